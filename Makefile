@@ -1,0 +1,57 @@
+# People and CI type the same commands. Needs python3 (3.11 to 3.14) with its venv module, and make.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: help env dev demo test check lock bench bench-accuracy sample picture clean
+
+help:  ## Say what can be typed.
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
+
+env: $(VENV)/.runtime  ## Make .venv with the program in it.
+
+dev: $(VENV)/.dev  ## The same, with what the tests and checks need.
+
+$(BIN)/python:
+	@PYTHON="$(PYTHON)" VENV="$(VENV)" sh .ci/make_venv
+
+$(VENV)/.runtime: requirements/runtime.txt pyproject.toml | $(BIN)/python
+	@VENV="$(VENV)" sh .ci/install requirements/runtime.txt
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(VENV)/.dev: requirements/dev.txt $(VENV)/.runtime
+	@VENV="$(VENV)" sh .ci/install requirements/dev.txt
+	@touch $@
+
+demo: env  ## Open the sample recording in the browser.
+	$(BIN)/cocalib demo
+
+check: dev  ## Style, types, layers, frame names, spelling.
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/typos
+	$(BIN)/pytest -q tests/architecture
+
+test: dev  ## Every test, the browser ones included.
+	@$(BIN)/python tests/find_browser.py --install
+	$(BIN)/pytest
+
+bench: dev  ## Speed, as ratios within one run; writes docs/speed.md.
+	@$(BIN)/python tests/find_browser.py --install
+	$(BIN)/python -m benchmarks.speed
+
+sample: env  ## Make sample_data/ again, bit for bit.
+	$(BIN)/python -m calib_core.synthetic.sample sample_data
+
+picture: dev  ## Take the README's picture again.
+	@$(BIN)/python tests/find_browser.py --install
+	$(BIN)/python docs/take_pictures.py
+
+lock: dev  ## Pin every dependency again, with hashes and without addresses (needs uv).
+	@sh .ci/lock
+
+clean:  ## Remove what make env and the tests left.
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache dist

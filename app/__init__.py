@@ -1,0 +1,1 @@
+"""What touches a person: command line, server, session."""

@@ -1,0 +1,1 @@
+"""The one port: viser, our page, its frames and its channel."""

@@ -1,0 +1,30 @@
+"""The tree of errors. Each says what was found, where, and what to do.
+
+CalibrationError
+ ├── RecordingError       a recording cannot be opened or read
+ │    └── MessageError    one message, or one topic, cannot be decoded
+ ├── InputError           a file of ours (clicks, pairs, camera, calibration) is malformed
+ └── OptionError          an option is misspelt or out of range
+"""
+
+__all__ = ["CalibrationError", "InputError", "MessageError", "OptionError", "RecordingError"]
+
+
+class CalibrationError(Exception):
+    """Any input this package refuses; the text is made to be shown as it is, in one line."""
+
+
+class RecordingError(CalibrationError):
+    """A recording that cannot be opened or read."""
+
+
+class MessageError(RecordingError):
+    """A message, or all of a topic, that cannot be decoded."""
+
+
+class InputError(CalibrationError):
+    """A file of clicks, pairs, camera or calibration that is malformed."""
+
+
+class OptionError(CalibrationError):
+    """An option that is misspelt, of the wrong type or out of range."""

@@ -1,0 +1,172 @@
+"""Rigid motion: target_from_source, and the algebra of it."""
+
+from dataclasses import dataclass
+from typing import overload
+
+import numpy as np
+
+from calib_core.arrays import Matrix33, Matrix66, Points3, Vector3, frozen_array
+
+__all__ = [
+    "RigidTransform",
+    "matrix_from_quaternion_wxyz",
+    "quaternion_wxyz_from_matrix",
+    "rotation_angle_rad",
+    "rotation_exp",
+    "rotation_log",
+    "skew",
+]
+
+_SMALL_ANGLE_RAD = 1e-6
+_ROTATION_TOLERANCE = 1e-6
+
+
+def skew(vector: Vector3) -> Matrix33:
+    """Return the matrix whose product with p is the cross product vector x p."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def rotation_exp(rotation_vector_rad: Vector3) -> Matrix33:
+    """Turn a rotation vector into a matrix by Rodrigues' formula, with its series near zero."""
+    angle = float(np.linalg.norm(rotation_vector_rad))
+    K = skew(np.asarray(rotation_vector_rad, dtype=np.float64))
+    if angle < _SMALL_ANGLE_RAD:
+        return np.eye(3) + K + 0.5 * K @ K
+    return np.eye(3) + np.sin(angle) / angle * K + (1.0 - np.cos(angle)) / angle**2 * K @ K
+
+
+def rotation_log(rotation: Matrix33) -> Vector3:
+    """Turn a rotation matrix into its rotation vector [rad], of length 0 to pi.
+
+    The quaternion carries it, so that angles next to 0 and next to pi keep their digits.
+    """
+    w, *xyz = quaternion_wxyz_from_matrix(rotation)
+    vector = np.array(xyz)
+    sine = float(np.linalg.norm(vector))
+    if sine < _SMALL_ANGLE_RAD:
+        return 2.0 * vector
+    return 2.0 * np.arctan2(sine, w) / sine * vector
+
+
+def rotation_angle_rad(rotation: Matrix33) -> float:
+    """Return the angle of a rotation, 0 to pi."""
+    return float(np.linalg.norm(rotation_log(rotation)))
+
+
+def quaternion_wxyz_from_matrix(rotation: Matrix33) -> np.ndarray:
+    """Return the unit quaternion (w, x, y, z) with w >= 0 (Shepperd's method: the largest component first)."""
+    r = np.asarray(rotation, dtype=np.float64)
+    squares = np.array([np.trace(r), r[0, 0], r[1, 1], r[2, 2]])
+    largest = int(np.argmax(squares))
+    if largest == 0:
+        q = np.array([1.0 + squares[0], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
+    else:
+        i = largest - 1
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q = np.empty(4)
+        q[0] = r[k, j] - r[j, k]
+        q[1 + i] = 1.0 + r[i, i] - r[j, j] - r[k, k]
+        q[1 + j] = r[j, i] + r[i, j]
+        q[1 + k] = r[k, i] + r[i, k]
+    q /= np.linalg.norm(q)
+    return -q if q[0] < 0.0 else q
+
+
+def matrix_from_quaternion_wxyz(quaternion: np.ndarray) -> Matrix33:
+    """Return the rotation matrix of a quaternion (w, x, y, z), normalised first.
+
+    Raises:
+        ValueError: the quaternion is zero or not finite.
+    """
+    q = np.asarray(quaternion, dtype=np.float64)
+    norm = float(np.linalg.norm(q))
+    if not np.isfinite(norm) or norm < 1e-12:
+        raise ValueError(f"not a rotation: quaternion {q.tolist()}")
+    w, x, y, z = q / norm
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RigidTransform:
+    """A rotation and a translation: p_target = rotation @ p_source + translation_m.
+
+    Name a value target_from_source. `@` composes transforms and moves points.
+
+    Attributes:
+        rotation: (3, 3) orthonormal, determinant +1.
+        translation_m: (3,) the source's origin in the target frame.
+    """
+
+    rotation: Matrix33
+    translation_m: Vector3
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
+        object.__setattr__(self, "translation_m", frozen_array(self.translation_m, (3,)))
+        r = self.rotation
+        if not (np.all(np.isfinite(r)) and np.all(np.isfinite(self.translation_m))):
+            raise ValueError("a transform must be finite")
+        if np.abs(r @ r.T - np.eye(3)).max() > _ROTATION_TOLERANCE:
+            raise ValueError("the rotation is not orthonormal")
+        if np.linalg.det(r) < 0:
+            raise ValueError("the rotation is left-handed (determinant -1): an axis is mirrored")
+
+    @classmethod
+    def identity(cls) -> "RigidTransform":
+        """Return the transform that moves nothing."""
+        return cls(np.eye(3), np.zeros(3))
+
+    @classmethod
+    def from_matrix(cls, matrix: np.ndarray) -> "RigidTransform":
+        """Take the top rows of a homogeneous (4, 4) or (3, 4) matrix."""
+        matrix = np.asarray(matrix, dtype=np.float64)
+        return cls(matrix[:3, :3], matrix[:3, 3])
+
+    def as_matrix(self) -> np.ndarray:
+        """Return the homogeneous (4, 4) matrix."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.rotation
+        matrix[:3, 3] = self.translation_m
+        return matrix
+
+    def inverse(self) -> "RigidTransform":
+        """Return source_from_target."""
+        return RigidTransform(self.rotation.T, -self.rotation.T @ self.translation_m)
+
+    def adjoint(self) -> Matrix66:
+        """Return the matrix that carries an error (dt, dtheta) [m, rad] of source into target axes about target's origin."""
+        adjoint = np.zeros((6, 6))
+        adjoint[:3, :3] = self.rotation
+        adjoint[3:, 3:] = self.rotation
+        adjoint[:3, 3:] = skew(self.translation_m) @ self.rotation
+        return adjoint
+
+    def perturbed(self, error: np.ndarray) -> "RigidTransform":
+        """Apply an error (dt, dtheta) [m, rad]: t = t_hat + dt, R = Exp(dtheta) R_hat; the result is re-orthonormalised."""
+        rotation = rotation_exp(np.asarray(error[3:6])) @ self.rotation
+        u, _, vt = np.linalg.svd(rotation)
+        return RigidTransform(u @ vt, self.translation_m + np.asarray(error[:3]))
+
+    def error_from(self, estimate: "RigidTransform") -> np.ndarray:
+        """Return the (6,) error (dt, dtheta) with self == estimate.perturbed(error)."""
+        return np.concatenate(
+            [self.translation_m - estimate.translation_m, rotation_log(self.rotation @ estimate.rotation.T)]
+        )
+
+    @overload
+    def __matmul__(self, other: "RigidTransform") -> "RigidTransform": ...
+    @overload
+    def __matmul__(self, other: Points3) -> Points3: ...
+    def __matmul__(self, other: "RigidTransform | Points3") -> "RigidTransform | Points3":
+        if isinstance(other, RigidTransform):
+            return RigidTransform(
+                self.rotation @ other.rotation, self.rotation @ other.translation_m + self.translation_m
+            )
+        return np.asarray(other) @ self.rotation.T + self.translation_m

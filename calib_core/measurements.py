@@ -1,0 +1,277 @@
+"""What the sensors and the person measured: radar scans, clicks, and the pairs they make."""
+
+from dataclasses import dataclass, field
+from typing import NewType
+
+import numpy as np
+
+from calib_core.arrays import Matrix33, Points3, TimesNs, Values, Vector2, Vector3, frozen_array
+
+__all__ = [
+    "NS_PER_S",
+    "Candidate",
+    "Pair",
+    "RadarScan",
+    "RadarScans",
+    "ReflectorClick",
+    "TimeNs",
+    "Unpaired",
+    "Unsolvable",
+    "time_from_parts",
+    "time_parts",
+]
+
+TimeNs = NewType("TimeNs", int)
+"""Nanoseconds since the epoch. Never a float: a float64 of today is off by up to 128 ns."""
+
+NS_PER_S = 1_000_000_000
+
+
+def time_from_parts(sec: int, nanosec: int) -> TimeNs:
+    """Join the two integers that ROS 2 and our JSON files carry."""
+    return TimeNs(sec * NS_PER_S + nanosec)
+
+
+def time_parts(time: TimeNs) -> tuple[int, int]:
+    """Split a stamp into whole seconds and the nanoseconds within the second."""
+    return divmod(int(time), NS_PER_S)
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class ReflectorClick:
+    """The reflector's centre, clicked in one camera frame. Sorts by time, then id.
+
+    Attributes:
+        image_time: the recorded stamp of the frame.
+        id: unique within a session.
+        u_px: column; (0, 0) is the centre of the top-left pixel.
+        v_px: row.
+        sigma_px: standard deviation of the click per axis; None takes the options' value.
+        excluded: kept and shown, but not used to solve.
+    """
+
+    image_time: TimeNs
+    id: str
+    u_px: float
+    v_px: float
+    sigma_px: float | None = None
+    excluded: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RadarScan:
+    """All returns of one radar measurement cycle.
+
+    Attributes:
+        time: the stamp of the scan.
+        points_radar_m: (n, 3) positions; x forward, y left, z up. May hold NaN where the message does.
+        doppler_mps: (n,) radial velocity, positive moving away; NaN where the message has none.
+        snr_db: (n,) signal-to-noise ratio or another amplitude in dB; NaN where the message has none.
+        sigma_polar: (n, 3) standard deviations of range [m], azimuth and elevation [rad]; NaN where the message has none.
+    """
+
+    time: TimeNs
+    points_radar_m: Points3
+    doppler_mps: Values
+    snr_db: Values
+    sigma_polar: Points3
+
+    def __post_init__(self) -> None:
+        n = len(self.points_radar_m)
+        for name, shape in (
+            ("points_radar_m", (n, 3)),
+            ("doppler_mps", (n,)),
+            ("snr_db", (n,)),
+            ("sigma_polar", (n, 3)),
+        ):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+
+    def __len__(self) -> int:
+        return len(self.points_radar_m)
+
+
+def _no_first_return() -> TimesNs:
+    return np.zeros(1, dtype=np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RadarScans:
+    """Many scans of one radar as columns: what pairing and the timeline work on.
+
+    Attributes:
+        times_ns: (m,) one stamp per scan, ascending.
+        first_return: (m + 1,) scan i owns the rows first_return[i] to first_return[i + 1].
+        points_radar_m: (n, 3) as in RadarScan, all scans below one another.
+        doppler_mps: (n,).
+        snr_db: (n,).
+        sigma_polar: (n, 3).
+    """
+
+    times_ns: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    first_return: TimesNs = field(default_factory=_no_first_return)
+    points_radar_m: Points3 = field(default_factory=lambda: np.zeros((0, 3)))
+    doppler_mps: Values = field(default_factory=lambda: np.zeros(0))
+    snr_db: Values = field(default_factory=lambda: np.zeros(0))
+    sigma_polar: Points3 = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self) -> None:
+        n, m = len(self.points_radar_m), len(self.times_ns)
+        for name, shape in (
+            ("points_radar_m", (n, 3)),
+            ("doppler_mps", (n,)),
+            ("snr_db", (n,)),
+            ("sigma_polar", (n, 3)),
+        ):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        for name, shape in (("times_ns", (m,)), ("first_return", (m + 1,))):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape, dtype=np.int64))
+        if np.any(np.diff(self.times_ns) < 0):
+            raise ValueError("scans must be in ascending order of time")
+        if self.first_return[0] != 0 or self.first_return[-1] != n or np.any(np.diff(self.first_return) < 0):
+            raise ValueError("first_return must rise from 0 to the number of returns")
+
+    def __len__(self) -> int:
+        return len(self.times_ns)
+
+    @classmethod
+    def from_scans(cls, scans: "list[RadarScan] | tuple[RadarScan, ...]") -> "RadarScans":
+        """Stack scans, sorted by time; scans of the same stamp keep their order."""
+        if not scans:
+            return cls()
+        ordered = sorted(scans, key=lambda scan: scan.time)
+        return cls(
+            times_ns=np.array([scan.time for scan in ordered], dtype=np.int64),
+            first_return=np.concatenate([[0], np.cumsum([len(scan) for scan in ordered])]),
+            points_radar_m=np.concatenate([scan.points_radar_m for scan in ordered]),
+            doppler_mps=np.concatenate([scan.doppler_mps for scan in ordered]),
+            snr_db=np.concatenate([scan.snr_db for scan in ordered]),
+            sigma_polar=np.concatenate([scan.sigma_polar for scan in ordered]),
+        )
+
+    def scan(self, index: int) -> RadarScan:
+        """Return one scan by its place in time order."""
+        rows = slice(int(self.first_return[index]), int(self.first_return[index + 1]))
+        return RadarScan(
+            time=TimeNs(int(self.times_ns[index])),
+            points_radar_m=self.points_radar_m[rows],
+            doppler_mps=self.doppler_mps[rows],
+            snr_db=self.snr_db[rows],
+            sigma_polar=self.sigma_polar[rows],
+        )
+
+    def nearest(self, time: TimeNs) -> int:
+        """Find the scan whose stamp is nearest; of two equally near, the earlier one.
+
+        Raises:
+            ValueError: there are no scans.
+        """
+        if not len(self):
+            raise ValueError("no scans to choose from")
+        after = int(np.searchsorted(self.times_ns, time))
+        before = max(after - 1, 0)
+        after = min(after, len(self) - 1)
+        return before if time - int(self.times_ns[before]) <= int(self.times_ns[after]) - time else after
+
+    def between(self, start: TimeNs, end: TimeNs) -> "RadarScans":
+        """Keep the scans with start <= stamp <= end."""
+        first = int(np.searchsorted(self.times_ns, start, side="left"))
+        last = max(int(np.searchsorted(self.times_ns, end, side="right")), first)
+        low, high = int(self.first_return[first]), int(self.first_return[last])
+        return RadarScans(
+            times_ns=self.times_ns[first:last],
+            first_return=self.first_return[first : last + 1] - low,
+            points_radar_m=self.points_radar_m[low:high],
+            doppler_mps=self.doppler_mps[low:high],
+            snr_db=self.snr_db[low:high],
+            sigma_polar=self.sigma_polar[low:high],
+        )
+
+    def scan_of_return(self) -> TimesNs:
+        """Return, for each row, the index of the scan that owns it: (n,)."""
+        return np.repeat(np.arange(len(self), dtype=np.int64), np.diff(self.first_return))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A radar position that may be the reflector at one click.
+
+    Attributes:
+        position_radar_m: (3,) mean of its returns.
+        sigma_polar: (3,) standard deviations of range [m], azimuth [rad], elevation [rad] of that position, floors included.
+        covariance_m2: (3, 3) the same in Cartesian axes of the radar frame.
+        score: plausibility before any pose is known, 0 to 1; the candidates of one pair add up to at most 1.
+        returns: how many returns it averages.
+        scans: in how many scans they lie.
+        snr_db: their mean; NaN when the radar reports none.
+    """
+
+    position_radar_m: Vector3
+    sigma_polar: Vector3
+    covariance_m2: Matrix33
+    score: float = 1.0
+    returns: int = 1
+    scans: int = 1
+    snr_db: float = float("nan")
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position_radar_m", frozen_array(self.position_radar_m, (3,)))
+        object.__setattr__(self, "sigma_polar", frozen_array(self.sigma_polar, (3,)))
+        object.__setattr__(self, "covariance_m2", frozen_array(self.covariance_m2, (3, 3)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pair:
+    """One click and the radar positions that may belong to it, the most plausible first.
+
+    Attributes:
+        id: the click's id.
+        pixel_px: (2,) the click.
+        sigma_px: its standard deviation per axis; None takes the options' value.
+        candidates: at least one.
+        image_time: stamp of the frame; None for pairs from a pairs file.
+        radar_time: stamp of the nearest scan; None for pairs from a pairs file.
+    """
+
+    id: str
+    pixel_px: Vector2
+    candidates: tuple[Candidate, ...]
+    sigma_px: float | None = None
+    image_time: TimeNs | None = None
+    radar_time: TimeNs | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+        if not self.candidates:
+            raise ValueError(f"pair {self.id} has no radar position")
+
+
+@dataclass(frozen=True, slots=True)
+class Unpaired:
+    """A click that found no radar position, and why.
+
+    Attributes:
+        id: the click's id.
+        code: one word for programs, such as "no-scan", "no-static-return".
+        reason: one sentence for people.
+        hint: what to do about it.
+    """
+
+    id: str
+    code: str
+    reason: str
+    hint: str
+
+
+@dataclass(frozen=True, slots=True)
+class Unsolvable:
+    """The expected answer when the data cannot give a calibration. It is a value, not an error.
+
+    Attributes:
+        code: one word for programs, such as "too-few-pairs".
+        reason: what is missing, with figures.
+        hint: what to do about it.
+    """
+
+    code: str
+    reason: str
+    hint: str

@@ -1,0 +1,148 @@
+"""What a calibration is: the pose, how sure it is, and what each pair says about it."""
+
+from dataclasses import dataclass, field
+
+from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, frozen_array
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import Unpaired
+from calib_core.options import CalibrationOptions
+
+__all__ = ["Calibration", "Caution", "CheckPoint", "Metrics", "PairResult"]
+
+
+@dataclass(frozen=True, slots=True)
+class Caution:
+    """Something about the data that a person must decide on.
+
+    Attributes:
+        code: one word for programs, such as "mirrored-axes"; stable.
+        message: what is the matter, with figures.
+        hint: what to do about it.
+    """
+
+    code: str
+    message: str
+    hint: str
+
+
+@dataclass(frozen=True, slots=True)
+class Metrics:
+    """The paper's figures over the inlier pairs, and the honest ones beside them.
+
+    Attributes:
+        aed_px: average Euclidean distance, divided by N (paper, AED).
+        cdsd_px: corrected standard deviation of the distances, divided by N - 1 (paper, CDSD); NaN below 2 pairs.
+        rms_px: root mean square distance.
+        held_out_aed_px: AED with each pair predicted from the others (leave one out); NaN where it was not computed.
+        acc: share of reprojected points inside detection boxes (paper, Acc), 0 to 1; None without boxes.
+        n: pairs the figures are over.
+        chi2: sum of squared whitened residuals; NaN where the method has no noise model.
+        degrees_of_freedom: of chi2.
+    """
+
+    aed_px: float
+    cdsd_px: float
+    rms_px: float
+    n: int
+    held_out_aed_px: float = float("nan")
+    acc: float | None = None
+    chi2: float = float("nan")
+    degrees_of_freedom: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairResult:
+    """One pair under the solved pose.
+
+    Attributes:
+        id: the click's id.
+        pixel_px: (2,) the click.
+        projected_px: (2,) the chosen radar position seen through camera_from_radar; NaN when it lies behind the camera.
+        point_radar_m: (3,) the chosen radar position as measured.
+        inlier: it took part in the final pose.
+        excluded: a person left it out.
+        outlier_probability: 0 to 1; NaN where the method has none.
+        influence: how far leaving it out moves the pose, in standard deviations; NaN where it was not computed.
+        candidate: which of the pair's candidates was chosen.
+        expected_covariance_px2: (2, 2) covariance of the residual by the noise model; NaN where there is none.
+    """
+
+    id: str
+    pixel_px: Vector2
+    projected_px: Vector2
+    point_radar_m: Vector3
+    inlier: bool
+    excluded: bool = False
+    outlier_probability: float = float("nan")
+    influence: float = float("nan")
+    candidate: int = 0
+    expected_covariance_px2: Points2 = field(default_factory=lambda: frozen_array([[float("nan")] * 2] * 2, (2, 2)))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+        object.__setattr__(self, "projected_px", frozen_array(self.projected_px, (2,)))
+        object.__setattr__(self, "point_radar_m", frozen_array(self.point_radar_m, (3,)))
+        object.__setattr__(self, "expected_covariance_px2", frozen_array(self.expected_covariance_px2, (2, 2)))
+
+    @property
+    def residual_px(self) -> Vector2:
+        """The reprojection minus the click: (2,) [px]."""
+        return self.projected_px - self.pixel_px
+
+    @property
+    def distance_px(self) -> float:
+        """The length of the residual [px]: e_i of the paper's AED."""
+        return float((self.residual_px**2).sum() ** 0.5)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckPoint:
+    """A radar point and the pixel it must come out at: whoever reads the file can prove the direction with it."""
+
+    radar_m: Vector3
+    pixel_px: Vector2
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radar_m", frozen_array(self.radar_m, (3,)))
+        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """A solved extrinsic calibration: p_camera = R p_radar + t.
+
+    Attributes:
+        camera_from_radar: the pose.
+        covariance: (6, 6) of the error (dt, dtheta) [m, rad], t = t_hat + dt, R = Exp(dtheta) R_hat; NaN where unknown.
+        camera: the intrinsics it was solved with.
+        metrics: the figures.
+        pairs: in order of image time, excluded ones included.
+        unpaired: clicks that found no radar position.
+        cautions: what a person must know before using it.
+        options: what it was solved with.
+        noise_scale: estimated over assumed standard deviation of (click, range, azimuth, elevation); ones where not estimated.
+        covariance_quantile: the factor on covariance whose ellipsoid holds 95 % for 6 degrees of freedom.
+        iterative_px: the paper's Algorithm 1 only: mean reprojection error of RANSAC with the iterative solver.
+        sqpnp_px: the same with SQPnP.
+    """
+
+    camera_from_radar: RigidTransform
+    covariance: Matrix66
+    camera: Camera
+    metrics: Metrics
+    pairs: tuple[PairResult, ...]
+    unpaired: tuple[Unpaired, ...]
+    cautions: tuple[Caution, ...]
+    options: CalibrationOptions
+    noise_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    covariance_quantile: float = 12.591587243743977
+    iterative_px: float = float("nan")
+    sqpnp_px: float = float("nan")
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
+
+    def reproject(self, points_radar_m: Points3) -> Points2:
+        """Carry radar points (n, 3) [m] to pixels (n, 2); NaN where the lens does not see them."""
+        return self.camera.project(self.camera_from_radar @ points_radar_m)
