@@ -1,0 +1,273 @@
+"""Pairs with known truth and no recording around them: what the estimators are tested and measured on."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from calib_core.arrays import Flags, Points2, Points3, Vector3, frozen_array
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import Candidate, Pair
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
+from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
+
+__all__ = [
+    "AISLE",
+    "FIELD",
+    "NOISE_PROFILES",
+    "NoiseName",
+    "NoiseProfile",
+    "OutlierMix",
+    "PairsLayout",
+    "SimulatedPairs",
+    "draw_positions",
+    "simulate_pairs",
+    "study_camera",
+]
+
+NoiseName = Literal["ti", "ti_fine", "ti_aisle", "imaging", "none"]
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseProfile:
+    """Standard deviations of one placement: independent, Gaussian, in range, azimuth, elevation and pixels."""
+
+    sigma_range_m: float = 0.015
+    """Of the range [m]."""
+    sigma_azimuth_deg: float = 0.55
+    """Of the azimuth [deg]."""
+    sigma_elevation_deg: float = 1.0
+    """Of the elevation [deg]."""
+    sigma_px: float = 2.0
+    """Of the click, per axis [px]."""
+
+    @property
+    def sigma_polar(self) -> Vector3:
+        """Range [m], azimuth [rad], elevation [rad] in one (3,) array."""
+        return np.array([self.sigma_range_m, *np.deg2rad([self.sigma_azimuth_deg, self.sigma_elevation_deg])])
+
+
+NOISE_PROFILES: dict[NoiseName, NoiseProfile] = {
+    "ti": NoiseProfile(),
+    "ti_fine": NoiseProfile(0.008, 0.20, 0.7),
+    "ti_aisle": NoiseProfile(0.02, 0.8, 2.0),
+    "imaging": NoiseProfile(0.03, 0.12, 0.25),
+    "none": NoiseProfile(0.0, 0.0, 0.0, 0.0),
+}
+"""Assumed levels for radar families; "none" is exact, its candidates carry the "ti_fine" sigmas."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutlierMix:
+    """What a wrong pair looks like; the three shares add up to 1."""
+
+    ghost: float = 0.5
+    """Share whose radar position is a reflection: anywhere in the field of view."""
+    misclick: float = 0.25
+    """Share whose click is anywhere in the image."""
+    wrong_pairing: float = 0.25
+    """Share that got the radar position of another placement."""
+
+
+@dataclass(frozen=True, slots=True)
+class PairsLayout:
+    """Where the reflector is put, in the world."""
+
+    min_range_m: float = 2.0
+    """Nearest placement [m]."""
+    max_range_m: float = 20.0
+    """Farthest placement [m]."""
+    max_azimuth_deg: float = 35.0
+    """Largest bearing to either side [deg]."""
+    max_lateral_m: float = 100.0
+    """Largest distance from the radar's axis [m]; an aisle is narrow."""
+    height_m: float = 0.025
+    """Height of the reflector's phase centre above the ground [m]."""
+    roughness_m: float = 0.01
+    """Standard deviation of the ground's height [m]."""
+    max_height_m: float = 0.0
+    """With more than 0: heights are uniform from height_m up to this, as on a tripod [m]."""
+    separation_m: float = 0.35
+    """Smallest distance between two placements [m]."""
+
+
+FIELD = PairsLayout()
+AISLE = PairsLayout(max_range_m=15.0, max_lateral_m=1.2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedPairs:
+    """Pairs, and what is true about them.
+
+    Attributes:
+        rig: the sensors; rig.camera_from_radar is the truth.
+        pairs: what an estimator gets; ids "p1", "p2", ...
+        points_radar_m: (n, 3) true reflector positions.
+        pixels_px: (n, 2) their true pixels.
+        outlier: (n,) pairs that are wrong.
+        true_candidate: for each pair, which of its candidates is the reflector; -1 in an outlier.
+    """
+
+    rig: Rig
+    pairs: tuple[Pair, ...]
+    points_radar_m: Points3
+    pixels_px: Points2
+    outlier: Flags
+    true_candidate: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        n = len(self.pairs)
+        object.__setattr__(self, "points_radar_m", frozen_array(self.points_radar_m, (n, 3)))
+        object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (n, 2)))
+        object.__setattr__(self, "outlier", frozen_array(self.outlier, (n,), dtype=np.bool_))
+
+    @property
+    def camera(self) -> Camera:
+        """The intrinsics."""
+        return self.rig.camera
+
+    @property
+    def camera_from_radar(self) -> RigidTransform:
+        """The true pose."""
+        return self.rig.camera_from_radar
+
+
+def simulate_pairs(
+    count: int = 20,
+    *,
+    rng: np.random.Generator,
+    noise: NoiseProfile | NoiseName = "ti",
+    outlier_share: float = 0.0,
+    outlier_mix: OutlierMix | None = None,
+    decoys: int = 0,
+    layout: PairsLayout = FIELD,
+    camera: Camera | None = None,
+    rig_options: RigOptions | None = None,
+    rig: Rig | None = None,
+) -> SimulatedPairs:
+    """Draw a rig and pairs of clicks and radar positions.
+
+    The number of outliers is round(outlier_share * count); which pairs they are is drawn.
+
+    Args:
+        count: pairs.
+        rng: the only source of chance.
+        noise: standard deviations, or the name of some.
+        outlier_share: 0 to 1.
+        outlier_mix: what outliers are; None takes half ghosts, a quarter each of misclicks and wrong pairings.
+        decoys: further, wrong candidates per pair. The right one is the most plausible in two pairs out of three.
+        layout: where the reflector is put.
+        camera: the intrinsics; None takes 1920 x 1080 with 75 deg and slight barrel distortion.
+        rig_options: how the sensors are mounted; None takes the defaults.
+        rig: sensors to use as they are instead of drawing some.
+    """
+    profile = NOISE_PROFILES[noise] if isinstance(noise, str) else noise
+    rig = rig or random_rig(rng, camera=camera or study_camera(), options=rig_options)
+    points = draw_positions(rng, count=count, rig=rig, layout=layout)
+    pixels = rig.camera.project(rig.camera_from_radar @ points)
+    measured = _measured(rng, points, profile)
+    clicks = pixels + profile.sigma_px * rng.standard_normal(pixels.shape)
+    outlier = np.zeros(count, dtype=np.bool_)
+    outlier[rng.permutation(count)[: round(outlier_share * count)]] = True
+    mix = outlier_mix or OutlierMix()
+    for i in np.flatnonzero(outlier).tolist():
+        _spoil(rng, i, measured, clicks, rig=rig, layout=layout, mix=mix, true=points)
+    sigma_polar = (profile if profile.sigma_range_m > 0 else NOISE_PROFILES["ti_fine"]).sigma_polar
+    pairs, true_candidate = [], []
+    for i in range(count):
+        candidates, chosen = _candidates(rng, measured[i], decoys, rig, layout, sigma_polar)
+        pairs.append(Pair(f"p{i + 1}", clicks[i], candidates, sigma_px=max(profile.sigma_px, 0.5)))
+        true_candidate.append(-1 if outlier[i] else chosen)
+    return SimulatedPairs(rig, tuple(pairs), points, pixels, outlier, tuple(true_candidate))
+
+
+def study_camera() -> Camera:
+    """Return the camera the noise study used: 1920 x 1080, 75 deg, slight barrel distortion."""
+    plain = typical_camera("plumb_bob", width_px=1920, height_px=1080)
+    matrix = plain.matrix_px.copy()
+    matrix[:2, 2] = [959.5, 539.5]
+    matrix[1, 1] = matrix[0, 0]
+    return Camera("plumb_bob", 1920, 1080, matrix, np.array([-0.10, 0.02, 0.0, 0.0]))
+
+
+def draw_positions(rng: np.random.Generator, *, count: int, rig: Rig, layout: PairsLayout) -> Points3:
+    """Draw reflector positions (count, 3) in the radar frame that the camera sees, apart from one another.
+
+    Raises:
+        ValueError: so many do not fit in the layout.
+    """
+    found: list[np.ndarray] = []
+    for _ in range(2000 * count):
+        if len(found) == count:
+            break
+        range_m = rng.uniform(layout.min_range_m, layout.max_range_m)
+        azimuth_rad = np.deg2rad(rng.uniform(-layout.max_azimuth_deg, layout.max_azimuth_deg))
+        if layout.max_lateral_m < 50.0:  # narrow: spread over the width instead of over the angle
+            azimuth_rad = np.arcsin(min(1.0, layout.max_lateral_m / range_m)) * rng.uniform(-1.0, 1.0)
+        height_m = layout.height_m + layout.roughness_m * rng.standard_normal()
+        height_m += rng.uniform(0.0, 1.0) * max(0.0, layout.max_height_m - layout.height_m)
+        world = np.array([range_m * np.cos(azimuth_rad), range_m * np.sin(azimuth_rad), height_m])
+        point = (rig.radar_from_world @ world[None])[0]
+        apart = all(np.linalg.norm(point - other) >= layout.separation_m for other in found)
+        if apart and bool(rig.camera.sees(rig.camera_from_radar @ point[None])[0]):
+            found.append(point)
+    if len(found) < count:
+        raise ValueError(f"only {len(found)} of {count} placements fit, {layout.separation_m} m apart and in view")
+    return np.array(found).reshape(-1, 3)
+
+
+def _measured(rng: np.random.Generator, points: Points3, profile: NoiseProfile) -> Points3:
+    polar = polar_from_cartesian(points) + profile.sigma_polar * rng.standard_normal(points.shape)
+    return cartesian_from_polar(polar)
+
+
+def _anywhere(rng: np.random.Generator, rig: Rig, layout: PairsLayout) -> Vector3:
+    """Draw a position in front of the radar: a wider field than the reflector's, at any height up to 2 m."""
+    wide = PairsLayout(
+        min_range_m=layout.min_range_m,
+        max_range_m=1.3 * layout.max_range_m,
+        max_azimuth_deg=1.3 * layout.max_azimuth_deg,
+    )
+    range_m = rng.uniform(wide.min_range_m, wide.max_range_m)
+    azimuth_rad = np.deg2rad(rng.uniform(-wide.max_azimuth_deg, wide.max_azimuth_deg))
+    world = np.array([range_m * np.cos(azimuth_rad), range_m * np.sin(azimuth_rad), rng.uniform(0.0, 2.0)])
+    return (rig.radar_from_world @ world[None])[0]
+
+
+def _spoil(
+    rng: np.random.Generator,
+    i: int,
+    measured: Points3,
+    clicks: Points2,
+    *,
+    rig: Rig,
+    layout: PairsLayout,
+    mix: OutlierMix,
+    true: Points3,
+) -> None:
+    """Make pair i wrong, in place."""
+    kind = rng.uniform(0.0, mix.ghost + mix.misclick + mix.wrong_pairing)
+    if kind < mix.ghost:
+        measured[i] = _anywhere(rng, rig, layout)
+    elif kind < mix.ghost + mix.misclick or len(true) < 2:
+        clicks[i] = rng.uniform([0.0, 0.0], [rig.camera.width_px - 1.0, rig.camera.height_px - 1.0])
+    else:
+        other = int(rng.integers(len(true) - 1))
+        measured[i] = true[other + (other >= i)] + 0.02 * rng.standard_normal(3)
+
+
+def _candidates(
+    rng: np.random.Generator, measured: Vector3, decoys: int, rig: Rig, layout: PairsLayout, sigma_polar: Vector3
+) -> tuple[tuple[Candidate, ...], int]:
+    """Build the candidates of a pair, the most plausible first, and tell which is the measured one."""
+    positions = [_anywhere(rng, rig, layout) for _ in range(decoys)]
+    place = 0 if decoys == 0 or rng.uniform() < 2.0 / 3.0 else int(rng.integers(1, decoys + 1))
+    positions.insert(place, measured)
+    shares = 0.5 ** np.arange(1, len(positions) + 1)
+    covariances = covariance_from_sigma_polar(np.array(positions), np.tile(sigma_polar, (len(positions), 1)))
+    candidates = tuple(
+        Candidate(position, sigma_polar, covariance, score=float(share / shares.sum()), returns=30, scans=30)
+        for position, covariance, share in zip(positions, covariances, shares, strict=True)
+    )
+    return candidates, place

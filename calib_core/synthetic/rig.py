@@ -1,0 +1,130 @@
+"""The sensor mast: a camera screwed on beside a radar, and where the two stand in the world.
+
+World frame: x forward along the ground, y left, z up; the origin on the ground below the radar.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Matrix33, Vector3
+from calib_core.camera import Camera, CameraModel
+from calib_core.geometry import RigidTransform, rotation_exp
+
+__all__ = ["NOMINAL_ROTATION", "Rig", "RigOptions", "nominal_rotation", "radar_stand", "random_rig", "typical_camera"]
+
+NOMINAL_ROTATION = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
+"""Optical axes (right, down, forward) in terms of radar axes (forward, left, up): a camera looking where the radar looks."""
+
+_DISTORTION: dict[CameraModel, tuple[float, ...]] = {
+    "pinhole": (),
+    "plumb_bob": (-0.17, 0.032, 0.0006, -0.0004, 0.0),
+    "rational_polynomial": (0.62, 0.21, 0.0005, -0.0003, 0.012, 0.79, 0.33, 0.045),
+    "equidistant": (-0.012, 0.006, -0.004, 0.0009),
+}
+_FIELD_OF_VIEW_DEG: dict[CameraModel, float] = {
+    "pinhole": 75.0,
+    "plumb_bob": 75.0,
+    "rational_polynomial": 75.0,
+    "equidistant": 110.0,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class RigOptions:
+    """How the sensors are mounted; the truth is drawn around these values."""
+
+    radar_height_m: float = 1.2
+    """Height of the radar above the ground [m]."""
+    radar_tilt_deg: float = 10.0
+    """How far the radar looks down [deg]."""
+    camera_offset_m: tuple[float, float, float] = (0.0, 0.0, 0.045)
+    """Nominal camera centre in the radar frame: forward, left, up [m]."""
+    camera_offset_sigma_m: float = 0.01
+    """Standard deviation of the true camera centre about it, per axis [m]."""
+    camera_angle_sigma_deg: float = 3.0
+    """Standard deviation of the true rotation about looking where the radar looks, per axis [deg]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """Two sensors with known truth.
+
+    Attributes:
+        camera: the intrinsics.
+        camera_from_radar: the truth a calibration is after.
+        radar_from_world: where the mast stands.
+    """
+
+    camera: Camera
+    camera_from_radar: RigidTransform
+    radar_from_world: RigidTransform
+
+    @property
+    def camera_from_world(self) -> RigidTransform:
+        """Where the camera stands."""
+        return self.camera_from_radar @ self.radar_from_world
+
+    @property
+    def camera_position_radar_m(self) -> Vector3:
+        """The camera centre in the radar frame: (3,) [m]; what a tape measure would find."""
+        return self.camera_from_radar.inverse().translation_m
+
+    @property
+    def camera_position_world_m(self) -> Vector3:
+        """The camera centre in the world: (3,) [m]."""
+        return self.camera_from_world.inverse().translation_m
+
+
+def nominal_rotation() -> Matrix33:
+    """Return NOMINAL_ROTATION as a matrix."""
+    return np.array(NOMINAL_ROTATION)
+
+
+def typical_camera(
+    model: CameraModel = "plumb_bob",
+    *,
+    width_px: int = 1280,
+    height_px: int = 720,
+    field_of_view_deg: float | None = None,
+) -> Camera:
+    """Make a plausible camera of a lens model.
+
+    Args:
+        model: the lens model; each has distortion a person can see.
+        width_px: columns.
+        height_px: rows.
+        field_of_view_deg: horizontal field of view before distortion [deg]; None takes 75, for equidistant 110.
+    """
+    half_rad = np.deg2rad(field_of_view_deg or _FIELD_OF_VIEW_DEG[model]) / 2.0
+    focal_px = (width_px / 2.0) / (half_rad if model == "equidistant" else np.tan(half_rad))
+    matrix = np.array(
+        [
+            [focal_px, 0.0, (width_px - 1) / 2.0 + 0.006 * width_px],
+            [0.0, focal_px * 1.0008, (height_px - 1) / 2.0 - 0.004 * height_px],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    return Camera(model, width_px, height_px, matrix, np.array(_DISTORTION[model]))
+
+
+def radar_stand(options: RigOptions) -> RigidTransform:
+    """Return radar_from_world of a radar at a height, tilted down."""
+    tilt = rotation_exp(np.array([0.0, np.deg2rad(options.radar_tilt_deg), 0.0]))  # world_from_radar: nose down
+    world_from_radar = RigidTransform(tilt, np.array([0.0, 0.0, options.radar_height_m]))
+    return world_from_radar.inverse()
+
+
+def random_rig(rng: np.random.Generator, *, camera: Camera, options: RigOptions | None = None) -> Rig:
+    """Draw where the camera really sits and looks.
+
+    Args:
+        rng: the only source of chance.
+        camera: the intrinsics.
+        options: how the sensors are mounted; None takes the defaults.
+    """
+    options = options or RigOptions()
+    error_rad = np.deg2rad(options.camera_angle_sigma_deg) * rng.standard_normal(3)
+    rotation = rotation_exp(error_rad) @ nominal_rotation()
+    centre = np.array(options.camera_offset_m) + options.camera_offset_sigma_m * rng.standard_normal(3)
+    return Rig(camera, RigidTransform(rotation, -rotation @ centre), radar_stand(options))
