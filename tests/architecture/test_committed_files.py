@@ -1,0 +1,103 @@
+"""What must never be in a committed file, and what must."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+# Written in two halves, so that this file does not hold what it looks for.
+_INDEX_HOSTS = ("pypi" + ".org", "python" + "hosted.org", "npmjs" + ".org", "files.python" + "hosted")
+_PIN = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*(\[[a-z,]+\])?==[^\s;]+( ; [^\\]+)? \\$")
+_HASH = re.compile(r"^    --hash=sha256:[0-9a-f]{64}( \\)?$")
+
+
+@pytest.fixture(scope="module")
+def committed_texts(project_root: Path) -> dict[str, str]:
+    """Return every text file that git tracks."""
+    names = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=project_root, capture_output=True, check=True, text=True
+    ).stdout.split("\0")
+    texts = {}
+    for name in filter(None, names):
+        path = project_root / name
+        if not path.is_file() or path.is_symlink():
+            continue
+        data = path.read_bytes()
+        if b"\0" not in data[:4096]:
+            texts[name] = data.decode("utf-8", errors="replace")
+    return texts
+
+
+def test_no_committed_file_names_a_package_index(committed_texts: dict[str, str]) -> None:
+    guilty = [name for name, text in committed_texts.items() if any(host in text for host in _INDEX_HOSTS)]
+    assert guilty == []
+
+
+def test_no_committed_file_names_a_folder_of_the_machine_it_was_written_on(
+    committed_texts: dict[str, str], project_root: Path
+) -> None:
+    here = re.escape(str(project_root.parent))
+    pattern = re.compile(rf"(?<![\w.]){here}/\w|/tmp/build|/home/\w+/|/Users/\w+/")
+    guilty = [
+        name
+        for name, text in committed_texts.items()
+        if pattern.search(text) and name != "tests/architecture/" + Path(__file__).name
+    ]
+    assert guilty == []
+
+
+@pytest.mark.parametrize("name", ["runtime.txt", "dev.txt"])
+def test_pins_are_exact_hashed_and_without_addresses(name: str, project_root: Path) -> None:
+    lines = (project_root / "requirements" / name).read_text().splitlines()
+    pins = [line for line in lines if line and not line.startswith((" ", "#"))]
+    assert len(pins) > 20
+    strange = [
+        line
+        for line in lines
+        if line and not _PIN.match(line) and not _HASH.match(line) and not re.match(r"^ *# ", line)
+    ]
+    assert strange == []
+    assert not any("://" in line for line in lines)
+
+
+def test_the_tests_run_on_the_runtime_pins(project_root: Path) -> None:
+    def pins(name: str) -> dict[str, str]:
+        lines = (project_root / "requirements" / name).read_text().splitlines()
+        return {
+            line.split("==")[0] + (line.split(";")[1] if ";" in line else ""): line.split("==")[1].split()[0]
+            for line in lines
+            if "==" in line and not line.startswith(" ")
+        }
+
+    runtime, dev = pins("runtime.txt"), pins("dev.txt")
+    assert {name: dev.get(name) for name in runtime} == runtime
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "README.md",
+        "CONTRIBUTING.md",
+        "ARCHITECTURE.md",
+        "GLOSSARY.md",
+        "CHANGELOG.md",
+        "LICENSE",
+        "Makefile",
+        ".ci/run",
+    ],
+)
+def test_the_house_has_its_papers(name: str, project_root: Path) -> None:
+    assert (project_root / name).stat().st_size > 100
+
+
+def test_nothing_in_the_code_unpickles_or_evaluates(committed_texts: dict[str, str]) -> None:
+    pattern = re.compile(
+        r"\bimport pickle\b|\bpickle\.loads?\b|allow_pickle=True|(?<![\w.])eval\(|(?<![\w.])exec\(|yaml\.load\(|typ=.unsafe"
+    )
+    guilty = [
+        name
+        for name, text in committed_texts.items()
+        if name.endswith(".py") and name.startswith(("app/", "calib_core/", "benchmarks/")) and pattern.search(text)
+    ]
+    assert guilty == []

@@ -1,0 +1,104 @@
+"""The wheel is built, installed into an empty environment and started there."""
+
+import json
+import subprocess
+import sys
+import sysconfig
+import zipfile
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def wheel(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the wheel with the pinned build backend, without reaching the network."""
+    folder = tmp_path_factory.mktemp("wheel")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)],
+        cwd=project_root,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Install the wheel into an empty environment that borrows this one's dependencies; return its folder.
+
+    The dependencies are those of the lock, already installed here; a path file lends them, so that the test
+    needs no network and the checkout is not on the path.
+    """
+    folder = tmp_path_factory.mktemp("environment")
+    subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
+    python = folder / "bin" / "python"
+    subprocess.run(
+        [
+            python,
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--no-index",
+            "--no-deps",
+            "--disable-pip-version-check",
+            str(wheel),
+        ],
+        check=True,
+    )
+    site = subprocess.run(
+        [python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"],
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout.strip()
+    (Path(site) / "zz_borrowed.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    return folder
+
+
+def test_the_wheel_carries_the_page_and_the_sample(wheel: Path) -> None:
+    names = set(zipfile.ZipFile(wheel).namelist())
+    assert {"app/static/index.html", "app/sample_data/rooftop/radar.bag", "app/sample_data/rooftop/camera.bag"} <= names
+    assert {"app/py.typed", "calib_core/py.typed"} <= names
+    assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"app", "calib_core"}
+    assert not any("__pycache__" in name or "/tests/" in name for name in names)
+
+
+def test_the_installed_command_finds_its_own_page_and_sample(installed: Path, tmp_path: Path) -> None:
+    code = "from app import resources; print(resources.static_folder()); print(resources.sample_folder())"
+    printed = subprocess.run(
+        [installed / "bin" / "python", "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True
+    ).stdout.split()
+    assert len(printed) == 2
+    for line in printed:
+        assert Path(line).is_relative_to(installed), "found in the checkout, not in the wheel"
+
+
+def test_the_installed_command_solves_its_sample(installed: Path, tmp_path: Path) -> None:
+    code = "from app import resources; print(resources.sample_folder() / 'rooftop')"
+    sample = Path(
+        subprocess.run(
+            [installed / "bin" / "python", "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True
+        ).stdout.strip()
+    )
+    out = tmp_path / "calibration.json"
+    done = subprocess.run(
+        [
+            installed / "bin" / "cocalib",
+            "solve",
+            sample / "radar.bag",
+            sample / "camera.bag",
+            "--clicks",
+            sample / "clicks.json",
+            "--out",
+            out,
+        ],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(out.read_text())["schema"] == "cocalib/calibration-1"
