@@ -1,0 +1,183 @@
+"""Camera frames for the page and the 3D view: recorded bytes untouched, half-size proxies, thumbnails; decoded off the loop."""
+
+import asyncio
+from collections import OrderedDict
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+
+__all__ = ["EncodedPicture", "Frame", "FrameStore", "PictureSource", "Size"]
+
+Size = Literal["full", "half", "thumbnail"]
+
+HALF_ABOVE_PX = 2_500_000
+"""Pictures above this many pixels are halved while playing [px]."""
+THUMBNAIL_WIDTH_PX = 480
+_PROXY_QUALITY, _THUMBNAIL_QUALITY = 85, 80
+
+
+class EncodedPicture(Protocol):
+    """A compressed picture as the recording hands it out."""
+
+    @property
+    def data(self) -> bytes: ...  # noqa: D102
+    @property
+    def format(self) -> Literal["jpeg", "png"]: ...  # noqa: D102
+    @property
+    def width_px(self) -> int: ...  # noqa: D102
+    @property
+    def height_px(self) -> int: ...  # noqa: D102
+
+
+class PictureSource(Protocol):
+    """The part of a Recording that holds pictures."""
+
+    def image_bytes(self, index: int, /) -> EncodedPicture: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One compressed picture.
+
+    Attributes:
+        index: place of the frame in the recording.
+        data: JPEG or PNG bytes.
+        format: which of the two.
+        width_px: columns of the recorded picture, whatever the size of this one.
+        height_px: rows of the recorded picture.
+        scale: size of this picture over the recorded one: 1, 0.5 or less.
+    """
+
+    index: int
+    data: bytes
+    format: Literal["jpeg", "png"]
+    width_px: int
+    height_px: int
+    scale: float
+
+
+class FrameStore:
+    """Frames by index and size, the newest used kept in memory, each made once however many ask. Lives on one event loop."""
+
+    def __init__(self, source: PictureSource, count: int, executor: Executor, *, budget_bytes: int = 256 << 20) -> None:
+        self._source = source
+        self._count = count
+        self._executor = executor
+        self._budget_bytes = budget_bytes
+        self._kept: OrderedDict[tuple[int, Size], Frame] = OrderedDict()
+        self._kept_bytes = 0
+        self._coming: dict[tuple[int, Size], asyncio.Task[Frame]] = {}
+
+    def __len__(self) -> int:
+        return self._count
+
+    @property
+    def kept_bytes(self) -> int:
+        """How much the kept frames weigh."""
+        return self._kept_bytes
+
+    async def get(self, index: int, size: Size = "full") -> Frame:
+        """Return a frame, from memory or made in the executor.
+
+        Raises:
+            IndexError: there is no such frame.
+        """
+        if not 0 <= index < self._count:
+            raise IndexError(f"frame {index} of {self._count}")
+        key = (index, size)
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        task = self._coming.get(key)
+        if task is None:
+            task = asyncio.get_running_loop().create_task(self._make(key))
+            self._coming[key] = task
+        return await asyncio.shield(task)  # a client that leaves must not take the frame from the others
+
+    def prefetch(self, index: int, size: Size, step: int, *, ahead: int = 3) -> None:
+        """Start on the next frames in the direction of play."""
+        for next_index in range(index + step, index + step * (ahead + 1), step) if step else ():
+            key: tuple[int, Size] = (next_index, size)
+            if 0 <= next_index < self._count and key not in self._kept and key not in self._coming:
+                task = asyncio.get_running_loop().create_task(self._make(key))
+                task.add_done_callback(_retrieve)
+                self._coming[key] = task
+
+    async def _make(self, key: tuple[int, Size]) -> Frame:
+        index, size = key
+        try:
+            frame = await asyncio.get_running_loop().run_in_executor(self._executor, _MAKERS[size], self._source, index)
+        finally:
+            self._coming.pop(key, None)
+        self._keep(key, frame)
+        return frame
+
+    def _keep(self, key: tuple[int, Size], frame: Frame) -> None:
+        self._kept[key] = frame
+        self._kept_bytes += len(frame.data)
+        while self._kept_bytes > self._budget_bytes and len(self._kept) > 1:
+            _, dropped = self._kept.popitem(last=False)
+            self._kept_bytes -= len(dropped.data)
+
+
+def _retrieve(task: "asyncio.Task[Frame]") -> None:
+    """Take the outcome of a prefetch nobody waits for; whoever asks for the frame gets its error then."""
+    if not task.cancelled():
+        task.exception()
+
+
+def _full(source: PictureSource, index: int) -> Frame:
+    picture = source.image_bytes(index)
+    return Frame(index, picture.data, picture.format, picture.width_px, picture.height_px, 1.0)
+
+
+def _half(source: PictureSource, index: int) -> Frame:
+    """Halve a large picture; a small one goes as it is."""
+    full = _full(source, index)
+    if full.width_px * full.height_px <= HALF_ABOVE_PX:
+        return full
+    return _encoded(full, _decoded(full.data, 2), 0.5, _PROXY_QUALITY)
+
+
+def _thumbnail(source: PictureSource, index: int) -> Frame:
+    """Shrink a picture for the frustum of the 3D view."""
+    import cv2
+
+    full = _full(source, index)
+    if full.width_px <= THUMBNAIL_WIDTH_PX and full.format == "jpeg":
+        return full
+    shrink = next((factor for factor in (8, 4, 2) if full.width_px >= factor * THUMBNAIL_WIDTH_PX), 1)
+    pixels = _decoded(full.data, shrink)
+    scale = min(1.0, THUMBNAIL_WIDTH_PX / full.width_px)
+    size = (max(1, round(full.width_px * scale)), max(1, round(full.height_px * scale)))
+    return _encoded(full, cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), scale, _THUMBNAIL_QUALITY)
+
+
+def _decoded(data: bytes, shrink: int) -> np.ndarray:
+    import cv2
+
+    flags = {
+        1: cv2.IMREAD_COLOR,
+        2: cv2.IMREAD_REDUCED_COLOR_2,
+        4: cv2.IMREAD_REDUCED_COLOR_4,
+        8: cv2.IMREAD_REDUCED_COLOR_8,
+    }
+    pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags[shrink] | cv2.IMREAD_IGNORE_ORIENTATION)
+    if pixels is None:
+        raise ValueError("the picture cannot be decoded")
+    return np.asarray(pixels)
+
+
+def _encoded(full: Frame, pixels: np.ndarray, scale: float, quality: int) -> Frame:
+    import cv2
+
+    done, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    if not done:
+        raise ValueError("the picture cannot be encoded")
+    return Frame(full.index, data.tobytes(), "jpeg", full.width_px, full.height_px, scale)
+
+
+_MAKERS: dict[Size, Callable[[PictureSource, int], Frame]] = {"full": _full, "half": _half, "thumbnail": _thumbnail}

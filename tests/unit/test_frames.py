@@ -1,0 +1,177 @@
+"""Frames go out as they were recorded, are made once, and never on the event loop."""
+
+import asyncio
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+import pytest
+
+from app.web.frames import FrameStore
+
+
+@dataclass(frozen=True)
+class Encoded:
+    data: bytes
+    format: Literal["jpeg", "png"]
+    width_px: int
+    height_px: int
+
+
+class Pictures:
+    """A recording's pictures, with a count of how often and where each was read."""
+
+    def __init__(self, width_px: int, height_px: int, suffix: str = ".jpg") -> None:
+        ramp = np.tile(np.linspace(0, 255, width_px).astype(np.uint8)[None, :, None], (height_px, 1, 3))
+        self.data = cv2.imencode(suffix, ramp)[1].tobytes()
+        self.size = (width_px, height_px)
+        self.format: Literal["jpeg", "png"] = "jpeg" if suffix == ".jpg" else "png"
+        self.read: list[int] = []
+        self.threads: set[int] = set()
+        self.may_read = threading.Event()
+        self.may_read.set()
+
+    def image_bytes(self, index: int) -> Encoded:
+        assert self.may_read.wait(10)
+        self.read.append(index)
+        self.threads.add(threading.get_ident())
+        if index == 7:
+            raise ValueError("frame 7 is broken")
+        return Encoded(self.data, self.format, *self.size)
+
+
+@pytest.fixture
+def executor() -> Iterator[ThreadPoolExecutor]:
+    with ThreadPoolExecutor(2) as pool:
+        yield pool
+
+
+def test_recorded_bytes_pass_through_untouched(executor: ThreadPoolExecutor) -> None:
+    pictures = Pictures(64, 48)
+    frame = asyncio.run(FrameStore(pictures, 10, executor).get(3))
+    assert frame.data is pictures.data
+    assert (frame.index, frame.width_px, frame.height_px, frame.scale) == (3, 64, 48, 1.0)
+
+
+def test_a_large_frame_is_halved_for_playing_and_a_small_one_is_not(executor: ThreadPoolExecutor) -> None:
+    large, small = Pictures(2000, 1500), Pictures(640, 480)
+    halved = asyncio.run(FrameStore(large, 10, executor).get(0, "half"))
+    picture = cv2.imdecode(np.frombuffer(halved.data, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    assert picture.shape[:2] == (750, 1000)
+    assert (halved.scale, halved.width_px, halved.height_px) == (0.5, 2000, 1500)
+    assert asyncio.run(FrameStore(small, 10, executor).get(0, "half")).data is small.data
+
+
+@pytest.mark.parametrize(
+    ("size", "suffix"), [((2000, 1500), ".jpg"), ((640, 480), ".png"), ((5000, 40), ".jpg"), ((100, 80), ".png")]
+)
+def test_a_thumbnail_is_a_small_jpeg(executor: ThreadPoolExecutor, size: tuple[int, int], suffix: str) -> None:
+    thumbnail = asyncio.run(FrameStore(Pictures(*size, suffix=suffix), 10, executor).get(0, "thumbnail"))
+    picture = cv2.imdecode(np.frombuffer(thumbnail.data, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    assert thumbnail.format == "jpeg"
+    assert picture.shape[1] == min(480, size[0])
+
+
+def test_many_who_ask_at_once_cost_one_read_off_the_event_loop(executor: ThreadPoolExecutor) -> None:
+    pictures = Pictures(64, 48)
+
+    async def ask() -> None:
+        store = FrameStore(pictures, 10, executor)
+        frames = await asyncio.gather(*(store.get(5) for _ in range(20)))
+        assert all(frame is frames[0] for frame in frames)
+        assert (await store.get(5)) is frames[0]
+
+    asyncio.run(ask())
+    assert pictures.read == [5]
+    assert threading.get_ident() not in pictures.threads
+
+
+def test_the_loop_runs_on_while_a_frame_is_read(executor: ThreadPoolExecutor) -> None:
+    pictures = Pictures(64, 48)
+    pictures.may_read.clear()
+
+    async def ask() -> None:
+        waiting = asyncio.ensure_future(FrameStore(pictures, 10, executor).get(1))
+        await asyncio.sleep(0)
+        assert not waiting.done()
+        pictures.may_read.set()
+        assert (await waiting).index == 1
+
+    asyncio.run(ask())
+
+
+def test_who_leaves_early_does_not_take_the_frame_from_the_others(executor: ThreadPoolExecutor) -> None:
+    pictures = Pictures(64, 48)
+    pictures.may_read.clear()
+
+    async def ask() -> None:
+        store = FrameStore(pictures, 10, executor)
+        leaver, stayer = asyncio.ensure_future(store.get(1)), asyncio.ensure_future(store.get(1))
+        await asyncio.sleep(0)
+        leaver.cancel()
+        pictures.may_read.set()
+        assert (await stayer).index == 1
+
+    asyncio.run(ask())
+    assert pictures.read == [1]
+
+
+def test_the_memory_stays_within_the_budget_and_drops_the_oldest(executor: ThreadPoolExecutor) -> None:
+    pictures = Pictures(64, 48)
+    budget = 3 * len(pictures.data)
+
+    async def ask() -> None:
+        store = FrameStore(pictures, 10, executor, budget_bytes=budget)
+        for index in (0, 1, 2, 0, 3):
+            await store.get(index)
+            assert store.kept_bytes <= budget
+        await store.get(0)
+        assert pictures.read == [0, 1, 2, 3], "frame 0 was used again and stayed"
+        await store.get(1)
+        assert pictures.read == [0, 1, 2, 3, 1]
+
+    asyncio.run(ask())
+
+
+@pytest.mark.parametrize(
+    ("start", "step", "expected"), [(4, 1, [4, 5, 6]), (4, -1, [2, 3, 4]), (9, 1, [9]), (4, 0, [4])]
+)
+def test_prefetching_goes_in_the_direction_of_play_and_stops_at_the_end(
+    executor: ThreadPoolExecutor, start: int, step: int, expected: list[int]
+) -> None:
+    pictures = Pictures(64, 48)
+
+    async def ask() -> None:
+        store = FrameStore(pictures, 10, executor)
+        await store.get(start)
+        store.prefetch(start, "full", step, ahead=2)
+        for index in expected:
+            await store.get(index)
+
+    asyncio.run(ask())
+    assert sorted(pictures.read) == expected
+
+
+def test_a_broken_frame_is_an_error_to_who_asks_and_only_then(executor: ThreadPoolExecutor) -> None:
+    pictures = Pictures(64, 48)
+
+    async def ask() -> None:
+        store = FrameStore(pictures, 10, executor)
+        store.prefetch(6, "full", 1, ahead=1)
+        with pytest.raises(ValueError, match="frame 7"):
+            await store.get(7)
+        assert (await store.get(6)).index == 6
+
+    asyncio.run(ask())
+
+
+@pytest.mark.parametrize("index", [-1, 10])
+def test_there_is_no_frame_outside_the_recording(executor: ThreadPoolExecutor, index: int) -> None:
+    with pytest.raises(IndexError):
+        asyncio.run(FrameStore(Pictures(64, 48), 10, executor).get(index))
