@@ -1,0 +1,309 @@
+"""Options by name: parsed, checked for range and described in one place, for the page, the journal and the command line.
+
+An option's name is its path in CalibrationOptions, such as "gating.max_range_m".
+"""
+
+import ast
+import dataclasses
+import difflib
+import inspect
+import math
+import typing
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any, Literal, TypeAlias
+
+import msgspec
+
+import calib_core.options
+from calib_core.errors import OptionError
+from calib_core.options import CalibrationOptions, CameraPositionPrior
+
+__all__ = [
+    "RANGES",
+    "OptionChange",
+    "OptionDescription",
+    "OptionGroup",
+    "OptionKind",
+    "changed_options",
+    "changes_from_tree",
+    "checked_options",
+    "option_groups",
+    "options_from_tree",
+]
+
+OptionKind: TypeAlias = Literal["number", "integer", "yes-no", "choice", "camera-position"]
+OptionValue: TypeAlias = bool | int | float | str | CameraPositionPrior | None
+
+RANGES: Mapping[str, tuple[float, float]] = {
+    "gating.max_speed_mps": (0.0, 100.0),
+    "gating.min_range_m": (0.0, 1000.0),
+    "gating.max_range_m": (0.1, 1000.0),
+    "locating.window_s": (0.01, 60.0),
+    "locating.max_candidates": (1, 50),
+    "locating.max_time_gap_s": (0.0, 60.0),
+    "noise.sigma_px": (0.01, 1000.0),
+    "noise.sigma_range_m": (1e-4, 10.0),
+    "noise.sigma_azimuth_deg": (1e-3, 45.0),
+    "noise.sigma_elevation_deg": (1e-3, 45.0),
+    "solving.camera_position.position_m": (-100.0, 100.0),
+    "solving.camera_position.sigma_m": (1e-4, 10.0),
+    "solving.nominal_camera_distance_m": (0.01, 100.0),
+    "solving.seed": (0, 2**32 - 1),
+    "paper.z_score_threshold": (0.01, 100.0),
+    "paper.window_s": (0.01, 60.0),
+    "paper.max_range_m": (0.1, 1000.0),
+    "paper.max_speed_mps": (0.0, 100.0),
+    "paper.ransac_threshold_px": (0.01, 1000.0),
+    "paper.ransac_iterations": (1, 1_000_000),
+    "paper.ransac_confidence": (0.01, 0.999999),
+}
+"""The smallest and largest value of each number, both allowed."""
+
+_UNITS = {"_mps": "m/s", "_px": "px", "_deg": "deg", "_rad": "rad", "_db": "dB", "_m": "m", "_s": "s"}
+
+
+@dataclass(frozen=True, slots=True)
+class OptionChange:
+    """One option and what it is to be.
+
+    Attributes:
+        path: the option's name, such as "noise.sigma_px".
+        value: of the option's type.
+    """
+
+    path: str
+    value: OptionValue
+
+
+@dataclass(frozen=True, slots=True)
+class OptionDescription:
+    """What a person needs to know to set one option.
+
+    Attributes:
+        path: the option's name, such as "noise.sigma_px".
+        label: the same in words, without the unit.
+        unit: "" where it has none.
+        hint: one sentence, from the option's own docstring.
+        kind: which field to draw.
+        choices: of a "choice".
+        low: smallest value; None where there is none.
+        high: largest value; None where there is none.
+        default: the value when nobody sets it.
+    """
+
+    path: str
+    label: str
+    unit: str
+    hint: str
+    kind: OptionKind
+    choices: tuple[str, ...]
+    low: float | None
+    high: float | None
+    default: OptionValue
+
+
+@dataclass(frozen=True, slots=True)
+class OptionGroup:
+    """Options that belong together; the first group has no name and holds the method.
+
+    Attributes:
+        name: such as "noise"; "" for the top.
+        hint: one sentence, from the group's docstring.
+        options: in the order of the source.
+    """
+
+    name: str
+    hint: str
+    options: tuple[OptionDescription, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Leaf:
+    path: str
+    owner: type
+    name: str
+    type: Any
+    default: Any
+
+
+def changes_from_tree(tree: object) -> tuple[OptionChange, ...]:
+    """Parse a partial, nested JSON object of options.
+
+    Raises:
+        OptionError: a name is unknown (the nearest one is suggested) or a value has the wrong type.
+    """
+    return tuple(_changes(tree, ""))
+
+
+def options_from_tree(tree: object) -> CalibrationOptions:
+    """Parse a nested JSON object of options; what it leaves out has its default.
+
+    Raises:
+        OptionError: an option is unknown, of the wrong type or out of range.
+    """
+    return changed_options(CalibrationOptions(), changes_from_tree(tree))
+
+
+def changed_options(options: CalibrationOptions, changes: Sequence[OptionChange]) -> CalibrationOptions:
+    """Set some options and leave the others.
+
+    Raises:
+        OptionError: an option is unknown or out of range.
+    """
+    for change in changes:
+        if change.path not in _leaves():
+            raise _unknown(change.path)
+        group, _, name = change.path.rpartition(".")
+        named: dict[str, Any] = {name: change.value}
+        if group:
+            named = {group: replace(getattr(options, group), **named)}
+        options = replace(options, **named)
+    return checked_options(options)
+
+
+def checked_options(options: CalibrationOptions) -> CalibrationOptions:
+    """Return the options as they are if every value makes sense.
+
+    Raises:
+        OptionError: a number is not finite or out of its range, a choice is none of the choices, or two options contradict.
+    """
+    for leaf in _leaves().values():
+        group = leaf.path.rpartition(".")[0]
+        value = getattr(getattr(options, group) if group else options, leaf.name)
+        if _kind(leaf) == "choice" and value not in typing.get_args(leaf.type):
+            choices = " or ".join(typing.get_args(leaf.type))
+            raise OptionError(f"option {leaf.path}: '{value}' is not one of its values; choose {choices}")
+        for name, number in _numbers(leaf.path, value):
+            low, high = RANGES.get(name, (-math.inf, math.inf))
+            if not (math.isfinite(number) and low <= number <= high):
+                raise OptionError(
+                    f"option {name}: {number:g} is out of range; give {low:g} to {high:g}{_unit_of(name)}"
+                )
+    if options.gating.min_range_m >= options.gating.max_range_m:
+        raise OptionError(
+            f"option gating.min_range_m: {options.gating.min_range_m:g} m leaves nothing below "
+            f"gating.max_range_m, {options.gating.max_range_m:g} m; make it smaller"
+        )
+    return options
+
+
+@cache
+def option_groups() -> tuple[OptionGroup, ...]:
+    """Describe every option once: labels and units from the names, hints from the docstrings, ranges from RANGES."""
+    groups: dict[str, list[OptionDescription]] = {}
+    owners: dict[str, type] = {}
+    for leaf in _leaves().values():
+        group = leaf.path.rpartition(".")[0]
+        owners[group] = leaf.owner
+        low, high = RANGES.get(leaf.path, (None, None))
+        groups.setdefault(group, []).append(
+            OptionDescription(
+                path=leaf.path,
+                label=_label(leaf.name),
+                unit=_unit(leaf.name),
+                hint=_docstrings()[leaf.owner.__name__, leaf.name],
+                kind=_kind(leaf),
+                choices=typing.get_args(leaf.type) if _kind(leaf) == "choice" else (),
+                low=low,
+                high=high,
+                default=leaf.default,
+            )
+        )
+    ordered = sorted(groups.items(), key=lambda item: item[0] != "")
+    return tuple(OptionGroup(name, inspect.getdoc(owners[name]) or "", tuple(group)) for name, group in ordered)
+
+
+def _changes(tree: object, prefix: str) -> Iterator[OptionChange]:
+    if not isinstance(tree, Mapping):
+        raise OptionError(f"options{f' {prefix[:-1]}' if prefix else ''}: expected an object of names and values")
+    groups = {path.partition(".")[0] for path in _leaves() if "." in path}
+    for name, value in tree.items():
+        path = f"{prefix}{name}"
+        if not prefix and name in groups:
+            yield from _changes(value, f"{path}.")
+        elif path in _leaves():
+            try:
+                yield OptionChange(path, msgspec.convert(value, _leaves()[path].type))
+            except msgspec.ValidationError as error:
+                raise OptionError(f"option {path}: {str(error)[:1].lower()}{str(error)[1:]}") from error
+        else:
+            raise _unknown(path)
+
+
+def _unknown(path: str) -> OptionError:
+    known = sorted(_leaves())
+    near = difflib.get_close_matches(path, known, n=1)
+    if not near:
+        by_name = {name.rpartition(".")[2]: name for name in known}
+        near = [by_name[name] for name in difflib.get_close_matches(path.rpartition(".")[2], by_name, n=1)]
+    advice = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
+    return OptionError(f"there is no option '{path[:80]}'; {advice}")
+
+
+@cache
+def _leaves() -> Mapping[str, _Leaf]:
+    """Every option that can be set on its own, by path; a camera position is set as a whole."""
+    leaves: dict[str, _Leaf] = {}
+    top = typing.get_type_hints(CalibrationOptions)
+    for top_field in dataclasses.fields(CalibrationOptions):
+        group = top[top_field.name]
+        if not dataclasses.is_dataclass(group):
+            leaves[top_field.name] = _Leaf(
+                top_field.name, CalibrationOptions, top_field.name, group, getattr(CalibrationOptions(), top_field.name)
+            )
+            continue
+        hints = typing.get_type_hints(group)
+        for option in dataclasses.fields(group):
+            path = f"{top_field.name}.{option.name}"
+            leaves[path] = _Leaf(path, typing.cast(type, group), option.name, hints[option.name], option.default)
+    return leaves
+
+
+def _kind(leaf: _Leaf) -> OptionKind:
+    if typing.get_origin(leaf.type) is Literal:
+        return "choice"
+    if leaf.type == CameraPositionPrior | None:
+        return "camera-position"
+    return {bool: "yes-no", int: "integer", float: "number"}[leaf.type]  # type: ignore[return-value]
+
+
+def _numbers(path: str, value: object) -> Iterator[tuple[str, float]]:
+    """Yield the numbers of an option's value, each with the name its range goes by."""
+    if isinstance(value, CameraPositionPrior):
+        for number in value.position_m:
+            yield f"{path}.position_m", number
+        yield f"{path}.sigma_m", value.sigma_m
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield path, value
+
+
+@cache
+def _docstrings() -> Mapping[tuple[str, str], str]:
+    """Read the text below each field of the options' source: (class, field) -> text in one line."""
+    texts: dict[tuple[str, str], str] = {}
+    for node in ast.parse(inspect.getsource(calib_core.options)).body:
+        if not isinstance(node, ast.ClassDef):
+            continue
+        for statement, below in zip(node.body, [*node.body[1:], None], strict=True):
+            if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
+                text = (
+                    below.value.value if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) else ""
+                )
+                texts[node.name, statement.target.id] = " ".join(str(text).split())
+    return texts
+
+
+def _unit(name: str) -> str:
+    return next((unit for suffix, unit in _UNITS.items() if name.endswith(suffix)), "")
+
+
+def _unit_of(path: str) -> str:
+    unit = _unit(path)
+    return f" {unit}" if unit else ""
+
+
+def _label(name: str) -> str:
+    suffix = next((suffix for suffix in _UNITS if name.endswith(suffix)), "")
+    return name.removesuffix(suffix).replace("_", " ")

@@ -1,0 +1,48 @@
+"""What the person has done so far, as a value: Session, the events that change it, and the pure functions that apply them.
+
+Nothing here knows files, threads or screens.
+"""
+
+from app.session.applying import EventError, apply
+from app.session.events import (
+    Cleared,
+    ClickExcluded,
+    ClickMoved,
+    ClickPlaced,
+    ClickRemoved,
+    ClicksImported,
+    Event,
+    OptionsChanged,
+    OptionsEdited,
+    Redo,
+    Solved,
+    Step,
+    Undo,
+)
+from app.session.history import History, advance, settled
+from app.session.state import Outcome, RecordingFacts, Session, Stamp
+
+__all__ = [
+    "Cleared",
+    "ClickExcluded",
+    "ClickMoved",
+    "ClickPlaced",
+    "ClickRemoved",
+    "ClicksImported",
+    "Event",
+    "EventError",
+    "History",
+    "OptionsChanged",
+    "OptionsEdited",
+    "Outcome",
+    "RecordingFacts",
+    "Redo",
+    "Session",
+    "Solved",
+    "Stamp",
+    "Step",
+    "Undo",
+    "advance",
+    "apply",
+    "settled",
+]

@@ -1,0 +1,150 @@
+"""How each event changes the session: `apply`, and one rule per event."""
+
+import math
+from dataclasses import replace
+from functools import singledispatch
+
+from app.option_changes import changed_options, checked_options
+from app.session.events import (
+    Cleared,
+    ClickExcluded,
+    ClickMoved,
+    ClickPlaced,
+    ClickRemoved,
+    ClicksImported,
+    Event,
+    OptionsChanged,
+    OptionsEdited,
+    Solved,
+)
+from app.session.state import RecordingFacts, Session
+from calib_core.errors import CalibrationError
+from calib_core.measurements import ReflectorClick, TimeNs, time_parts
+
+__all__ = ["EventError", "apply"]
+
+
+class EventError(CalibrationError):
+    """An event that does not fit the session or the recording; the session stays as it was."""
+
+
+def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
+    """Return the session after an event; the very same one when the event changes nothing.
+
+    Raises:
+        EventError: the event does not fit the session or the recording.
+        OptionError: an option is unknown or out of range.
+    """
+    if isinstance(event, Solved):
+        if event.revision != session.revision:
+            return session
+        return replace(session, outcome=event.outcome, outcome_revision=event.revision)
+    changed = _changed(event, session, facts)
+    if changed.clicks == session.clicks and changed.options == session.options:
+        return session
+    return replace(changed, revision=session.revision + 1)
+
+
+@singledispatch
+def _changed(event: Event, session: Session, facts: RecordingFacts) -> Session:
+    """Return the session with what the event says in it; `apply` counts the revision."""
+    raise TypeError(f"not an event of the session: {event!r}")
+
+
+@_changed.register
+def _placed(event: ClickPlaced, session: Session, facts: RecordingFacts) -> Session:
+    _require_frame(event.image_time, facts)
+    _require_pixel(event.u_px, event.v_px, facts)
+    for click in session.clicks:
+        if click.image_time == event.image_time:
+            return _with_click(session, replace(click, u_px=event.u_px, v_px=event.v_px))
+    click = ReflectorClick(event.image_time, f"c{session.next_click}", event.u_px, event.v_px)
+    return replace(_with_click(session, click), next_click=session.next_click + 1)
+
+
+@_changed.register
+def _moved(event: ClickMoved, session: Session, facts: RecordingFacts) -> Session:
+    _require_pixel(event.u_px, event.v_px, facts)
+    return _with_click(session, replace(_click(session, event.id), u_px=event.u_px, v_px=event.v_px))
+
+
+@_changed.register
+def _removed(event: ClickRemoved, session: Session, facts: RecordingFacts) -> Session:
+    gone = _click(session, event.id)
+    return replace(session, clicks=tuple(click for click in session.clicks if click is not gone))
+
+
+@_changed.register
+def _excluded(event: ClickExcluded, session: Session, facts: RecordingFacts) -> Session:
+    return _with_click(session, replace(_click(session, event.id), excluded=event.excluded))
+
+
+@_changed.register
+def _options_changed(event: OptionsChanged, session: Session, facts: RecordingFacts) -> Session:
+    return replace(session, options=checked_options(event.options))
+
+
+@_changed.register
+def _options_edited(event: OptionsEdited, session: Session, facts: RecordingFacts) -> Session:
+    return replace(session, options=changed_options(session.options, event.changes))
+
+
+@_changed.register
+def _cleared(event: Cleared, session: Session, facts: RecordingFacts) -> Session:
+    return replace(session, clicks=(), outcome=None, outcome_revision=-1)
+
+
+@_changed.register
+def _imported(event: ClicksImported, session: Session, facts: RecordingFacts) -> Session:
+    times: set[TimeNs] = set()
+    for click in event.clicks:
+        _require_frame(click.image_time, facts)
+        _require_pixel(click.u_px, click.v_px, facts)
+        if click.image_time in times:
+            raise EventError(f"two of the clicks lie in the frame at {_seconds(click.image_time)}; keep one per frame")
+        times.add(click.image_time)
+    clicks = [click for click in session.clicks if click.image_time not in times]
+    taken = {click.id for click in clicks}
+    number = max([session.next_click, *(_number(click.id) + 1 for click in event.clicks)])
+    for click in sorted(event.clicks):
+        if click.id in taken:
+            click, number = replace(click, id=f"c{number}"), number + 1
+        taken.add(click.id)
+        clicks.append(click)
+    return replace(session, clicks=tuple(sorted(clicks)), next_click=number)
+
+
+def _with_click(session: Session, click: ReflectorClick) -> Session:
+    others = (other for other in session.clicks if other.id != click.id)
+    return replace(session, clicks=tuple(sorted((*others, click))))
+
+
+def _click(session: Session, click_id: str) -> ReflectorClick:
+    for click in session.clicks:
+        if click.id == click_id:
+            return click
+    raise EventError(f"there is no click '{click_id}'; it may have been removed in another tab")
+
+
+def _require_frame(time: TimeNs, facts: RecordingFacts) -> None:
+    if facts.frame_at(time) is None:
+        raise EventError(
+            f"no frame of {facts.name} has the stamp {_seconds(time)}; a click belongs to a frame, by its exact stamp"
+        )
+
+
+def _require_pixel(u_px: float, v_px: float, facts: RecordingFacts) -> None:
+    if not (math.isfinite(u_px) and math.isfinite(v_px) and facts.has_pixel(u_px, v_px)):
+        raise EventError(
+            f"({u_px:.1f}, {v_px:.1f}) px is outside the frame of {facts.width_px} x {facts.height_px} px; click inside it"
+        )
+
+
+def _seconds(time: TimeNs) -> str:
+    sec, nanosec = time_parts(time)
+    return f"{sec}.{nanosec:09d} s"
+
+
+def _number(click_id: str) -> int:
+    digits = click_id[1:]
+    return int(digits) if click_id.startswith("c") and digits.isascii() and digits.isdigit() and len(digits) < 10 else 0

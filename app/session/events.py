@@ -1,0 +1,116 @@
+"""What can happen to a session: one frozen class per event."""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from app.option_changes import OptionChange
+from app.session.state import Outcome
+from calib_core.measurements import ReflectorClick, TimeNs
+from calib_core.options import CalibrationOptions
+
+__all__ = [
+    "Cleared",
+    "ClickExcluded",
+    "ClickMoved",
+    "ClickPlaced",
+    "ClickRemoved",
+    "ClicksImported",
+    "Event",
+    "OptionsChanged",
+    "OptionsEdited",
+    "Redo",
+    "Solved",
+    "Step",
+    "Undo",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class ClickPlaced:
+    """The reflector's centre was clicked in a frame; a click that this frame already has moves here."""
+
+    image_time: TimeNs
+    u_px: float
+    v_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class ClickMoved:
+    """A click was dragged or nudged."""
+
+    id: str
+    u_px: float
+    v_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class ClickRemoved:
+    """A click was deleted."""
+
+    id: str
+
+
+@dataclass(frozen=True, slots=True)
+class ClickExcluded:
+    """A click was left out of the solve, or taken in again."""
+
+    id: str
+    excluded: bool
+
+
+@dataclass(frozen=True, slots=True)
+class OptionsChanged:
+    """These are the options from now on."""
+
+    options: CalibrationOptions
+
+
+@dataclass(frozen=True, slots=True)
+class OptionsEdited:
+    """Some options were set; the others stay. `settled` turns it into OptionsChanged."""
+
+    changes: tuple[OptionChange, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Cleared:
+    """All clicks were thrown away; the options stay."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClicksImported:
+    """Clicks from a file join the session; where a frame has one already, the file's wins."""
+
+    clicks: tuple[ReflectorClick, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """The solver's answer to one revision; an answer to an older revision changes nothing."""
+
+    revision: int
+    outcome: Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class Undo:
+    """Take the last change back."""
+
+
+@dataclass(frozen=True, slots=True)
+class Redo:
+    """Make the change again that was taken back last."""
+
+
+Event: TypeAlias = (
+    ClickPlaced
+    | ClickMoved
+    | ClickRemoved
+    | ClickExcluded
+    | OptionsChanged
+    | OptionsEdited
+    | Cleared
+    | ClicksImported
+    | Solved
+)
+Step: TypeAlias = Event | Undo | Redo

@@ -1,0 +1,74 @@
+"""Undo and redo as steps like any other: replaying a journal and living through it are the same function."""
+
+from dataclasses import dataclass, field, replace
+
+from app.option_changes import changed_options
+from app.session.applying import apply
+from app.session.events import OptionsChanged, OptionsEdited, Redo, Solved, Step, Undo
+from app.session.state import RecordingFacts, Session
+
+__all__ = ["History", "advance", "settled"]
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """The session of now, with those before it (undo) and those taken back (redo), nearest last."""
+
+    present: Session = field(default_factory=Session)
+    past: tuple[Session, ...] = ()
+    future: tuple[Session, ...] = ()
+
+
+def advance(history: History, step: Step, facts: RecordingFacts) -> History:
+    """Take one step; a step that changes nothing returns the very same History.
+
+    Raises:
+        EventError: the event does not fit the session or the recording.
+        OptionError: an option is unknown or out of range.
+    """
+    if isinstance(step, Undo):
+        return _undone(history)
+    if isinstance(step, Redo):
+        return _redone(history)
+    present = apply(history.present, step, facts)
+    if present is history.present:
+        return history
+    if isinstance(step, Solved):
+        return replace(history, present=present)
+    return History(present, (*history.past, history.present))
+
+
+def settled(step: Step, session: Session) -> Step:
+    """Turn "set these options" into "these are the options": what is journalled no longer depends on what was before.
+
+    Raises:
+        OptionError: an option is unknown, of the wrong type or out of range.
+    """
+    if isinstance(step, OptionsEdited):
+        return OptionsChanged(changed_options(session.options, step.changes))
+    return step
+
+
+def _undone(history: History) -> History:
+    if not history.past:
+        return history
+    *past, before = history.past
+    return History(_resumed(before, history.present), tuple(past), (*history.future, history.present))
+
+
+def _redone(history: History) -> History:
+    if not history.future:
+        return history
+    *future, after = history.future
+    return History(_resumed(after, history.present), (*history.past, history.present), tuple(future))
+
+
+def _resumed(kept: Session, current: Session) -> Session:
+    """Return to a kept session under a new revision, so that no answer on its way can be taken for an answer to this."""
+    revision = current.revision + 1
+    return replace(
+        kept,
+        revision=revision,
+        next_click=current.next_click,
+        outcome_revision=revision if kept.is_solved else kept.outcome_revision,
+    )

@@ -1,0 +1,93 @@
+"""The session as a value, and the little it must know about the recording."""
+
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from calib_core.arrays import TimesNs, frozen_array
+from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable, time_from_parts, time_parts
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
+
+__all__ = ["Outcome", "RecordingFacts", "Session", "Stamp"]
+
+Outcome: TypeAlias = Calibration | Unsolvable
+
+
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """A time as JSON carries it: two integers, because a JavaScript number cannot hold nanoseconds of today."""
+
+    sec: int
+    nanosec: int
+
+    @classmethod
+    def of(cls, time: TimeNs) -> "Stamp":
+        """Split a time in nanoseconds."""
+        return cls(*time_parts(time))
+
+    @property
+    def time(self) -> TimeNs:
+        """The same time in nanoseconds since the epoch."""
+        return time_from_parts(self.sec, self.nanosec)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordingFacts:
+    """The little that clicks must fit.
+
+    Attributes:
+        name: what the person calls the recording.
+        image_times: (m,) stamps of the frames [ns], ascending and unique.
+        width_px: columns of a frame.
+        height_px: rows of a frame.
+    """
+
+    name: str
+    image_times: TimesNs
+    width_px: int
+    height_px: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "image_times", frozen_array(self.image_times, (None,), dtype=np.int64))
+
+    def frame_at(self, time: TimeNs) -> int | None:
+        """Return the index of the frame with exactly this stamp; None when no frame has it."""
+        index = int(np.searchsorted(self.image_times, time))
+        return index if index < len(self.image_times) and int(self.image_times[index]) == time else None
+
+    def has_pixel(self, u_px: float, v_px: float) -> bool:
+        """Tell whether a pixel lies on the frame, whose edge is half a pixel outside the outermost pixel centres."""
+        return -0.5 <= u_px <= self.width_px - 0.5 and -0.5 <= v_px <= self.height_px - 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """Everything the person decided, and the answer to it.
+
+    Attributes:
+        clicks: sorted by time; at most one per frame.
+        options: what the next solve uses.
+        next_click: number of the next id ("c7"); grows only, so that no id is ever given twice.
+        revision: grows by one with every change of clicks or options, undo and redo included.
+        outcome: the newest answer; it stays while a newer one is being worked out.
+        outcome_revision: the revision that `outcome` answers; -1 before the first.
+    """
+
+    clicks: tuple[ReflectorClick, ...] = ()
+    options: CalibrationOptions = field(default_factory=CalibrationOptions)
+    next_click: int = 1
+    revision: int = 0
+    outcome: Outcome | None = None
+    outcome_revision: int = -1
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether the outcome answers the clicks and options of now."""
+        return self.outcome is not None and self.outcome_revision == self.revision
+
+    @property
+    def needs_solving(self) -> bool:
+        """Whether there is something to solve that has not been answered."""
+        return bool(self.clicks) and not self.is_solved
