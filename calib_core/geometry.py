@@ -9,10 +9,12 @@ from calib_core.arrays import Matrix33, Matrix66, Points3, Vector3, frozen_array
 
 __all__ = [
     "RigidTransform",
+    "euler_from_rotation",
     "matrix_from_quaternion_wxyz",
     "quaternion_wxyz_from_matrix",
     "rotation_angle_rad",
     "rotation_exp",
+    "rotation_from_euler",
     "rotation_log",
     "skew",
 ]
@@ -91,6 +93,25 @@ def matrix_from_quaternion_wxyz(quaternion: np.ndarray) -> Matrix33:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def rotation_from_euler(x_rad: float, y_rad: float, z_rad: float) -> Matrix33:
+    """Return R = Rz(z) Ry(y) Rx(x), the paper's sequence of Euler angles: about the fixed axes x, then y, then z."""
+    (sx, sy, sz), (cx, cy, cz) = np.sin([x_rad, y_rad, z_rad]), np.cos([x_rad, y_rad, z_rad])
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
+    about_y = np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]])
+    about_z = np.array([[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]])
+    return about_z @ about_y @ about_x
+
+
+def euler_from_rotation(rotation: Matrix33) -> Vector3:
+    """Return the angles (x, y, z) [rad] with rotation = Rz(z) Ry(y) Rx(x), y from -pi/2 to pi/2; z is 0 where y is +-pi/2."""
+    r = np.asarray(rotation, dtype=np.float64)
+    cosine_y = float(np.hypot(r[0, 0], r[1, 0]))
+    y_rad = np.arctan2(-r[2, 0], cosine_y)
+    if cosine_y < 1e-9:  # only the sum or the difference of x and z is defined
+        return np.array([np.arctan2(-r[1, 2], r[1, 1]), y_rad, 0.0])
+    return np.array([np.arctan2(r[2, 1], r[2, 2]), y_rad, np.arctan2(r[1, 0], r[0, 0])])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

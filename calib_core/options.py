@@ -85,10 +85,12 @@ class PaperOptions:
 
     z_score_threshold: float = 1.0
     """Largest absolute z-score per axis of a return that is averaged; the authors use 1."""
+    z_score_axes: Literal["separately", "in-turn"] = "separately"
+    """Each axis judged over the whole window, or as the authors do: y over what x left, z over what y left."""
     window: Literal["centred", "whole-second"] = "centred"
-    """3 s centred on the nearest stamp as the paper prints, or the authors' window around the stamp's whole second."""
+    """Centred on the nearest stamp as the paper prints, or the authors' 1 s to either side of that stamp's whole second."""
     window_s: float = 3.0
-    """Length of the window [s]."""
+    """Length of the centred window [s]."""
     max_range_m: float = 20.0
     """Range filter of Algorithm 1 [m]."""
     max_speed_mps: float = 0.0

@@ -1,0 +1,296 @@
+"""OpenCV's perspective-n-point solvers for all four lens models. The only geometry that imports cv2, and only when called.
+
+OpenCV knows the pinhole and the Brown-Conrady lenses itself. For the fisheye lens (and for a camera matrix with skew, which
+OpenCV drops silently) the pixels become points of the plane z = 1 first, and the refinement is our own Levenberg-Marquardt,
+so that what is minimised stays in pixels.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from calib_core.arrays import Flags, Points2, Points3, Values, frozen_array
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform, rotation_exp, rotation_log, skew
+
+__all__ = ["PnPSolver", "RansacSolution", "project_points", "refine_lm", "solve_pnp", "solve_pnp_ransac"]
+
+PnPSolver = Literal["iterative", "sqpnp"]
+
+_MINIMUM_POINTS = 4
+_MINIMUM_POINTS_FOR_DLT = 6
+_MINIMUM_POINTS_FOR_REFINEMENT = 3
+_LM_STEPS = 100
+_LM_FIRST_DAMPING = 1e-3
+_LM_LARGEST_DAMPING = 1e12
+_LM_TOLERANCE = 1e-12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RansacSolution:
+    """What RANSAC found.
+
+    Attributes:
+        camera_from_radar: the pose fitted to the inliers.
+        inliers: (n,) the points within the threshold of the winning sample's pose.
+    """
+
+    camera_from_radar: RigidTransform
+    inliers: Flags
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inliers", frozen_array(self.inliers, (None,), dtype=np.bool_))
+
+
+def project_points(points_radar_m: Points3, camera_from_radar: RigidTransform, camera: Camera) -> Points2:
+    """Project by OpenCV's own code: (n, 2) [px]. Unlike Camera.project it also mirrors points behind the camera into the image.
+
+    Args:
+        points_radar_m: (n, 3).
+        camera_from_radar: the pose.
+        camera: any model; skew is not known to OpenCV and is refused.
+
+    Raises:
+        ValueError: the camera matrix has skew.
+    """
+    import cv2
+
+    if camera.matrix_px[0, 1] != 0.0 or camera.matrix_px[1, 0] != 0.0:
+        raise ValueError("OpenCV cannot project through a camera matrix with skew")
+    points = np.ascontiguousarray(points_radar_m, dtype=np.float64).reshape(-1, 1, 3)
+    if not len(points):
+        return np.zeros((0, 2))
+    rotation_vector = rotation_log(camera_from_radar.rotation).reshape(3, 1)
+    translation = np.array(camera_from_radar.translation_m).reshape(3, 1)
+    if camera.model == "equidistant":
+        pixels, _ = cv2.fisheye.projectPoints(
+            points, rotation_vector, translation, np.array(camera.matrix_px), np.array(camera.distortion)
+        )
+    else:
+        pixels, _ = cv2.projectPoints(
+            points, rotation_vector, translation, np.array(camera.matrix_px), np.array(camera.distortion)
+        )
+    return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+
+
+def solve_pnp(
+    points_radar_m: Points3, pixels_px: Points2, camera: Camera, solver: PnPSolver = "iterative"
+) -> RigidTransform | None:
+    """Solve camera_from_radar from all points, none of them doubted.
+
+    Args:
+        points_radar_m: (n, 3), n >= 4.
+        pixels_px: (n, 2) where each is seen.
+        camera: any model.
+        solver: OpenCV's iterative solver (DLT or homography, then Levenberg-Marquardt) or SQPnP.
+
+    Returns:
+        The pose, or None where there are too few points or OpenCV finds no finite pose.
+    """
+    view = _view(points_radar_m, pixels_px, camera)
+    if len(view.points) < _MINIMUM_POINTS:
+        return None
+    start: dict[str, Any] = {}
+    if solver == "iterative" and len(view.points) < _MINIMUM_POINTS_FOR_DLT:
+        guess = _solved(view, "sqpnp")
+        if guess is None:
+            return None
+        start = {"useExtrinsicGuess": True, **_vectors(guess)}
+    return _solved(view, solver, **start)
+
+
+def solve_pnp_ransac(
+    points_radar_m: Points3,
+    pixels_px: Points2,
+    camera: Camera,
+    solver: PnPSolver = "iterative",
+    *,
+    threshold_px: float = 8.0,
+    iterations: int = 10_000,
+    confidence: float = 0.99,
+) -> RansacSolution | None:
+    """Solve camera_from_radar by RANSAC around one of OpenCV's solvers; deterministic.
+
+    Args:
+        points_radar_m: (n, 3), n >= 4.
+        pixels_px: (n, 2) where each is seen.
+        camera: any model; with a fisheye lens the threshold is carried to the plane z = 1 by the mean focal length.
+        solver: what fits the samples' consensus.
+        threshold_px: largest reprojection error of an inlier [px].
+        iterations: at most so many samples.
+        confidence: stop early when an all-inlier sample has been drawn with this probability.
+
+    Returns:
+        The pose and its inliers, or None where RANSAC finds none.
+    """
+    import cv2
+
+    view = _view(points_radar_m, pixels_px, camera)
+    if len(view.points) < _MINIMUM_POINTS:
+        return None
+    try:
+        found, rotation_vector, translation, rows = cv2.solvePnPRansac(
+            view.points,
+            view.pixels,
+            view.matrix,
+            view.distortion,
+            flags=_flag(solver),
+            reprojectionError=threshold_px / view.px_per_unit,
+            iterationsCount=iterations,
+            confidence=confidence,
+        )
+    except cv2.error:  # OpenCV asserts where its sample is degenerate
+        return None
+    if not found or rows is None or not len(rows):
+        return None
+    camera_from_radar = _transform(rotation_vector, translation)
+    if camera_from_radar is None:
+        return None
+    inliers = np.zeros(len(view.usable), dtype=np.bool_)
+    inliers[np.flatnonzero(view.usable)[np.asarray(rows).ravel()]] = True
+    return RansacSolution(camera_from_radar=camera_from_radar, inliers=inliers)
+
+
+def refine_lm(
+    points_radar_m: Points3, pixels_px: Points2, camera: Camera, camera_from_radar: RigidTransform
+) -> RigidTransform | None:
+    """Minimise the sum of squared reprojection errors [px^2] over all points by Levenberg-Marquardt.
+
+    Args:
+        points_radar_m: (n, 3), n >= 3.
+        pixels_px: (n, 2).
+        camera: any model.
+        camera_from_radar: where to start.
+
+    Returns:
+        The refined pose, or None where there are too few points or the refinement leaves the finite numbers.
+    """
+    import cv2
+
+    points = np.ascontiguousarray(points_radar_m, dtype=np.float64)
+    pixels = np.ascontiguousarray(pixels_px, dtype=np.float64)
+    if len(points) < _MINIMUM_POINTS_FOR_REFINEMENT:
+        return None
+    if not _known_to_opencv(camera):
+        return _refined(points, pixels, camera, camera_from_radar)
+    start = _vectors(camera_from_radar)
+    try:
+        rotation_vector, translation = cv2.solvePnPRefineLM(
+            points, pixels, np.array(camera.matrix_px), np.array(camera.distortion), start["rvec"], start["tvec"]
+        )
+    except cv2.error:
+        return None
+    return _transform(rotation_vector, translation)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    """Points and pixels as OpenCV is to see them."""
+
+    points: Points3
+    pixels: Points2
+    matrix: np.ndarray
+    distortion: Values
+    px_per_unit: float
+    usable: Flags
+
+
+def _view(points_radar_m: Points3, pixels_px: Points2, camera: Camera) -> _View:
+    points = np.ascontiguousarray(points_radar_m, dtype=np.float64).reshape(-1, 3)
+    pixels = np.ascontiguousarray(pixels_px, dtype=np.float64).reshape(-1, 2)
+    if _known_to_opencv(camera):
+        everything = np.ones(len(points), dtype=np.bool_)
+        return _View(points, pixels, np.array(camera.matrix_px), np.array(camera.distortion), 1.0, everything)
+    rays = camera.rays(pixels)
+    with np.errstate(invalid="ignore"):
+        usable = rays[:, 2] > 1e-3  # a ray at or beyond 90 deg never meets the plane z = 1
+    plane = rays[usable, :2] / rays[usable, 2:]
+    px_per_unit = float(camera.matrix_px[0, 0] + camera.matrix_px[1, 1]) / 2.0
+    return _View(
+        np.ascontiguousarray(points[usable]),
+        np.ascontiguousarray(plane),
+        np.eye(3),
+        np.zeros(0),
+        px_per_unit,
+        usable,
+    )
+
+
+def _known_to_opencv(camera: Camera) -> bool:
+    skewed = camera.matrix_px[0, 1] != 0.0 or camera.matrix_px[1, 0] != 0.0
+    return camera.model != "equidistant" and not skewed
+
+
+def _flag(solver: PnPSolver) -> int:
+    import cv2
+
+    return int(cv2.SOLVEPNP_SQPNP if solver == "sqpnp" else cv2.SOLVEPNP_ITERATIVE)
+
+
+def _vectors(camera_from_radar: RigidTransform) -> dict[str, np.ndarray]:
+    return {
+        "rvec": rotation_log(camera_from_radar.rotation).reshape(3, 1),
+        "tvec": np.array(camera_from_radar.translation_m).reshape(3, 1),
+    }
+
+
+def _solved(view: _View, solver: PnPSolver, **start: Any) -> RigidTransform | None:
+    import cv2
+
+    try:
+        found, rotation_vector, translation = cv2.solvePnP(
+            view.points, view.pixels, view.matrix, view.distortion, flags=_flag(solver), **start
+        )
+    except cv2.error:  # OpenCV asserts on degenerate points
+        return None
+    return _transform(rotation_vector, translation) if found else None
+
+
+def _transform(rotation_vector: Any, translation: Any) -> RigidTransform | None:
+    vector = np.asarray(rotation_vector, dtype=np.float64).reshape(3)
+    translation_m = np.asarray(translation, dtype=np.float64).reshape(3)
+    if not (np.all(np.isfinite(vector)) and np.all(np.isfinite(translation_m))):
+        return None
+    return RigidTransform(rotation_exp(vector), translation_m)
+
+
+def _refined(
+    points: Points3, pixels: Points2, camera: Camera, camera_from_radar: RigidTransform
+) -> RigidTransform | None:
+    """Run Levenberg-Marquardt on (dt, dtheta) with the analytic Jacobian of Camera.project_with_jacobian."""
+    best = camera_from_radar
+    residuals, jacobian = _linearised(points, pixels, camera, best)
+    cost = float(residuals @ residuals)
+    if not np.isfinite(cost):
+        return None
+    damping = _LM_FIRST_DAMPING
+    for _ in range(_LM_STEPS):
+        normal, gradient = jacobian.T @ jacobian, jacobian.T @ residuals
+        step = -np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), gradient, rcond=None)[0]
+        trial = best.perturbed(step)
+        trial_residuals, trial_jacobian = _linearised(points, pixels, camera, trial)
+        trial_cost = float(trial_residuals @ trial_residuals)
+        if not trial_cost <= cost:  # also when a point has left the lens and the cost is NaN
+            damping *= 10.0
+            if damping > _LM_LARGEST_DAMPING:
+                break
+            continue
+        gain = cost - trial_cost
+        best, residuals, jacobian, cost = trial, trial_residuals, trial_jacobian, trial_cost
+        damping = max(damping / 10.0, 1e-15)
+        if gain <= _LM_TOLERANCE * cost or float(np.abs(step).max()) < _LM_TOLERANCE:
+            break
+    return best
+
+
+def _linearised(
+    points: Points3, pixels: Points2, camera: Camera, camera_from_radar: RigidTransform
+) -> tuple[Values, np.ndarray]:
+    """Return the stacked residuals (2n,) [px] and their derivative (2n, 6) by (dt, dtheta)."""
+    turned = points @ camera_from_radar.rotation.T
+    projected, d_pixel = camera.project_with_jacobian(turned + camera_from_radar.translation_m)
+    d_point = np.zeros((len(points), 3, 6))
+    d_point[:, :, :3] = np.eye(3)
+    d_point[:, :, 3:] = np.stack([-skew(point) for point in turned])
+    return (projected - pixels).ravel(), (d_pixel @ d_point).reshape(-1, 6)
