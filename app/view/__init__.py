@@ -1,0 +1,6 @@
+"""What the screen shows, as a value: `view(session)` is pure, and every client draws the same View."""
+
+from app.view.drawing import view
+from app.view.drawn import CautionRow, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View
+
+__all__ = ["CautionRow", "ClickRow", "ClickState", "Ellipse", "Figure", "Level", "Stage", "View", "view"]

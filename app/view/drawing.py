@@ -1,0 +1,89 @@
+"""From the session to the View, in one pure call."""
+
+from app.session import History, RecordingFacts, Session
+from app.view.drawn import CautionRow, Stage, View
+from app.view.figures import metric_figures, pose_figures, residual_limit_px
+from app.view.rows import click_rows
+from calib_core.measurements import Unsolvable
+from calib_core.results import Calibration
+
+__all__ = ["MIN_PLACEMENTS", "view"]
+
+MIN_PLACEMENTS = 4
+"""Fewer pairs than this give no pose."""
+
+
+def view(history: History, facts: RecordingFacts) -> View:
+    """Say everything there is to draw about the session of now.
+
+    Args:
+        history: the session with what can be undone and redone.
+        facts: the recording's frames.
+    """
+    session = history.present
+    outcome = session.outcome
+    calibration = outcome if isinstance(outcome, Calibration) else None
+    stage = _stage(session)
+    status, hint = _words(session, stage)
+    return View(
+        revision=session.revision,
+        stage=stage,
+        status=status,
+        hint=hint,
+        solving=session.needs_solving,
+        solved_revision=session.outcome_revision if outcome is not None else -1,
+        can_undo=bool(history.past),
+        can_redo=bool(history.future),
+        has_calibration=calibration is not None,
+        method=session.options.method,
+        clicks=click_rows(session, facts),
+        metrics=metric_figures(calibration) if calibration else (),
+        pose=pose_figures(calibration) if calibration else (),
+        cautions=_cautions(calibration) if calibration else (),
+        options=session.options,
+        residual_limit_px=residual_limit_px(calibration) if calibration else None,
+    )
+
+
+def _stage(session: Session) -> Stage:
+    if not session.clicks:
+        return "collecting"
+    if session.needs_solving:
+        return "solving"
+    if isinstance(session.outcome, Calibration):
+        return "solved"
+    return "collecting" if _missing(session) else "unsolvable"
+
+
+def _missing(session: Session) -> int:
+    """How many placements are missing before a solve can be tried."""
+    return max(0, MIN_PLACEMENTS - sum(not click.excluded for click in session.clicks))
+
+
+def _words(session: Session, stage: Stage) -> tuple[str, str]:
+    """Return the status line and the next thing to do."""
+    missing, outcome = _missing(session), session.outcome
+    if missing:
+        return f"{missing} more placement{'s' if missing > 1 else ''} needed", _NEXT_CLICK
+    if stage == "solving":
+        return "solving…", ""
+    if isinstance(outcome, Unsolvable):
+        return outcome.reason, outcome.hint
+    if isinstance(outcome, Calibration):
+        return _agreement(outcome), outcome.cautions[0].hint if outcome.cautions else ""
+    return "", ""
+
+
+_NEXT_CLICK = "Step to a frame in which the reflector stands still, and click its centre."
+
+
+def _agreement(calibration: Calibration) -> str:
+    used = [pair for pair in calibration.pairs if not pair.excluded]
+    agreeing = sum(pair.inlier for pair in used)
+    if agreeing == len(used):
+        return f"solved: all {len(used)} pairs agree"
+    return f"solved: {agreeing} of {len(used)} pairs agree"
+
+
+def _cautions(calibration: Calibration) -> tuple[CautionRow, ...]:
+    return tuple(CautionRow(caution.code, caution.message, caution.hint) for caution in calibration.cautions)

@@ -1,0 +1,122 @@
+"""The figures beside the picture, each with one sentence that explains it."""
+
+import numpy as np
+
+from app.view.digits import plain, with_sigma
+from app.view.drawn import Figure
+from app.view.mounting import mounting_of
+from app.view.rows import ellipse_of
+from calib_core.results import Calibration
+
+__all__ = ["metric_figures", "pose_figures", "residual_limit_px"]
+
+_HELD_OUT_RATIO = 1.5
+"""A held-out error this much above the fitted one says that the pose leans on single pairs."""
+
+
+def metric_figures(calibration: Calibration) -> tuple[Figure, ...]:
+    """Return the figures that say how well the pairs agree."""
+    metrics = calibration.metrics
+    used = sum(not pair.excluded for pair in calibration.pairs)
+    leaning = metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px
+    held_out_hint = (
+        "Mean distance when each pair is predicted from all the others: the error to expect at a new placement."
+    )
+    if leaning:
+        held_out_hint += " It is well above AED, so the pose leans on single pairs: add placements."
+    return (
+        Figure(
+            "aed",
+            "AED",
+            plain(metrics.aed_px),
+            "px",
+            "Mean distance between the clicks and their reprojections (paper: AED).",
+        ),
+        Figure(
+            "held_out_aed",
+            "held-out AED",
+            plain(metrics.held_out_aed_px),
+            "px",
+            held_out_hint,
+            "caution" if leaning else "plain",
+        ),
+        Figure(
+            "cdsd",
+            "CDSD",
+            plain(metrics.cdsd_px),
+            "px",
+            "Standard deviation of these distances, divided by N - 1 (paper: CDSD).",
+        ),
+        Figure(
+            "rms",
+            "RMS",
+            plain(metrics.rms_px),
+            "px",
+            "Root mean square of these distances: large ones weigh more than in AED.",
+        ),
+        Figure(
+            "inliers",
+            "pairs that agree",
+            f"{metrics.n} of {used}",
+            "",
+            "Pairs that took part in the final pose, of all that were not excluded by hand.",
+            "good" if metrics.n == used else "plain",
+        ),
+    )
+
+
+def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:
+    """Return where the camera sits and where it looks, seen from the radar, with one standard deviation."""
+    mounting = mounting_of(calibration)
+    figures = [
+        Figure(key, label, with_sigma(100 * float(value), 100 * float(sigma)), "cm", hint)
+        for (key, label, hint), value, sigma in zip(
+            _POSITION, mounting.position_m, mounting.position_sigma_m, strict=True
+        )
+    ]
+    degrees, sigmas = np.rad2deg(mounting.roll_pitch_yaw_rad), np.rad2deg(mounting.roll_pitch_yaw_sigma_rad)
+    figures += [
+        Figure(key, label, with_sigma(float(value), float(sigma)), "deg", hint)
+        for (key, label, hint), value, sigma in zip(_ANGLES, degrees, sigmas, strict=True)
+    ]
+    return tuple(figures)
+
+
+def residual_limit_px(calibration: Calibration) -> float | None:
+    """Return the length beyond which a residual deserves a look [px].
+
+    The paper's method: RANSAC's threshold. Otherwise the middle one of the 95 % ellipses' longer half axes.
+    """
+    if calibration.options.method == "paper":
+        return calibration.options.paper.ransac_threshold_px
+    ellipses = (ellipse_of(pair.expected_covariance_px2) for pair in calibration.pairs)
+    lengths = [ellipse.semi_major_px for ellipse in ellipses if ellipse is not None]
+    return float(np.median(lengths)) if lengths else None
+
+
+_POSITION = (
+    (
+        "camera_x",
+        "camera forward",
+        "Camera centre ahead of the radar, along the radar's x axis, ± one standard deviation.",
+    ),
+    (
+        "camera_y",
+        "camera left",
+        "Camera centre to the left of the radar, along the radar's y axis, ± one standard deviation.",
+    ),
+    ("camera_z", "camera up", "Camera centre above the radar, along the radar's z axis, ± one standard deviation."),
+)
+_ANGLES = (
+    (
+        "roll",
+        "roll",
+        "Camera tipped to its right, compared with looking straight along the radar, ± one standard deviation.",
+    ),
+    (
+        "pitch",
+        "pitch",
+        "Camera looking down, compared with looking straight along the radar, ± one standard deviation.",
+    ),
+    ("yaw", "yaw", "Camera looking left, compared with looking straight along the radar, ± one standard deviation."),
+)
