@@ -1,0 +1,68 @@
+"""Where the installed program finds its own files, and whether it is installed alone."""
+
+import importlib.metadata
+from pathlib import Path
+
+from calib_core.errors import CalibrationError
+
+__all__ = ["InstallationError", "check_installation", "installed_app_owners", "sample_folder", "static_folder", "version"]
+
+_DISTRIBUTION = "cocalib"
+_PACKAGE_FOLDER = Path(__file__).resolve().parent
+
+
+class InstallationError(CalibrationError):
+    """The program is not installed as it must be."""
+
+
+def static_folder() -> Path:
+    """Return the folder of the page's files: inside the installed package, else beside it in the checkout.
+
+    Raises:
+        InstallationError: it is in neither place.
+    """
+    return _folder("static")
+
+
+def sample_folder() -> Path:
+    """Return the folder of the sample recordings: inside the installed package, else beside it in the checkout.
+
+    Raises:
+        InstallationError: it is in neither place.
+    """
+    return _folder("sample_data")
+
+
+def version() -> str:
+    """Return the version of the installed program; "0+unknown" when it runs from a checkout that is not installed."""
+    try:
+        return importlib.metadata.version(_DISTRIBUTION)
+    except importlib.metadata.PackageNotFoundError:
+        return "0+unknown"
+
+
+def installed_app_owners() -> tuple[str, ...]:
+    """Return the names of the installed distributions that bring a top-level package called `app`."""
+    return tuple(sorted(set(importlib.metadata.packages_distributions().get("app", ()))))
+
+
+def check_installation() -> None:
+    """Refuse to start when another distribution has put its own `app` over ours.
+
+    Raises:
+        InstallationError: more than one distribution owns `app`.
+    """
+    others = [owner for owner in installed_app_owners() if owner != _DISTRIBUTION]
+    if others:
+        raise InstallationError(
+            f"another package, {' and '.join(others)}, is installed here with the same import name, app: "
+            f"one of them has overwritten the other; install {_DISTRIBUTION} into an environment of its own, "
+            f"with `uv tool install {_DISTRIBUTION}` or `pipx install {_DISTRIBUTION}`"
+        )
+
+
+def _folder(name: str) -> Path:
+    for folder in (_PACKAGE_FOLDER / name, _PACKAGE_FOLDER.parent / name):
+        if folder.is_dir():
+            return folder
+    raise InstallationError(f"the folder {name} is not in {_PACKAGE_FOLDER} nor beside it: install {_DISTRIBUTION} again")

@@ -1,0 +1,9 @@
+"""The one error of session files."""
+
+from calib_core.errors import CalibrationError
+
+__all__ = ["SessionFileError"]
+
+
+class SessionFileError(CalibrationError):
+    """A session that cannot be opened, read or written; what is on disk stays as it is."""

@@ -1,0 +1,263 @@
+"""The JSON form of each step: what the journal holds, and what the page sends for the same steps."""
+
+from functools import singledispatch
+from typing import Annotated, Any, TypeAlias
+
+import msgspec
+from msgspec import Meta
+
+from app.option_changes import options_from_tree
+from app.session import (
+    Cleared,
+    ClickExcluded,
+    ClickMoved,
+    ClickPlaced,
+    ClickRemoved,
+    ClicksImported,
+    OptionsChanged,
+    Redo,
+    Stamp,
+    Step,
+    Undo,
+)
+from calib_core.measurements import ReflectorClick
+
+__all__ = [
+    "ClearedForm",
+    "ClickExcludedForm",
+    "ClickForm",
+    "ClickId",
+    "ClickMovedForm",
+    "ClickPlacedForm",
+    "ClickRemovedForm",
+    "ClicksImportedForm",
+    "OptionsChangedForm",
+    "PixelForm",
+    "RedoForm",
+    "StampForm",
+    "StepForm",
+    "UndoForm",
+    "click_from_form",
+    "form_of_click",
+    "form_of_step",
+    "step_from_form",
+]
+
+ClickId: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
+PixelForm: TypeAlias = tuple[float, float]
+
+
+class StampForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A time."""
+
+    sec: Annotated[int, Meta(ge=0, le=9_223_372_035)]
+    nanosec: Annotated[int, Meta(ge=0, le=999_999_999)]
+
+    @classmethod
+    def of(cls, stamp: Stamp) -> "StampForm":
+        """Write a stamp."""
+        return cls(stamp.sec, stamp.nanosec)
+
+    @property
+    def stamp(self) -> Stamp:
+        """The time as the session knows it."""
+        return Stamp(self.sec, self.nanosec)
+
+
+class ClickForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A click, as in a clicks-1 file."""
+
+    id: ClickId
+    image_time: StampForm
+    pixel_px: PixelForm
+    sigma_px: float | None = None
+    excluded: bool = False
+
+
+class _Form(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
+    """A JSON object with a "type"."""
+
+
+class ClickPlacedForm(_Form, frozen=True, tag="click_placed"):
+    """A click in a frame."""
+
+    image_time: StampForm
+    pixel_px: PixelForm
+
+
+class ClickMovedForm(_Form, frozen=True, tag="click_moved"):
+    """A click dragged or nudged."""
+
+    id: ClickId
+    pixel_px: PixelForm
+
+
+class ClickRemovedForm(_Form, frozen=True, tag="click_removed"):
+    """A click deleted."""
+
+    id: ClickId
+
+
+class ClickExcludedForm(_Form, frozen=True, tag="click_excluded"):
+    """A click left out or taken in."""
+
+    id: ClickId
+    excluded: bool
+
+
+class OptionsChangedForm(_Form, frozen=True, tag="options_changed"):
+    """Options by group and name; the journal holds all of them, a page may send some."""
+
+    options: dict[str, Any]
+
+
+class ClearedForm(_Form, frozen=True, tag="cleared"):
+    """All clicks thrown away."""
+
+
+class ClicksImportedForm(_Form, frozen=True, tag="clicks_imported"):
+    """Clicks from a file."""
+
+    clicks: tuple[ClickForm, ...]
+
+
+class UndoForm(_Form, frozen=True, tag="undo"):
+    """The last change taken back."""
+
+
+class RedoForm(_Form, frozen=True, tag="redo"):
+    """The change made again that was taken back last."""
+
+
+StepForm: TypeAlias = (
+    ClickPlacedForm
+    | ClickMovedForm
+    | ClickRemovedForm
+    | ClickExcludedForm
+    | OptionsChangedForm
+    | ClearedForm
+    | ClicksImportedForm
+    | UndoForm
+    | RedoForm
+)
+
+
+def form_of_click(click: ReflectorClick) -> ClickForm:
+    """Write a click."""
+    stamp = StampForm.of(Stamp.of(click.image_time))
+    return ClickForm(click.id, stamp, (click.u_px, click.v_px), click.sigma_px, click.excluded)
+
+
+def click_from_form(form: ClickForm) -> ReflectorClick:
+    """Read a click."""
+    return ReflectorClick(form.image_time.stamp.time, form.id, *form.pixel_px, form.sigma_px, form.excluded)
+
+
+@singledispatch
+def form_of_step(step: Step) -> StepForm:
+    """Write a step; answers of the solver and half-finished option edits have no form.
+
+    Raises:
+        TypeError: the step has no form.
+    """
+    raise TypeError(f"{type(step).__name__} is not journalled")
+
+
+@singledispatch
+def step_from_form(form: StepForm) -> Step:
+    """Read a step.
+
+    Raises:
+        OptionError: an option is unknown, of the wrong type or out of range.
+    """
+    raise TypeError(f"not the form of a step: {form!r}")
+
+
+@form_of_step.register
+def _form_of_placed(step: ClickPlaced) -> StepForm:
+    return ClickPlacedForm(StampForm.of(Stamp.of(step.image_time)), (step.u_px, step.v_px))
+
+
+@form_of_step.register
+def _form_of_moved(step: ClickMoved) -> StepForm:
+    return ClickMovedForm(step.id, (step.u_px, step.v_px))
+
+
+@form_of_step.register
+def _form_of_removed(step: ClickRemoved) -> StepForm:
+    return ClickRemovedForm(step.id)
+
+
+@form_of_step.register
+def _form_of_excluded(step: ClickExcluded) -> StepForm:
+    return ClickExcludedForm(step.id, step.excluded)
+
+
+@form_of_step.register
+def _form_of_options(step: OptionsChanged) -> StepForm:
+    return OptionsChangedForm(msgspec.to_builtins(step.options))
+
+
+@form_of_step.register
+def _form_of_cleared(step: Cleared) -> StepForm:
+    return ClearedForm()
+
+
+@form_of_step.register
+def _form_of_imported(step: ClicksImported) -> StepForm:
+    return ClicksImportedForm(tuple(form_of_click(click) for click in step.clicks))
+
+
+@form_of_step.register
+def _form_of_undo(step: Undo) -> StepForm:
+    return UndoForm()
+
+
+@form_of_step.register
+def _form_of_redo(step: Redo) -> StepForm:
+    return RedoForm()
+
+
+@step_from_form.register
+def _placed(form: ClickPlacedForm) -> Step:
+    return ClickPlaced(form.image_time.stamp.time, *form.pixel_px)
+
+
+@step_from_form.register
+def _moved(form: ClickMovedForm) -> Step:
+    return ClickMoved(form.id, *form.pixel_px)
+
+
+@step_from_form.register
+def _removed(form: ClickRemovedForm) -> Step:
+    return ClickRemoved(form.id)
+
+
+@step_from_form.register
+def _excluded(form: ClickExcludedForm) -> Step:
+    return ClickExcluded(form.id, form.excluded)
+
+
+@step_from_form.register
+def _options(form: OptionsChangedForm) -> Step:
+    return OptionsChanged(options_from_tree(form.options))
+
+
+@step_from_form.register
+def _cleared(form: ClearedForm) -> Step:
+    return Cleared()
+
+
+@step_from_form.register
+def _imported(form: ClicksImportedForm) -> Step:
+    return ClicksImported(tuple(click_from_form(click) for click in form.clicks))
+
+
+@step_from_form.register
+def _undo(form: UndoForm) -> Step:
+    return Undo()
+
+
+@step_from_form.register
+def _redo(form: RedoForm) -> Step:
+    return Redo()
