@@ -1,5 +1,6 @@
 """Truth to test with: scenes, sensors and recordings whose camera_from_radar is known."""
 
+from calib_core.synthetic.options import Clutter, Container, RadarMessage, RadarName, SceneName, SimulationOptions
 from calib_core.synthetic.pairs import (
     AISLE,
     FIELD,
@@ -10,19 +11,32 @@ from calib_core.synthetic.pairs import (
     SimulatedPairs,
     simulate_pairs,
 )
+from calib_core.synthetic.radar_profiles import RADAR_PROFILES, RadarProfile
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
+from calib_core.synthetic.scans import SimulatedPlacement, SimulatedScans, simulate_scans
 
 __all__ = [
     "AISLE",
     "FIELD",
     "NOISE_PROFILES",
+    "RADAR_PROFILES",
+    "Clutter",
+    "Container",
     "NoiseProfile",
     "OutlierMix",
     "PairsLayout",
+    "RadarMessage",
+    "RadarName",
+    "RadarProfile",
     "Rig",
     "RigOptions",
+    "SceneName",
     "SimulatedPairs",
+    "SimulatedPlacement",
+    "SimulatedScans",
+    "SimulationOptions",
     "random_rig",
     "simulate_pairs",
+    "simulate_scans",
     "typical_camera",
 ]

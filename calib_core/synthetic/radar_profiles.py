@@ -1,0 +1,96 @@
+"""What two kinds of radar can tell apart, and how wrong they are.
+
+The levels are assumptions in line with vendors' figures and with an array simulation; no real radar was measured.
+"""
+
+from dataclasses import dataclass
+
+from calib_core.synthetic.options import RadarName
+
+__all__ = ["RADAR_PROFILES", "RadarProfile"]
+
+
+@dataclass(frozen=True, slots=True)
+class RadarProfile:
+    """A radar, in the coordinates it measures in: range, sines of the angles, Doppler."""
+
+    range_bin_m: float
+    """Width of a range bin [m]; positions lie on bins."""
+    angle_bins: int
+    """Bins over the sine of the azimuth from -1 to 1 (64 gives a lattice of 1/32); 0 interpolates."""
+    doppler_bin_mps: float
+    """Width of a Doppler bin [m/s]; whatever is slower than half of it has Doppler exactly 0."""
+    doppler_bins: int
+    """Bins from the fastest approaching to the fastest receding; beyond, speeds wrap round."""
+    range_sigma_m: float
+    """Of one scan's range, before binning [m]."""
+    azimuth_sigma: float
+    """Of one scan's sine of azimuth."""
+    elevation_sigma: float
+    """Of one scan's sine of elevation."""
+    azimuth_bias_sigma: float
+    """Of the part of the azimuth error that stays as long as the object does (multipath, clutter beneath)."""
+    elevation_bias_sigma: float
+    """The same of the elevation."""
+    calibration_azimuth: float
+    """Amplitude of the smooth azimuth error over the field of view."""
+    calibration_elevation: float
+    """The same of the elevation."""
+    snr_at_10_m_db: float
+    """Of a 0 dBsm object at 10 m on the axis [dB]."""
+    threshold_db: float
+    """Least SNR of a return [dB]."""
+    beam_azimuth_deg: float
+    """Half-power half-width of the antenna in azimuth [deg], two-way."""
+    beam_elevation_deg: float
+    """The same in elevation [deg]."""
+    resolution_azimuth: float
+    """Two objects in one range bin closer than this in sine of azimuth show as one return."""
+    false_alarms: float
+    """Mean number of returns from nothing per scan."""
+    latency_s: float
+    """From the measurement to its stamp [s]."""
+
+
+RADAR_PROFILES: dict[RadarName, RadarProfile] = {
+    "awr1843": RadarProfile(
+        range_bin_m=0.0436,
+        angle_bins=64,
+        doppler_bin_mps=0.1256,
+        doppler_bins=32,
+        range_sigma_m=0.012,
+        azimuth_sigma=0.0035,
+        elevation_sigma=0.010,
+        azimuth_bias_sigma=0.0025,
+        elevation_bias_sigma=0.012,
+        calibration_azimuth=0.0025,
+        calibration_elevation=0.004,
+        snr_at_10_m_db=16.0,
+        threshold_db=11.0,
+        beam_azimuth_deg=38.0,
+        beam_elevation_deg=18.0,
+        resolution_azimuth=0.25,
+        false_alarms=0.12,
+        latency_s=0.018,
+    ),
+    "imaging": RadarProfile(
+        range_bin_m=0.03,
+        angle_bins=0,
+        doppler_bin_mps=0.05,
+        doppler_bins=256,
+        range_sigma_m=0.015,
+        azimuth_sigma=0.0012,
+        elevation_sigma=0.003,
+        azimuth_bias_sigma=0.0012,
+        elevation_bias_sigma=0.003,
+        calibration_azimuth=0.0008,
+        calibration_elevation=0.0015,
+        snr_at_10_m_db=22.0,
+        threshold_db=10.0,
+        beam_azimuth_deg=50.0,
+        beam_elevation_deg=22.0,
+        resolution_azimuth=0.02,
+        false_alarms=0.5,
+        latency_s=0.030,
+    ),
+}

@@ -1,0 +1,178 @@
+"""From objects to radar returns: the radar equation, bins, biases that stay, misses and ghosts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Flags, Points3, Values, frozen_array
+from calib_core.measurements import RadarScan, TimeNs
+from calib_core.radar import direction_cosines
+from calib_core.synthetic.radar_profiles import RadarProfile
+
+__all__ = ["Targets", "measure"]
+
+_MISSED = 0.02
+_SIDE_LOBE_SHARE = 0.12
+_SIDE_LOBE_DB = 11.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Targets:
+    """What is in front of the radar at one time.
+
+    Attributes:
+        points_radar_m: (n, 3) true positions.
+        velocity_mps: (n,) true radial speeds, positive moving away.
+        rcs_dbsm: (n,) radar cross-sections.
+        fading_db: (n,) standard deviation of the echo's level from scan to scan.
+        bias: (n, 3) errors that stay as long as the object does: range [m], sines of azimuth and elevation.
+        hidden: (n,) somebody stands in the way.
+    """
+
+    points_radar_m: Points3
+    velocity_mps: Values
+    rcs_dbsm: Values
+    fading_db: Values
+    bias: Points3
+    hidden: Flags
+
+    def __post_init__(self) -> None:
+        n = len(self.points_radar_m)
+        for name, shape in (
+            ("points_radar_m", (n, 3)),
+            ("velocity_mps", (n,)),
+            ("rcs_dbsm", (n,)),
+            ("fading_db", (n,)),
+            ("bias", (n, 3)),
+        ):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        object.__setattr__(self, "hidden", frozen_array(self.hidden, (n,), dtype=np.bool_))
+
+    def __len__(self) -> int:
+        return len(self.points_radar_m)
+
+
+def measure(
+    rng: np.random.Generator,
+    targets: Targets,
+    *,
+    profile: RadarProfile,
+    time: TimeNs,
+    angle_bins: bool = True,
+    calibration_phase: float = 0.0,
+) -> RadarScan:
+    """Measure everything once.
+
+    Positions come out as the sensor sends them: on bins, in single precision. The stock demo computes
+    y = -R Wx, z = R Wz, x = sqrt(R^2 - y^2 - z^2) with Wx on its lattice.
+
+    Args:
+        rng: the only source of chance.
+        targets: what there is.
+        profile: the radar.
+        time: the stamp.
+        angle_bins: whether azimuths lie on the profile's lattice.
+        calibration_phase: where the smooth angle error has its zero; belongs to one radar.
+    """
+    cosines, velocity, snr = _echoes(rng, targets, profile, calibration_phase)
+    cosines, velocity, snr = _with_side_lobes(rng, cosines, velocity, snr, profile)
+    cosines, velocity, snr = _with_false_alarms(rng, cosines, velocity, snr, profile)
+    cosines, velocity = _on_bins(cosines, velocity, profile, angle_bins)
+    kept = _resolved(cosines, velocity, snr, profile)
+    kept = kept[np.argsort(cosines[kept, 0], kind="stable")]
+    r, u, w = cosines[kept].T
+    x = r * np.sqrt(np.maximum(0.0, 1.0 - u * u - w * w))
+    points = np.stack([x, r * u, r * w], axis=1).astype(np.float32).astype(np.float64)
+    n = len(points)
+    return RadarScan(
+        time,
+        points,
+        velocity[kept].astype(np.float32).astype(np.float64),
+        (np.round(10.0 * snr[kept]) / 10.0).astype(np.float32).astype(np.float64),
+        np.full((n, 3), np.nan),
+    )
+
+
+_Echoes = tuple[Points3, Values, Values]
+
+
+def _echoes(rng: np.random.Generator, targets: Targets, profile: RadarProfile, phase: float) -> _Echoes:
+    """Return (r, u, w), speed and SNR of the targets that are detected."""
+    n = len(targets)
+    true = direction_cosines(targets.points_radar_m)
+    azimuth = np.arcsin(np.clip(true[:, 1], -1.0, 1.0))
+    elevation = np.arcsin(np.clip(true[:, 2], -1.0, 1.0))
+    gain_db = -3.0 * (azimuth / np.deg2rad(profile.beam_azimuth_deg)) ** 2
+    gain_db -= 3.0 * (elevation / np.deg2rad(profile.beam_elevation_deg)) ** 2
+    path_db = -40.0 * np.log10(np.maximum(true[:, 0], 0.3) / 10.0)
+    snr = profile.snr_at_10_m_db + targets.rcs_dbsm + path_db + gain_db
+    snr = snr + targets.fading_db * rng.standard_normal(n)
+    noise = rng.standard_normal((n, 3)) * [profile.range_sigma_m, profile.azimuth_sigma, profile.elevation_sigma]
+    weak = np.sqrt(1.0 + 10.0 ** ((14.0 - np.minimum(snr, 60.0)) / 10.0))  # thermal noise shows near the threshold
+    cosines = true + targets.bias + noise * weak[:, None]
+    cosines[:, 1] += profile.calibration_azimuth * np.sin(5.0 * true[:, 1] + phase)
+    cosines[:, 2] += profile.calibration_elevation * np.cos(4.0 * true[:, 1] + 6.0 * true[:, 2] + phase)
+    missed = rng.uniform(size=n) < _MISSED
+    seen = (snr > profile.threshold_db) & ~missed & ~targets.hidden & (targets.points_radar_m[:, 0] > 0.1)
+    return cosines[seen], targets.velocity_mps[seen], snr[seen]
+
+
+def _with_side_lobes(
+    rng: np.random.Generator, cosines: Points3, velocity: Values, snr: Values, profile: RadarProfile
+) -> _Echoes:
+    """Let strong echoes now and then spill into a neighbouring range bin."""
+    spill = (snr > profile.threshold_db + _SIDE_LOBE_DB + 3.0) & (rng.uniform(size=len(snr)) < _SIDE_LOBE_SHARE)
+    extra = cosines[spill].copy()
+    extra[:, 0] += rng.choice([-2.0, 2.0], size=len(extra)) * profile.range_bin_m
+    extra[:, 2] += 2.0 * profile.elevation_sigma * rng.standard_normal(len(extra))
+    return (
+        np.concatenate([cosines, extra]),
+        np.concatenate([velocity, velocity[spill]]),
+        np.concatenate([snr, snr[spill] - _SIDE_LOBE_DB]),
+    )
+
+
+def _with_false_alarms(
+    rng: np.random.Generator, cosines: Points3, velocity: Values, snr: Values, profile: RadarProfile
+) -> _Echoes:
+    """Add returns from nothing."""
+    n = int(rng.poisson(profile.false_alarms))
+    fastest = 0.5 * profile.doppler_bins * profile.doppler_bin_mps
+    anywhere = np.stack(
+        [rng.uniform(0.6, 28.0, n), rng.uniform(-0.8, 0.8, n), rng.uniform(-0.3, 0.3, n)], axis=1
+    ).reshape(-1, 3)
+    return (
+        np.concatenate([cosines, anywhere]),
+        np.concatenate([velocity, rng.uniform(-fastest, fastest, n)]),
+        np.concatenate([snr, profile.threshold_db + rng.exponential(1.5, n)]),
+    )
+
+
+def _on_bins(cosines: Points3, velocity: Values, profile: RadarProfile, angle_bins: bool) -> tuple[Points3, Values]:
+    """Put range, azimuth and speed on the radar's bins."""
+    cosines = cosines.copy()
+    cosines[:, 0] = np.round(cosines[:, 0] / profile.range_bin_m) * profile.range_bin_m
+    if angle_bins and profile.angle_bins:
+        half = profile.angle_bins / 2.0
+        cosines[:, 1] = np.clip(np.round(cosines[:, 1] * half), -half, half - 1.0) / half
+    cosines[:, 2] = np.clip(cosines[:, 2], -0.95, 0.95)
+    half_bins = profile.doppler_bins // 2
+    index = np.round(velocity / profile.doppler_bin_mps)
+    index = (index + half_bins) % profile.doppler_bins - half_bins
+    return cosines, index * profile.doppler_bin_mps
+
+
+def _resolved(cosines: Points3, velocity: Values, snr: Values, profile: RadarProfile) -> np.ndarray:
+    """Return the rows that show as returns of their own: of close ones only the strongest."""
+    kept: list[int] = []
+    for i in np.argsort(-snr, kind="stable").tolist():
+        near = [
+            j
+            for j in kept
+            if abs(cosines[i, 0] - cosines[j, 0]) < 1.5 * profile.range_bin_m
+            and abs(cosines[i, 1] - cosines[j, 1]) < profile.resolution_azimuth
+            and abs(velocity[i] - velocity[j]) < 0.5 * profile.doppler_bin_mps
+        ]
+        if not near and cosines[i, 0] > 0.0 and cosines[i, 1] ** 2 + cosines[i, 2] ** 2 < 1.0:
+            kept.append(i)
+    return np.array(kept, dtype=np.int64)

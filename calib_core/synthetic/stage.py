@@ -1,0 +1,149 @@
+"""What is decided before a sensor measures: the place, the sensors, the choreography, the clocks."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib_core.arrays import Points3, Vector3
+from calib_core.measurements import NS_PER_S
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.pairs import draw_positions
+from calib_core.synthetic.radar_profiles import RADAR_PROFILES, RadarProfile
+from calib_core.synthetic.rig import Rig, random_rig, typical_camera
+from calib_core.synthetic.scenes import Scatterer, Scene, scene_named
+from calib_core.synthetic.story import Story, tell_story
+from calib_core.synthetic.timeline import SensorTimes, draw_times
+
+__all__ = ["Stage", "child_rng", "set_stage"]
+
+_GHOST_SHARE = 0.25
+_TRIPOD_M = 1.4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stage:
+    """Everything that is decided before a sensor measures.
+
+    Attributes:
+        options: what was asked for.
+        scene: the place.
+        rig: the sensors.
+        story: who is where when.
+        frame_times: of the camera.
+        scan_times: of the radar.
+        clutter: static things the radar sees, in the world.
+        clutter_bias: (k, 3) the error of each that stays: range [m], sines of azimuth and elevation.
+        reflector_bias: (n, 3) the error that stays during each placement: range [m], sines of azimuth and elevation.
+        ghosts: for each placement the static reflection that comes and goes with it, or None.
+    """
+
+    options: SimulationOptions
+    scene: Scene
+    rig: Rig
+    story: Story
+    frame_times: SensorTimes
+    scan_times: SensorTimes
+    clutter: tuple[Scatterer, ...]
+    clutter_bias: Points3
+    reflector_bias: Points3
+    ghosts: tuple[Scatterer | None, ...]
+
+    @property
+    def profile(self) -> RadarProfile:
+        """The radar's profile."""
+        return RADAR_PROFILES[self.options.radar]
+
+
+def child_rng(options: SimulationOptions, number: int) -> np.random.Generator:
+    """Return a generator of its own for each concern, so that changing one leaves the draws of the others alone."""
+    return np.random.default_rng([options.seed, number])
+
+
+def set_stage(options: SimulationOptions) -> Stage:
+    """Decide where everything is and when, from the options alone."""
+    scene = scene_named(options.scene)
+    camera = typical_camera(options.camera_model, width_px=options.width_px, height_px=options.height_px)
+    rig = random_rig(child_rng(options, 0), camera=camera, options=options.rig)
+    positions = _positions(child_rng(options, 1), scene, rig, options)
+    story = tell_story(child_rng(options, 2), positions_m=positions, dwell_s=options.dwell_s, narrow=scene.narrow)
+    profile = RADAR_PROFILES[options.radar]
+    start_ns = options.start_s * NS_PER_S
+    frame_times = draw_times(
+        child_rng(options, 3),
+        duration_s=story.duration_s,
+        rate_hz=options.camera_rate_hz,
+        jitter_s=options.stamp_jitter_s,
+        dropped_share=options.dropped_share,
+        latency_s=0.0,
+        transfer_s=0.022,
+        start_ns=start_ns,
+    )
+    scan_times = draw_times(
+        child_rng(options, 4),
+        duration_s=story.duration_s,
+        rate_hz=options.radar_rate_hz,
+        jitter_s=options.stamp_jitter_s,
+        dropped_share=options.dropped_share,
+        latency_s=profile.latency_s + options.clock_offset_s,
+        transfer_s=0.003,
+        start_ns=start_ns,
+    )
+    rng = child_rng(options, 5)
+    bias_sigma = [0.004, profile.azimuth_bias_sigma, profile.elevation_bias_sigma]
+    bias = rng.standard_normal((options.placements, 3)) * bias_sigma
+    ghosts = tuple(_ghost(rng, resting.position_m) for resting in story.restings)
+    clutter = _clutter(child_rng(options, 6), scene, options)
+    clutter_bias = child_rng(options, 7).standard_normal((len(clutter), 3)) * bias_sigma
+    return Stage(options, scene, rig, story, frame_times, scan_times, clutter, clutter_bias, bias, ghosts)
+
+
+def _positions(rng: np.random.Generator, scene: Scene, rig: Rig, options: SimulationOptions) -> Points3:
+    """Draw apex positions in the world, clear of what stands there."""
+    layout = scene.layout
+    if options.heights:
+        layout = replace(layout, max_height_m=_TRIPOD_M)
+    world_from_radar = rig.radar_from_world.inverse()
+    found: list[np.ndarray] = []
+    for _ in range(400):
+        batch = world_from_radar @ draw_positions(rng, count=min(options.placements, 8), rig=rig, layout=layout)
+        for position in batch:
+            apart = all(np.linalg.norm(position[:2] - other[:2]) >= layout.separation_m for other in found)
+            if apart and scene.free(position[:2], 0.7) and len(found) < options.placements:
+                found.append(position)
+        if len(found) == options.placements:
+            return np.array(found)
+    raise ValueError(f"only {len(found)} of {options.placements} placements fit in the {scene.name}")
+
+
+def _clutter(rng: np.random.Generator, scene: Scene, options: SimulationOptions) -> tuple[Scatterer, ...]:
+    """Choose the static things the radar sees; heavy clutter adds strong ones that stand among the placements."""
+    if options.clutter == "none":
+        return ()
+    if options.clutter == "scene":
+        return scene.scatterers
+    reach = min(scene.layout.max_lateral_m + 0.4, 7.0)
+    hidden = tuple(
+        Scatterer(
+            float(rng.uniform(3.0, scene.layout.max_range_m)),
+            float(rng.uniform(-reach, reach)),
+            float(rng.uniform(0.05, 1.0)),
+            float(rng.uniform(6.0, 18.0)),
+        )
+        for _ in range(8)
+    )
+    return scene.scatterers + hidden
+
+
+def _ghost(rng: np.random.Generator, position_m: Vector3) -> Scatterer | None:
+    """Draw the static reflection that comes and goes with a placement: farther away, a little aside, weaker."""
+    share, extra_m, aside_rad, rcs_dbsm = rng.uniform([0.0, 0.8, -0.08, -4.0], [1.0, 3.5, 0.08, 3.0])
+    if share > _GHOST_SHARE:
+        return None
+    range_m = float(np.linalg.norm(position_m[:2])) + extra_m
+    azimuth_rad = float(np.arctan2(position_m[1], position_m[0])) + aside_rad
+    return Scatterer(
+        float(range_m * np.cos(azimuth_rad)),
+        float(range_m * np.sin(azimuth_rad)),
+        float(-position_m[2]),
+        float(rcs_dbsm),
+    )

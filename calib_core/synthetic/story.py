@@ -1,0 +1,213 @@
+"""What happens: a person carries the reflector from placement to placement and steps away each time.
+
+Times here are seconds from the start of the recording.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from calib_core.arrays import Vector2, Vector3
+from calib_core.synthetic.person import PersonState, hand_position
+
+__all__ = ["Moment", "Resting", "Story", "tell_story"]
+
+_SPEED_MPS = 1.25
+_PUT_DOWN_S = 0.8
+_STEP_AWAY_S = 1.3
+_LEAD_IN_S = 0.6
+_BEHIND_M = 0.52
+"""How far behind the reflector, seen from the radar, the person stands to put it down."""
+
+_Action = Literal["walk", "stand", "put", "pick"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Resting:
+    """One placement: the reflector rests at a position from start to end.
+
+    Attributes:
+        index: its number, from 0.
+        start_s: when it is released.
+        end_s: when it is picked up again.
+        position_m: (3,) the apex in the world.
+        facing_rad: where the reflector looks, as a heading in the world.
+    """
+
+    index: int
+    start_s: float
+    end_s: float
+    position_m: Vector3
+    facing_rad: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moment:
+    """Where everybody is at one time. `resting` is None while the reflector is carried."""
+
+    person: PersonState
+    reflector_m: Vector3
+    facing_rad: float
+    resting: Resting | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Leg:
+    start_s: float
+    end_s: float
+    start_m: Vector2
+    end_m: Vector2
+    heading_rad: float
+    action: _Action
+    carrying: bool
+    walked_m: float
+    placement: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Story:
+    """The whole recording as one piece of choreography."""
+
+    restings: tuple[Resting, ...]
+    duration_s: float
+    _legs: tuple[_Leg, ...]
+
+    def at(self, time_s: float) -> Moment:
+        """Return where everybody is."""
+        ends = [leg.end_s for leg in self._legs]
+        leg = self._legs[min(int(np.searchsorted(ends, time_s, side="right")), len(self._legs) - 1)]
+        person = _person(leg, time_s)
+        resting = self.restings[leg.placement] if leg.placement >= 0 else None
+        if resting is None or leg.carrying:
+            return Moment(person, hand_position(person) + np.array([0.0, 0.0, 0.03]), leg.heading_rad + np.pi, None)
+        if leg.action in ("put", "pick"):
+            share = _eased((time_s - leg.start_s) / (leg.end_s - leg.start_s))
+            down = share if leg.action == "put" else 1.0 - share
+            held = hand_position(_upright(person)) + np.array([0.0, 0.0, 0.03])
+            return Moment(person, (1.0 - down) * held + down * resting.position_m, resting.facing_rad, None)
+        return Moment(person, resting.position_m, resting.facing_rad, resting)
+
+
+def _upright(person: PersonState) -> PersonState:
+    return PersonState(person.x_m, person.y_m, person.heading_rad, carrying=True)
+
+
+def _eased(share: float) -> float:
+    s = min(1.0, max(0.0, share))
+    return s * s * s * (s * (6.0 * s - 15.0) + 10.0)
+
+
+def _person(leg: _Leg, time_s: float) -> PersonState:
+    share = (time_s - leg.start_s) / max(leg.end_s - leg.start_s, 1e-9)
+    eased = _eased(share)
+    place = leg.start_m + eased * (leg.end_m - leg.start_m)
+    length_m = float(np.linalg.norm(leg.end_m - leg.start_m))
+    pace = min(1.0, 4.0 * eased * (1.0 - eased) * 1.6) if leg.action == "walk" else 0.0
+    crouch = {"put": eased, "pick": 1.0 - eased}.get(leg.action, 0.0)
+    if leg.action == "put" or leg.action == "pick":
+        down = share if leg.action == "put" else 1.0 - share
+        crouch = _eased(min(1.0, 1.25 * down))
+    if leg.action == "stand":  # nobody stands like a post: sway by a centimetre
+        place = place + 0.008 * np.array([np.sin(1.9 * time_s), np.cos(1.3 * time_s)])
+    return PersonState(
+        float(place[0]), float(place[1]), leg.heading_rad, leg.walked_m + eased * length_m, pace, crouch, leg.carrying
+    )
+
+
+class _Script:
+    """Collects legs one after the other."""
+
+    def __init__(self, place_m: Vector2) -> None:
+        self.legs: list[_Leg] = []
+        self.time_s = 0.0
+        self.walked_m = 0.0
+        self.place_m = place_m
+        self.heading_rad = 0.0
+
+    def walk(self, to_m: Vector2, *, carrying: bool, placement: int = -1, duration_s: float | None = None) -> None:
+        step = to_m - self.place_m
+        length_m = float(np.linalg.norm(step))
+        if length_m > 0.05:
+            self.heading_rad = float(np.arctan2(step[1], step[0]))
+        self._add("walk", to_m, duration_s or 0.5 + length_m / _SPEED_MPS, carrying, placement)
+        self.walked_m += length_m
+
+    def stay(self, action: _Action, duration_s: float, *, carrying: bool, placement: int, facing_m: Vector2) -> None:
+        look = facing_m - self.place_m
+        self.heading_rad = float(np.arctan2(look[1], look[0]))
+        self._add(action, self.place_m, duration_s, carrying, placement)
+
+    def _add(self, action: _Action, to_m: Vector2, duration_s: float, carrying: bool, placement: int) -> None:
+        end_s = self.time_s + duration_s
+        self.legs.append(
+            _Leg(
+                self.time_s,
+                end_s,
+                self.place_m,
+                to_m,
+                self.heading_rad,
+                action,
+                carrying,
+                self.walked_m,
+                placement,
+            )
+        )
+        self.time_s, self.place_m = end_s, to_m
+
+
+def _in_order(positions: np.ndarray, start_m: Vector2) -> list[int]:
+    """Return a short walk through all positions: always on to the nearest one left."""
+    left, here, order = set(range(len(positions))), start_m, []
+    while left:
+        nearest = min(left, key=lambda i: (float(np.linalg.norm(positions[i, :2] - here)), i))
+        order.append(nearest)
+        here = positions[nearest, :2]
+        left.remove(nearest)
+    return order
+
+
+def tell_story(
+    rng: np.random.Generator,
+    *,
+    positions_m: np.ndarray,
+    dwell_s: float,
+    narrow: bool = False,
+    start_m: tuple[float, float] = (2.6, -1.2),
+) -> Story:
+    """Let a person carry the reflector to each position, nearest next.
+
+    Args:
+        rng: the only source of chance.
+        positions_m: (n, 3) apex positions in the world, in any order.
+        dwell_s: from releasing the reflector to picking it up.
+        narrow: the person steps back, not aside.
+        start_m: where the person comes from.
+    """
+    script = _Script(np.array(start_m))
+    restings: list[Resting] = []
+    for index, chosen in enumerate(_in_order(positions_m, script.place_m)):
+        position = positions_m[chosen]
+        away = position[:2] / np.linalg.norm(position[:2])
+        behind = position[:2] + _BEHIND_M * away
+        script.walk(behind, carrying=True)
+        script.stay("put", _PUT_DOWN_S, carrying=False, placement=index, facing_m=position[:2])
+        start_s = script.time_s
+        script.walk(_aside(rng, behind, away, narrow), carrying=False, placement=index, duration_s=_STEP_AWAY_S)
+        wait_s = dwell_s - 2.0 * _STEP_AWAY_S
+        script.stay("stand", wait_s, carrying=False, placement=index, facing_m=position[:2])
+        script.walk(behind, carrying=False, placement=index, duration_s=_STEP_AWAY_S)
+        facing_rad = float(np.arctan2(-away[1], -away[0]) + np.deg2rad(6.0) * rng.standard_normal())
+        restings.append(Resting(index, start_s, script.time_s, position, facing_rad))
+        script.stay("pick", _PUT_DOWN_S, carrying=False, placement=index, facing_m=position[:2])
+    script.walk(script.place_m + np.array([-1.0, 1.5 if script.place_m[1] < 0 else -1.5]), carrying=True)
+    return Story(tuple(restings), script.time_s + _LEAD_IN_S, tuple(script.legs))
+
+
+def _aside(rng: np.random.Generator, behind: Vector2, away: Vector2, narrow: bool) -> Vector2:
+    """Choose where the person waits: to one side and a little behind, or in a narrow place straight behind."""
+    if narrow:
+        return behind + rng.uniform(1.3, 1.7) * away + np.array([0.0, rng.uniform(-0.3, 0.3)])
+    side = 1.0 if rng.uniform() < 0.5 else -1.0
+    across = np.array([-away[1], away[0]]) * side
+    return behind + rng.uniform(1.2, 1.7) * across + rng.uniform(0.0, 0.5) * away
