@@ -1,0 +1,214 @@
+"""The whole of it: clicks and radar returns go in, camera_from_radar comes out."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.consensus import associate, find_consensus
+from calib_core.evidence import Evidence, evidence_of
+from calib_core.initial_pose import starting_poses
+from calib_core.measurements import Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
+from calib_core.metrics import distances, metrics_of
+from calib_core.options import CalibrationOptions
+from calib_core.pairing import pair_clicks
+from calib_core.radar import cartesian_from_polar
+from calib_core.refining import Refined, refine
+from calib_core.results import Calibration, Metrics, PairResult
+from calib_core.uncertainty import LeftOut, leave_one_out, pose_uncertainty
+
+__all__ = ["MIN_PAIRS", "calibrate", "calibrate_pairs"]
+
+MIN_PAIRS = 4
+"""Three pairs leave up to four poses; the fourth decides."""
+
+_INLIER_PROBABILITY = 0.5
+_STARTS_MEASURED = 3
+_STARTS_FREE = 6
+_PAIRS_TO_START = 150  # more do not make a start better
+_LIKELY = 6.0  # starts whose cost is within this of the best are refined too
+
+
+def calibrate(
+    clicks: Sequence[ReflectorClick], scans: RadarScans, camera: Camera, options: CalibrationOptions
+) -> Calibration | Unsolvable:
+    """Calibrate from clicks and radar scans.
+
+    Args:
+        clicks: in any order; excluded ones are paired and shown, but not used.
+        scans: at least those around the clicks.
+        camera: the intrinsics.
+        options: method "paper" is Algorithm 1 as printed.
+    """
+    if options.method == "paper":
+        from calib_core.paper import calibrate_as_printed
+
+        return calibrate_as_printed(clicks, scans, camera, options)
+    pairing = pair_clicks(clicks, scans, options)
+    excluded = frozenset(click.id for click in clicks if click.excluded)
+    return _solved(pairing.pairs, pairing.unpaired, excluded, camera, options)
+
+
+def calibrate_pairs(
+    pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, excluded: frozenset[str] = frozenset()
+) -> Calibration | Unsolvable:
+    """Calibrate from pairs that exist already, such as those of a pairs file.
+
+    Args:
+        pairs: in any order; results come in order of image time, pairs without a time in the order given.
+        camera: the intrinsics.
+        options: method "paper" is Algorithm 1 as printed, from its RANSAC on.
+        excluded: ids of pairs that are shown, but not used.
+    """
+    if options.method == "paper":
+        from calib_core.paper import solve_pairs_as_printed
+
+        return solve_pairs_as_printed(pairs, camera, options, excluded)
+    shown = sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))
+    return _solved(tuple(shown), (), excluded, camera, options)
+
+
+def _solved(
+    shown: tuple[Pair, ...],
+    unpaired: tuple[Unpaired, ...],
+    excluded: frozenset[str],
+    camera: Camera,
+    options: CalibrationOptions,
+) -> Calibration | Unsolvable:
+    used = sorted((pair for pair in shown if pair.id not in excluded), key=_canonical)
+    if len(used) < MIN_PAIRS:
+        return _too_few(len(used), len(excluded), len(unpaired))
+    evidence = evidence_of(used, camera, options)
+    refined = _best_fit(evidence, options)
+    if isinstance(refined, Unsolvable):
+        return refined
+    uncertainty = pose_uncertainty(refined)
+    left_out = leave_one_out(refined, uncertainty.information)
+    results = _used_results(used, refined, left_out) | _excluded_results(shown, excluded, refined, camera, options)
+    ordered = tuple(results[pair.id] for pair in shown)
+    return Calibration(
+        camera_from_radar=refined.camera_from_radar,
+        covariance=uncertainty.covariance,
+        camera=camera,
+        metrics=_metrics(evidence, refined, left_out),
+        pairs=ordered,
+        unpaired=unpaired,
+        cautions=(),
+        options=options,
+        noise_scale=tuple(refined.noise_scale.tolist()),
+        covariance_quantile=uncertainty.quantile,
+    )
+
+
+def _canonical(pair: Pair) -> tuple[int, str, float, float]:
+    """Order pairs so that the order they came in cannot change a bit of the result."""
+    return (pair.image_time or 0, pair.id, float(pair.pixel_px[0]), float(pair.pixel_px[1]))
+
+
+def _too_few(used: int, excluded: int, unpaired: int) -> Unsolvable:
+    aside = "".join(f", {count} {what}" for count, what in ((excluded, "excluded"), (unpaired, "unpaired")) if count)
+    return Unsolvable(
+        "too-few-pairs",
+        f"{used} of at least {MIN_PAIRS} pairs{aside}",
+        "click the reflector at more placements; ten or more, spread over the picture, near and far, are a good set",
+    )
+
+
+def _best_fit(evidence: Evidence, options: CalibrationOptions) -> Refined | Unsolvable:
+    """Start from several poses, keep what the pairs agree on most, and fit it."""
+    estimate_scale = options.noise.estimate_scale
+    few = _some_pairs(evidence)
+    most = _STARTS_MEASURED if evidence.belief.measured else _STARTS_FREE
+    starts = starting_poses(few, most=most, rng=np.random.default_rng(options.solving.seed))
+    found = find_consensus(few, starts, estimate_scale=estimate_scale)
+    if not found:
+        return _no_pose("no two placements lie in different directions")
+    refined = refine(evidence, found[0], estimate_scale=estimate_scale)
+    inliers = int((refined.weights > _INLIER_PROBABILITY).sum())
+    if inliers < MIN_PAIRS:
+        return _no_pose(f"only {inliers} of {len(evidence)} pairs agree on any pose")
+    return refined
+
+
+def _some_pairs(evidence: Evidence) -> Evidence:
+    if len(evidence) <= _PAIRS_TO_START:
+        return evidence
+    return evidence.some(np.linspace(0, len(evidence) - 1, _PAIRS_TO_START).round().astype(np.int64))
+
+
+def _no_pose(reason: str) -> Unsolvable:
+    return Unsolvable(
+        "no-pose",
+        reason,
+        "check that clicks and radar belong to the same moments, that the intrinsics are of this camera at this image "
+        "size, and that the placements are spread over the picture",
+    )
+
+
+def _metrics(evidence: Evidence, refined: Refined, left_out: LeftOut) -> Metrics:
+    """Measure the inlier pairs; chi2 is by the noise as assumed, so that a wrong assumption shows."""
+    inliers = refined.weights > _INLIER_PROBABILITY
+    points = cartesian_from_polar(evidence.polar[refined.rows])
+    projected = evidence.camera.project(refined.camera_from_radar @ points)
+    errors = distances(projected, evidence.pixels_px)
+    assumed = associate(evidence, refined.camera_from_radar)[1]
+    return metrics_of(
+        errors[inliers],
+        held_out_distances_px=left_out.distance_px[inliers],
+        chi2=float(assumed.squared[inliers].sum()),
+        degrees_of_freedom=2 * int(inliers.sum()) - (3 if evidence.belief.measured else 6),
+    )
+
+
+def _used_results(used: Sequence[Pair], refined: Refined, left_out: LeftOut) -> dict[str, PairResult]:
+    evidence = refined.evidence
+    points = cartesian_from_polar(evidence.polar[refined.rows])
+    return {
+        pair.id: PairResult(
+            id=pair.id,
+            pixel_px=pair.pixel_px,
+            projected_px=evidence.camera.project(refined.camera_from_radar @ points[i : i + 1])[0],
+            point_radar_m=pair.candidates[chosen].position_radar_m,
+            inlier=bool(refined.weights[i] > _INLIER_PROBABILITY),
+            outlier_probability=float(1.0 - refined.weights[i]),
+            influence=float(left_out.influence[i]),
+            candidate=chosen,
+            expected_covariance_px2=_residual_covariance(refined.model.whitening[i]),
+        )
+        for i, pair in enumerate(used)
+        for chosen in (int(refined.rows[i] - evidence.first[i]),)
+    }
+
+
+def _residual_covariance(whitening: np.ndarray) -> np.ndarray:
+    """Recover S = W^-1 W^-T; NaN where the camera does not see the position."""
+    if not whitening.any():
+        return np.full((2, 2), np.nan)
+    inverse = np.linalg.inv(whitening)
+    return np.asarray(inverse @ inverse.T)
+
+
+def _excluded_results(
+    shown: Sequence[Pair], excluded: frozenset[str], refined: Refined, camera: Camera, options: CalibrationOptions
+) -> dict[str, PairResult]:
+    """Show the pairs left out by a person under the pose, each with the candidate that suits it best."""
+    aside = [pair for pair in shown if pair.id in excluded]
+    if not aside:
+        return {}
+    evidence = evidence_of(aside, camera, options).scaled(refined.noise_scale)
+    rows, model = associate(evidence, refined.camera_from_radar)
+    results = {}
+    for i, pair in enumerate(aside):
+        chosen = int(rows[i] - evidence.first[i])
+        point = pair.candidates[chosen].position_radar_m
+        results[pair.id] = PairResult(
+            id=pair.id,
+            pixel_px=pair.pixel_px,
+            projected_px=camera.project(refined.camera_from_radar @ point[None])[0],
+            point_radar_m=point,
+            inlier=False,
+            excluded=True,
+            candidate=chosen,
+            expected_covariance_px2=_residual_covariance(model.whitening[i]),
+        )
+    return results
