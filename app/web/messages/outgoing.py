@@ -1,35 +1,22 @@
-"""The words of the channel between the page and the program: text to commands, values to text.
+"""What is sent to a page: values in, text out."""
 
-A page's message is a JSON object with a "type" and, if it wants an answer, a "request" number. `python -m app.web.messages`
-writes `static/messages.d.ts` from the types here, and a test holds the file to them.
-"""
-
-import difflib
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias
 
 import msgspec
-from msgspec import Meta
 
-from app.option_changes import OptionGroup, changes_from_tree, option_groups
-from app.session import OptionsEdited, Stamp, Step
-from app.session_file import forms
+from app.option_changes import OptionGroup, option_groups
+from app.session import Stamp
 from app.view import CautionRow, View
 from calib_core.arrays import TimesNs
-from calib_core.errors import InputError
 from calib_core.measurements import NS_PER_S
 
 __all__ = [
-    "MAX_TEXT_BYTES",
-    "Command",
-    "CursorMoved",
+    "TYPES",
     "Done",
     "FrameHeader",
-    "FrameWanted",
-    "Hello",
-    "ImportWanted",
-    "Incoming",
     "Outgoing",
     "Overlay",
     "OverlayReturn",
@@ -42,73 +29,7 @@ __all__ = [
     "StampColumns",
     "encode",
     "encode_frame",
-    "parse",
-    "request_of",
 ]
-
-MAX_TEXT_BYTES = 4 * 1024 * 1024
-"""A longer message is refused unread; 10,000 clicks take about one megabyte."""
-
-RequestNumber: TypeAlias = Annotated[int, Meta(ge=0, le=2**53 - 1)]
-FrameIndex: TypeAlias = Annotated[int, Meta(ge=0, le=2**31 - 1)]
-
-
-@dataclass(frozen=True, slots=True)
-class Hello:
-    """A page has opened: send it the recording and the view."""
-
-
-@dataclass(frozen=True, slots=True)
-class FrameWanted:
-    """A page wants the picture of a frame.
-
-    Attributes:
-        index: of the frame.
-        request: echoed in the picture's header; a newer request of the same page makes this one void.
-        playing: frames follow one another quickly.
-        size: "half" is enough while playing.
-    """
-
-    index: int
-    request: int
-    playing: bool = False
-    size: Literal["full", "half"] = "full"
-
-
-@dataclass(frozen=True, slots=True)
-class CursorMoved:
-    """A page looks at another frame: the 3D view and the overlay follow."""
-
-    index: int
-
-
-@dataclass(frozen=True, slots=True)
-class ImportWanted:
-    """A page read a file of clicks.
-
-    Attributes:
-        text: the file's content.
-        name: the file's name, for error messages.
-    """
-
-    text: str
-    name: str
-
-
-Command: TypeAlias = Step | Hello | FrameWanted | CursorMoved | ImportWanted
-
-
-@dataclass(frozen=True, slots=True)
-class Incoming:
-    """A message from a page.
-
-    Attributes:
-        command: what it wants.
-        request: the number to answer with; None when no answer is wanted.
-    """
-
-    command: Command
-    request: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,15 +124,23 @@ class Placements:
     placements: tuple[PlacementRow, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class OverlayReturn:
-    """One radar return on the picture."""
+class OverlayReturn(msgspec.Struct, frozen=True, array_like=True):
+    """One radar return on the picture; written as an array, since there are many.
+
+    Attributes:
+        u_px: column.
+        v_px: row.
+        range_m: from the radar.
+        doppler_mps: positive moving away; None or NaN where the radar has none.
+        snr_db: None or NaN where the radar has none.
+        static: slow enough to be the reflector.
+    """
 
     u_px: float
     v_px: float
     range_m: float
-    doppler_mps: float
-    snr_db: float
+    doppler_mps: float | None
+    snr_db: float | None
     static: bool
 
 
@@ -286,7 +215,7 @@ class FrameHeader:
 
 Outgoing: TypeAlias = View | RecordingNote | Placements | Overlay | Progress | Problem | Done
 
-_TYPES: dict[type, str] = {
+TYPES: Mapping[type, str] = {
     View: "view",
     RecordingNote: "recording",
     Placements: "placements",
@@ -295,55 +224,14 @@ _TYPES: dict[type, str] = {
     Problem: "error",
     Done: "done",
 }
-
-
-class _Form(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
-    """A message of the page that is not a step."""
-
-
-class _HelloForm(_Form, frozen=True, tag="hello"):
-    pass
-
-
-class _FrameForm(_Form, frozen=True, tag="frame"):
-    index: FrameIndex
-    request: RequestNumber
-    playing: bool = False
-    size: Literal["full", "half"] = "full"
-
-
-class _CursorForm(_Form, frozen=True, tag="cursor"):
-    index: FrameIndex
-
-
-class _ImportForm(_Form, frozen=True, tag="import_clicks"):
-    text: str
-    name: Annotated[str, Meta(max_length=300)] = "the file"
-
-
-_MessageForm: TypeAlias = forms.StepForm | _HelloForm | _FrameForm | _CursorForm | _ImportForm
-
-
-def parse(text: str | bytes) -> Incoming:
-    """Read a message from a page.
-
-    Raises:
-        InputError: it is too long, not JSON, of an unknown type, or has a field that is missing, unknown or wrong.
-        OptionError: it names an option that does not exist or gives it a value of the wrong type.
-    """
-    raise NotImplementedError
-
-
-def request_of(text: str | bytes) -> int | None:
-    """Return the request number of a message that `parse` refused; None when it has none that can be read."""
-    raise NotImplementedError
+"""The "type" that each message carries."""
 
 
 def encode(message: Outgoing) -> str:
     """Write a message to a page as JSON text, with its "type"; a number that is not finite becomes null."""
     body = msgspec.json.encode(message).decode()
     separator = "," if len(body) > 2 else ""
-    return f'{{"type":"{_TYPES[type(message)]}"{separator}{body[1:]}'
+    return f'{{"type":"{TYPES[type(message)]}"{separator}{body[1:]}'
 
 
 def encode_frame(header: FrameHeader, data: bytes) -> bytes:

@@ -1,0 +1,59 @@
+"""The words of the channel between the page and the program: text to commands, values to text.
+
+A page's message is a JSON object with a "type" and, if it wants an answer, a "request" number. `python -m app.web.messages`
+writes the types as TypeScript; `static/messages.d.ts` holds its output, and a test compares the two.
+"""
+
+from app.web.messages.incoming import (
+    MAX_TEXT_BYTES,
+    Command,
+    CursorMoved,
+    FrameWanted,
+    Hello,
+    ImportWanted,
+    Incoming,
+    parse,
+    request_of,
+)
+from app.web.messages.outgoing import (
+    Done,
+    FrameHeader,
+    Outgoing,
+    Overlay,
+    OverlayReturn,
+    PlacementRow,
+    Placements,
+    Problem,
+    Progress,
+    RecordingNote,
+    SessionNote,
+    StampColumns,
+    encode,
+    encode_frame,
+)
+
+__all__ = [
+    "MAX_TEXT_BYTES",
+    "Command",
+    "CursorMoved",
+    "Done",
+    "FrameHeader",
+    "FrameWanted",
+    "Hello",
+    "ImportWanted",
+    "Incoming",
+    "Outgoing",
+    "Overlay",
+    "OverlayReturn",
+    "PlacementRow",
+    "Placements",
+    "Problem",
+    "Progress",
+    "RecordingNote",
+    "SessionNote",
+    "StampColumns",
+    "encode",
+    "encode_frame",
+    "parse",
+    "request_of",
+]

@@ -1,0 +1,202 @@
+"""What a page may send: text in, commands out."""
+
+import difflib
+from dataclasses import dataclass
+from functools import singledispatch
+from typing import Annotated, Any, Literal, TypeAlias, get_args
+
+import msgspec
+from msgspec import Meta
+
+from app.option_changes import changes_from_tree
+from app.session import OptionsEdited, Step
+from app.session_file import forms
+from calib_core.errors import InputError
+
+__all__ = [
+    "MAX_TEXT_BYTES",
+    "Command",
+    "CursorMoved",
+    "FrameWanted",
+    "Hello",
+    "ImportWanted",
+    "Incoming",
+    "MessageForm",
+    "parse",
+    "request_of",
+]
+
+MAX_TEXT_BYTES = 4 * 1024 * 1024
+"""A longer message is refused unread; 10,000 clicks take about one megabyte."""
+
+RequestNumber: TypeAlias = Annotated[int, Meta(ge=0, le=2**53 - 1)]
+FrameIndex: TypeAlias = Annotated[int, Meta(ge=0, le=2**31 - 1)]
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """A page has opened: send it the recording and the view."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameWanted:
+    """A page wants the picture of a frame.
+
+    Attributes:
+        index: of the frame.
+        request: echoed in the picture's header; a newer request of the same page makes this one void.
+        playing: frames follow one another quickly.
+        size: "half" is enough while playing.
+    """
+
+    index: int
+    request: int
+    playing: bool = False
+    size: Literal["full", "half"] = "full"
+
+
+@dataclass(frozen=True, slots=True)
+class CursorMoved:
+    """A page looks at another frame: the 3D view and the overlay follow."""
+
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class ImportWanted:
+    """A page read a file of clicks.
+
+    Attributes:
+        text: the file's content.
+        name: the file's name, for error messages.
+    """
+
+    text: str
+    name: str
+
+
+Command: TypeAlias = Step | Hello | FrameWanted | CursorMoved | ImportWanted
+
+
+@dataclass(frozen=True, slots=True)
+class Incoming:
+    """A message from a page.
+
+    Attributes:
+        command: what it wants.
+        request: the number to answer with; None when no answer is wanted.
+    """
+
+    command: Command
+    request: int | None = None
+
+
+class _Form(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
+    """A message of the page that is not a step."""
+
+
+class HelloForm(_Form, frozen=True, tag="hello"):
+    """A page has opened."""
+
+
+class FrameForm(_Form, frozen=True, tag="frame"):
+    """The picture of a frame is wanted; exactly one binary message answers, unless a newer request comes first."""
+
+    index: FrameIndex
+    request: RequestNumber
+    playing: bool = False
+    size: Literal["full", "half"] = "full"
+
+
+class CursorForm(_Form, frozen=True, tag="cursor"):
+    """Another frame is looked at."""
+
+    index: FrameIndex
+
+
+class ImportForm(_Form, frozen=True, tag="import_clicks"):
+    """A file of clicks was read."""
+
+    text: str
+    name: Annotated[str, Meta(max_length=300)] = "the file"
+
+
+MessageForm: TypeAlias = forms.StepForm | HelloForm | FrameForm | CursorForm | ImportForm
+
+
+_TYPES = {str(form.__struct_config__.tag): form for form in get_args(MessageForm)}
+
+
+class _Envelope(msgspec.Struct):
+    request: RequestNumber | None = None
+
+
+def parse(text: str | bytes) -> Incoming:
+    """Read a message from a page.
+
+    Raises:
+        InputError: it is too long, not JSON, of an unknown type, or has a field that is missing, unknown or wrong.
+        OptionError: it names an option that does not exist or gives it a value of the wrong type.
+    """
+    if len(text) > MAX_TEXT_BYTES:
+        raise InputError(f"the message is longer than {MAX_TEXT_BYTES // 2**20} MB; no message of the page is")
+    try:
+        fields = msgspec.json.decode(text)
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
+        raise InputError(f"the message is not JSON: {error}") from error
+    kind = _kind(fields)
+    request = None if kind == "frame" else fields.pop("request", None)
+    try:
+        form = msgspec.convert(fields, _TYPES[kind])
+        return Incoming(_command(form), msgspec.convert(request, RequestNumber | None))
+    except msgspec.ValidationError as error:
+        raise InputError(f"the message '{kind}' is not as it should be: {error}") from error
+
+
+def request_of(text: str | bytes) -> int | None:
+    """Return the request number of a message that `parse` refused; None when it has none that can be read."""
+    try:
+        return msgspec.json.decode(text[:MAX_TEXT_BYTES], type=_Envelope).request
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+        return None
+
+
+def _kind(fields: object) -> str:
+    if not isinstance(fields, dict):
+        raise InputError('the message is not a JSON object; expected one with a "type"')
+    kind = fields.get("type")
+    if isinstance(kind, str) and kind in _TYPES:
+        return kind
+    near = difflib.get_close_matches(str(kind)[:80], _TYPES, n=1)
+    advice = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(_TYPES)}"
+    raise InputError(f"there is no message of the type '{str(kind)[:80]}'; {advice}")
+
+
+@singledispatch
+def _command(form: Any) -> Command:
+    return forms.step_from_form(form)
+
+
+@_command.register
+def _options(form: forms.OptionsChangedForm) -> Command:
+    return OptionsEdited(changes_from_tree(form.options))
+
+
+@_command.register
+def _hello(form: HelloForm) -> Command:
+    return Hello()
+
+
+@_command.register
+def _frame(form: FrameForm) -> Command:
+    return FrameWanted(form.index, form.request, form.playing, form.size)
+
+
+@_command.register
+def _cursor(form: CursorForm) -> Command:
+    return CursorMoved(form.index)
+
+
+@_command.register
+def _import(form: ImportForm) -> Command:
+    return ImportWanted(form.text, form.name)
