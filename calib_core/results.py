@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
-from calib_core.measurements import Unpaired
+from calib_core.measurements import TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 
 __all__ = ["Calibration", "Caution", "CheckPoint", "Metrics", "PairResult"]
@@ -66,6 +66,7 @@ class PairResult:
         influence: how far leaving it out moves the pose, in standard deviations; NaN where it was not computed.
         candidate: which of the pair's candidates was chosen.
         expected_covariance_px2: (2, 2) covariance of the residual by the noise model; NaN where there is none.
+        image_time: stamp of the clicked frame; None for pairs from a pairs file.
     """
 
     id: str
@@ -78,6 +79,7 @@ class PairResult:
     influence: float = float("nan")
     candidate: int = 0
     expected_covariance_px2: Points2 = field(default_factory=lambda: frozen_array([[float("nan")] * 2] * 2, (2, 2)))
+    image_time: TimeNs | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))

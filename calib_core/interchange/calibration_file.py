@@ -1,0 +1,151 @@
+"""A solved calibration together with what makes it readable by others: frames, check point, provenance."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calib_core.errors import InputError
+from calib_core.results import Calibration, CheckPoint, PairResult
+
+__all__ = [
+    "EQUATION",
+    "CalibrationFile",
+    "FrameNames",
+    "InputFile",
+    "Provenance",
+    "choose_check_point",
+]
+
+EQUATION = "p_camera = R p_radar + t"
+_OPTICAL_ENDINGS = ("_optical_frame", "_optical_link", "_optical")
+_FALLBACK_RANGE_M = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class FrameNames:
+    """The names of the two frames. A leading "/" is dropped, as tf2 wants it.
+
+    Names come from recordings and end up in launch files, where "$" would start a substitution: it is refused.
+
+    Attributes:
+        radar: x forward, y left, z up.
+        camera: the optical frame: x right, y down, z forward.
+    """
+
+    radar: str = "radar"
+    camera: str = "camera_optical"
+
+    def __post_init__(self) -> None:
+        for role in ("radar", "camera"):
+            object.__setattr__(self, role, _checked_name(getattr(self, role), role))
+        if self.radar == self.camera:
+            raise InputError(f"both frames are called {self.radar!r}; name them apart")
+
+    @property
+    def camera_link(self) -> str:
+        """The camera's body frame (x forward, y left, z up) that URDF and Autoware hang the optical frame on."""
+        stem = self.camera
+        for ending in _OPTICAL_ENDINGS:
+            stem = stem.removesuffix(ending)
+        link = f"{stem}_link" if stem != self.camera else f"{stem.removesuffix('_link')}_body_link"
+        return link if link != self.radar else f"{link}_body"
+
+
+def _checked_name(name: str, role: str) -> str:
+    shown = name.strip().lstrip("/")
+    if not shown:
+        raise InputError(f"the {role} frame has no name; name it, for example {role!r}")
+    if not shown.isprintable() or any(character in shown for character in "$`\\\"'<>&"):
+        raise InputError(
+            f"the {role} frame is called {name!r}; take a name without control characters, quotes or any of $ ` \\ < > &"
+        )
+    if len(shown) > 200:
+        raise InputError(f"the {role} frame's name has {len(shown)} characters; take one of at most 200")
+    return shown
+
+
+@dataclass(frozen=True, slots=True)
+class InputFile:
+    """A file that went in, by its content.
+
+    Attributes:
+        name: without its folder.
+        size_bytes: its length.
+        sha256: of its content, in hexadecimal.
+    """
+
+    name: str
+    size_bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Where a calibration comes from; None where a part does not apply.
+
+    Attributes:
+        inputs: the files it was made from.
+        radar_topic: the topic of the radar returns.
+        image_topic: the topic of the images.
+        camera_info_topic: the topic of the intrinsics.
+        radar_clock: "header" or "receive": which stamp times the radar.
+        image_clock: the same for the images.
+        version: of this program.
+    """
+
+    inputs: tuple[InputFile, ...] = ()
+    radar_topic: str | None = None
+    image_topic: str | None = None
+    camera_info_topic: str | None = None
+    radar_clock: str | None = None
+    image_clock: str | None = None
+    version: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CalibrationFile:
+    """The content of a calibration-1 file.
+
+    Attributes:
+        calibration: the pose, its covariance and what each pair says about it.
+        frames: the names of the two frames.
+        check_point: a radar point and the pixel it must come out at; None where a foreign file has none.
+        provenance: where it comes from.
+    """
+
+    calibration: Calibration
+    frames: FrameNames = field(default_factory=FrameNames)
+    check_point: CheckPoint | None = None
+    provenance: Provenance = field(default_factory=Provenance)
+
+
+def choose_check_point(calibration: Calibration) -> CheckPoint | None:
+    """Choose the inlier's radar position, rounded to a millimetre, that comes out nearest to the image's centre.
+
+    Without an inlier in the image it is a point ten metres along a ray off the centre. None when the lens sees neither.
+    """
+    camera = calibration.camera
+    centre_px = np.array([camera.width_px - 1, camera.height_px - 1]) / 2
+    inliers = sorted((pair for pair in calibration.pairs if pair.inlier), key=_id)
+    points_radar_m = np.round([pair.point_radar_m for pair in inliers], 3).reshape(-1, 3)
+    if not _first_seen(calibration, points_radar_m).size:
+        ray = camera.rays(centre_px[None] * (0.9, 1.15))
+        points_radar_m = np.round(calibration.camera_from_radar.inverse() @ (ray * _FALLBACK_RANGE_M), 3)
+    seen = _first_seen(calibration, points_radar_m)
+    if not seen.size:
+        return None
+    points_radar_m = points_radar_m[seen]
+    pixels_px = calibration.reproject(points_radar_m)
+    nearest = int(np.argmin(np.linalg.norm(pixels_px - centre_px, axis=1)))
+    return CheckPoint(points_radar_m[nearest], pixels_px[nearest])
+
+
+def _id(pair: PairResult) -> str:
+    return pair.id
+
+
+def _first_seen(calibration: Calibration, points_radar_m: np.ndarray) -> np.ndarray:
+    """Return the indices of the points that are finite and that the lens images."""
+    if not len(points_radar_m) or not np.isfinite(points_radar_m).all():
+        return np.zeros(0, dtype=np.int64)
+    return np.flatnonzero(calibration.camera.sees(calibration.camera_from_radar @ points_radar_m))

@@ -1,0 +1,33 @@
+"""A camera to and from the object that our files carry it in."""
+
+from typing import Any
+
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.interchange.documents import CameraDocument
+
+__all__ = ["camera_document", "camera_of"]
+
+
+def camera_document(camera: Camera) -> CameraDocument:
+    """Return the object that carries a camera."""
+    matrix: Any = tuple(tuple(row) for row in camera.matrix_px.tolist())
+    return CameraDocument(camera.model, camera.width_px, camera.height_px, matrix, camera.distortion.tolist())
+
+
+def camera_of(document: CameraDocument, *, source: str, place: str = "camera") -> Camera:
+    """Return the camera an object carries.
+
+    Raises:
+        InputError: a camera cannot be like that.
+    """
+    try:
+        return Camera(
+            document.model,
+            document.width_px,
+            document.height_px,
+            document.matrix_px,  # type: ignore[arg-type]
+            document.distortion,  # type: ignore[arg-type]
+        )
+    except ValueError as error:
+        raise InputError(f"{source}: {place}: {error}; correct it or calibrate the camera again") from None

@@ -1,0 +1,266 @@
+"""What our three files look like on disk, key by key. JSON Schema is generated from these types (docs/schemas).
+
+Inputs and settings refuse keys they do not know; results may carry more.
+"""
+
+from typing import Annotated, Final, Literal
+
+from msgspec import Meta, Struct, field
+
+from calib_core.options import CalibrationOptions
+
+__all__ = [
+    "CALIBRATION_SCHEMA",
+    "CLICKS_SCHEMA",
+    "PAIRS_SCHEMA",
+    "CalibrationDocument",
+    "CameraDocument",
+    "CheckPointDocument",
+    "ClickDocument",
+    "ClicksDocument",
+    "FramesDocument",
+    "PairDocument",
+    "PairsDocument",
+    "PositionDocument",
+    "RadarDocument",
+    "SolvedPairDocument",
+    "TimeDocument",
+    "TransformDocument",
+]
+
+CLICKS_SCHEMA: Final = "cocalib/clicks-1"
+PAIRS_SCHEMA: Final = "cocalib/pairs-1"
+CALIBRATION_SCHEMA: Final = "cocalib/calibration-1"
+
+Vector2 = tuple[float, float]
+Vector3 = tuple[float, float, float]
+Vector4 = tuple[float, float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+Matrix22 = tuple[Vector2, Vector2]
+Matrix33 = tuple[Vector3, Vector3, Vector3]
+Matrix66 = tuple[Vector6, Vector6, Vector6, Vector6, Vector6, Vector6]
+Name = Annotated[str, Meta(min_length=1, max_length=200)]
+Positive = Annotated[float, Meta(gt=0)]
+Count = Annotated[int, Meta(ge=0)]
+
+
+class TimeDocument(Struct, frozen=True, forbid_unknown_fields=True):
+    """A stamp as in ROS 2: whole seconds since the epoch, and nanoseconds within the second."""
+
+    sec: Annotated[int, Meta(ge=0, le=9_223_372_035)]
+    nanosec: Annotated[int, Meta(ge=0, le=999_999_999)]
+
+
+class ClickDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """The reflector's centre in one frame; pixel (0, 0) is the centre of the top-left pixel."""
+
+    id: Name
+    image_time: TimeDocument
+    pixel_px: Vector2
+    sigma_px: Positive | None = None
+    excluded: bool = False
+
+
+class ClicksDocument(Struct, frozen=True, forbid_unknown_fields=True):
+    """Clicks on recorded frames, named by the frames' stamps."""
+
+    schema: Literal["cocalib/clicks-1"]
+    clicks: list[ClickDocument]
+
+
+class CameraDocument(Struct, frozen=True, forbid_unknown_fields=True):
+    """A calibrated camera; coefficients in OpenCV's order."""
+
+    model: Literal["pinhole", "plumb_bob", "rational_polynomial", "equidistant"]
+    width_px: Annotated[int, Meta(ge=1)]
+    height_px: Annotated[int, Meta(ge=1)]
+    matrix_px: Matrix33
+    distortion: list[float] = []
+
+
+class RadarDocument(Struct, frozen=True, forbid_unknown_fields=True):
+    """Standard deviations of one radar position."""
+
+    sigma_range_m: Positive | None = None
+    sigma_azimuth_rad: Positive | None = None
+    sigma_elevation_rad: Positive | None = None
+
+
+class PositionDocument(Struct, frozen=True, forbid_unknown_fields=True):
+    """A tape-measured camera centre in the radar frame: forward, left, up."""
+
+    position_m: Vector3
+    sigma_m: Positive = 0.01
+
+
+class PairDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """One reflector position seen by both sensors."""
+
+    id: Name
+    radar_m: Vector3
+    pixel_px: Vector2
+    alternatives_radar_m: list[Vector3] = []
+    sigma_px: Positive | None = None
+
+
+class PairsDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Ready-made pairs and the camera they were clicked in."""
+
+    schema: Literal["cocalib/pairs-1"]
+    camera: CameraDocument
+    pairs: list[PairDocument]
+    radar: RadarDocument | None = None
+    camera_position_in_radar: PositionDocument | None = None
+
+
+class TransformDocument(Struct, frozen=True):
+    """p_target = rotation p_source + translation_m; the quaternion is the same rotation."""
+
+    rotation: Matrix33
+    translation_m: Vector3
+    quaternion_wxyz: Vector4 | None = None
+
+
+class FramesDocument(Struct, frozen=True):
+    """Names of the two frames; the camera's is the optical one (x right, y down, z forward)."""
+
+    radar: Name
+    camera: Name
+
+
+class SigmaDocument(Struct, frozen=True):
+    """Square roots of the covariance's diagonal."""
+
+    x_m: float | None = None
+    y_m: float | None = None
+    z_m: float | None = None
+    rot_x_rad: float | None = None
+    rot_y_rad: float | None = None
+    rot_z_rad: float | None = None
+
+
+class CheckPointDocument(Struct, frozen=True):
+    """A radar point and the pixel it must come out at."""
+
+    radar_m: Vector3
+    pixel_px: Vector2
+
+
+class MetricsDocument(Struct, frozen=True):
+    """Figures over the inlier pairs; null where there is none."""
+
+    aed_px: float | None = None
+    cdsd_px: float | None = None
+    rms_px: float | None = None
+    held_out_aed_px: float | None = None
+    acc: float | None = None
+    n: Count = 0
+    chi2: float | None = None
+    degrees_of_freedom: Count = 0
+
+
+class SolvedPairDocument(Struct, frozen=True):
+    """One pair under the solved pose; residual_px is projected_px minus pixel_px, distance_px its length."""
+
+    id: Name
+    radar_m: Vector3
+    pixel_px: Vector2
+    inlier: bool
+    image_time: TimeDocument | None = None
+    excluded: bool = False
+    projected_px: Vector2 | None = None
+    residual_px: Vector2 | None = None
+    distance_px: float | None = None
+    outlier_probability: float | None = None
+    influence: float | None = None
+    candidate: Count = 0
+    expected_covariance_px2: Matrix22 | None = None
+
+
+class UnpairedDocument(Struct, frozen=True):
+    """A click that found no radar position."""
+
+    id: Name
+    code: str
+    reason: str
+    hint: str
+
+
+class WarningDocument(Struct, frozen=True):
+    """Something a person must know before using the result."""
+
+    code: str
+    message: str
+    hint: str
+
+
+class InputDocument(Struct, frozen=True):
+    """A file that went in."""
+
+    name: str
+    size_bytes: Count
+    sha256: str
+
+
+class TopicsDocument(Struct, frozen=True):
+    """The topics that were read."""
+
+    radar: str | None = None
+    image: str | None = None
+    camera_info: str | None = None
+
+
+class ClocksDocument(Struct, frozen=True):
+    """Which stamp each topic was timed by: "header" or "receive"."""
+
+    radar: str | None = None
+    image: str | None = None
+
+
+class ProvenanceDocument(Struct, frozen=True):
+    """Where the result comes from."""
+
+    inputs: list[InputDocument] = []
+    topics: TopicsDocument = field(default_factory=TopicsDocument)
+    clocks: ClocksDocument = field(default_factory=ClocksDocument)
+    version: str | None = None
+
+
+class NoiseScaleDocument(Struct, frozen=True):
+    """Estimated over assumed standard deviations."""
+
+    click: float = 1.0
+    range: float = 1.0
+    azimuth: float = 1.0
+    elevation: float = 1.0
+
+
+class PaperDocument(Struct, frozen=True):
+    """Mean reprojection errors of Algorithm 1's two candidates."""
+
+    iterative_px: float | None = None
+    sqpnp_px: float | None = None
+
+
+class CalibrationDocument(Struct, frozen=True):
+    """A solved extrinsic calibration, and how far to trust it."""
+
+    schema: Literal["cocalib/calibration-1"]
+    camera_from_radar: TransformDocument
+    frames: FramesDocument
+    camera: CameraDocument
+    radar_from_camera: TransformDocument | None = None
+    equation: str = ""
+    covariance: Matrix66 | None = None
+    covariance_convention: str = ""
+    covariance_quantile: float | None = None
+    sigma: SigmaDocument = field(default_factory=SigmaDocument)
+    check_point: CheckPointDocument | None = None
+    metrics: MetricsDocument = field(default_factory=MetricsDocument)
+    noise_scale: NoiseScaleDocument = field(default_factory=NoiseScaleDocument)
+    paper: PaperDocument = field(default_factory=PaperDocument)
+    warnings: list[WarningDocument] = []
+    unpaired: list[UnpairedDocument] = []
+    pairs: list[SolvedPairDocument] = []
+    options: CalibrationOptions = field(default_factory=CalibrationOptions)
+    provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)

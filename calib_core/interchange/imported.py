@@ -1,0 +1,189 @@
+"""What a reader found in somebody's file: the pose as written there, and what it means."""
+
+import dataclasses
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from calib_core.arrays import Vector2, Vector3, frozen_array
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
+from calib_core.interchange.rotations import LINK_FROM_OPTICAL, matrix_from_rpy, nearest_rotation
+
+__all__ = ["ImportedCalibration", "StatedCheckPoint", "WrittenPose", "posed_between"]
+
+Form = Literal["matrix", "quaternion_xyzw", "quaternion_wxyz", "rpy"]
+Direction = Literal["camera_from_radar", "radar_from_camera"]
+Axes = Literal["optical", "link"]
+
+_FEW_DIGITS = 2e-3
+_RADAR_NAME = re.compile(r"radar|rdr|mmwave|umrr|ars\d|srr|mrr|lrr", re.IGNORECASE)
+_CAMERA_NAME = re.compile(r"cam|optical|image|rgb", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WrittenPose:
+    """A pose as the file writes it, before it is turned into camera_from_radar.
+
+    Attributes:
+        form: how the rotation is written.
+        rotation: (3, 3), (4,) in the order of the form, or (3,) roll, pitch, yaw [rad].
+        translation_m: (3,).
+        direction: what p_target = R p_source + t means with these numbers.
+        axes: of the camera frame meant: optical, or the body frame camera_link (x forward).
+    """
+
+    form: Form
+    rotation: np.ndarray
+    translation_m: Vector3
+    direction: Direction
+    axes: Axes = "optical"
+
+    def __post_init__(self) -> None:
+        shape = {"matrix": (3, 3), "rpy": (3,)}.get(self.form, (4,))
+        object.__setattr__(self, "rotation", frozen_array(self.rotation, shape))
+        object.__setattr__(self, "translation_m", frozen_array(self.translation_m, (3,)))
+
+    def rotation_matrix(self) -> np.ndarray:
+        """Return the rotation as written, as a matrix.
+
+        Raises:
+            ValueError: it is none.
+        """
+        if self.form == "matrix":
+            return nearest_rotation(self.rotation, tolerance=_FEW_DIGITS)
+        if self.form == "rpy":
+            return matrix_from_rpy(self.rotation)
+        wxyz = np.roll(self.rotation, 1) if self.form == "quaternion_xyzw" else self.rotation
+        if abs(float(np.linalg.norm(wxyz)) - 1.0) > _FEW_DIGITS:
+            raise ValueError(f"the quaternion {self.rotation.tolist()} has length {np.linalg.norm(wxyz):.4g}, not 1")
+        return matrix_from_quaternion_wxyz(wxyz)
+
+    def camera_from_radar(self) -> RigidTransform:
+        """Return the pose in our one meaning: p_camera = R p_radar + t, camera optical.
+
+        Raises:
+            ValueError: the rotation is none.
+        """
+        written = RigidTransform(self.rotation_matrix(), self.translation_m)
+        camera_from_radar = written if self.direction == "camera_from_radar" else written.inverse()
+        if self.axes == "link":
+            optical_from_link = LINK_FROM_OPTICAL.inverse()
+            return optical_from_link @ camera_from_radar
+        return camera_from_radar
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StatedCheckPoint:
+    """The check point a file states.
+
+    Attributes:
+        radar_m: (3,) the point in the radar frame.
+        camera_m: (3,) where it must come out in the camera frame; None when only the pixel is stated.
+        pixel_px: (2,) where it must come out in the image, through the lens; None when only camera_m is stated.
+    """
+
+    radar_m: Vector3
+    camera_m: Vector3 | None = None
+    pixel_px: Vector2 | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radar_m", frozen_array(self.radar_m, (3,)))
+        if self.camera_m is not None:
+            object.__setattr__(self, "camera_m", frozen_array(self.camera_m, (3,)))
+        if self.pixel_px is not None:
+            object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImportedCalibration:
+    """A calibration read from any format.
+
+    Attributes:
+        format: the format it was read as.
+        pose: the pose as written, with the meaning the file gives it.
+        camera: the camera; None where the format or the file has none.
+        frames: the two frames' names; None where the file has none.
+        check_point: None where the file states none.
+        notes: what had to be assumed, one sentence each.
+        file: everything else, when it is a calibration-1 file.
+    """
+
+    format: str
+    pose: WrittenPose
+    camera: Camera | None = None
+    frames: FrameNames | None = None
+    check_point: StatedCheckPoint | None = None
+    notes: tuple[str, ...] = ()
+    file: CalibrationFile | None = None
+
+    @property
+    def camera_from_radar(self) -> RigidTransform:
+        """The pose in our one meaning: p_camera = R p_radar + t, camera optical."""
+        return self.pose.camera_from_radar()
+
+    def checked(self, source: str) -> "ImportedCalibration":
+        """Return itself when its rotation is one.
+
+        Raises:
+            InputError: it is mirrored, or not a rotation at all.
+        """
+        try:
+            self.pose.camera_from_radar()
+        except ValueError as error:
+            raise InputError(f"{source}: {error}; a proper rotation is needed") from None
+        return self
+
+    def noted(self, *notes: str) -> "ImportedCalibration":
+        """Return the same with more notes."""
+        return dataclasses.replace(self, notes=(*self.notes, *notes))
+
+
+@dataclass(frozen=True, slots=True)
+class Roles:
+    """Which of two frames is whose, and what was assumed for it."""
+
+    direction: Direction
+    axes: Axes
+    frames: FrameNames
+    notes: tuple[str, ...]
+
+
+def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
+    """Tell what "the pose of child in parent" means: which frame is the radar's, and which axes the camera's has.
+
+    Args:
+        parent: name of the frame the pose is given in; its numbers carry child points into it.
+        child: name of the other.
+        stated: what the file says in words about its frames, if it does.
+
+    Raises:
+        InputError: a frame has no name.
+    """
+    notes: list[str] = []
+    if stated is not None and stated.radar in (parent, child):
+        radar, camera = stated.radar, child if parent == stated.radar else parent
+    else:
+        radar_first = not (_looks_like_radar(child) and not _looks_like_radar(parent))
+        radar, camera = (parent, child) if radar_first else (child, parent)
+        if not (_looks_like_radar(radar) and not _looks_like_radar(camera)):
+            notes.append(f"no word says which frame is the radar's; took {radar!r} for it")
+    if stated is not None and camera in (stated.camera, stated.camera_link):
+        axes: Axes = "optical" if camera == stated.camera else "link"
+        frames = stated
+    else:
+        axes = "link" if camera.endswith("_link") and "optical" not in camera else "optical"
+        notes.append(
+            f"took {camera!r} for " + ("optical axes (z forward)" if axes == "optical" else "body axes (x forward)")
+        )
+        frames = FrameNames(radar, camera if axes == "optical" else camera.removesuffix("_link") + "_optical")
+    direction: Direction = "radar_from_camera" if parent == radar else "camera_from_radar"
+    return Roles(direction, axes, frames, tuple(notes))
+
+
+def _looks_like_radar(name: str) -> bool:
+    return bool(_RADAR_NAME.search(name)) and not _CAMERA_NAME.search(name)

@@ -1,0 +1,47 @@
+"""OpenCV's FileStorage XML as plain values."""
+
+from typing import Any
+from xml.etree import ElementTree
+
+from calib_core.errors import InputError
+
+__all__ = ["load_opencv_xml", "parse_xml"]
+
+_MAX_CHARACTERS = 4 * 1024 * 1024
+
+
+def parse_xml(text: str, *, source: str) -> ElementTree.Element:
+    """Parse XML without a document type, so that nothing in it expands.
+
+    Raises:
+        InputError: it is not XML, or declares entities.
+    """
+    if len(text) > _MAX_CHARACTERS or "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise InputError(f"{source}: too large for a calibration, or declares a document type; give a plain XML file")
+    try:
+        return ElementTree.fromstring(text.lstrip("\ufeff \t\r\n"))
+    except ElementTree.ParseError as error:
+        raise InputError(f"{source}: not XML ({error}); correct it there") from None
+    except ValueError as error:
+        raise InputError(f"{source}: not XML ({error}); save it as UTF-8") from None
+
+
+def load_opencv_xml(text: str, *, source: str) -> dict[str, Any]:
+    """Return a FileStorage XML's values: matrices become mappings with rows, cols and data, as in its YAML.
+
+    Raises:
+        InputError: it is other XML.
+    """
+    root = parse_xml(text, source=source)
+    if root.tag != "opencv_storage":
+        raise InputError(f"{source}: XML with <{root.tag}>; expected OpenCV's <opencv_storage>")
+    return {child.tag: _value(child) for child in root}
+
+
+def _value(element: ElementTree.Element) -> Any:
+    if element.get("type_id") == "opencv-matrix":
+        parts = {child.tag: (child.text or "").strip() for child in element}
+        return {**parts, "data": parts.get("data", "").split()}
+    if len(element):
+        return {child.tag: _value(child) for child in element}
+    return (element.text or "").strip().strip('"')

@@ -1,0 +1,69 @@
+"""Rotations as other formats write them: fixed-axis roll, pitch, yaw, both quaternion orders, and optical against body axes."""
+
+import numpy as np
+
+from calib_core.arrays import Matrix33, Vector3
+from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+
+__all__ = [
+    "LINK_FROM_OPTICAL",
+    "OPTICAL_RPY_RAD",
+    "matrix_from_rpy",
+    "nearest_rotation",
+    "quaternion_xyzw_from_matrix",
+    "rpy_from_matrix",
+]
+
+LINK_FROM_OPTICAL = RigidTransform(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]), np.zeros(3))
+"""From optical axes (x right, y down, z forward) to body axes (x forward, y left, z up), REP-103."""
+
+OPTICAL_RPY_RAD = (-np.pi / 2, 0.0, -np.pi / 2)
+"""The same rotation as URDF writes it."""
+
+
+def matrix_from_rpy(rpy_rad: Vector3) -> Matrix33:
+    """Return Rz(yaw) Ry(pitch) Rx(roll): rotations about fixed axes, as in URDF and tf2."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy_rad), np.sin(rpy_rad)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rpy_from_matrix(rotation: Matrix33) -> Vector3:
+    """Return (roll, pitch, yaw) [rad]; at a pitch of 90 degrees, where only one sum is fixed, yaw is what is left at 0.
+
+    Roll is taken from the matrix with yaw undone, so that it keeps its digits next to that pitch.
+    """
+    r = np.asarray(rotation, dtype=np.float64)
+    across = float(np.hypot(r[0, 0], r[1, 0]))
+    yaw = float(np.arctan2(r[1, 0], r[0, 0])) if across > 1e-12 else 0.0
+    sine, cosine = np.sin(yaw), np.cos(yaw)
+    roll = np.arctan2(sine * r[0, 2] - cosine * r[1, 2], cosine * r[1, 1] - sine * r[0, 1])
+    return np.array([roll, np.arctan2(-r[2, 0], across), yaw])
+
+
+def quaternion_xyzw_from_matrix(rotation: Matrix33) -> np.ndarray:
+    """Return the unit quaternion in the order x, y, z, w, with w >= 0."""
+    return np.roll(quaternion_wxyz_from_matrix(rotation), -1)
+
+
+def nearest_rotation(matrix: Matrix33, *, tolerance: float) -> Matrix33:
+    """Return the rotation nearest to a matrix that was written with few digits.
+
+    Raises:
+        ValueError: it is mirrored, or farther from orthonormal than the tolerance.
+    """
+    matrix = np.asarray(matrix, dtype=np.float64)
+    if np.linalg.det(matrix) < 0:
+        raise ValueError("the rotation is left-handed (determinant -1): an axis is mirrored")
+    off = np.abs(matrix @ matrix.T - np.eye(3)).max()
+    if not off <= tolerance:
+        raise ValueError(f"the rotation is not orthonormal (off by {off:.2g})")
+    if off <= 1e-14:
+        return matrix
+    u, _, vt = np.linalg.svd(matrix)
+    return u @ vt

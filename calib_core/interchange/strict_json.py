@@ -1,0 +1,173 @@
+"""JSON in, checked: every fault is one line that names the file, the place in it and what to do."""
+
+import dataclasses
+import json
+import math
+import re
+import types
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+
+from calib_core.errors import InputError
+
+__all__ = ["checked", "json_object", "parse_document"]
+
+Document = TypeVar("Document")
+
+MAX_CHARACTERS = 256 * 1024 * 1024
+"""No file of ours comes near it; it keeps a wrong file (a recording) from filling the memory."""
+
+
+def parse_document(text: str, document: type[Document], *, source: str) -> Document:
+    """Parse JSON text into a document type, refusing what it does not know.
+
+    Args:
+        text: the file's content.
+        document: a msgspec Struct whose key "schema" names the format.
+        source: what to call the file in an error.
+
+    Raises:
+        InputError: not JSON, another format, an unknown or repeated key, a value of the wrong type, NaN or Infinity.
+    """
+    content = json_object(text, source=source)
+    wanted = _schema_of(document)
+    found = content.get("schema")
+    if found != wanted:
+        raise InputError(f"{source}: schema: expected {wanted!r}, found {_shown(found)}; give a file of that format")
+    return checked(content, document, source=source)
+
+
+def checked(content: Mapping[str, Any], document: type[Document], *, source: str, place: str = "") -> Document:
+    """Check parsed values against a document type and return the document.
+
+    Args:
+        content: parsed values.
+        document: a msgspec Struct.
+        source: what to call the file in an error.
+        place: where in the file the values stand.
+
+    Raises:
+        InputError: an unknown key, a value of the wrong type, NaN or Infinity.
+    """
+    for where, fault in _faults(content, document, place):
+        raise InputError(f"{source}: {where or 'the file'}: {fault}")
+    try:
+        return msgspec.convert(content, document)
+    except (msgspec.ValidationError, OverflowError) as error:
+        raise InputError(f"{source}: {_in_our_words(str(error), place)}") from None
+
+
+def json_object(text: str, *, source: str) -> dict[str, Any]:
+    """Parse JSON text that must be an object; keys may not repeat within it.
+
+    Raises:
+        InputError: it is something else.
+    """
+    if len(text) > MAX_CHARACTERS:
+        raise InputError(f"{source}: {len(text):,} characters is too large for this kind of file; is it the right one?")
+    try:
+        content = json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_without_repeats)
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise InputError(f"{source}: {where}: not JSON ({error.msg}); correct it there") from None
+    except (ValueError, RecursionError) as error:
+        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise InputError(f"{source}: {reason}; correct the file") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{source}: expected an object in braces, found {_shown(content)}; give a file of cocalib's")
+    return content
+
+
+def _without_repeats(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(items)
+    if len(content) != len(items):
+        keys = [key for key, _ in items]
+        twice = next(key for index, key in enumerate(keys) if key in keys[:index])
+        raise ValueError(f"the key {twice!r} stands twice in one object; keep one")
+    return content
+
+
+def _schema_of(document: type) -> str:
+    return str(get_args(get_type_hints(document)["schema"])[0])
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return "none"
+    if isinstance(value, dict | list):
+        return "an object" if isinstance(value, dict) else "a list"
+    shown = json.dumps(value)
+    return shown if len(shown) <= 60 else shown[:57] + "..."
+
+
+def _faults(value: Any, annotation: Any, place: str) -> Iterator[tuple[str, str]]:
+    """Walk a value beside its type: yield the place and the fault of each unknown key and each number that is none."""
+    if isinstance(value, float) and not math.isfinite(value):
+        yield place, f"{value} is not a number to calculate with; give its value or remove the entry"
+    elif isinstance(value, str) and get_origin(annotation) is Literal and value not in get_args(annotation):
+        yield place, _unfamiliar(f"unknown value {value!r}", value, list(get_args(annotation)), "it can be")
+    elif isinstance(value, dict):
+        fields = _fields(annotation)
+        for key, item in value.items():
+            inner = f"{place}.{key}" if place else key
+            if fields is not None and key not in fields and _refuses_unknown(annotation):
+                yield inner, _unfamiliar("unknown key", key, list(fields), "the keys here are")
+            yield from _faults(item, (fields or {}).get(key), inner)
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from _faults(item, _item_type(annotation), f"{place}[{index}]")
+
+
+def _unfamiliar(what: str, word: str, known: list[str], these: str) -> str:
+    near = get_close_matches(word, known, n=1, cutoff=0.6)
+    return f"{what}; did you mean {near[0]}?" if near else f"{what}; {these} {', '.join(known)}"
+
+
+def _variants(annotation: Any) -> list[Any]:
+    if get_origin(annotation) in (Union, types.UnionType):
+        return [part for part in get_args(annotation) if part is not type(None)]
+    return [annotation]
+
+
+def _fields(annotation: Any) -> dict[str, Any] | None:
+    for part in _variants(annotation):
+        if isinstance(part, type) and issubclass(part, msgspec.Struct):
+            hints = get_type_hints(part)
+            return {field.encode_name: hints[field.name] for field in msgspec.structs.fields(part)}
+        if isinstance(part, type) and dataclasses.is_dataclass(part):
+            hints = get_type_hints(part)
+            return {field.name: hints[field.name] for field in dataclasses.fields(part)}
+    return None
+
+
+def _refuses_unknown(annotation: Any) -> bool:
+    """Tell a type of input or setting, where an unknown key is a slip, from one of results, which may grow."""
+    return all(
+        part.__struct_config__.forbid_unknown_fields if issubclass(part, msgspec.Struct) else True
+        for part in _variants(annotation)
+        if isinstance(part, type)
+    )
+
+
+def _item_type(annotation: Any) -> Any:
+    for part in _variants(annotation):
+        items = [item for item in get_args(part) if item is not Ellipsis]
+        if get_origin(part) in (tuple, list) and items:
+            return items[0]
+    return None
+
+
+def _in_our_words(message: str, outer: str) -> str:
+    """Turn msgspec's "text - at `$.path`" into "path: text"."""
+    match = re.fullmatch(r"(.*?)(?: - at `\$\.?(.*?)`)?", message, flags=re.DOTALL)
+    text, inner = (match.group(1), match.group(2)) if match else (message, None)
+    place = ".".join(part for part in (outer, inner) if part)
+    text = text.replace("`", "").replace("Expected", "expected", 1)
+    missing = re.fullmatch(r"Object missing required field (\w+)", text)
+    if missing:
+        return f"{f'{place}.' if place else ''}{missing.group(1)}: missing; add it"
+    text = re.sub(r"expected (\S+), got null", r"is null, expected \1; give its value or remove the entry", text)
+    return f"{place or 'the file'}: {text}"

@@ -1,0 +1,64 @@
+"""YAML in by the safe loader only, OpenCV's dialect included; and numbers and names out that every YAML reader takes."""
+
+import json
+import re
+from typing import Any
+
+from calib_core.errors import InputError
+
+__all__ = ["load_yaml", "number_text", "numbers_text", "quoted"]
+
+_MAX_CHARACTERS = 2 * 1024 * 1024
+_OPENCV_TAG = "tag:yaml.org,2002:opencv-matrix"
+
+
+def load_yaml(text: str, *, source: str) -> Any:
+    """Parse YAML of plain values; OpenCV's header and its matrices (as mappings with rows, cols, data) are understood.
+
+    Raises:
+        InputError: it is not YAML, or too large to be a calibration.
+    """
+    if len(text) > _MAX_CHARACTERS:
+        raise InputError(f"{source}: {len(text):,} characters is too large for a calibration; is it the right file?")
+    from ruamel.yaml import YAML
+    from ruamel.yaml.constructor import SafeConstructor
+    from ruamel.yaml.error import YAMLError
+
+    class Constructor(SafeConstructor):
+        """The safe constructor, and OpenCV's matrix tag."""
+
+    Constructor.add_constructor(_OPENCV_TAG, lambda self, node: self.construct_mapping(node, deep=True))
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Constructor = Constructor
+    # OpenCV before 5 writes "%YAML:1.0", which is no YAML directive, and may leave out the "---" after it.
+    plain = re.sub(r"\A\ufeff?%YAML[: ][\d.]+[^\n]*\n(---[^\n]*\n)?", "", text)
+    try:
+        return yaml.load(plain)
+    except (YAMLError, ValueError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f"line {mark.line + 1 + text.count(chr(10)) - plain.count(chr(10))}: " if mark else ""
+        raise InputError(f"{source}: {where}not YAML ({_problem(error)}); correct it there") from None
+
+
+def _problem(error: Exception) -> str:
+    if isinstance(error, RecursionError):
+        return "nested too deeply"
+    return " ".join(str(getattr(error, "problem", None) or error).split())[:200]
+
+
+def number_text(value: float) -> str:
+    """Write a float so that it comes back bit for bit, also through readers of YAML 1.1, which want a point in 1.0e-05."""
+    text = repr(float(value) + 0.0)
+    if "e" in text and "." not in text:
+        text = text.replace("e", ".0e")
+    return text
+
+
+def numbers_text(values: Any, separator: str = ", ") -> str:
+    """Write numbers one after another."""
+    return separator.join(number_text(value) for value in values)
+
+
+def quoted(name: str) -> str:
+    """Quote a name for YAML and for comments; JSON's quoting is valid in both."""
+    return json.dumps(name)

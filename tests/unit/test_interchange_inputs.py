@@ -1,0 +1,272 @@
+"""clicks-1, pairs-1 and calibration-1: what they hold comes back, and what they cannot hold is refused in words."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib_core.errors import InputError
+from calib_core.interchange import (
+    FrameNames,
+    calibration_text,
+    choose_check_point,
+    read_calibration,
+    read_clicks,
+    read_pairs,
+    write_calibration,
+    write_clicks,
+    write_pairs,
+)
+from calib_core.measurements import ReflectorClick, time_from_parts
+from calib_core.options import CalibrationOptions
+
+CAMERA = {"model": "pinhole", "width_px": 640, "height_px": 480, "matrix_px": [[500, 0, 320], [0, 500, 240], [0, 0, 1]]}
+
+
+def pairs_text(pair: object = None, **changes: object) -> str:
+    pair = pair or {"id": "p1", "radar_m": [5, 1, -0.5], "pixel_px": [212.9, 239.4]}
+    content = {"schema": "cocalib/pairs-1", "camera": CAMERA, "pairs": [pair], **changes}
+    return json.dumps({key: value for key, value in content.items() if value is not None})
+
+
+@pytest.fixture
+def golden_text(project_root: Path) -> str:
+    return (project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8")
+
+
+def test_clicks_come_back_in_order_of_time_with_every_nanosecond():
+    late = ReflectorClick(time_from_parts(1_700_000_001, 999_999_999), "c1", 10.25, 20.5)
+    early = ReflectorClick(time_from_parts(1_700_000_001, 999_999_998), "c2", -0.4, 1e-7, sigma_px=0.5, excluded=True)
+
+    text = write_clicks([late, early])
+
+    assert read_clicks(text) == (early, late)
+    assert write_clicks([early, late]) == text
+    assert json.loads(text)["clicks"][1] == {
+        "id": "c1",
+        "image_time": {"sec": 1_700_000_001, "nanosec": 999_999_999},
+        "pixel_px": [10.25, 20.5],
+    }
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"radar_mm": [5, 1, 0]}, "pairs[0].radar_mm: unknown key; did you mean radar_m?"),
+        ({"radar_m": [5, 1]}, "pairs[0].radar_m: expected array of length 3, got 2"),
+        ({"radar_m": [5, 1, None]}, "pairs[0].radar_m[2]: is null, expected float; give its value or remove the entry"),
+        ({"radar_m": [5, 1, math.nan]}, "pairs[0].radar_m[2]: nan is not a number to calculate with"),
+        ({"pixel_px": [math.inf, 1]}, "pairs[0].pixel_px[0]: inf is not a number to calculate with"),
+        ({"radar_m": [0, 0, 0]}, "pairs[0].radar_m: lies at the radar itself"),
+        ({"alternatives_radar_m": [[0, 0, 0]]}, "pairs[0].alternatives_radar_m[0]: lies at the radar itself"),
+        ({"sigma_px": 0}, "pairs[0].sigma_px: expected float > 0.0"),
+        ({"sigma_px": "2"}, "pairs[0].sigma_px: expected float | null, got str"),
+        ({"id": ""}, "pairs[0].id: expected str of length >= 1"),
+        ({"pixel_px": [True, 1]}, "pairs[0].pixel_px[0]: expected float, got bool"),
+    ],
+)
+def test_a_fault_in_a_pair_is_named_with_its_place_and_what_to_do(change, words):
+    pair = {"id": "p1", "radar_m": [5, 1, -0.5], "pixel_px": [212.9, 239.4], **change}
+
+    with pytest.raises(InputError) as refusal:
+        read_pairs(pairs_text(pair), "my_pairs.json")
+
+    assert str(refusal.value).startswith(f"my_pairs.json: {words}")
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "line 1, column 1: not JSON"),
+        ("[1]", "expected an object in braces, found a list"),
+        ('{"schema": "cocalib/pairs-1",}', "line 1, column 30: not JSON"),
+        ('{"schema": "cocalib/pairs-1", "a": 1, "a": 2}', "the key 'a' stands twice in one object"),
+        ("[" * 100_000, "nested too deeply"),
+        ('{"schema": "cocalib/clicks-1"}', "schema: expected 'cocalib/pairs-1', found \"cocalib/clicks-1\""),
+        ('{"pairs": []}', "schema: expected 'cocalib/pairs-1', found none"),
+        (pairs_text(camera=None), "camera: missing; add it"),
+        (
+            pairs_text(camera={**CAMERA, "model": "pinhle"}),
+            "camera.model: unknown value 'pinhle'; did you mean pinhole?",
+        ),
+        (pairs_text(camera={**CAMERA, "distorsion": []}), "camera.distorsion: unknown key; did you mean distortion?"),
+        (pairs_text(camera={**CAMERA, "distortion": [1, 2]}), "camera: pinhole takes 0 distortion coefficients, got 2"),
+        (pairs_text(radar={"sigma_range": 1}), "radar.sigma_range: unknown key; did you mean sigma_range_m?"),
+        (pairs_text(zebra=1), "zebra: unknown key; the keys here are schema, camera, pairs, radar,"),
+        (pairs_text().replace("212.9", "1e999"), "pairs[0].pixel_px[0]: inf is not a number to calculate with"),
+    ],
+)
+def test_a_fault_in_a_file_is_named_with_its_place(text, words):
+    with pytest.raises(InputError) as refusal:
+        read_pairs(text, "p.json")
+
+    assert str(refusal.value).startswith(f"p.json: {words}")
+
+
+def test_two_entries_of_one_id_are_refused():
+    pair = {"id": "p1", "radar_m": [5, 1, -0.5], "pixel_px": [212.9, 239.4]}
+    with pytest.raises(InputError, match=r"pairs\[0\] and pairs\[2\]: both have the id 'p1'; give each its own"):
+        read_pairs(pairs_text(pairs=[pair, {**pair, "id": "p2"}, pair]))
+
+    click = {"id": "c1", "image_time": {"sec": 1, "nanosec": 0}, "pixel_px": [1, 2]}
+    with pytest.raises(InputError, match=r"clicks\[0\] and clicks\[1\]"):
+        read_clicks(json.dumps({"schema": "cocalib/clicks-1", "clicks": [click, click]}))
+
+
+@pytest.mark.parametrize("stamp", [{"sec": 1, "nanosec": 1_000_000_000}, {"sec": -1, "nanosec": 0}, {"sec": 1}, 1.5])
+def test_a_stamp_that_is_none_is_refused(stamp):
+    click = {"id": "c1", "image_time": stamp, "pixel_px": [1, 2]}
+
+    with pytest.raises(InputError, match=r"clicks\[0\]\.image_time"):
+        read_clicks(json.dumps({"schema": "cocalib/clicks-1", "clicks": [click]}))
+
+
+def test_a_pairs_file_overrules_the_options_where_it_says_something():
+    position = {"position_m": [0.1, 0.2, 0.3], "sigma_m": 0.02}
+    text = pairs_text(radar={"sigma_range_m": 0.1, "sigma_azimuth_rad": 0.02}, camera_position_in_radar=position)
+
+    pairs_file = read_pairs(text)
+    options = pairs_file.options(CalibrationOptions())
+
+    assert options.noise.sigma_range_m == 0.1
+    assert options.noise.sigma_azimuth_deg == pytest.approx(math.degrees(0.02))
+    assert options.noise.sigma_elevation_deg == CalibrationOptions().noise.sigma_elevation_deg
+    assert options.solving.camera_position is not None
+    assert options.solving.camera_position.position_m == (0.1, 0.2, 0.3)
+    candidate = pairs_file.pairs[0].candidates[0]
+    np.testing.assert_allclose(candidate.sigma_polar, [0.1, 0.02, math.radians(1.0)])
+    range_m = np.linalg.norm(candidate.position_radar_m)
+    along = candidate.position_radar_m / range_m
+    assert along @ candidate.covariance_m2 @ along == pytest.approx(0.1**2)
+
+
+def test_pairs_come_back_with_their_alternatives_and_give_the_same_bytes():
+    pair = {"id": "p1", "radar_m": [5, 1, 0], "pixel_px": [1, 2], "alternatives_radar_m": [[6, 1, 0]], "sigma_px": 0.5}
+    pairs_file = read_pairs(pairs_text(pair, radar={"sigma_range_m": 0.1}))
+
+    text = write_pairs(pairs_file)
+
+    assert write_pairs(read_pairs(text)) == text
+    assert [candidate.score for candidate in pairs_file.pairs[0].candidates] == [0.5, 0.5]
+    assert json.loads(text)["pairs"][0]["alternatives_radar_m"] == [[6.0, 1.0, 0.0]]
+
+
+def test_a_calibration_reads_back_and_writes_the_same_bytes(golden_text):
+    file = read_calibration(golden_text)
+
+    assert write_calibration(file) == golden_text
+    assert [pair.id for pair in file.calibration.pairs if pair.excluded] == ["c4"]
+    assert file.calibration.pairs[1].image_time == 1_700_000_010_123_456_789
+    assert file.provenance.inputs[0].sha256 == "ab" * 32
+    assert file.frames == FrameNames("radar", "camera_optical")
+
+
+def test_what_is_unknown_is_null_and_never_nan(golden_text):
+    content = json.loads(golden_text)
+    content["covariance"] = None
+    content["metrics"]["cdsd_px"] = None
+    content["pairs"][0]["projected_px"] = None
+    file = read_calibration(json.dumps(content))
+
+    written = write_calibration(file)
+
+    assert "NaN" not in written
+    assert math.isnan(file.calibration.metrics.cdsd_px)
+    again = json.loads(written)
+    assert again["sigma"]["x_m"] is None
+    assert again["pairs"][0]["projected_px"] is None
+    assert again["pairs"][0]["distance_px"] is None
+
+
+def test_results_may_hold_more_keys_but_settings_may_not(golden_text):
+    content = json.loads(golden_text)
+    content["metrics"]["median_px"] = 3.0
+    content["remarks"] = {"weather": "dry"}
+    read_calibration(json.dumps(content))
+
+    content["options"]["noise"]["sigma_pixels"] = 3.0
+    with pytest.raises(InputError, match=r"options\.noise\.sigma_pixels: unknown key; did you mean sigma_px\?"):
+        read_calibration(json.dumps(content))
+
+
+def test_a_calibration_of_few_keys_is_enough(golden_text):
+    content = json.loads(golden_text)
+    few = {key: content[key] for key in ("schema", "camera_from_radar", "frames", "camera")}
+    del few["camera_from_radar"]["quaternion_wxyz"]
+
+    file = read_calibration(json.dumps(few))
+
+    assert file.calibration.metrics.n == 0
+    assert np.isnan(file.calibration.covariance).all()
+
+
+def test_a_mirrored_rotation_is_refused(golden_text):
+    content = json.loads(golden_text)
+    content["camera_from_radar"]["rotation"][0] = [-x for x in content["camera_from_radar"]["rotation"][0]]
+
+    with pytest.raises(InputError, match=r"camera_from_radar\.rotation: .*left-handed.*axis is mirrored"):
+        read_calibration(json.dumps(content))
+
+
+def test_transforms_that_disagree_are_refused(golden_text):
+    content = json.loads(golden_text)
+    content["camera_from_radar"]["quaternion_wxyz"].reverse()
+    with pytest.raises(InputError, match="quaternion_wxyz: is another rotation"):
+        read_calibration(json.dumps(content))
+
+    content = json.loads(golden_text)
+    content["radar_from_camera"] = content["camera_from_radar"]
+    with pytest.raises(InputError, match="radar_from_camera: is not the inverse of camera_from_radar"):
+        read_calibration(json.dumps(content))
+
+
+@pytest.mark.parametrize("name", ["", " ", "/", "a\nb", "$(command ls)", "${x}", 'a"b', "a\u2028b", "x" * 201, "<a>"])
+def test_a_frame_name_that_could_do_harm_is_refused(name):
+    with pytest.raises(InputError, match="the radar frame"):
+        FrameNames(name, "camera")
+
+
+def test_frame_names_lose_their_leading_slash_and_tell_apart():
+    assert FrameNames("/ti_mmwave_0", "camera_optical").radar == "ti_mmwave_0"
+    with pytest.raises(InputError, match="both frames are called"):
+        FrameNames("sensor", "/sensor")
+
+
+@pytest.mark.parametrize(
+    ("camera", "link"),
+    [
+        ("camera_optical", "camera_link"),
+        ("camera0/camera_optical_link", "camera0/camera_link"),
+        ("cam_color_optical_frame", "cam_color_link"),
+        ("usb_cam", "usb_cam_body_link"),
+        ("camera_link", "camera_body_link"),
+    ],
+)
+def test_the_body_frame_is_named_after_the_optical_one(camera, link):
+    assert FrameNames("radar", camera).camera_link == link
+
+
+def test_the_check_point_is_the_inlier_nearest_to_the_image_centre(golden_text):
+    calibration = read_calibration(golden_text).calibration
+    check = choose_check_point(calibration)
+
+    assert check is not None
+    centre = np.array([319.5, 239.5])
+    distances = {tuple(p.point_radar_m): np.linalg.norm(p.projected_px - centre) for p in calibration.pairs if p.inlier}
+    assert tuple(check.radar_m) == min(distances, key=distances.__getitem__)
+    np.testing.assert_allclose(check.pixel_px, calibration.reproject(check.radar_m[None])[0], atol=1e-9)
+
+
+def test_the_stamp_of_a_pair_comes_from_its_click_where_the_pair_has_none(golden_text):
+    import dataclasses
+
+    calibration = read_calibration(golden_text).calibration
+    bare = dataclasses.replace(calibration, pairs=(dataclasses.replace(calibration.pairs[0], image_time=None),))
+    click = ReflectorClick(time_from_parts(12, 5), "c1", 0.0, 0.0)
+
+    content = json.loads(calibration_text(bare, clicks=[click]))
+
+    assert content["pairs"][0]["image_time"] == {"sec": 12, "nanosec": 5}
