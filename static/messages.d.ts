@@ -336,6 +336,15 @@ export interface FrameForm {
 export interface CursorForm {
   type: "cursor";
   index: number;
+  playing?: boolean;
+  selected?: string | null;
+  request?: number;
+}
+
+/** The 3D view should look from somewhere. */
+export interface ViewpointForm {
+  type: "viewpoint";
+  viewpoint: "behind" | "above" | "side" | "camera";
   request?: number;
 }
 
@@ -369,4 +378,5 @@ export type FromPage =
   | HelloForm
   | FrameForm
   | CursorForm
+  | ViewpointForm
   | ImportForm;

@@ -12,6 +12,8 @@ from app.web.messages.incoming import (
     Hello,
     ImportWanted,
     Incoming,
+    Viewpoint,
+    ViewpointWanted,
     parse,
     request_of,
 )
@@ -52,6 +54,8 @@ __all__ = [
     "RecordingNote",
     "SessionNote",
     "StampColumns",
+    "Viewpoint",
+    "ViewpointWanted",
     "encode",
     "encode_frame",
     "parse",

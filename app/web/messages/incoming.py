@@ -22,6 +22,8 @@ __all__ = [
     "ImportWanted",
     "Incoming",
     "MessageForm",
+    "Viewpoint",
+    "ViewpointWanted",
     "parse",
     "request_of",
 ]
@@ -57,9 +59,31 @@ class FrameWanted:
 
 @dataclass(frozen=True, slots=True)
 class CursorMoved:
-    """A page looks at another frame: the 3D view and the overlay follow."""
+    """A page looks at another frame: the 3D view and the overlay follow.
+
+    Attributes:
+        index: of the frame.
+        playing: frames follow one another quickly.
+        selected: id of the click that is selected; None without one.
+    """
 
     index: int
+    playing: bool = False
+    selected: str | None = None
+
+
+Viewpoint: TypeAlias = Literal["behind", "above", "side", "camera"]
+
+
+@dataclass(frozen=True, slots=True)
+class ViewpointWanted:
+    """A page wants its 3D view to look from somewhere.
+
+    Attributes:
+        viewpoint: behind the radar, above it, beside it, or the camera's own place.
+    """
+
+    viewpoint: Viewpoint
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +99,7 @@ class ImportWanted:
     name: str
 
 
-Command: TypeAlias = Step | Hello | FrameWanted | CursorMoved | ImportWanted
+Command: TypeAlias = Step | Hello | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +136,14 @@ class CursorForm(_Form, frozen=True, tag="cursor"):
     """Another frame is looked at."""
 
     index: FrameIndex
+    playing: bool = False
+    selected: Annotated[str, Meta(max_length=100)] | None = None
+
+
+class ViewpointForm(_Form, frozen=True, tag="viewpoint"):
+    """The 3D view should look from somewhere."""
+
+    viewpoint: Viewpoint
 
 
 class ImportForm(_Form, frozen=True, tag="import_clicks"):
@@ -121,7 +153,7 @@ class ImportForm(_Form, frozen=True, tag="import_clicks"):
     name: Annotated[str, Meta(max_length=300)] = "the file"
 
 
-MessageForm: TypeAlias = forms.StepForm | HelloForm | FrameForm | CursorForm | ImportForm
+MessageForm: TypeAlias = forms.StepForm | HelloForm | FrameForm | CursorForm | ViewpointForm | ImportForm
 
 
 _TYPES = {str(form.__struct_config__.tag): form for form in get_args(MessageForm)}
@@ -194,7 +226,12 @@ def _frame(form: FrameForm) -> Command:
 
 @_command.register
 def _cursor(form: CursorForm) -> Command:
-    return CursorMoved(form.index)
+    return CursorMoved(form.index, form.playing, form.selected)
+
+
+@_command.register
+def _viewpoint(form: ViewpointForm) -> Command:
+    return ViewpointWanted(form.viewpoint)
 
 
 @_command.register
