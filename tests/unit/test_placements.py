@@ -1,0 +1,144 @@
+"""Placements from the radar alone."""
+
+import numpy as np
+import pytest
+
+from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
+from calib_core.options import GatingOptions
+from calib_core.placements import Placement, find_placements
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.scans import SimulatedPlacement, simulate_scans
+
+REFLECTOR = (6.0, 1.0, -0.8)
+RATE_HZ = 10.0
+
+
+def scans_with(
+    dwells: list[tuple[float, float, tuple[float, float, float], float]], *, length_s: float = 60.0, seed: int = 0
+) -> RadarScans:
+    """Build scans in which things (start [s], end [s], position [m], SNR [dB]) are seen nine times out of ten."""
+    rng = np.random.default_rng(seed)
+    scans = []
+    for time_s in np.arange(0.0, length_s, 1.0 / RATE_HZ):
+        there = [dwell for dwell in dwells if dwell[0] <= time_s <= dwell[1] and rng.uniform() < 0.9]
+        points = np.array([dwell[2] for dwell in there]).reshape(-1, 3)
+        scans.append(
+            RadarScan(
+                time=TimeNs(round(time_s * NS_PER_S)),
+                points_radar_m=points + 0.01 * rng.standard_normal(points.shape),
+                doppler_mps=np.zeros(len(there)),
+                snr_db=np.array([dwell[3] for dwell in there]) + rng.standard_normal(len(there)),
+                sigma_polar=np.full((len(there), 3), np.nan),
+            )
+        )
+    return RadarScans.from_scans(scans)
+
+
+def found_in(*dwells: tuple[float, float, tuple[float, float, float], float]) -> tuple[Placement, ...]:
+    return find_placements(scans_with(list(dwells)), GatingOptions())
+
+
+def is_of(placement: Placement, truth: SimulatedPlacement) -> bool:
+    overlap = min(placement.end, truth.end) - max(placement.start, truth.start)
+    range_m = float(np.linalg.norm(truth.position_radar_m))
+    apart_m = float(np.linalg.norm(placement.position_radar_m - truth.position_radar_m))
+    return overlap > 0.5 * (truth.end - truth.start) and apart_m < 0.06 + 0.06 * range_m
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        SimulationOptions(seed=11),
+        SimulationOptions(scene="field", radar="imaging", clutter="heavy", seed=12),
+        SimulationOptions(scene="aisle", clutter="heavy", placements=12, seed=13),
+        SimulationOptions(scene="checkerboard", radar="imaging", dwell_s=3.5, seed=14),
+    ],
+    ids=["rooftop", "field-imaging-heavy", "aisle-heavy", "checkerboard-short"],
+)
+def test_nearly_all_simulated_placements_are_found_and_nearly_nothing_else(options: SimulationOptions) -> None:
+    simulated = simulate_scans(options)
+    found = find_placements(simulated.scans, GatingOptions())
+    hits = sum(any(is_of(placement, truth) for placement in found) for truth in simulated.placements)
+    assert hits >= 0.95 * len(simulated.placements) - 0.5
+    assert len(found) - hits <= 1
+    assert list(found) == sorted(found, key=lambda placement: placement.start)
+    assert all(0.0 < placement.score <= 1.0 for placement in found)
+
+
+def test_a_dwell_is_found_with_its_times_and_its_place() -> None:
+    (placement,) = found_in((20.0, 27.0, REFLECTOR, 25.0))
+    assert placement.start / NS_PER_S == pytest.approx(20.0, abs=0.5)
+    assert placement.end / NS_PER_S == pytest.approx(27.0, abs=0.5)
+    np.testing.assert_allclose(placement.position_radar_m, REFLECTOR, atol=0.01)
+    assert placement.snr_db == pytest.approx(25.0, abs=0.5)
+
+
+def test_what_is_always_there_is_clutter() -> None:
+    assert found_in((0.0, 60.0, REFLECTOR, 40.0)) == ()
+
+
+def test_a_blinking_return_is_no_placement() -> None:
+    blinks = [(float(start), start + 2.5, REFLECTOR, 25.0) for start in range(0, 60, 5)]
+    assert found_in(*blinks) == ()
+
+
+def test_a_short_stop_is_no_placement() -> None:
+    assert found_in((20.0, 21.5, REFLECTOR, 25.0)) == ()
+
+
+def test_of_two_things_at_the_same_time_the_stronger_is_the_reflector() -> None:
+    person = (21.0, 26.0, (6.5, -0.5, 0.2), 12.0)
+    (placement,) = found_in((20.0, 27.0, REFLECTOR, 25.0), person)
+    np.testing.assert_allclose(placement.position_radar_m, REFLECTOR, atol=0.02)
+
+
+def test_strength_is_judged_free_of_range_so_that_a_far_reflector_counts() -> None:
+    near = (5.0, 10.0, (3.0, 0.0, -0.8), 40.0)
+    far = (20.0, 25.0, (12.0, 1.0, -0.8), 40.0 - 40.0 * float(np.log10(12.0 / 3.0)))
+    assert len(found_in(near, far)) == 2
+
+
+def test_something_much_weaker_than_the_placements_is_left_out() -> None:
+    dwells = [(5.0 + 10.0 * i, 10.0 + 10.0 * i, (4.0 + i, 0.0, -0.8), 30.0) for i in range(4)]
+    weak = (47.0, 52.0, (6.0, 2.0, 0.0), 8.0)
+    assert len(found_in(*dwells)) == 4
+    assert len(found_in(*dwells, weak)) == 4
+
+
+def test_a_return_between_two_cells_is_one_placement() -> None:
+    # range 6.00 m lies on a border of the 8 cm cells, azimuth 0 on one of the angle cells
+    (placement,) = found_in((20.0, 27.0, (6.0, 0.0, 0.0), 25.0))
+    assert (placement.end - placement.start) / NS_PER_S > 6.0
+
+
+def test_moving_returns_and_returns_without_position_are_not_looked_at() -> None:
+    scans = scans_with([(20.0, 27.0, REFLECTOR, 25.0)])
+    columns = {
+        "times_ns": scans.times_ns,
+        "first_return": scans.first_return,
+        "snr_db": scans.snr_db,
+        "sigma_polar": scans.sigma_polar,
+    }
+    moving = RadarScans(**columns, points_radar_m=scans.points_radar_m, doppler_mps=np.full(len(scans.snr_db), 0.4))
+    nowhere = RadarScans(**columns, points_radar_m=scans.points_radar_m * np.nan, doppler_mps=scans.doppler_mps)
+    assert find_placements(moving, GatingOptions()) == ()
+    assert find_placements(nowhere, GatingOptions()) == ()
+
+
+def test_a_radar_without_snr_and_doppler_still_shows_placements() -> None:
+    scans = scans_with([(20.0, 27.0, REFLECTOR, float("nan"))])
+    silent = RadarScans(
+        times_ns=scans.times_ns,
+        first_return=scans.first_return,
+        points_radar_m=scans.points_radar_m,
+        doppler_mps=np.full(len(scans.snr_db), np.nan),
+        snr_db=scans.snr_db,
+        sigma_polar=scans.sigma_polar,
+    )
+    (placement,) = find_placements(silent, GatingOptions())
+    assert np.isnan(placement.snr_db)
+    assert placement.score > 0.5
+
+
+def test_no_scans_hold_no_placements() -> None:
+    assert find_placements(RadarScans(), GatingOptions()) == ()
