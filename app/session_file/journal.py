@@ -15,7 +15,7 @@ from app.session import History, RecordingFacts, Step, advance
 from app.session_file.errors import SessionFileError
 from app.session_file.forms import StepForm, form_of_step, step_from_form
 from app.session_file.identity import SCHEMA, RecordingForm, recording_form, require_same_recording
-from app.session_file.whole import write_whole
+from app.whole_file import write_whole
 from calib_core.errors import CalibrationError
 
 __all__ = ["Journal", "Replayed", "begin_journal", "replay"]

@@ -23,12 +23,14 @@ class Restored:
     """What was found in a session folder.
 
     Attributes:
+        folder: where it lies.
         history: the session, with what can be undone and redone.
         steps: how many steps the journal held; 0 for a new session.
         torn_bytes: length of a half-written last line that was dropped; nobody had been told that it was kept.
         from_snapshot: the journal was missing, so the snapshot was taken.
     """
 
+    folder: Path
     history: History
     steps: int = 0
     torn_bytes: int = 0
@@ -81,7 +83,7 @@ class SessionFile:
         """Write the snapshot unless it is up to date; the journal holds everything, so a failure is only logged."""
         if self._snapshot_steps == self._journal.steps:
             return
-        path, steps = self.folder / _SNAPSHOT, self._journal.steps
+        path, steps = self.restored.folder / _SNAPSHOT, self._journal.steps
         try:
             write_snapshot(path, self._history.present, facts=self._facts, steps=steps, cocalib=version())
             self._snapshot_steps = steps
@@ -113,7 +115,7 @@ def open_session_file(folder: Path, facts: RecordingFacts) -> SessionFile:
     except SessionFileError:
         lock.close()
         raise
-    return SessionFile(folder, facts, lock, journal, restored)
+    return SessionFile(facts, lock, journal, restored)
 
 
 def set_aside(folder: Path) -> Path | None:
@@ -137,4 +139,6 @@ def _opened(folder: Path, facts: RecordingFacts) -> tuple[Journal, Restored]:
     if not path.exists():
         begin_journal(path, facts, read_snapshot(snapshot, facts) if from_snapshot else (), version())
     replayed = replay(path, facts)
-    return Journal(path, replayed), Restored(replayed.history, replayed.steps, replayed.torn_bytes, from_snapshot)
+    return Journal(path, replayed), Restored(
+        folder, replayed.history, replayed.steps, replayed.torn_bytes, from_snapshot
+    )

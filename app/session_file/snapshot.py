@@ -10,7 +10,7 @@ from app.session import ClicksImported, OptionsChanged, RecordingFacts, Session,
 from app.session_file.errors import SessionFileError
 from app.session_file.forms import ClickForm, click_from_form, form_of_click
 from app.session_file.identity import SCHEMA, RecordingForm, recording_form, require_same_recording
-from app.session_file.whole import write_whole
+from app.whole_file import write_whole
 
 __all__ = ["read_snapshot", "write_snapshot"]
 
