@@ -5,7 +5,14 @@ from pathlib import Path
 
 from calib_core.errors import CalibrationError
 
-__all__ = ["InstallationError", "check_installation", "installed_app_owners", "sample_folder", "static_folder", "version"]
+__all__ = [
+    "InstallationError",
+    "check_installation",
+    "installed_app_owners",
+    "sample_folder",
+    "static_folder",
+    "version",
+]
 
 _DISTRIBUTION = "cocalib"
 _PACKAGE_FOLDER = Path(__file__).resolve().parent
@@ -65,4 +72,6 @@ def _folder(name: str) -> Path:
     for folder in (_PACKAGE_FOLDER / name, _PACKAGE_FOLDER.parent / name):
         if folder.is_dir():
             return folder
-    raise InstallationError(f"the folder {name} is not in {_PACKAGE_FOLDER} nor beside it: install {_DISTRIBUTION} again")
+    raise InstallationError(
+        f"the folder {name} is not in {_PACKAGE_FOLDER} nor beside it: install {_DISTRIBUTION} again"
+    )

@@ -3,15 +3,20 @@
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Protocol, TypeAlias
 
 from app.session import ClicksImported, History, RecordingFacts, Redo, Session, Solved, Step, Undo, advance, settled
+from app.session_file import Restored, open_session_file
+from app.solving import RecordingSource, SolverWorker
 from app.view import View, view
+from calib_core.camera import Camera
+from calib_core.errors import InputError
 from calib_core.interchange import read_clicks, write_clicks
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 
-__all__ = ["Journal", "Solver", "Subscriber", "Workspace"]
+__all__ = ["Journal", "Solver", "Subscriber", "Workspace", "open_workspace", "recording_facts"]
 
 Subscriber: TypeAlias = Callable[[View], None]
 
@@ -36,7 +41,7 @@ class Solver(Protocol):
         options: CalibrationOptions,
         when_done: Callable[[Solved], None],
     ) -> None:
-        """Answer this revision soon, and forget the older ones; must not wait."""
+        """Answer this revision soon, and forget the older ones; must not wait. A larger revision is a newer one."""
 
     def close(self) -> None:
         """Stop; no answer comes after this returns."""
@@ -58,8 +63,7 @@ class Workspace:
         self._subscribers: tuple[Subscriber, ...] = ()
         self._untold: deque[tuple[View, tuple[Subscriber, ...]]] = deque()
         self._telling = False
-        with self._lock:
-            self._ask_for_answer()
+        self._ask_for_answer(history.present)
 
     @property
     def history(self) -> History:
@@ -92,8 +96,8 @@ class Workspace:
             if not isinstance(step, Solved):
                 self._journal.append(step, after)
             self._history = after
-            self._ask_for_answer()
             self._untold.append((view(after, self.facts), self._subscribers))
+        self._ask_for_answer(after.present)
         self._tell()
 
     def undo(self) -> None:
@@ -144,8 +148,8 @@ class Workspace:
         with self._lock:
             self._journal.close()
 
-    def _ask_for_answer(self) -> None:
-        session = self._history.present
+    def _ask_for_answer(self, session: Session) -> None:
+        """Ask without the lock: the answer may come in this very call, and older requests never replace newer ones."""
         if session.needs_solving:
             self._solver.request(session.revision, session.clicks, session.options, self.dispatch)
 
@@ -163,3 +167,46 @@ class Workspace:
             finally:
                 with self._lock:
                     self._telling = False
+
+
+def recording_facts(recording: RecordingSource, name: str) -> RecordingFacts:
+    """Return the little that clicks must fit.
+
+    Args:
+        recording: the open recording.
+        name: what to call it.
+
+    Raises:
+        InputError: it has no frames to click in.
+    """
+    if not len(recording.image_times):
+        raise InputError(
+            f"{name}: has no frames to click in; give the recording of the camera too, or another --image-topic"
+        )
+    picture = recording.image_bytes(0)
+    return RecordingFacts(name, recording.image_times, picture.width_px, picture.height_px)
+
+
+def open_workspace(
+    recording: RecordingSource, *, camera: Camera | None, session_folder: Path, name: str
+) -> tuple[Workspace, Restored]:
+    """Open or begin the session of a recording, with a solver beside it.
+
+    Args:
+        recording: the open recording.
+        camera: the intrinsics to solve with; None where there are none.
+        session_folder: where the session is kept.
+        name: what to call the recording.
+
+    Returns:
+        the workspace, and what was found in the folder.
+
+    Raises:
+        InputError: the recording has no frames.
+        SessionFileError: the session cannot be opened.
+    """
+    facts = recording_facts(recording, name)
+    session_file = open_session_file(session_folder, facts)
+    return Workspace(
+        facts, session_file.restored.history, session_file, SolverWorker(recording, camera)
+    ), session_file.restored

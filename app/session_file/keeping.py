@@ -51,10 +51,7 @@ class Restored:
 class SessionFile:
     """Keeps the steps of one session, from `open_session_file` to `close`. One thread at a time."""
 
-    def __init__(
-        self, folder: Path, facts: RecordingFacts, lock: FolderLock, journal: Journal, restored: Restored
-    ) -> None:
-        self.folder = folder
+    def __init__(self, facts: RecordingFacts, lock: FolderLock, journal: Journal, restored: Restored) -> None:
         self.restored = restored
         self._facts = facts
         self._lock = lock

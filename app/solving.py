@@ -1,0 +1,277 @@
+"""From clicks to an answer: the one function that page and command line share, and the worker that runs it for the page."""
+
+import hashlib
+import logging
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Protocol
+
+from app.resources import version
+from app.session import Outcome, Solved
+from calib_core.arrays import TimesNs
+from calib_core.calibrate import calibrate, calibrate_pairs
+from calib_core.camera import Camera
+from calib_core.errors import CalibrationError, InputError
+from calib_core.interchange import (
+    FrameNames,
+    InputFile,
+    Provenance,
+    read_camera_file,
+    read_pairs,
+)
+from calib_core.interchange import calibration_text as interchange_text
+from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
+
+__all__ = [
+    "RadarSource",
+    "RecordingSource",
+    "RememberedScans",
+    "SolverWorker",
+    "calibration_text",
+    "calibration_text_of_pairs",
+    "camera_for",
+    "half_window_s",
+    "solve_clicks",
+    "solve_pairs",
+]
+
+_log = logging.getLogger(__name__)
+
+
+class Picture(Protocol):
+    """The size of a frame."""
+
+    @property
+    def width_px(self) -> int: ...  # noqa: D102
+    @property
+    def height_px(self) -> int: ...  # noqa: D102
+
+
+class HashedFile(Protocol):
+    """A file by its content."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def size_bytes(self) -> int: ...  # noqa: D102
+    @property
+    def sha256(self) -> str: ...  # noqa: D102
+
+
+class RadarSource(Protocol):
+    """The part of a Recording that a solve needs."""
+
+    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans:
+        """Return the scans within the half window of any of the times, each once, in order of time."""
+
+
+class RecordingSource(RadarSource, Protocol):
+    """The part of a Recording that the application needs besides."""
+
+    @property
+    def image_times(self) -> TimesNs: ...  # noqa: D102
+    @property
+    def radar_topic(self) -> str | None: ...  # noqa: D102
+    @property
+    def image_topic(self) -> str | None: ...  # noqa: D102
+    @property
+    def camera_info_topic(self) -> str | None: ...  # noqa: D102
+    @property
+    def radar_frame(self) -> str: ...  # noqa: D102
+    @property
+    def camera_frame(self) -> str: ...  # noqa: D102
+
+    def camera(self) -> Camera | None: ...  # noqa: D102
+    def image_bytes(self, index: int, /) -> Picture: ...  # noqa: D102
+    def fingerprint(self) -> Sequence[HashedFile]: ...  # noqa: D102
+
+
+def solve_clicks(
+    recording: RadarSource, clicks: Sequence[ReflectorClick], camera: Camera | None, options: CalibrationOptions
+) -> Outcome:
+    """Solve for camera_from_radar.
+
+    Args:
+        recording: where the radar scans come from.
+        clicks: in any order; excluded ones are paired and shown, but not used.
+        camera: the intrinsics; without them there is an answer too: that they are missing.
+        options: what steers the solve.
+
+    Raises:
+        CalibrationError: the recording cannot be read where the clicks lie.
+    """
+    if camera is None:
+        return Unsolvable(
+            "no-camera",
+            "The camera's intrinsics are missing: the recording has none that can be used.",
+            "Start again with --camera FILE (camera_info YAML, OpenCV, Kalibr), or calibrate them with cocalib intrinsics.",
+        )
+    times = sorted({click.image_time for click in clicks})
+    scans = recording.radar_scans_around(times, half_window_s(options))
+    return calibrate(clicks, scans, camera, options)
+
+
+def half_window_s(options: CalibrationOptions) -> float:
+    """Return how far around a click radar scans can matter [s].
+
+    A window is centred on a scan up to `max_time_gap_s` away; the paper's may begin at a whole second instead.
+    """
+    longest_s = max(options.locating.window_s, options.paper.window_s)
+    return longest_s / 2 + options.locating.max_time_gap_s + 1.0
+
+
+def solve_pairs(text: str, source: str, options: CalibrationOptions) -> Outcome:
+    """Solve for camera_from_radar from the text of a pairs-1 file; what the file says about noise wins over the options.
+
+    Args:
+        text: the file's content.
+        source: its name, for error messages.
+        options: what steers the solve.
+
+    Raises:
+        InputError: the text is not a file of pairs.
+    """
+    pairs_file = read_pairs(text, source, noise=options.noise)
+    return calibrate_pairs(pairs_file.pairs, pairs_file.camera, pairs_file.options(options))
+
+
+def camera_for(recording: RecordingSource, camera_file: Path | None) -> Camera | None:
+    """Return the intrinsics to solve with: the file's where one is given, else the recording's, else None.
+
+    Raises:
+        InputError: the file holds no camera, or one of another image size than the recording's.
+    """
+    if camera_file is None:
+        return recording.camera()
+    picture = recording.image_bytes(0)
+    camera = read_camera_file(camera_file, image_size_px=(picture.width_px, picture.height_px))
+    if (camera.width_px, camera.height_px) != (picture.width_px, picture.height_px):
+        raise InputError(
+            f"{camera_file}: calibrated for {camera.width_px} x {camera.height_px} px, but the frames have "
+            f"{picture.width_px} x {picture.height_px} px; give the intrinsics of these frames"
+        )
+    return camera
+
+
+def calibration_text(calibration: Calibration, recording: RecordingSource) -> str:
+    """Write a calibration-1 file; the page and the command line give the same bytes for the same clicks."""
+    provenance = Provenance(
+        inputs=tuple(InputFile(file.name, file.size_bytes, file.sha256) for file in recording.fingerprint()),
+        radar_topic=recording.radar_topic,
+        image_topic=recording.image_topic,
+        camera_info_topic=recording.camera_info_topic,
+        version=version(),
+    )
+    return interchange_text(calibration, FrameNames(recording.radar_frame, recording.camera_frame), provenance)
+
+
+def calibration_text_of_pairs(calibration: Calibration, text: str, name: str) -> str:
+    """Write a calibration-1 file of a calibration that came from a pairs-1 file.
+
+    Args:
+        calibration: what was solved.
+        text: the content of the file of pairs.
+        name: its name without the folder.
+    """
+    data = text.encode()
+    pairs_file = InputFile(name, len(data), hashlib.sha256(data).hexdigest())
+    return interchange_text(calibration, provenance=Provenance(inputs=(pairs_file,), version=version()))
+
+
+class RememberedScans:
+    """Radar scans as a solve last asked for them: moving a mark or changing an option reads nothing again."""
+
+    def __init__(self, recording: RadarSource) -> None:
+        self._recording = recording
+        self._asked: tuple[tuple[TimeNs, ...], float] | None = None
+        self._scans = RadarScans()
+
+    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float) -> RadarScans:
+        """Return the scans within the half window of any of the times, each once, in order of time."""
+        asked = (tuple(times), half_window_s)
+        if asked != self._asked:
+            self._scans = self._recording.radar_scans_around(times, half_window_s)
+            self._asked = asked
+        return self._scans
+
+
+@dataclass(frozen=True, slots=True)
+class _Request:
+    revision: int
+    clicks: tuple[ReflectorClick, ...]
+    options: CalibrationOptions
+    when_done: Callable[[Solved], None]
+
+
+class SolverWorker:
+    """Solves in one thread of its own; of several requests waiting, only the newest is worked on."""
+
+    def __init__(self, recording: RadarSource, camera: Camera | None) -> None:
+        self._scans = RememberedScans(recording)
+        self._camera = camera
+        self._lock = threading.Lock()
+        self._newest_revision = -1
+        self._closed = False
+        self._executor = ThreadPoolExecutor(max_workers=1, thread_name_prefix="solver")
+
+    def request(
+        self,
+        revision: int,
+        clicks: Sequence[ReflectorClick],
+        options: CalibrationOptions,
+        when_done: Callable[[Solved], None],
+    ) -> None:
+        """Answer this revision soon, and forget the older ones; returns at once, and does nothing after `close`.
+
+        Args:
+            revision: echoed in the answer; a larger one is a newer one.
+            clicks: as they are in this revision.
+            options: as they are in this revision.
+            when_done: called with the answer, without any lock held; not called when a newer request came in time.
+        """
+        request = _Request(revision, tuple(clicks), options, when_done)
+        with self._lock:
+            if self._closed or revision <= self._newest_revision:
+                return
+            self._newest_revision = revision
+            future = self._executor.submit(self._answer, request)
+        future.add_done_callback(partial(_deliver, request))
+
+    def close(self) -> None:
+        """Stop; the solve under way is finished, and no answer comes after this returns."""
+        with self._lock:
+            self._closed = True
+            self._newest_revision += 1
+        self._executor.shutdown(wait=True, cancel_futures=True)
+
+    def _answer(self, request: _Request) -> Outcome | None:
+        if request.revision != self._newest_revision:
+            return None
+        return solve_clicks(self._scans, request.clicks, self._camera, request.options)
+
+
+def _deliver(request: _Request, future: "Future[Outcome | None]") -> None:
+    """Hand the answer over. A failure is an answer too: it is shown where the person looks, and logged if it is ours."""
+    if future.cancelled():
+        return
+    error = future.exception()
+    outcome = future.result() if error is None else _failure(error)
+    if outcome is not None:
+        request.when_done(Solved(request.revision, outcome))
+
+
+def _failure(error: BaseException) -> Unsolvable:
+    if isinstance(error, CalibrationError):
+        return Unsolvable("unreadable", str(error), "The clicks are kept; once that is put right, change any of them.")
+    _log.error("the solver failed", exc_info=error)
+    return Unsolvable(
+        "internal-error",
+        f"The solver failed: {type(error).__name__}: {error}.",
+        "This is a fault of the program, not of your data. The clicks are kept; the log has the details for a report.",
+    )
