@@ -1,11 +1,14 @@
 """The whole of it: clicks and radar returns go in, camera_from_radar comes out."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from calib_core.arrays import Flags, Values
 from calib_core.camera import Camera
-from calib_core.consensus import associate, find_consensus
+from calib_core.consensus import Consensus, associate, find_consensus
+from calib_core.diagnostics import Findings, cautions_of, handedness
 from calib_core.evidence import Evidence, evidence_of
 from calib_core.initial_pose import starting_poses
 from calib_core.measurements import Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
@@ -25,8 +28,10 @@ MIN_PAIRS = 4
 _INLIER_PROBABILITY = 0.5
 _STARTS_MEASURED = 3
 _STARTS_FREE = 6
+_AGREEING_SHARE = 0.6
+_PLAUSIBLE_SCALE = 1.8
+_NEAR_PRIOR = 4.0  # standard deviations
 _PAIRS_TO_START = 150  # more do not make a start better
-_LIKELY = 6.0  # starts whose cost is within this of the best are refined too
 
 
 def calibrate(
@@ -79,25 +84,42 @@ def _solved(
     if len(used) < MIN_PAIRS:
         return _too_few(len(used), len(excluded), len(unpaired))
     evidence = evidence_of(used, camera, options)
-    refined = _best_fit(evidence, options)
-    if isinstance(refined, Unsolvable):
-        return refined
+    fit = _best_fit(evidence, options)
+    if isinstance(fit, Unsolvable):
+        return fit
+    refined = fit.refined
     uncertainty = pose_uncertainty(refined)
     left_out = leave_one_out(refined, uncertainty.information)
+    metrics = _metrics(evidence, refined, left_out)
+    findings = Findings(
+        ids=tuple(pair.id for pair in used),
+        evidence=evidence,
+        refined=refined,
+        uncertainty=uncertainty,
+        left_out=left_out,
+        inliers=_inliers(refined),
+        alternatives=fit.found,
+        mirror_gain=fit.mirror_gain,
+        chi2_per_degree=metrics.chi2 / max(metrics.degrees_of_freedom, 1),
+    )
     results = _used_results(used, refined, left_out) | _excluded_results(shown, excluded, refined, camera, options)
-    ordered = tuple(results[pair.id] for pair in shown)
     return Calibration(
         camera_from_radar=refined.camera_from_radar,
         covariance=uncertainty.covariance,
         camera=camera,
-        metrics=_metrics(evidence, refined, left_out),
-        pairs=ordered,
+        metrics=metrics,
+        pairs=tuple(results[pair.id] for pair in shown),
         unpaired=unpaired,
-        cautions=(),
+        cautions=cautions_of(findings),
         options=options,
-        noise_scale=tuple(refined.noise_scale.tolist()),
+        noise_scale=_four(refined.noise_scale),
         covariance_quantile=uncertainty.quantile,
     )
+
+
+def _four(values: Values) -> tuple[float, float, float, float]:
+    click, range_, azimuth, elevation = values.tolist()
+    return click, range_, azimuth, elevation
 
 
 def _canonical(pair: Pair) -> tuple[int, str, float, float]:
@@ -114,20 +136,52 @@ def _too_few(used: int, excluded: int, unpaired: int) -> Unsolvable:
     )
 
 
-def _best_fit(evidence: Evidence, options: CalibrationOptions) -> Refined | Unsolvable:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """The fit, the poses the other starts ended in, and what mirrored axes would gain."""
+
+    refined: Refined
+    found: tuple[Consensus, ...]
+    mirror_gain: float
+
+
+def _best_fit(evidence: Evidence, options: CalibrationOptions) -> _Fit | Unsolvable:
     """Start from several poses, keep what the pairs agree on most, and fit it."""
-    estimate_scale = options.noise.estimate_scale
+    estimate_scale, seed = options.noise.estimate_scale, options.solving.seed
     few = _some_pairs(evidence)
     most = _STARTS_MEASURED if evidence.belief.measured else _STARTS_FREE
-    starts = starting_poses(few, most=most, rng=np.random.default_rng(options.solving.seed))
+    starts = starting_poses(few, most=most, rng=np.random.default_rng(seed))
     found = find_consensus(few, starts, estimate_scale=estimate_scale)
     if not found:
         return _no_pose("no two placements lie in different directions")
     refined = refine(evidence, found[0], estimate_scale=estimate_scale)
-    inliers = int((refined.weights > _INLIER_PROBABILITY).sum())
+    mirror_gain = -np.inf
+    if not _beyond_doubt(evidence, refined):
+        mirror_gain = handedness(few, found[0], estimate_scale=estimate_scale, seed=seed)
+    inliers = int(_inliers(refined).sum())
     if inliers < MIN_PAIRS:
-        return _no_pose(f"only {inliers} of {len(evidence)} pairs agree on any pose")
-    return refined
+        reason = f"only {inliers} of {len(evidence)} pairs agree on any pose"
+        return _mirrored(reason) if mirror_gain > 0 else _no_pose(reason)
+    return _Fit(refined, found, mirror_gain)
+
+
+def _inliers(refined: Refined) -> Flags:
+    return np.asarray(refined.weights > _INLIER_PROBABILITY)
+
+
+def _beyond_doubt(evidence: Evidence, refined: Refined) -> bool:
+    """Tell whether pairs and a measured camera position agree so well that mirrored axes are out of the question."""
+    agreeing = _inliers(refined).mean() >= _AGREEING_SHARE and float(refined.noise_scale.max()) < _PLAUSIBLE_SCALE
+    prior_residual = evidence.belief.rows(refined.camera_from_radar)[0]
+    return evidence.belief.measured and bool(agreeing) and float(np.linalg.norm(prior_residual)) < _NEAR_PRIOR
+
+
+def _mirrored(reason: str) -> Unsolvable:
+    return Unsolvable(
+        "mirrored-axes",
+        f"{reason}; with one radar axis mirrored they fit better",
+        "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) where the positions come from",
+    )
 
 
 def _some_pairs(evidence: Evidence) -> Evidence:
@@ -147,7 +201,7 @@ def _no_pose(reason: str) -> Unsolvable:
 
 def _metrics(evidence: Evidence, refined: Refined, left_out: LeftOut) -> Metrics:
     """Measure the inlier pairs; chi2 is by the noise as assumed, so that a wrong assumption shows."""
-    inliers = refined.weights > _INLIER_PROBABILITY
+    inliers = _inliers(refined)
     points = cartesian_from_polar(evidence.polar[refined.rows])
     projected = evidence.camera.project(refined.camera_from_radar @ points)
     errors = distances(projected, evidence.pixels_px)
@@ -163,13 +217,15 @@ def _metrics(evidence: Evidence, refined: Refined, left_out: LeftOut) -> Metrics
 def _used_results(used: Sequence[Pair], refined: Refined, left_out: LeftOut) -> dict[str, PairResult]:
     evidence = refined.evidence
     points = cartesian_from_polar(evidence.polar[refined.rows])
+    projected = evidence.camera.project(refined.camera_from_radar @ points)
+    inliers = _inliers(refined)
     return {
         pair.id: PairResult(
             id=pair.id,
             pixel_px=pair.pixel_px,
-            projected_px=evidence.camera.project(refined.camera_from_radar @ points[i : i + 1])[0],
+            projected_px=projected[i],
             point_radar_m=pair.candidates[chosen].position_radar_m,
-            inlier=bool(refined.weights[i] > _INLIER_PROBABILITY),
+            inlier=bool(inliers[i]),
             outlier_probability=float(1.0 - refined.weights[i]),
             influence=float(left_out.influence[i]),
             candidate=chosen,

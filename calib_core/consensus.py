@@ -5,7 +5,7 @@ threshold in pixels cannot. The radius of the Geman-McClure loss shrinks from "n
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ RADII = (12.0, 8.0, 5.5, 4.0, 3.0)
 
 _STEPS_PER_RADIUS = 2
 _INLIER_SHARE = 0.8
+_SAME_POSE = 0.25  # squared distance, in standard deviations
 _NOISE_SCALES = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
 _SCALE_PENALTY = 4.0  # how much better a larger noise level must explain the pairs than the assumed one
 
@@ -50,16 +51,18 @@ def find_consensus(
         estimate_scale: allow a larger noise than assumed.
     """
     scales = _NOISE_SCALES if estimate_scale else _NOISE_SCALES[:1]
-    found = []
+    found: list[Consensus] = []
     for start in starts:
-        pose = _graduated(evidence, start)
-        costs = [_scaled_cost(evidence, pose, scale) for scale in scales]
-        best = int(np.argmin(costs))
-        found.append(Consensus(pose, costs[best], scales[best]))
+        pose = _graduated(evidence, start, [other.camera_from_radar for other in found])
+        if pose is not None:
+            costs = _mixture_costs(evidence, pose, scales)
+            best = int(np.argmin(costs))
+            found.append(Consensus(pose, costs[best], scales[best]))
     return tuple(sorted(found, key=lambda one: one.cost))
 
 
-def _graduated(evidence: Evidence, start: RigidTransform) -> RigidTransform:
+def _graduated(evidence: Evidence, start: RigidTransform, known: Sequence[RigidTransform]) -> RigidTransform | None:
+    """Follow the shrinking radius from one start; None as soon as it runs into a pose that is known already."""
     pose = start
     for radius in RADII:
         for _ in range(_STEPS_PER_RADIUS):
@@ -67,6 +70,9 @@ def _graduated(evidence: Evidence, start: RigidTransform) -> RigidTransform:
             weights = (1.0 + model.squared / radius**2) ** -2.0
             hessian, gradient = normal_equations(evidence, pose, model, weights)
             pose = pose.perturbed(_damped(hessian, gradient))
+        errors = [other.error_from(pose) for other in known]
+        if any(error @ hessian @ error < _SAME_POSE for error in errors):
+            return None
     return pose
 
 
@@ -75,19 +81,19 @@ def associate(evidence: Evidence, pose: RigidTransform) -> tuple[TimesNs, Linear
 
     The choice maximises log score + log N(e; 0, S).
     """
-    owner = evidence.owner
+    each = evidence if evidence.one_to_one else evidence.candidates_apart()
     model = linearise(
         pose,
-        evidence.camera,
-        pixels_px=evidence.pixels_px[owner],
-        sigma_px=evidence.sigma_px[owner],
-        polar=evidence.polar,
-        sigma_polar=evidence.sigma_polar,
+        each.camera,
+        pixels_px=each.pixels_px,
+        sigma_px=each.sigma_px,
+        polar=each.polar,
+        sigma_polar=each.sigma_polar,
     )
     if evidence.one_to_one:
         return np.arange(len(evidence)), model
     cost = model.squared + model.log_determinant - 2.0 * evidence.log_score
-    order = np.lexsort((cost, owner))  # by pair, the cheapest candidate first
+    order = np.lexsort((cost, evidence.owner))  # by pair, the cheapest candidate first
     rows = order[evidence.first[:-1]]
     return rows, Linearised(
         residual=model.residual[rows],
@@ -128,11 +134,20 @@ def log_odds_of(evidence: Evidence, model: Linearised, log_score: Values, inlier
 
 def mixture_cost(evidence: Evidence, pose: RigidTransform) -> float:
     """Return twice the negative log-likelihood of the mixture, against "all are outliers", with what is known of the camera."""
+    return _mixture_costs(evidence, pose, (1.0,))[0]
+
+
+def _mixture_costs(evidence: Evidence, pose: RigidTransform, scales: Sequence[float]) -> list[float]:
+    """Return the cost if all noise were larger by each scale: S grows by its square, log det S by 4 log scale."""
     rows, model = associate(evidence, pose)
-    odds = log_odds_of(evidence, model, evidence.log_score[rows], _INLIER_SHARE)
-    return float(-2.0 * np.logaddexp(0.0, odds).sum()) + evidence.belief.cost(pose)
-
-
-def _scaled_cost(evidence: Evidence, pose: RigidTransform, scale: float) -> float:
-    penalty = _SCALE_PENALTY * (scale > 1.0)
-    return mixture_cost(evidence.scaled([scale] * 4), pose) + penalty
+    belief = evidence.belief.cost(pose)
+    costs = []
+    for scale in scales:
+        grown = replace(
+            model,
+            residual=model.residual / scale,
+            log_determinant=model.log_determinant + 4.0 * np.log(scale),
+        )
+        odds = log_odds_of(evidence, grown, evidence.log_score[rows], _INLIER_SHARE)
+        costs.append(float(-2.0 * np.logaddexp(0.0, odds).sum()) + belief + _SCALE_PENALTY * (scale > 1.0))
+    return costs

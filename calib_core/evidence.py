@@ -23,7 +23,7 @@ from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar, cartesian_jacobian, polar_from_cartesian
 
-__all__ = ["CameraBelief", "Evidence", "Linearised", "evidence_of", "linearise"]
+__all__ = ["CameraBelief", "Evidence", "Linearised", "evidence_of", "linearise", "with_respect_to_pose"]
 
 _FLAT_SIGMA_RAD = np.deg2rad(10.0)  # elevation of a radar that always reports 0: unknown, not zero
 _FAR = 1e6  # whitened residual of a position the camera cannot see
@@ -113,6 +113,12 @@ class Evidence:
             sigma_polar=self.sigma_polar[rows],
             log_score=self.log_score[rows],
         )
+
+    def candidates_apart(self) -> "Evidence":
+        """Make every candidate a pair of its own, with its pair's click."""
+        owner = self.owner
+        first = np.arange(len(owner) + 1)
+        return replace(self, pixels_px=self.pixels_px[owner], sigma_px=self.sigma_px[owner], first=first)
 
     def mirrored(self) -> "Evidence":
         """Return what the pairs would be if the radar's y axis pointed the other way."""
@@ -208,8 +214,7 @@ def linearise(
         residual_px = residual_px - (point_jacobian @ (polar - mu)[:, :, None])[:, :, 0]
     whitening, log_determinant = _whitening(point_jacobian, sigma_px, sigma_polar)
     residual = (whitening @ residual_px[:, :, None])[:, :, 0]
-    # d (R p) / d theta = -[R p]x for R = Exp(dtheta) R_hat; a row j of d_point times -[q]x is (q x j)
-    pose_jacobian = np.concatenate([d_point, np.cross(turned_m[:, None, :], d_point)], axis=2)
+    pose_jacobian = with_respect_to_pose(d_point, turned_m)
     unseen = ~np.isfinite(residual).all(axis=1)
     return Linearised(
         residual=np.where(unseen[:, None], _FAR, residual),
@@ -218,6 +223,20 @@ def linearise(
         log_determinant=np.where(unseen, 0.0, log_determinant),
         whitening=_cleared(whitening, unseen),
     )
+
+
+def with_respect_to_pose(d_point: np.ndarray, turned_m: Points3) -> np.ndarray:
+    """Turn d pixel / d camera point (n, 2, 3) into d pixel / d (dt, dtheta) (n, 2, 6).
+
+    With R = Exp(dtheta) R_hat, d (R p) / d theta = -[R p]x; a row j times -[q]x is the cross product q x j.
+
+    Args:
+        d_point: (n, 2, 3) [px/m].
+        turned_m: (n, 3) R p, the points in camera axes before the translation.
+    """
+    x, y, z = turned_m[:, 0, None], turned_m[:, 1, None], turned_m[:, 2, None]
+    a, b, c = d_point[:, :, 0], d_point[:, :, 1], d_point[:, :, 2]
+    return np.stack([a, b, c, y * c - z * b, z * a - x * c, x * b - y * a], axis=2)
 
 
 def _cleared(rows: np.ndarray, unseen: np.ndarray) -> np.ndarray:

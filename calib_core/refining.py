@@ -40,7 +40,7 @@ class Refined:
         evidence: the evidence with the estimated noise.
         model: the linear model at the optimum, whitened by that noise.
         noise_scale: (4,) estimated over assumed sigma of (click, range, azimuth, elevation).
-        redundancy: degrees of freedom that went into the noise scales; 0 where they were not estimated.
+        degrees_of_freedom: that went into the noise scales, the assumed sigmas' own included; 0 where not estimated.
         inlier_share: prior probability of an inlier, estimated.
     """
 
@@ -50,7 +50,7 @@ class Refined:
     evidence: Evidence
     model: Linearised
     noise_scale: Values
-    redundancy: float
+    degrees_of_freedom: float
     inlier_share: float
 
 
@@ -75,7 +75,7 @@ def refine(evidence: Evidence, start: Consensus, *, estimate_scale: bool) -> Ref
     """
     state = _State(start.camera_from_radar, None, np.zeros(0, dtype=np.int64), np.full(4, start.noise_scale), 0.8)
     state.rows = associate(evidence, state.pose)[0]
-    redundancy = 0.0
+    degrees = 0.0
     for round_ in range(_MOST_ROUNDS):
         noisy = evidence.scaled(state.scale)
         model, weights = _expect(noisy, state)
@@ -83,13 +83,13 @@ def refine(evidence: Evidence, start: Consensus, *, estimate_scale: bool) -> Ref
         moved = 0.0
         if estimate_scale and round_ >= _ROUNDS_BEFORE_SCALES and weights.sum() >= _LEAST_PAIRS_FOR_SCALES:
             before = state.scale
-            state.scale, redundancy = _variance_components(noisy, state, model, weights)
+            state.scale, degrees = _variance_components(noisy, state, model, weights)
             moved = float(np.abs(np.log(state.scale / before)).max())
         if step < _STEP_TOLERANCE and moved < 1e-6 and round_ > _ROUNDS_BEFORE_SCALES:
             break
     noisy = evidence.scaled(state.scale)
     model, weights = _expect(noisy, state)
-    return Refined(state.pose, state.rows, weights, noisy, model, state.scale, redundancy, state.share)
+    return Refined(state.pose, state.rows, weights, noisy, model, state.scale, degrees, state.share)
 
 
 def _expect(evidence: Evidence, state: _State) -> tuple[Linearised, Values]:
@@ -155,4 +155,4 @@ def _variance_components(evidence: Evidence, state: _State, model: Linearised, w
     # the pseudo-redundancy belongs to the assumed sigma: in units of the present one it is 1 / scale^2
     ratio = (found + _PSEUDO_REDUNDANCY / state.scale**2) / (np.maximum(redundant, 0.0) + _PSEUDO_REDUNDANCY)
     scale = np.clip(state.scale * np.sqrt(ratio), *_SCALE_LIMITS)
-    return scale, float(redundant.sum())
+    return scale, float(redundant.sum() + 4 * _PSEUDO_REDUNDANCY)

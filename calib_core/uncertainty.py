@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Points3, Values
+from calib_core.arrays import Matrix66, Points2, Points3, Values
 from calib_core.camera import Camera
 from calib_core.consensus import normal_equations
+from calib_core.evidence import with_respect_to_pose
 from calib_core.geometry import RigidTransform
 from calib_core.radar import cartesian_from_polar
 from calib_core.refining import Refined
@@ -52,7 +53,7 @@ def pose_uncertainty(refined: Refined) -> PoseUncertainty:
     return PoseUncertainty(
         covariance=_symmetric_inverse(information),
         information=information,
-        quantile=_quantile(refined.redundancy),
+        quantile=_quantile(refined.degrees_of_freedom),
         condition=_scaled_condition(pairs_only),
     )
 
@@ -78,13 +79,13 @@ def _scaled_condition(information: Matrix66) -> float:
     return float(values[-1] / max(values[0], 1e-16))
 
 
-def _quantile(redundancy: float) -> float:
+def _quantile(degrees_of_freedom: float) -> float:
     """Return the 95 % quantile for 6 parameters: chi-square with the noise known, 6 F(6, nu) with it estimated."""
-    if redundancy <= 0:
+    if degrees_of_freedom <= 0:
         return _CHI2_95_6
     from scipy.special import fdtri
 
-    return float(6.0 * fdtri(6.0, redundancy, 0.95))
+    return float(6.0 * fdtri(6.0, degrees_of_freedom, 0.95))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,13 +116,18 @@ def leave_one_out(refined: Refined, information: Matrix66) -> LeftOut:
     moves = -np.linalg.solve(rest, (pull * scale)[:, :, None])[:, :, 0] * scale
     influence = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", moves, information, moves), 0.0))
     points = cartesian_from_polar(refined.evidence.polar[refined.rows])
-    distance = np.empty(len(moves))
-    for i, move in enumerate(moves):
-        longest = max(float(np.linalg.norm(move[3:])), 1.0)
-        pose = refined.camera_from_radar.perturbed(move / longest)
-        pixel = refined.evidence.camera.project(pose @ points[i : i + 1])[0]
-        distance[i] = np.linalg.norm(pixel - refined.evidence.pixels_px[i])
-    return LeftOut(distance, influence)
+    missed_px = _projected_after(refined, moves, points) - refined.evidence.pixels_px
+    return LeftOut(np.linalg.norm(missed_px, axis=1), influence)
+
+
+def _projected_after(refined: Refined, moves: np.ndarray, points_radar_m: Points3) -> Points2:
+    """Project each point under the pose moved by its own (dt, dtheta): pixels (n, 2), by Rodrigues' formula on vectors."""
+    turned = points_radar_m @ refined.camera_from_radar.rotation.T
+    angle = np.linalg.norm(moves[:, 3:], axis=1, keepdims=True)
+    axis = moves[:, 3:] / np.maximum(angle, 1e-12)
+    along = axis * (axis * turned).sum(axis=1, keepdims=True)
+    swung = along + (turned - along) * np.cos(angle) + np.cross(axis, turned) * np.sin(angle)
+    return refined.evidence.camera.project(swung + refined.camera_from_radar.translation_m + moves[:, :3])
 
 
 def pixel_covariance(calibration: Calibration, points_radar_m: Points3) -> np.ndarray:
@@ -141,4 +147,4 @@ def pose_jacobian(camera: Camera, camera_from_radar: RigidTransform, points_rada
     """Return d pixel / d (dt, dtheta) at radar points (n, 3): (n, 2, 6) [px/m, px/rad]."""
     turned_m = np.asarray(points_radar_m, dtype=np.float64) @ camera_from_radar.rotation.T
     d_point = camera.project_with_jacobian(turned_m + camera_from_radar.translation_m)[1]
-    return np.concatenate([d_point, np.cross(turned_m[:, None, :], d_point)], axis=2)
+    return with_respect_to_pose(d_point, turned_m)

@@ -1,0 +1,309 @@
+"""What a person must know before using a calibration: each doubt with its figures, and what to do about it.
+
+A check says nothing when all is well. The texts are for people; the codes are for programs and stay as they are.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Flags
+from calib_core.consensus import Consensus, associate, find_consensus, log_odds_of
+from calib_core.evidence import Evidence
+from calib_core.geometry import RigidTransform
+from calib_core.initial_pose import starting_poses
+from calib_core.locating import CLUSTER_SCALE
+from calib_core.radar import cartesian_from_polar, direction_cosines
+from calib_core.refining import Refined
+from calib_core.results import Caution
+from calib_core.uncertainty import LeftOut, PoseUncertainty
+
+__all__ = ["Findings", "cautions_of", "handedness"]
+
+_CLEARLY = 12.0  # difference of twice the log-likelihood that settles a question
+_BARELY = 6.0
+_OTHER_POSE_RAD = np.deg2rad(5.0)
+_OTHER_POSE_SIGMAS = 6.0
+_NARROW_CONDITION = 5e5
+_WEAK_ROTATION_RAD = np.deg2rad(2.0)
+_WEAK_POSITION_M = 0.15
+_NOISE_EXCESS = 2.5
+_FEW_INLIERS = 8
+_DECISIVE_INFLUENCE = 3.0
+_MIRROR_STARTS = 2
+_AMBIGUOUS_MARGIN = 4.0
+_FAR_CAMERA = 3.0
+_CONTRADICTION_SIGMAS = 4.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Findings:
+    """All that the checks look at.
+
+    Attributes:
+        ids: of the used pairs, in the order of the evidence.
+        evidence: with the noise as assumed.
+        refined: the fit.
+        uncertainty: of its pose.
+        left_out: leave-one-out.
+        inliers: (n,) which pairs took part.
+        alternatives: where the other starts ended, the most likely first.
+        mirror_gain: by how much mirrored radar axes explain the pairs better; negative: worse.
+        chi2_per_degree: by the noise as assumed.
+    """
+
+    ids: tuple[str, ...]
+    evidence: Evidence
+    refined: Refined
+    uncertainty: PoseUncertainty
+    left_out: LeftOut
+    inliers: Flags
+    alternatives: Sequence[Consensus]
+    mirror_gain: float
+    chi2_per_degree: float
+
+
+def cautions_of(findings: Findings) -> tuple[Caution, ...]:
+    """Run every check; the gravest come first."""
+    checks = (
+        _mirrored_axes,
+        _two_poses,
+        _camera_position,
+        _flat_radar,
+        _many_outliers,
+        _few_inliers,
+        _noise_excess,
+        _weak_geometry,
+        _same_places,
+        _ambiguous_candidates,
+        _decisive_pair,
+    )
+    return tuple(caution for check in checks for caution in check(findings))
+
+
+def handedness(evidence: Evidence, best: Consensus, *, estimate_scale: bool, seed: int) -> float:
+    """Return by how much twice the log-likelihood rises when the radar's y axis is mirrored.
+
+    A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be told by its residuals:
+    placements on the ground fit a camera mirrored below the ground just as well. Only what is known of the camera
+    position, or placements at varied heights, tell the two apart. The 24 right-handed conventions need no test: they are
+    rotations, and the pose absorbs them.
+    """
+    mirrored = evidence.mirrored()
+    starts = starting_poses(mirrored, most=_MIRROR_STARTS, rng=np.random.default_rng(seed))
+    found = find_consensus(mirrored, starts, estimate_scale=estimate_scale)
+    return best.cost - found[0].cost if found else -np.inf
+
+
+def _mirrored_axes(f: Findings) -> list[Caution]:
+    if f.mirror_gain > _CLEARLY:
+        return [
+            Caution(
+                "mirrored-axes",
+                "the pairs fit much better when one radar axis is mirrored "
+                f"(log-likelihood ratio {f.mirror_gain / 2:.0f}): the radar's axes look left-handed",
+                "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) where the "
+                "positions come from; do not use this pose",
+            )
+        ]
+    if f.mirror_gain > -_BARELY:
+        return [
+            Caution(
+                "handedness-open",
+                "a mirrored radar axis would explain the pairs about as well: all placements lie near one plane",
+                "measure the camera position with a tape, or add placements at other heights (a tripod)",
+            )
+        ]
+    return []
+
+
+def _two_poses(f: Findings) -> list[Caution]:
+    best = f.alternatives[0]
+    for other in f.alternatives[1:]:
+        error = other.camera_from_radar.error_from(f.refined.camera_from_radar)
+        apart_rad = float(np.linalg.norm(error[3:]))
+        sigmas = float(np.sqrt(error @ f.uncertainty.information @ error))
+        if other.cost - best.cost < _BARELY and apart_rad > _OTHER_POSE_RAD and sigmas > _OTHER_POSE_SIGMAS:
+            return [
+                Caution(
+                    "two-poses",
+                    f"another pose, {np.rad2deg(apart_rad):.0f} deg away, explains the pairs almost as well",
+                    "measure the camera position with a tape, or add placements nearer and farther than the present ones",
+                )
+            ]
+    return []
+
+
+def _camera_position(f: Findings) -> list[Caution]:
+    belief = f.evidence.belief
+    centre_m = _camera_centre(f.refined.camera_from_radar)
+    away_m = centre_m - belief.position_m
+    if belief.measured:
+        sigmas = float(np.linalg.norm(away_m)) / belief.sigma_m
+        if sigmas <= _CONTRADICTION_SIGMAS:
+            return []
+        return [
+            Caution(
+                "camera-position-contradicted",
+                f"the pairs want the camera {100 * np.linalg.norm(away_m):.1f} cm from where it was measured "
+                f"({sigmas:.1f} times the stated {100 * belief.sigma_m:.1f} cm)",
+                "measure again from the radar's antennas to the lens: forward, left, up; or state a larger uncertainty",
+            )
+        ]
+    if np.linalg.norm(away_m) <= _FAR_CAMERA * belief.sigma_m:
+        return []
+    return [
+        Caution(
+            "camera-far-away",
+            f"the camera comes out {np.linalg.norm(away_m):.1f} m from the radar; {belief.sigma_m:g} m was expected",
+            "if the sensors are really that far apart, say so (nominal distance); otherwise suspect axes or intrinsics",
+        )
+    ]
+
+
+def _camera_centre(camera_from_radar: RigidTransform) -> np.ndarray:
+    return camera_from_radar.inverse().translation_m
+
+
+def _flat_radar(f: Findings) -> list[Caution]:
+    if f.evidence.polar[:, 2].any():
+        return []
+    return [
+        Caution(
+            "flat-radar",
+            "every radar position has elevation 0: this radar measures none, and its real elevations are unknown",
+            "put the reflector's centre at the radar's height at every placement, and measure the camera position",
+        )
+    ]
+
+
+def _many_outliers(f: Findings) -> list[Caution]:
+    outliers = [name for name, inlier in zip(f.ids, f.inliers, strict=True) if not inlier]
+    if len(outliers) <= 0.35 * len(f.ids):
+        return []
+    return [
+        Caution(
+            "many-outliers",
+            f"{len(outliers)} of {len(f.ids)} pairs do not fit: {_listed(outliers)}",
+            "look at each: was the reflector clicked, did it rest, do both recordings run on one clock?",
+        )
+    ]
+
+
+def _few_inliers(f: Findings) -> list[Caution]:
+    count = int(f.inliers.sum())
+    if count >= _FEW_INLIERS:
+        return []
+    return [
+        Caution(
+            "few-pairs",
+            f"only {count} pairs carry the pose; a wrong one among them could not be told, nor a wrong noise level",
+            "add placements: ten or more, near and far, on both sides",
+        )
+    ]
+
+
+def _noise_excess(f: Findings) -> list[Caution]:
+    degrees = 2 * int(f.inliers.sum()) - 6
+    if degrees < 6 or f.chi2_per_degree < 1.0 + 4.0 * np.sqrt(2.0 / degrees) or f.chi2_per_degree < _NOISE_EXCESS:
+        return []
+    return [
+        Caution(
+            "residuals-too-large",
+            f"residuals are {np.sqrt(f.chi2_per_degree):.1f} times what the assumed noise explains "
+            f"(chi2 / degrees of freedom {f.chi2_per_degree:.1f})",
+            "check that the intrinsics belong to this camera, lens and image size; then the assumed radar noise",
+        )
+    ]
+
+
+def _weak_geometry(f: Findings) -> list[Caution]:
+    sigma = np.sqrt(np.diag(f.uncertainty.covariance))
+    rotation_rad, position_m = float(np.linalg.norm(sigma[3:])), float(np.linalg.norm(sigma[:3]))
+    narrow = f.uncertainty.condition > _NARROW_CONDITION and not f.evidence.belief.measured
+    if rotation_rad <= _WEAK_ROTATION_RAD and position_m <= _WEAK_POSITION_M and not narrow:
+        return []
+    range_m, azimuth_rad, _ = f.evidence.polar[f.refined.rows[f.inliers]].T
+    hint = "place the reflector near (2 to 3 m) and far, at both edges of the picture"
+    if not f.evidence.belief.measured:
+        hint = "measure the camera position with a tape: it helps most; and " + hint
+    return [
+        Caution(
+            "weak-geometry",
+            f"the pose is uncertain: {np.rad2deg(rotation_rad):.1f} deg and {100 * position_m:.0f} cm (one sigma); "
+            f"placements span {range_m.min():.1f} to {range_m.max():.1f} m and {np.rad2deg(np.ptp(azimuth_rad)):.0f} deg",
+            hint,
+        )
+    ]
+
+
+def _places(f: Findings) -> int:
+    """Count the distinct places among the inlier placements, by the radar's own resolution."""
+    centres = direction_cosines(cartesian_from_polar(f.evidence.polar[f.refined.rows[f.inliers]])) / CLUSTER_SCALE
+    close = ((centres[:, None] - centres[None]) ** 2).sum(axis=2) <= 1.0
+    return int((~np.tril(close, -1).any(axis=1)).sum())
+
+
+def _same_places(f: Findings) -> list[Caution]:
+    count, places = int(f.inliers.sum()), _places(f)
+    if places > 0.7 * count:
+        return []
+    return [
+        Caution(
+            "repeated-placements",
+            f"{count} pairs show only {places} places; a radar repeats its error at the same place, so the stated "
+            "uncertainty is too small",
+            "move the reflector between clicks; more clicks of one placement add little",
+        )
+    ]
+
+
+def _ambiguous_candidates(f: Findings) -> list[Caution]:
+    """Name the pairs where a second candidate explains the click nearly as well as the chosen one."""
+    if f.evidence.one_to_one:
+        return []
+    evidence, owner = f.refined.evidence, f.refined.evidence.owner
+    margins = np.full(len(evidence), np.inf)
+    cost = _candidate_costs(f)
+    for i in np.flatnonzero(f.inliers):
+        own = np.sort(cost[owner == i])
+        if len(own) > 1:
+            margins[i] = own[1] - own[0]
+    doubtful = [f.ids[i] for i in np.flatnonzero(margins < _AMBIGUOUS_MARGIN)]
+    if not doubtful:
+        return []
+    return [
+        Caution(
+            "uncertain-association",
+            f"more than one radar position suits the click of {_listed(doubtful)}",
+            "look at the radar view there; exclude the pair if the chosen return is not the reflector",
+        )
+    ]
+
+
+def _candidate_costs(f: Findings) -> np.ndarray:
+    evidence = f.refined.evidence
+    each = evidence.candidates_apart()
+    rows, model = associate(each, f.refined.camera_from_radar)
+    return -2.0 * log_odds_of(each, model, each.log_score[rows], 0.5)
+
+
+def _decisive_pair(f: Findings) -> list[Caution]:
+    if f.inliers.sum() < 6:
+        return []
+    worst = int(np.argmax(np.where(f.inliers, f.left_out.influence, 0.0)))
+    if f.left_out.influence[worst] < _DECISIVE_INFLUENCE:
+        return []
+    return [
+        Caution(
+            "one-pair-decides",
+            f"without {f.ids[worst]} the pose would move by {f.left_out.influence[worst]:.1f} standard deviations",
+            "look at that click again, and add a placement near it",
+        )
+    ]
+
+
+def _listed(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:6])
+    return shown if len(names) <= 6 else f"{shown} and {len(names) - 6} more"
