@@ -48,20 +48,20 @@ class Picture(Protocol):
     """The size of a frame."""
 
     @property
-    def width_px(self) -> int: ...  # noqa: D102
+    def width_px(self) -> int: ...
     @property
-    def height_px(self) -> int: ...  # noqa: D102
+    def height_px(self) -> int: ...
 
 
 class HashedFile(Protocol):
     """A file by its content."""
 
     @property
-    def name(self) -> str: ...  # noqa: D102
+    def name(self) -> str: ...
     @property
-    def size_bytes(self) -> int: ...  # noqa: D102
+    def size_bytes(self) -> int: ...
     @property
-    def sha256(self) -> str: ...  # noqa: D102
+    def sha256(self) -> str: ...
 
 
 class RadarSource(Protocol):
