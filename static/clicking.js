@@ -1,0 +1,209 @@
+// @ts-check
+/** The hand on the frame: click places, drag on a mark adjusts, drag elsewhere pans, wheel zooms at the cursor, arrows nudge. */
+
+import { onImage, pan, toCss, toImage, viewport } from "./geometry.js";
+import { hold } from "./loupe.js";
+import { marks, redraw, zoomBy } from "./picture.js";
+import { send } from "./socket.js";
+import { clickIn, clicks, emit, on, select, selectedClick, stampKey, stampOf, state } from "./state.js";
+import { pause } from "./player.js";
+import { toast } from "./notices.js";
+
+/** A press that moves farther than this is a drag [CSS px]. */
+const THRESHOLD = 4;
+/** A press this near to a mark takes hold of it [CSS px]. */
+const REACH = 9;
+/** Nudges are sent when the key rests this long [ms]: one change, one step back. */
+const REST = 250;
+
+/** @type {{x: number, y: number, lastX: number, lastY: number, u: number, v: number, moved: boolean, mark: import("./messages.js").ClickRow|null, pointer: number}|null} */
+let press = null;
+/** @type {{click: import("./messages.js").ClickRow, u: number, v: number, timer: number}|null} */
+let nudge = null;
+
+export function startClicking() {
+  marks.addEventListener("pointerdown", pressed);
+  marks.addEventListener("pointermove", moved);
+  marks.addEventListener("pointerup", released);
+  marks.addEventListener("pointercancel", () => (press = null));
+  marks.addEventListener("pointerleave", () => hover(null));
+  marks.addEventListener("wheel", wheeled, { passive: false });
+  marks.addEventListener("contextmenu", (event) => event.preventDefault());
+  addEventListener("pagehide", flushNudge);
+  on(["cursor", "playing"], flushNudge);
+}
+
+/** Place of an event in the canvas box. @param {MouseEvent} event @returns {[number, number]} CSS px */
+function inBox(event) {
+  const box = marks.getBoundingClientRect();
+  return [event.clientX - box.left, event.clientY - box.top];
+}
+
+/** @param {PointerEvent} event */
+function pressed(event) {
+  if (event.button > 1 || !state.shown) return;
+  const [x, y] = inBox(event);
+  const [u, v] = toImage(x, y);
+  const mark = event.button === 0 ? markNear(x, y) : null;
+  press = { x, y, lastX: x, lastY: y, u, v, moved: false, mark, pointer: event.button };
+  marks.setPointerCapture(event.pointerId);
+  /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
+}
+
+/** The mark of this frame under the hand. @param {number} x @param {number} y */
+function markNear(x, y) {
+  const click = clickIn(state.shown?.index ?? -1);
+  if (!click || state.playing) return null;
+  const [cx, cy] = toCss(click.u_px, click.v_px);
+  return Math.hypot(cx - x, cy - y) <= REACH ? click : null;
+}
+
+/** @param {PointerEvent} event */
+function moved(event) {
+  const [x, y] = inBox(event);
+  const [u, v] = toImage(x, y);
+  if (!press) {
+    marks.classList.toggle("grab", markNear(x, y) !== null);
+    return hover(onImage(u, v) ? { u, v } : null);
+  }
+  if (!press.moved && Math.hypot(x - press.x, y - press.y) < THRESHOLD) return;
+  press.moved = true;
+  if (press.mark) dragMark(press.mark, press.mark.u_px + u - press.u, press.mark.v_px + v - press.v);
+  else {
+    marks.classList.add("grabbing");
+    pan(x - press.lastX, y - press.lastY);
+    hover(null);
+    redraw();
+    emit("box");
+  }
+  [press.lastX, press.lastY] = [x, y];
+}
+
+/** @param {PointerEvent} event */
+function released(event) {
+  const done = press;
+  press = null;
+  marks.classList.remove("grabbing");
+  if (!done) return;
+  const [x, y] = inBox(event);
+  const [u, v] = toImage(x, y);
+  if (done.mark && done.moved) {
+    moveTo(done.mark, done.mark.u_px + u - done.u, done.mark.v_px + v - done.v);
+    hold(null);
+  } else if (done.mark) select(done.mark.id);
+  else if (!done.moved && done.pointer === 0 && onImage(done.u, done.v)) place(done.u, done.v);
+}
+
+/** @param {{u: number, v: number}|null} point */
+function hover(point) {
+  state.hover = point;
+  emit("hover");
+}
+
+/** Put a click into the frame on screen. @param {number} u @param {number} v */
+export async function place(u, v) {
+  if (!state.shown) return;
+  if (state.playing) return pause();
+  flushNudge();
+  const image_time = stampOf(state.shown.index);
+  const key = stampKey(image_time);
+  draft(key, u, v);
+  await settle(key, { type: "click_placed", image_time, pixel_px: [u, v] });
+  const here = clickIn(state.shown.index);
+  if (here?.id) select(here.id);
+}
+
+/** @param {import("./messages.js").ClickRow} click @param {number} u @param {number} v */
+function dragMark(click, u, v) {
+  draft(stampKey(click.image_time), ...clamped(u, v));
+  const [heldU, heldV] = clamped(u, v);
+  hold({ u: heldU, v: heldV });
+}
+
+/** @param {import("./messages.js").ClickRow} click @param {number} u @param {number} v */
+async function moveTo(click, u, v) {
+  const [inU, inV] = clamped(u, v);
+  const key = stampKey(click.image_time);
+  draft(key, inU, inV);
+  await settle(key, { type: "click_moved", id: click.id, pixel_px: [inU, inV] });
+}
+
+/** Keep a point on the picture. @param {number} u @param {number} v @returns {[number, number]} */
+function clamped(u, v) {
+  const most = [viewport.imageWidth - 0.5, viewport.imageHeight - 0.5];
+  return [Math.min(most[0], Math.max(-0.5, u)), Math.min(most[1], Math.max(-0.5, v))];
+}
+
+/** Show a mark where the hand left it, before the server has said so. @param {string} key @param {number} u @param {number} v */
+function draft(key, u, v) {
+  state.local.set(key, { u, v });
+  emit("view");
+}
+
+/** Send and then believe the server. @param {string} key @param {Record<string, any>} message */
+async function settle(key, message) {
+  const mine = state.local.get(key);
+  const refusal = await send(message);
+  if (state.local.get(key) === mine) state.local.delete(key);
+  if (refusal) toast(refusal, "The mark is back where it was.");
+  emit("view");
+}
+
+/** Move the click of this frame a little. @param {number} du @param {number} dv image px @returns {boolean} */
+export function nudgeBy(du, dv) {
+  const click = nudge?.click ?? clickIn(state.shown?.index ?? -1);
+  if (!click || !click.id || state.playing) return false;
+  const from = nudge ?? { u: click.u_px, v: click.v_px, timer: 0 };
+  clearTimeout(from.timer);
+  const [u, v] = clamped(from.u + du, from.v + dv);
+  nudge = { click, u, v, timer: window.setTimeout(flushNudge, REST) };
+  draft(stampKey(click.image_time), u, v);
+  hold({ u, v });
+  return true;
+}
+
+/** Send what was nudged. */
+export function flushNudge() {
+  if (!nudge) return;
+  const { click, u, v, timer } = nudge;
+  nudge = null;
+  clearTimeout(timer);
+  hold(null);
+  moveTo(click, u, v);
+}
+
+/** @param {WheelEvent} event */
+function wheeled(event) {
+  event.preventDefault();
+  const [x, y] = inBox(event);
+  const unit = event.deltaMode === 1 ? 16 : event.deltaMode === 2 ? 400 : 1;
+  zoomBy(Math.exp(-event.deltaY * unit * 0.0016), x, y);
+  const [u, v] = toImage(x, y);
+  hover(onImage(u, v) ? { u, v } : null);
+}
+
+/** Leave the selected click out of the solve, or take it in again. */
+export async function toggleExcluded() {
+  const click = selectedClick();
+  if (!click) return;
+  flushNudge();
+  const refusal = await send({ type: "click_excluded", id: click.id, excluded: click.state !== "excluded" });
+  if (refusal) toast(refusal);
+}
+
+/** Delete the selected click. */
+export async function removeSelected() {
+  const click = selectedClick();
+  if (!click) return;
+  flushNudge();
+  const refusal = await send({ type: "click_removed", id: click.id });
+  if (refusal) toast(refusal);
+  else if (!clicks().some((other) => other.id === state.selected)) select(null);
+}
+
+/** @param {"undo"|"redo"} type */
+export async function turnBack(type) {
+  flushNudge();
+  const refusal = await send({ type });
+  if (refusal) toast(refusal);
+}

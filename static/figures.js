@@ -1,0 +1,75 @@
+// @ts-check
+/** Metrics, pose and cautions, as the server worded them. */
+
+import { icon, make } from "./notices.js";
+import { on, state } from "./state.js";
+
+/** @typedef {import("./messages.js").Figure} Figure */
+const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));
+const cautions = /** @type {HTMLElement} */ (document.getElementById("cautions"));
+const posePage = /** @type {HTMLElement} */ (document.getElementById("page-pose"));
+/** What stands in the strip before there is anything to say: nothing jumps when it arrives. @type {[string, string][]} */
+const EMPTY = [
+  ["aed", "AED"],
+  ["held_out_aed", "held-out AED"],
+  ["cdsd", "CDSD"],
+  ["rms", "RMS"],
+  ["inliers", "pairs that agree"],
+];
+/** Cautions that the person has opened stay open. @type {Set<string>} */
+const openCodes = new Set();
+export const poseTable = make("table", "", []);
+let cautionText = "";
+
+export function startFigures() {
+  const pose = make("div", "pose", [poseTable]);
+  posePage.append(pose);
+  on(["view", "recording"], draw);
+}
+
+function draw() {
+  const view = state.view;
+  if (!view) return;
+  figures.classList.toggle("stale", view.solving && view.has_calibration);
+  const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Appears with the first calibration.", level: "none" }));
+  figures.replaceChildren(...shown.map(cell));
+  poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Appears with the first calibration.")])]));
+  drawCautions([...(state.recording?.cautions ?? []), ...view.cautions]);
+}
+
+/** @param {Omit<Figure, "level"> & {level: string}} figure */
+function cell(figure) {
+  const value = make("dd", "", [figure.value, make("span", "unit", figure.unit)]);
+  const box = make("dl", `figure ${figure.level}`, [make("dt", "", figure.label), value]);
+  box.style.margin = "0";
+  box.dataset.key = figure.key;
+  box.dataset.hint = figure.hint;
+  return box;
+}
+
+/** @param {Figure} figure */
+function row(figure) {
+  const line = make("tr", figure.level, [make("td", "", figure.label), make("td", "", figure.value), make("td", "", figure.unit)]);
+  line.dataset.key = figure.key;
+  line.dataset.hint = figure.hint;
+  return line;
+}
+
+/** @param {import("./messages.js").CautionRow[]} rows */
+function drawCautions(rows) {
+  const text = JSON.stringify(rows);
+  if (text === cautionText) return;
+  cautionText = text;
+  cautions.replaceChildren(
+    ...rows.map((caution) => {
+      const box = make("details", "caution", [
+        make("summary", "", [icon("caution"), make("span", "", caution.message)]),
+        make("div", "hint", caution.hint),
+      ]);
+      box.dataset.code = caution.code;
+      box.open = openCodes.has(caution.code);
+      box.ontoggle = () => (box.open ? openCodes.add(caution.code) : openCodes.delete(caution.code));
+      return box;
+    }),
+  );
+}

@@ -1,0 +1,73 @@
+// @ts-check
+/** Keys, mouse and marks on one sheet. */
+
+import { KEYS } from "./keys.js";
+import { make } from "./notices.js";
+
+const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("help-dialog"));
+/** @type {[string, string][]} */
+const MOUSE = [
+  ["wheel", "zoom at the cursor"],
+  ["drag", "move the picture"],
+  ["click", "place the mark of this frame"],
+  ["drag a mark", "adjust it"],
+];
+/** @type {[string, string][]} */
+const MARKS = [
+  ["M8 1v5M8 10v5M1 8h5M10 8h5", "click"],
+  ["M8 3a5 5 0 1 0 .01 0z", "reprojection of its radar position"],
+  ["M2 13 13 3", "residual"],
+  ["M6.5 1h3v5.5H15v3H9.5V15h-3V9.5H1v-3h5.5z", "click that was left out"],
+  ["M8 3a5 5 0 1 0 .01 0z|2.5 2.5", "predicted reflector"],
+  ["M8 5.5a2.5 2.5 0 1 0 .01 0z|fill", "radar return that stands still"],
+];
+
+export function toggleHelp() {
+  if (dialog.open) return dialog.close();
+  if (!dialog.childElementCount) build();
+  dialog.showModal();
+}
+
+function build() {
+  const close = make("button", "icon close", "×");
+  close.setAttribute("aria-label", "Close");
+  close.onclick = () => dialog.close();
+  const keys = make("dl", "", KEYS.flatMap(({ keys: names, does }) => [make("dt", "", names.map(key)), make("dd", "", does)]));
+  const mouse = make("dl", "", MOUSE.flatMap(([hand, does]) => [make("dt", "", [key(hand)]), make("dd", "", does)]));
+  const legend = make("div", "legend", MARKS.map(([path, words]) => make("div", "", [drawing(path), words])));
+  dialog.replaceChildren(
+    make("h2", "", "Keys, mouse and marks"),
+    close,
+    make("div", "columns", [keys, make("div", "", [mouse, note()])]),
+    legend,
+  );
+  dialog.addEventListener("click", (event) => {
+    if (event.target === dialog) dialog.close();
+  });
+}
+
+function note() {
+  const text = make("p", "", "Every click is kept on disk at once: there is nothing to save. Colours run from blue (small residual) to red (large), and every number explains itself when the pointer rests on it.");
+  text.style.maxWidth = "260px";
+  text.style.color = "var(--muted)";
+  return text;
+}
+
+/** @param {string} name */
+const key = (name) => make("span", "key", name);
+
+/** @param {string} spec path, and after a bar: dashes or "fill" */
+function drawing(spec) {
+  const [path, style] = spec.split("|");
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("viewBox", "0 0 16 16");
+  svg.setAttribute("aria-hidden", "true");
+  const shape = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  shape.setAttribute("d", path);
+  shape.setAttribute("fill", style === "fill" ? "currentColor" : "none");
+  shape.setAttribute("stroke", "currentColor");
+  shape.setAttribute("stroke-width", "1.5");
+  if (style && style !== "fill") shape.setAttribute("stroke-dasharray", style);
+  svg.append(shape);
+  return svg;
+}

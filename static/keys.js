@@ -1,0 +1,115 @@
+// @ts-check
+/** One key, one deed; the same when the hand is in the 3D view. */
+
+import { flushNudge, nudgeBy, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
+import { toggleHelp } from "./help.js";
+import { toggleLayer } from "./layers.js";
+import { close as closeMenu } from "./menus.js";
+import { nextWorst } from "./pairs.js";
+import { fit, zoomBy } from "./picture.js";
+import { goTo, pause, play, step } from "./player.js";
+import { state } from "./state.js";
+
+/** Keys with what they do, in the order of the help. @type {{keys: string[], does: string}[]} */
+export const KEYS = [
+  { keys: ["Space"], does: "play or pause" },
+  { keys: ["←", "→"], does: "one frame" },
+  { keys: ["Shift", "←", "→"], does: "ten frames" },
+  { keys: ["N", "P"], does: "next, previous placement" },
+  { keys: ["J"], does: "next worst residual" },
+  { keys: ["Alt", "arrows"], does: "move the mark by 0.1 px" },
+  { keys: ["Alt", "Shift", "arrows"], does: "move the mark by 1 px" },
+  { keys: ["X"], does: "leave the pair out, or take it in again" },
+  { keys: ["Del"], does: "remove the click" },
+  { keys: ["Ctrl", "Z"], does: "undo" },
+  { keys: ["Ctrl", "Shift", "Z"], does: "redo" },
+  { keys: ["F"], does: "fit the picture" },
+  { keys: ["+", "−"], does: "zoom" },
+  { keys: ["1", "–", "4"], does: "overlays on and off" },
+  { keys: ["?"], does: "this help" },
+];
+
+/** @type {Record<string, () => unknown>} */
+const PLAIN = {
+  " ": () => (state.playing ? pause() : play()),
+  n: () => placement(1),
+  p: () => placement(-1),
+  j: nextWorst,
+  x: toggleExcluded,
+  f: fit,
+  "+": () => zoomBy(1.25),
+  "=": () => zoomBy(1.25),
+  "-": () => zoomBy(0.8),
+  "?": toggleHelp,
+  1: () => toggleLayer("returns"),
+  2: () => toggleLayer("others"),
+  3: () => toggleLayer("ellipses"),
+  4: () => toggleLayer("predictions"),
+  Delete: removeSelected,
+  Backspace: removeSelected,
+  Home: () => goTo(0),
+  End: () => goTo(state.seconds.length - 1),
+  Escape: closeMenu,
+};
+/** @type {Record<string, [number, number]>} */
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+
+/** Listen in a window; in the capture phase, before viser's own keys. @param {Window} owner */
+export function listen(owner) {
+  owner.addEventListener("keydown", pressed, { capture: true });
+}
+
+/** @param {KeyboardEvent} event */
+function pressed(event) {
+  const inside = event.view !== null && event.view !== window;
+  const deed = typing(event) && !inside ? undefined : deedOf(event);
+  if (!deed && !(inside && event.key in ARROWS)) return;
+  event.preventDefault();
+  event.stopImmediatePropagation();
+  deed?.();
+}
+
+/** Whether the key belongs to a field, a button or a dialog. @param {KeyboardEvent} event */
+function typing(event) {
+  const target = event.target;
+  if (!(target instanceof HTMLElement)) return false;
+  if (target.closest("dialog")) return event.key !== "?";
+  if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
+  const presses = event.key === " " || event.key === "Enter";
+  if (target.matches("button, a, summary, label, [role=menuitem], input") && presses) return !target.matches("#play");
+  return target.closest("[role=tablist], .divider, .menu") !== null && event.key.startsWith("Arrow");
+}
+
+/** @param {KeyboardEvent} event @returns {(() => unknown)|undefined} */
+function deedOf(event) {
+  const command = event.ctrlKey || event.metaKey;
+  if (command) return commandOf(event);
+  if (event.key in ARROWS) return arrow(event);
+  if (event.altKey) return undefined;
+  return PLAIN[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+}
+
+/** @param {KeyboardEvent} event */
+function commandOf(event) {
+  const key = event.key.toLowerCase();
+  if (key === "z") return () => turnBack(event.shiftKey ? "redo" : "undo");
+  return key === "y" ? () => turnBack("redo") : undefined;
+}
+
+/** @param {KeyboardEvent} event */
+function arrow(event) {
+  const [dx, dy] = ARROWS[event.key];
+  const size = event.shiftKey ? 1 : 0.1;
+  if (event.altKey) return () => nudgeBy(dx * size, dy * size);
+  return dx ? () => step(dx * (event.shiftKey ? 10 : 1)) : undefined;
+}
+
+/** Go to the next placement, or the one before. @param {1|-1} direction */
+export function placement(direction) {
+  flushNudge();
+  pause();
+  const frames = state.placements.map((found) => found.frame);
+  const ahead = direction > 0 ? frames.filter((frame) => frame > state.cursor) : frames.filter((frame) => frame < state.cursor).reverse();
+  const next = ahead.length ? ahead[0] : direction > 0 ? frames[0] : frames[frames.length - 1];
+  if (next !== undefined) goTo(next);
+}

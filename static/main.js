@@ -1,0 +1,136 @@
+// @ts-check
+/** The page: wires the parts together and gives the server's messages to those who draw them. */
+
+import { startClicking, turnBack } from "./clicking.js";
+import { startFigures } from "./figures.js";
+import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
+import { toggleHelp } from "./help.js";
+import { listen, placement } from "./keys.js";
+import { activity } from "./lanes.js";
+import { startLayers } from "./layers.js";
+import { startLayout } from "./layout.js";
+import { startLoupe } from "./loupe.js";
+import { setFormats, startMenus } from "./menus.js";
+import { setBanner, startTips, toast } from "./notices.js";
+import { startOptions } from "./options.js";
+import { startPairs } from "./pairs.js";
+import { startPicture } from "./picture.js";
+import { frameFailed, goTo, pause, play, receiveFrame, requestAgain, step, tellCursor } from "./player.js";
+import { startScatter } from "./scatter.js";
+import { connect, unconfirmed } from "./socket.js";
+import { startSpace } from "./space.js";
+import { clickIn, clicks, emit, on, state } from "./state.js";
+import { startStatus } from "./status.js";
+import { startGuide } from "./steps.js";
+import { startTimeline } from "./timeline.js";
+
+/** @type {Record<string, (message: any) => void>} */
+const readers = {
+  recording: takeRecording,
+  view(message) {
+    state.view = message;
+    if (state.selected && !message.clicks.some((/** @type {{id: string}} */ click) => click.id === state.selected)) state.selected = null;
+    emit("view");
+    const here = clickIn(state.shown?.index ?? -1);
+    if (here?.id && !state.selected) {
+      state.selected = here.id;
+      emit("selected");
+    }
+  },
+  placements(message) {
+    state.placements = message.placements;
+    state.placementsKnown = true;
+    emit("placements");
+    loadActivity();
+  },
+  overlay(message) {
+    state.overlay = message;
+    emit("overlay");
+  },
+  progress(message) {
+    state.progress = message;
+    emit("progress");
+  },
+  error(message) {
+    if (message.request === null || message.request === undefined) toast(message.message, message.hint);
+    frameFailed();
+  },
+};
+
+/** @param {import("./messages.js").RecordingNote} message */
+function takeRecording(message) {
+  const same = state.recording !== null;
+  state.recording = message;
+  const { sec, nanosec } = message.frame_times;
+  state.seconds = Float64Array.from(sec, (value, index) => value - sec[0] + (nanosec[index] - nanosec[0]) * 1e-9);
+  document.title = `${message.name} · cocalib`;
+  emit("recording");
+  loadFormats();
+  if (message.session.note) toast(message.session.note);
+  if (same) requestAgain();
+  else goTo(firstFrame());
+}
+
+/** A page that is loaded again stays where it was. */
+function firstFrame() {
+  const kept = Number(sessionStorage.getItem("cocalib-frame") ?? 0);
+  return Number.isInteger(kept) && kept < state.seconds.length ? kept : 0;
+}
+
+async function loadFormats() {
+  const answer = await fetch("api/formats.json");
+  if (answer.ok) setFormats(await answer.json());
+}
+
+async function loadActivity() {
+  const answer = await fetch("api/activity.json");
+  if (!answer.ok) return;
+  Object.assign(activity, await answer.json());
+  emit("cursor");
+}
+
+/** @param {string} id @param {() => unknown} deed */
+function press(id, deed) {
+  /** @type {HTMLElement} */ (document.getElementById(id)).addEventListener("click", deed);
+}
+
+startLayout();
+startTips();
+startStatus();
+startPicture();
+startLayers();
+startLoupe();
+startClicking();
+startTimeline();
+startPairs();
+startFigures();
+startScatter();
+startOptions();
+startMenus();
+startGuide();
+listen(window);
+press("undo", () => turnBack("undo"));
+press("redo", () => turnBack("redo"));
+press("help", toggleHelp);
+press("play", () => (state.playing ? pause() : play()));
+press("step-back", () => step(-1));
+press("step-forward", () => step(1));
+press("previous-placement", () => placement(-1));
+press("next-placement", () => placement(1));
+on(["cursor"], () => sessionStorage.setItem("cocalib-frame", String(state.cursor)));
+on(["selected"], tellCursor);
+connect({
+  message: (message) => readers[message.type]?.(message),
+  frame: receiveFrame,
+  connection(connected) {
+    state.connected = connected;
+    setBanner(connected ? "" : "The server does not answer. Clicks are kept here and sent when it is back.");
+    emit("connection");
+  },
+});
+startSpace();
+
+/** What the browser tests hold on to. */
+Object.assign(window, {
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, goTo, unconfirmed },
+});

@@ -1,0 +1,140 @@
+// @ts-check
+/**
+ * Marks on the frame: click = cross, reprojection = ring, their residual = line, excluded = hollow, predicted = dashed,
+ * 95 % of good residuals = ellipse, radar returns = dots (still) and triangles (moving).
+ */
+
+import { ink, residualColour } from "./colours.js";
+import { toDevice, viewport } from "./geometry.js";
+import { clicks, state } from "./state.js";
+
+/** @typedef {CanvasRenderingContext2D} Ink */
+/** @typedef {import("./messages.js").ClickRow} Click */
+
+/** Draw all marks of the frame on screen. @param {Ink} pen */
+export function drawMarks(pen) {
+  const index = state.shown?.index ?? -1;
+  const overlay = state.overlay?.index === index ? state.overlay : null;
+  if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
+  if (state.layers.predictions && overlay) for (const [u, v] of overlay.guesses) drawGuess(pen, u, v);
+  const here = clicks();
+  if (state.layers.others) for (const click of here) if (click.frame !== index) drawOther(pen, click);
+  for (const click of here) if (click.frame === index) drawClick(pen, click);
+}
+
+/** @param {Ink} pen @param {import("./messages.js").OverlayReturn[]} returns */
+function drawReturns(pen, returns) {
+  const size = 3.2 * viewport.ratio;
+  for (const [u, v, , , , isStill] of returns) {
+    const [x, y] = toDevice(u, v);
+    pen.beginPath();
+    if (isStill) pen.arc(x, y, size, 0, 2 * Math.PI);
+    else triangle(pen, x, y, size * 1.25);
+    pen.fillStyle = isStill ? ink.still : ink.moving;
+    pen.globalAlpha = 0.85;
+    pen.fill();
+    pen.globalAlpha = 1;
+    pen.lineWidth = viewport.ratio;
+    pen.strokeStyle = ink.edge;
+    pen.stroke();
+  }
+}
+
+/** @param {Ink} pen @param {number} x @param {number} y @param {number} size */
+function triangle(pen, x, y, size) {
+  pen.moveTo(x, y - size);
+  pen.lineTo(x + size * 0.9, y + size * 0.7);
+  pen.lineTo(x - size * 0.9, y + size * 0.7);
+  pen.closePath();
+}
+
+/** Where the reflector should be by the radar and the pose. @param {Ink} pen @param {number} u @param {number} v */
+function drawGuess(pen, u, v) {
+  const [x, y] = toDevice(u, v);
+  const dashes = [4 * viewport.ratio, 3.5 * viewport.ratio];
+  outlined(pen, ink.guess, 1.4, () => pen.arc(x, y, 15 * viewport.ratio, 0, 2 * Math.PI), dashes);
+}
+
+/** A click of another frame: where it was, small and quiet. @param {Ink} pen @param {Click} click */
+function drawOther(pen, click) {
+  const [x, y] = toDevice(click.u_px, click.v_px);
+  const arm = 4 * viewport.ratio;
+  pen.globalAlpha = click.id !== "" && click.id === state.selected ? 1 : 0.65;
+  const colour = residualColour(click.residual_px, state.view?.residual_limit_px ?? null);
+  outlined(pen, colour, 1.3, () => cross(pen, x, y, arm, 0), click.state === "excluded" ? [2 * viewport.ratio, 2 * viewport.ratio] : []);
+  pen.globalAlpha = 1;
+}
+
+/** The click of this frame with all that belongs to it. @param {Ink} pen @param {Click} click */
+function drawClick(pen, click) {
+  const [x, y] = toDevice(click.u_px, click.v_px);
+  if (click.projected_px) drawReprojection(pen, click, x, y);
+  const hollow = click.state === "excluded";
+  const arm = 13 * viewport.ratio;
+  const gap = 3 * viewport.ratio;
+  if (hollow) outlined(pen, ink.click, 1.2, () => hollowCross(pen, x, y, arm, gap));
+  else outlined(pen, ink.click, 1.6, () => cross(pen, x, y, arm, gap));
+}
+
+/** @param {Ink} pen @param {Click} click @param {number} x @param {number} y */
+function drawReprojection(pen, click, x, y) {
+  const [ring, limit] = [/** @type {[number, number]} */ (click.projected_px), state.view?.residual_limit_px ?? null];
+  const [px, py] = toDevice(ring[0], ring[1]);
+  const colour = residualColour(click.residual_px, limit);
+  if (state.layers.ellipses && click.ellipse) {
+    const { semi_major_px: major, semi_minor_px: minor, angle_rad: angle } = click.ellipse;
+    pen.beginPath();
+    pen.ellipse(px, py, major * viewport.scale, minor * viewport.scale, angle, 0, 2 * Math.PI);
+    pen.fillStyle = "rgb(255 255 255 / 7%)";
+    pen.fill();
+    outlined(pen, ink.ring, 1, () => pen.ellipse(px, py, major * viewport.scale, minor * viewport.scale, angle, 0, 2 * Math.PI));
+  }
+  const length = Math.hypot(px - x, py - y);
+  const radius = 7 * viewport.ratio;
+  if (length > radius) {
+    const end = (length - radius) / length;
+    outlined(pen, colour, 2, () => {
+      pen.moveTo(x, y);
+      pen.lineTo(x + (px - x) * end, y + (py - y) * end);
+    });
+  }
+  outlined(pen, colour, 2, () => pen.arc(px, py, radius, 0, 2 * Math.PI));
+}
+
+/**
+ * Stroke a path with a dark edge below it, so that it shows on any picture.
+ * @param {Ink} pen @param {string} colour @param {number} width CSS px @param {() => void} path @param {number[]} [dashes]
+ */
+function outlined(pen, colour, width, path, dashes = []) {
+  pen.setLineDash(dashes);
+  pen.beginPath();
+  path();
+  pen.lineWidth = (width + 2) * viewport.ratio;
+  pen.strokeStyle = ink.edge;
+  pen.stroke();
+  pen.lineWidth = width * viewport.ratio;
+  pen.strokeStyle = colour;
+  pen.stroke();
+  pen.setLineDash([]);
+}
+
+/** @param {Ink} pen @param {number} x @param {number} y @param {number} arm @param {number} gap */
+function cross(pen, x, y, arm, gap) {
+  for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+    pen.moveTo(x + dx * gap, y + dy * gap);
+    pen.lineTo(x + dx * arm, y + dy * arm);
+  }
+}
+
+/** @param {Ink} pen @param {number} x @param {number} y @param {number} arm @param {number} gap */
+function hollowCross(pen, x, y, arm, gap) {
+  const half = 2 * viewport.ratio;
+  for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+    const [from, to] = [gap, arm];
+    pen.moveTo(x + dx * from - dy * half, y + dy * from - dx * half);
+    pen.lineTo(x + dx * to - dy * half, y + dy * to - dx * half);
+    pen.lineTo(x + dx * to + dy * half, y + dy * to + dx * half);
+    pen.lineTo(x + dx * from + dy * half, y + dy * from + dx * half);
+    pen.closePath();
+  }
+}

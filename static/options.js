@@ -1,0 +1,177 @@
+// @ts-check
+/** The options, drawn from the server's own description of them: the few that matter first, all others below. */
+
+import { make, toast } from "./notices.js";
+import { send } from "./socket.js";
+import { on, state } from "./state.js";
+
+/** @typedef {import("./messages.js").OptionDescription} Field */
+const page = /** @type {HTMLElement} */ (document.getElementById("page-options"));
+/** The options that most people come for. */
+const FIRST = ["locating.window_s", "noise.sigma_px", "gating.max_range_m", "solving.camera_position"];
+/** @type {Record<string, string>} */
+const METHODS = { default: "Robust", paper: "Paper" };
+/** @type {Record<string, string>} */
+const METHOD_HINTS = {
+  default: "Robust estimator: finds wrong pairs, weighs radar and click noise, says how sure it is.",
+  paper: "Algorithm 1 of the paper, line by line: average, RANSAC, Levenberg-Marquardt.",
+};
+/** @type {Map<string, (value: any) => void>} */
+const writers = new Map();
+
+export function startOptions() {
+  on(["recording"], build);
+  on(["view"], fill);
+}
+
+function build() {
+  const groups = state.recording?.option_groups ?? [];
+  const fields = new Map(groups.flatMap((group) => group.options.map((field) => [field.path, field])));
+  const box = make("div", "options", []);
+  writers.clear();
+  const method = fields.get("method");
+  if (method) box.append(segmented(method));
+  for (const path of FIRST) {
+    const field = fields.get(path);
+    if (field) box.append(control(field));
+  }
+  const more = make("details", "", [make("summary", "", "All options")]);
+  const rest = make("div", "", []);
+  for (const group of groups) {
+    const others = group.options.filter((field) => !FIRST.includes(field.path) && field.path !== "method");
+    if (!others.length) continue;
+    const title = make("div", "group", group.name);
+    title.dataset.hint = group.hint;
+    rest.append(title, ...others.map(control));
+  }
+  more.append(rest);
+  box.append(more);
+  page.replaceChildren(box);
+  fill();
+}
+
+/** @param {Field} field */
+function segmented(field) {
+  const buttons = field.choices.map((choice) => {
+    const button = make("button", "", METHODS[choice] ?? choice);
+    button.dataset.method = choice;
+    button.dataset.hint = METHOD_HINTS[choice] ?? field.hint;
+    button.onclick = () => change(field.path, choice);
+    return button;
+  });
+  writers.set(field.path, (value) => {
+    for (const button of buttons) button.setAttribute("aria-pressed", String(button.dataset.method === value));
+  });
+  return row(field, make("span", "segmented", buttons), "Method");
+}
+
+/** @param {Field} field */
+function control(field) {
+  if (field.kind === "camera-position") return cameraPosition(field);
+  if (field.kind === "choice") return choice(field);
+  if (field.kind === "yes-no") return yesNo(field);
+  const input = number(field.low, field.high, field.label);
+  input.onchange = () => change(field.path, field.kind === "integer" ? Math.round(Number(input.value)) : Number(input.value));
+  writers.set(field.path, (value) => write(input, value));
+  return row(field, make("span", "control", [input, make("span", "unit", field.unit)]));
+}
+
+/** @param {Field} field */
+function choice(field) {
+  const list = make("select", "", field.choices.map((name) => make("option", "", name)));
+  list.setAttribute("aria-label", field.label);
+  list.onchange = () => change(field.path, list.value);
+  writers.set(field.path, (value) => (list.value = value));
+  return row(field, make("span", "control", [list]));
+}
+
+/** @param {Field} field */
+function yesNo(field) {
+  const input = make("input", "", []);
+  input.type = "checkbox";
+  input.setAttribute("aria-label", field.label);
+  input.onchange = () => change(field.path, input.checked);
+  writers.set(field.path, (value) => (input.checked = value));
+  return row(field, make("span", "control", [input]));
+}
+
+/** Camera position by tape measure: off, or three numbers and how sure they are. @param {Field} field */
+function cameraPosition(field) {
+  const on_ = make("input", "", []);
+  on_.type = "checkbox";
+  on_.id = "camera-position";
+  on_.setAttribute("aria-label", "Camera position measured by tape");
+  const names = ["forward", "left", "up"];
+  const inputs = names.map((name) => number(-100, 100, `camera ${name} of the radar`));
+  inputs.forEach((input, index) => {
+    input.placeholder = names[index];
+    input.dataset.hint = `Camera's distance ${names[index]} of the radar [m]`;
+  });
+  const sure = number(0.0001, 10, "standard deviation of the position");
+  const told = () => {
+    if (!on_.checked) return change(field.path, null);
+    change(field.path, { position_m: inputs.map((input) => Number(input.value) || 0), sigma_m: Number(sure.value) || 0.01 });
+  };
+  for (const input of [on_, ...inputs, sure]) input.onchange = told;
+  writers.set(field.path, (value) => {
+    on_.checked = value !== null;
+    inputs.forEach((input, index) => write(input, value?.position_m[index] ?? ""));
+    write(sure, value?.sigma_m ?? "");
+    for (const input of [...inputs, sure]) input.disabled = value === null;
+  });
+  const head = row(field, make("span", "control", [on_]), "Camera position by tape");
+  const numbers = make("span", "control triple", [...inputs, make("span", "", "±"), sure, make("span", "unit", "m")]);
+  return make("div", "", [head, numbers]);
+}
+
+/** @param {number|null} low @param {number|null} high @param {string} label */
+function number(low, high, label) {
+  const input = make("input", "", []);
+  input.type = "number";
+  input.step = "any";
+  if (low !== null) input.min = String(low);
+  if (high !== null) input.max = String(high);
+  input.setAttribute("aria-label", label);
+  return input;
+}
+
+/** A field that is being typed in keeps its text. @param {HTMLInputElement} input @param {any} value */
+function write(input, value) {
+  if (document.activeElement !== input) input.value = value === null || value === undefined ? "" : String(value);
+}
+
+/** @param {Field} field @param {HTMLElement} content @param {string} [label] */
+function row(field, content, label = sentence(field.label)) {
+  const line = make("div", "field", [make("span", "", label), content]);
+  line.dataset.hint = field.hint;
+  line.dataset.path = field.path;
+  return line;
+}
+
+/** @param {string} text */
+const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** Put the values of the view into the fields. */
+function fill() {
+  const options = /** @type {Record<string, any>|undefined} */ (state.view?.options);
+  if (!options) return;
+  for (const [path, set] of writers) {
+    const value = path.split(".").reduce((tree, name) => tree?.[name], /** @type {any} */ (options));
+    set(value);
+    const field = state.recording?.option_groups.flatMap((group) => group.options).find((other) => other.path === path);
+    const same = JSON.stringify(field?.default ?? null) === JSON.stringify(value ?? null);
+    page.querySelector(`[data-path="${path}"]`)?.classList.toggle("changed", !same);
+  }
+}
+
+/** @param {string} path @param {any} value */
+async function change(path, value) {
+  if (typeof value === "number" && !Number.isFinite(value)) return fill();
+  const [name, ...groups] = path.split(".").reverse();
+  const options = groups.reduce((tree, group) => ({ [group]: tree }), /** @type {Record<string, any>} */ ({ [name]: value }));
+  const refusal = await send({ type: "options_changed", options });
+  if (!refusal) return;
+  toast(refusal, "The option is back at its last value.");
+  /** @type {HTMLElement|null} */ (document.activeElement)?.blur();
+  fill();
+}

@@ -1,0 +1,151 @@
+// @ts-check
+/** The table of pairs: by time or by residual, one line per click; press a line to go there, X leaves it out. */
+
+import { residualColour } from "./colours.js";
+import { toggleExcluded } from "./clicking.js";
+import { make } from "./notices.js";
+import { goTo, pause } from "./player.js";
+import { drawSteps } from "./steps.js";
+import { clicks, on, select, state } from "./state.js";
+
+/** @typedef {import("./messages.js").ClickRow} Click */
+const page = /** @type {HTMLElement} */ (document.getElementById("page-pairs"));
+const count = /** @type {HTMLElement} */ (document.getElementById("pair-count"));
+/** @type {{key: "frame"|"residual_px"|"range_m", descending: boolean}} */
+const sorting = { key: "frame", descending: false };
+/** @type {{key: "frame"|"residual_px"|"range_m"|null, label: string, hint: string}[]} */
+const COLUMNS = [
+  { key: "frame", label: "Time", hint: "Time of the frame from the first one. Press to sort." },
+  { key: "range_m", label: "Range", hint: "Distance of the reflector from the radar. Press to sort." },
+  { key: "residual_px", label: "Residual", hint: "Distance between the click and the reprojection of its radar position. Press to sort." },
+  { key: null, label: "", hint: "" },
+];
+let drawn = "";
+
+export function startPairs() {
+  on(["view", "selected", "recording", "placements"], draw);
+  page.addEventListener("click", pressed);
+}
+
+/** Clicks in the order of the table. */
+export function sorted() {
+  const sign = sorting.descending ? -1 : 1;
+  return [...clicks()].sort((a, b) => sign * ((a[sorting.key] ?? -1) - (b[sorting.key] ?? -1)) || a.frame - b.frame);
+}
+
+/** Go to the click of the next smaller residual; from the smallest to the largest. */
+export function nextWorst() {
+  const ranked = clicks().filter((click) => click.residual_px !== null && click.state !== "excluded");
+  ranked.sort((a, b) => Number(b.residual_px) - Number(a.residual_px));
+  if (!ranked.length) return;
+  const at = ranked.findIndex((click) => click.id === state.selected);
+  const next = ranked[(at + 1) % ranked.length];
+  pause();
+  goTo(next.frame);
+  select(next.id);
+}
+
+function draw() {
+  const rows = sorted();
+  count.textContent = rows.length ? String(rows.length) : "";
+  const text = JSON.stringify([rows, state.selected, sorting, state.view?.residual_limit_px, state.placements.length, state.view?.solving]);
+  if (text === drawn) return;
+  drawn = text;
+  if (!rows.length) return page.replaceChildren(drawSteps());
+  const head = make("thead", "", [make("tr", "", COLUMNS.map(heading))]);
+  const table = make("table", "pairs", [head, make("tbody", "", rows.map(line))]);
+  const top = page.scrollTop;
+  page.replaceChildren(...(state.view?.has_calibration ? [table] : [table, drawSteps()]));
+  page.scrollTop = top;
+  page.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" });
+}
+
+/** @param {(typeof COLUMNS)[number]} column */
+function heading(column) {
+  const cell = make("th", "", []);
+  cell.scope = "col";
+  if (!column.key) return cell;
+  const button = make("button", "", column.label);
+  button.dataset.sort = column.key;
+  button.dataset.hint = column.hint;
+  cell.append(button);
+  if (sorting.key === column.key) cell.setAttribute("aria-sort", sorting.descending ? "descending" : "ascending");
+  return cell;
+}
+
+/** @param {Click} click */
+function line(click) {
+  const limit = state.view?.residual_limit_px ?? null;
+  const colour = residualColour(click.residual_px, limit);
+  const bar = make("b", "", "");
+  bar.style.width = `${Math.min(100, (100 * (click.residual_px ?? 0)) / (1.5 * (limit ?? 20)))}%`;
+  bar.style.background = colour;
+  const residual = click.residual_px === null ? word(click) : digits(click.residual_px);
+  const act = make("button", "act", "X");
+  const excluded = click.state === "excluded";
+  act.setAttribute("aria-label", excluded ? `Take ${click.id} in again` : `Leave ${click.id} out`);
+  act.dataset.hint = excluded ? "Take this pair in again (X)" : "Leave this pair out of the solve (X)";
+  act.dataset.act = "exclude";
+  const time = make("span", "name", [glyph(click.state, colour), `${(state.seconds[click.frame] ?? 0).toFixed(2)} s`]);
+  const row = make("tr", `row ${click.state}`, [
+    make("td", "", [time]),
+    make("td", "", click.range_m === null ? "–" : `${click.range_m.toFixed(1)} m`),
+    make("td", "bar", [make("span", "meter", [make("i", "", [bar]), make("span", "", residual)])]),
+    make("td", "", [act]),
+  ]);
+  row.dataset.id = click.id;
+  row.setAttribute("aria-selected", String(click.id !== "" && click.id === state.selected));
+  row.dataset.hint = explain(click);
+  return row;
+}
+
+/** Three digits. @param {number} value */
+const digits = (value) => (value < 10 ? value.toFixed(2) : value < 100 ? value.toFixed(1) : value.toFixed(0));
+
+/** @param {Click} click */
+const word = (click) => (click.state === "unpaired" ? "no return" : click.state === "pending" ? "…" : "–");
+
+/** @param {Click} click */
+function explain(click) {
+  const lines = [`${click.id}: click at ${click.u_px.toFixed(1)}, ${click.v_px.toFixed(1)} px`];
+  if (click.projected_px) lines.push(`reprojected at ${click.projected_px.map((value) => value.toFixed(1)).join(", ")} px`);
+  if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${click.azimuth_deg?.toFixed(1)}° left, ${click.elevation_deg?.toFixed(1)}° up`);
+  if (click.note) lines.push(click.note);
+  return lines.join("\n");
+}
+
+/** The shape says the state again. @param {string} clickState @param {string} colour */
+function glyph(clickState, colour) {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("viewBox", "0 0 12 12");
+  svg.setAttribute("role", "img");
+  svg.setAttribute("aria-label", clickState);
+  const shape = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  const disc = "M6 2.2a3.8 3.8 0 1 0 .01 0z";
+  shape.setAttribute("d", clickState === "outlier" ? "M6 .8 11.2 6 6 11.2.8 6z" : disc);
+  const hollow = clickState === "excluded" || clickState === "unpaired" || clickState === "pending";
+  shape.setAttribute("fill", hollow ? "none" : colour);
+  shape.setAttribute("stroke", colour);
+  shape.setAttribute("stroke-width", "1.5");
+  if (clickState === "pending") shape.setAttribute("stroke-dasharray", "2 2");
+  svg.append(shape);
+  return svg;
+}
+
+/** @param {MouseEvent} event */
+function pressed(event) {
+  const target = /** @type {Element} */ (event.target);
+  const key = target.closest("[data-sort]")?.getAttribute("data-sort");
+  if (key) {
+    sorting.descending = sorting.key === key ? !sorting.descending : key === "residual_px";
+    sorting.key = /** @type {typeof sorting.key} */ (key);
+    return draw();
+  }
+  const id = /** @type {HTMLElement|null} */ (target.closest("[data-id]"))?.dataset.id;
+  const click = clicks().find((row) => row.id === id && id !== "");
+  if (!click) return;
+  select(click.id);
+  if (target.closest("[data-act]")) return void toggleExcluded();
+  pause();
+  goTo(click.frame);
+}

@@ -1,0 +1,115 @@
+// @ts-check
+/** The camera frame on its canvas: box, zoom, pan, and when to draw again. */
+
+import { drawMarks } from "./marks.js";
+import * as geometry from "./geometry.js";
+import { emit, on, state } from "./state.js";
+
+const { viewport } = geometry;
+const pane = /** @type {HTMLElement} */ (document.getElementById("picture-pane"));
+const picture = /** @type {HTMLCanvasElement} */ (document.getElementById("picture"));
+export const marks = /** @type {HTMLCanvasElement} */ (document.getElementById("marks"));
+const paper = /** @type {CanvasRenderingContext2D} */ (picture.getContext("2d", { alpha: false }));
+const ink = /** @type {CanvasRenderingContext2D} */ (marks.getContext("2d"));
+/** Above this many screen px per image px, pixels are shown as squares. */
+const SQUARES_ABOVE = 2.5;
+let drawPicture = false;
+let drawInk = false;
+
+export function startPicture() {
+  new ResizeObserver(measure).observe(pane);
+  watchRatio();
+  on(["shown"], () => {
+    takeSize();
+    redraw();
+  });
+  on(["view", "overlay", "selected", "layers", "hover", "placements", "theme"], redrawMarks);
+  on(["theme"], redraw);
+  measure();
+}
+
+/** The ratio of device to CSS pixels changes with the browser's zoom and the monitor. */
+function watchRatio() {
+  matchMedia(`(resolution: ${window.devicePixelRatio}dppx)`).addEventListener(
+    "change",
+    () => {
+      measure();
+      watchRatio();
+    },
+    { once: true },
+  );
+}
+
+function measure() {
+  if (!geometry.resize(pane.clientWidth, pane.clientHeight)) return;
+  for (const canvas of [picture, marks]) {
+    canvas.width = Math.round(viewport.width * viewport.ratio);
+    canvas.height = Math.round(viewport.height * viewport.ratio);
+    canvas.style.width = `${viewport.width}px`;
+    canvas.style.height = `${viewport.height}px`;
+  }
+  paint();
+  emit("box");
+}
+
+/** The first frame tells how large the picture is. */
+function takeSize() {
+  const shown = state.shown;
+  if (!shown || (shown.width === viewport.imageWidth && shown.height === viewport.imageHeight)) return;
+  viewport.imageWidth = shown.width;
+  viewport.imageHeight = shown.height;
+  geometry.fit();
+}
+
+/** Draw everything with the next screen frame. */
+export function redraw() {
+  drawPicture = true;
+  redrawMarks();
+}
+
+function redrawMarks() {
+  if (drawInk) return;
+  drawInk = true;
+  requestAnimationFrame(paint);
+}
+
+function paint() {
+  if (drawPicture || !drawInk) paintPicture();
+  drawPicture = drawInk = false;
+  ink.setTransform(1, 0, 0, 1, 0, 0);
+  ink.clearRect(0, 0, marks.width, marks.height);
+  if (state.shown) drawMarks(ink);
+}
+
+function paintPicture() {
+  paper.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ground").trim() || "#000";
+  paper.fillRect(0, 0, picture.width, picture.height);
+  const shown = state.shown;
+  if (!shown) return;
+  paper.imageSmoothingEnabled = viewport.scale < SQUARES_ABOVE * shown.scale;
+  paper.imageSmoothingQuality = state.playing ? "low" : "high";
+  const [x, y] = geometry.toDevice(-0.5, -0.5);
+  paper.drawImage(shown.bitmap, x, y, shown.width * viewport.scale, shown.height * viewport.scale);
+}
+
+/** Fit the picture into its box. */
+export function fit() {
+  geometry.fit();
+  redraw();
+  emit("box");
+}
+
+/** Zoom at a point of the box; in the middle without one. @param {number} factor @param {number} [x] @param {number} [y] CSS px */
+export function zoomBy(factor, x = viewport.width / 2, y = viewport.height / 2) {
+  geometry.zoomAt(factor, x, y);
+  redraw();
+  emit("box");
+}
+
+/** Bring an image point into the box if it is outside. @param {number} u @param {number} v */
+export function reveal(u, v) {
+  const [x, y] = geometry.toCss(u, v);
+  if (x > 24 && y > 24 && x < viewport.width - 24 && y < viewport.height - 24) return;
+  geometry.lookAt(u, v);
+  redraw();
+}

@@ -1,0 +1,168 @@
+// @ts-check
+/** Which frame is on the screen: stepping, playing, and the requests for frames (few on their way, the newest wins). */
+
+import { clicks, emit, select, state } from "./state.js";
+import { tell } from "./socket.js";
+
+const KEPT = 12;
+/** Frames asked for and not here yet, while playing. */
+const CREDIT = 2;
+/** @type {Map<number, import("./state.js").Shown>} */
+const kept = new Map();
+let nextRequest = 1;
+let newest = 0;
+let coming = 0;
+let startedAt = 0;
+let startedFrom = 0;
+let asked = -1;
+
+/** Go to a frame. @param {number} index */
+export function goTo(index) {
+  const last = state.seconds.length - 1;
+  if (last < 0) return;
+  state.cursor = Math.min(last, Math.max(0, Math.round(index)));
+  const ready = kept.get(state.cursor);
+  if (ready && (ready.scale === 1 || state.playing)) show(ready);
+  else request(state.cursor);
+  emit("cursor");
+  tellCursor();
+}
+
+/** Step over real frames; stops playing. @param {number} count */
+export function step(count) {
+  pause();
+  goTo(state.cursor + count);
+}
+
+export function pause() {
+  if (!state.playing) return;
+  state.playing = false;
+  emit("playing");
+  goTo(state.cursor);
+}
+
+export function play() {
+  if (state.playing || state.seconds.length < 2) return;
+  if (state.cursor >= state.seconds.length - 1) state.cursor = 0;
+  state.playing = true;
+  restart();
+  emit("playing");
+  requestAnimationFrame(tick);
+}
+
+/** The clock of play starts again at the frame of now. */
+function restart() {
+  startedAt = performance.now();
+  startedFrom = state.seconds[state.cursor];
+  asked = state.cursor;
+  coming = 0;
+}
+
+/** Scrub while playing or not. @param {number} index */
+export function jump(index) {
+  goTo(index);
+  if (state.playing) restart();
+}
+
+function tick() {
+  if (!state.playing) return;
+  const time = startedFrom + (performance.now() - startedAt) / 1000;
+  const due = indexAt(time);
+  if (due > asked && coming < CREDIT) {
+    asked = due;
+    const ready = kept.get(due);
+    if (ready) show(ready);
+    else request(due);
+  }
+  if (due >= state.seconds.length - 1 && state.shown?.index === due) return pause();
+  requestAnimationFrame(tick);
+}
+
+/** The last frame at or before a time. @param {number} time s from the first frame */
+export function indexAt(time) {
+  let [low, high] = [0, state.seconds.length - 1];
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (state.seconds[middle] <= time) low = middle;
+    else high = middle - 1;
+  }
+  return low;
+}
+
+/** The frame nearest to a time. @param {number} time s from the first frame */
+export function nearestIndex(time) {
+  const index = indexAt(time);
+  const next = Math.min(index + 1, state.seconds.length - 1);
+  return time - state.seconds[index] <= state.seconds[next] - time ? index : next;
+}
+
+/** @param {number} index */
+function request(index) {
+  newest = nextRequest++;
+  const sent = tell({ type: "frame", index, request: newest, playing: state.playing, size: state.playing ? "half" : "full" });
+  if (sent) coming += 1;
+}
+
+/** Ask again after the line came back. */
+export function requestAgain() {
+  coming = 0;
+  kept.clear();
+  if (state.playing) restart();
+  request(state.cursor);
+  tellCursor();
+}
+
+/** A frame arrived. @param {any} header @param {Uint8Array<ArrayBuffer>} data */
+export async function receiveFrame(header, data) {
+  coming = Math.max(0, coming - 1);
+  const stale = header.request < newest && !state.playing;
+  if (stale) return;
+  const blob = new Blob([data], { type: `image/${header.format}` });
+  const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+  const shown = { index: header.index, bitmap, scale: header.scale, width: header.width_px, height: header.height_px };
+  keep(shown);
+  const wanted = state.playing ? header.index > (state.shown?.index ?? -1) || header.request === newest : header.index === state.cursor;
+  if (wanted) show(shown);
+}
+
+/** A frame could not be read. */
+export function frameFailed() {
+  coming = Math.max(0, coming - 1);
+}
+
+/** @param {import("./state.js").Shown} shown */
+function keep(shown) {
+  const before = kept.get(shown.index);
+  if (before && before.scale > shown.scale) return;
+  kept.delete(shown.index);
+  kept.set(shown.index, shown);
+  for (const [index, old] of kept) {
+    if (kept.size <= KEPT) break;
+    kept.delete(index);
+    if (old.bitmap !== state.shown?.bitmap) old.bitmap.close();
+  }
+}
+
+/** @param {import("./state.js").Shown} shown */
+function show(shown) {
+  state.shown = shown;
+  if (state.playing) {
+    state.cursor = shown.index;
+    emit("cursor");
+    tellCursor();
+  }
+  selectHere(shown.index);
+  emit("shown");
+}
+
+/** A click in the frame on screen is the selected one. @param {number} index */
+function selectHere(index) {
+  const here = clicks().find((click) => click.frame === index && click.id !== "");
+  if (here) select(here.id);
+  else if (!state.playing) select(null);
+}
+
+/** Tell the server where this tab is: it answers with the overlay and moves the 3D view. */
+export function tellCursor() {
+  tell({ type: "cursor", index: state.cursor, playing: state.playing, selected: state.selected });
+}

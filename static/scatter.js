@@ -1,0 +1,97 @@
+// @ts-check
+/** Residuals as a scatter: how far right (du) and down (dv) each reprojection lies from its click. A cloud off the middle is a bias. */
+
+import { ink, residualColour, themeColour } from "./colours.js";
+import { make } from "./notices.js";
+import { goTo, pause } from "./player.js";
+import { clicks, on, select, state } from "./state.js";
+
+const SIDE = 168;
+const canvas = make("canvas", "", []);
+const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+
+export function startScatter() {
+  canvas.id = "scatter";
+  canvas.tabIndex = -1;
+  canvas.setAttribute("role", "img");
+  canvas.dataset.hint = "Reprojection minus click of every pair. A cloud off the middle means a bias; press a mark to go to its frame.";
+  document.querySelector("#page-pose .pose")?.append(canvas);
+  canvas.addEventListener("click", pressed);
+  on(["view", "selected", "theme", "box"], draw);
+}
+
+/** Half the width of the plot [px of the image], a round number that holds every inlier. */
+function reach() {
+  const agreeing = clicks().filter((click) => click.state === "inlier" && click.projected_px);
+  const farthest = Math.max(1, ...agreeing.flatMap(offset).map(Math.abs));
+  const power = 10 ** Math.floor(Math.log10(farthest));
+  return [1, 2, 5, 10].map((factor) => factor * power).find((size) => size >= farthest) ?? farthest;
+}
+
+/** @param {import("./messages.js").ClickRow} click @returns {number[]} */
+const offset = (click) => (click.projected_px ? [click.projected_px[0] - click.u_px, click.projected_px[1] - click.v_px] : []);
+
+/** Place of a click in the plot; those beyond lie on its edge. @param {import("./messages.js").ClickRow} click @param {number} most @returns {[number, number]} */
+function place(click, most) {
+  const [du, dv] = offset(click).map((value) => Math.min(1.06, Math.max(-1.06, value / most)));
+  const half = SIDE / 2;
+  return [half + du * (half - 14), half + dv * (half - 14)];
+}
+
+function draw() {
+  const ratio = window.devicePixelRatio || 1;
+  canvas.width = canvas.height = Math.round(SIDE * ratio);
+  canvas.style.width = canvas.style.height = `${SIDE}px`;
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, SIDE, SIDE);
+  const most = reach();
+  const half = SIDE / 2;
+  pen.strokeStyle = themeColour("line");
+  pen.lineWidth = 1;
+  for (const share of [0.5, 1]) ring(half, half, share * (half - 14));
+  pen.beginPath();
+  pen.moveTo(half, 6);
+  pen.lineTo(half, SIDE - 6);
+  pen.moveTo(6, half);
+  pen.lineTo(SIDE - 6, half);
+  pen.stroke();
+  pen.fillStyle = themeColour("faint");
+  pen.font = `10px ${themeColour("mono")}`;
+  pen.textAlign = "right";
+  pen.fillText(`${most} px`, SIDE - 5, half - 4);
+  for (const click of clicks()) if (click.projected_px) mark(click, most);
+}
+
+/** @param {import("./messages.js").ClickRow} click @param {number} most */
+function mark(click, most) {
+  const [x, y] = place(click, most);
+  const colour = click.state === "excluded" ? ink.grey : residualColour(click.residual_px, state.view?.residual_limit_px ?? null);
+  const chosen = click.id === state.selected;
+  pen.beginPath();
+  pen.arc(x, y, chosen ? 5 : 3.2, 0, 2 * Math.PI);
+  pen.fillStyle = pen.strokeStyle = colour;
+  pen.lineWidth = 1.4;
+  if (click.state === "inlier") pen.fill();
+  else pen.stroke();
+  if (chosen) ring(x, y, 7.5);
+}
+
+/** @param {number} x @param {number} y @param {number} radius */
+function ring(x, y, radius) {
+  pen.beginPath();
+  pen.arc(x, y, radius, 0, 2 * Math.PI);
+  pen.stroke();
+}
+
+/** @param {MouseEvent} event */
+function pressed(event) {
+  const most = reach();
+  const near = clicks()
+    .filter((click) => click.projected_px)
+    .map((click) => ({ click, far: Math.hypot(place(click, most)[0] - event.offsetX, place(click, most)[1] - event.offsetY) }))
+    .sort((a, b) => a.far - b.far)[0];
+  if (!near || near.far > 10) return;
+  pause();
+  goTo(near.click.frame);
+  select(near.click.id);
+}

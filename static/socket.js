@@ -1,0 +1,100 @@
+// @ts-check
+/**
+ * The channel to the server: sends events, repeats what was not confirmed when the line was cut, hands messages to their reader.
+ * Undo and redo are not repeated: doing them twice is another thing than doing them once.
+ */
+
+/** @type {WebSocket|null} */
+let socket = null;
+let nextRequest = 1;
+let delay = 250;
+let opened = false;
+/** @type {Map<number, {message: Record<string, any>, repeats: boolean, resolve: (text: string|null) => void}>} */
+const waiting = new Map();
+/** @type {{message: (message: any) => void, frame: (header: any, data: Uint8Array<ArrayBuffer>) => void, connection: (connected: boolean) => void}} */
+let reader;
+
+/** One name per tab: the 3D view of this tab carries the same. */
+export const tab = Array.from(crypto.getRandomValues(new Uint8Array(9)), (byte) => byte.toString(36)).join("");
+
+/** Open the channel and keep it open. @param {typeof reader} given */
+export function connect(given) {
+  reader = given;
+  open();
+}
+
+function open() {
+  const address = new URL("ws", location.href);
+  address.protocol = address.protocol.replace("http", "ws");
+  socket = new WebSocket(address);
+  socket.binaryType = "arraybuffer";
+  socket.onopen = () => {
+    delay = 250;
+    opened = true;
+    socket?.send(JSON.stringify({ type: "hello", tab }));
+    for (const [request, { message }] of waiting) socket?.send(JSON.stringify({ ...message, request }));
+    reader.connection(true);
+  };
+  socket.onmessage = (event) => (typeof event.data === "string" ? receive(JSON.parse(event.data)) : unpack(event.data));
+  socket.onclose = lost;
+}
+
+function lost() {
+  socket = null;
+  for (const [request, { repeats, resolve }] of waiting) {
+    if (repeats) continue;
+    waiting.delete(request);
+    resolve("the connection was lost before the server confirmed it");
+  }
+  reader.connection(false);
+  setTimeout(open, delay);
+  delay = Math.min(opened ? 1000 : 4000, delay * 2);
+}
+
+/** @param {any} message */
+function receive(message) {
+  const request = waiting.get(message.request);
+  if (request && (message.type === "done" || message.type === "error")) {
+    waiting.delete(message.request);
+    request.resolve(message.type === "done" ? null : message.message);
+  }
+  if (message.type !== "done") reader.message(message);
+}
+
+/** @param {ArrayBuffer} buffer */
+function unpack(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  reader.frame(header, new Uint8Array(buffer, 4 + length));
+}
+
+/**
+ * Send an event; it is kept until the server confirms it.
+ * @param {Record<string, any>} message
+ * @returns {Promise<string|null>} null when confirmed, else what the server said against it
+ */
+export function send(message) {
+  const request = nextRequest++;
+  const repeats = message.type !== "undo" && message.type !== "redo";
+  return new Promise((resolve) => {
+    waiting.set(request, { message, repeats, resolve });
+    if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ ...message, request }));
+    else if (!repeats) lostNow(request);
+  });
+}
+
+/** @param {number} request */
+function lostNow(request) {
+  waiting.get(request)?.resolve("not connected");
+  waiting.delete(request);
+}
+
+/** Send something that is worthless later: a cursor, a request for a frame. @param {Record<string, any>} message @returns {boolean} whether it went out */
+export function tell(message) {
+  if (socket?.readyState !== WebSocket.OPEN) return false;
+  socket.send(JSON.stringify(message));
+  return true;
+}
+
+/** How many events the server has not confirmed. */
+export const unconfirmed = () => waiting.size;

@@ -1,0 +1,38 @@
+// @ts-check
+/** The 3D view: viser's own page in a frame of ours. It has its own line to the server; the name of this tab ties the two. */
+
+import { listen } from "./keys.js";
+import { make } from "./notices.js";
+import { tab, tell } from "./socket.js";
+import { on } from "./state.js";
+
+const frame = /** @type {HTMLIFrameElement} */ (document.getElementById("space-view"));
+const group = /** @type {HTMLElement} */ (document.getElementById("viewpoints"));
+/** @type {[string, string, string][]} */
+const VIEWPOINTS = [
+  ["behind", "Behind", "Look forward from behind the radar."],
+  ["above", "Above", "Look down on the radar; forward is up."],
+  ["side", "Side", "Look from the right-hand side."],
+  ["camera", "Camera", "Look from where the camera is."],
+];
+
+export function startSpace() {
+  for (const [viewpoint, label, hint] of VIEWPOINTS) {
+    const chip = make("button", "chip", label);
+    chip.dataset.hint = hint;
+    chip.onclick = () => tell({ type: "viewpoint", viewpoint });
+    group.append(chip);
+  }
+  frame.addEventListener("load", () => {
+    if (frame.contentWindow) listen(frame.contentWindow);
+    tint();
+  });
+  on(["theme"], tint);
+  frame.src = `viser/${tab}/`;
+}
+
+/** The 3D view follows the theme. */
+function tint() {
+  const root = frame.contentDocument?.documentElement;
+  if (root) root.dataset.theme = document.documentElement.dataset.theme ?? "dark";
+}

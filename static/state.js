@@ -1,0 +1,105 @@
+// @ts-check
+/** What the page knows, and who wants to hear of changes. Truth lives in the server: this is its last word. */
+
+/** @typedef {import("./messages.js").View} View */
+/** @typedef {import("./messages.js").ClickRow} Click */
+/** A decoded frame. @typedef {{index: number, bitmap: ImageBitmap, scale: number, width: number, height: number}} Shown */
+/** @typedef {"recording"|"view"|"progress"|"placements"|"overlay"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"} Topic */
+
+export const state = {
+  /** @type {import("./messages.js").RecordingNote|null} */ recording: null,
+  /** @type {View|null} */ view: null,
+  /** @type {import("./messages.js").PlacementRow[]} */ placements: [],
+  placementsKnown: false,
+  /** @type {import("./messages.js").Overlay|null} */ overlay: null,
+  /** @type {Shown|null} */ shown: null,
+  /** The frame asked for; the one on screen is `shown`. */ cursor: 0,
+  /** @type {string|null} */ selected: null,
+  playing: false,
+  connected: false,
+  /** @type {import("./messages.js").Progress|null} */ progress: null,
+  /** @type {{u: number, v: number}|null} */ hover: null,
+  layers: { returns: true, others: true, ellipses: true, predictions: true },
+  /** Seconds of each frame from the first one. @type {Float64Array} */ seconds: new Float64Array(0),
+  /** Marks as the person left them, until the server's view has them. @type {Map<string, {u: number, v: number}>} */ local: new Map(),
+};
+
+/** @type {Map<string, Set<() => void>>} */
+const listeners = new Map();
+
+/** Call `listener` whenever one of the topics changed. @param {Topic[]} topics @param {() => void} listener */
+export function on(topics, listener) {
+  for (const topic of topics) {
+    if (!listeners.has(topic)) listeners.set(topic, new Set());
+    /** @type {Set<() => void>} */ (listeners.get(topic)).add(listener);
+  }
+}
+
+/** Say that a topic changed. @param {Topic} topic */
+export function emit(topic) {
+  for (const listener of listeners.get(topic) ?? []) listener();
+}
+
+/** The clicks as they should be drawn now. @returns {Click[]} */
+export function clicks() {
+  const known = state.view?.clicks ?? [];
+  const drawn = known.map((click) => {
+    const local = state.local.get(stampKey(click.image_time));
+    return local ? { ...click, u_px: local.u, v_px: local.v } : click;
+  });
+  const stamps = new Set(known.map((click) => stampKey(click.image_time)));
+  for (const [key, place] of state.local) if (!stamps.has(key)) drawn.push(placedHere(key, place));
+  return drawn;
+}
+
+/** A click that the server has not confirmed yet. @param {string} key @param {{u: number, v: number}} place @returns {Click} */
+function placedHere(key, place) {
+  const [sec, nanosec] = key.split(".").map(Number);
+  return {
+    id: "", image_time: { sec, nanosec }, frame: frameOf({ sec, nanosec }), u_px: place.u, v_px: place.v, state: "pending",
+    projected_px: null, residual_px: null, ellipse: null, range_m: null, azimuth_deg: null, elevation_deg: null,
+    returns: null, outlier_probability: null, note: "",
+  };
+}
+
+/** @param {import("./messages.js").Stamp} stamp */
+export const stampKey = (stamp) => `${stamp.sec}.${stamp.nanosec}`;
+
+/** The stamp of a frame, exactly as recorded. @param {number} index @returns {import("./messages.js").Stamp} */
+export function stampOf(index) {
+  const times = /** @type {import("./messages.js").RecordingNote} */ (state.recording).frame_times;
+  return { sec: times.sec[index], nanosec: times.nanosec[index] };
+}
+
+/** @param {import("./messages.js").Stamp} stamp */
+function frameOf(stamp) {
+  const times = /** @type {import("./messages.js").RecordingNote} */ (state.recording).frame_times;
+  return times.sec.findIndex((sec, index) => sec === stamp.sec && times.nanosec[index] === stamp.nanosec);
+}
+
+/** The click in a frame. @param {number} index @returns {Click|undefined} */
+export const clickIn = (index) => clicks().find((click) => click.frame === index);
+
+/** The selected click. @returns {Click|undefined} */
+export const selectedClick = () => clicks().find((click) => click.id !== "" && click.id === state.selected);
+
+/** The placement that a frame lies in. @param {number} index @returns {import("./messages.js").PlacementRow|undefined} */
+export function placementAt(index) {
+  const time = state.seconds[index];
+  return state.placements.find((placement) => placement.start_s <= time && time <= placement.end_s);
+}
+
+/** Whether some click lies within a placement. @param {import("./messages.js").PlacementRow} placement */
+export function isClicked(placement) {
+  return clicks().some((click) => {
+    const time = state.seconds[click.frame];
+    return placement.start_s <= time && time <= placement.end_s;
+  });
+}
+
+/** Change the selection. @param {string|null} id */
+export function select(id) {
+  if (state.selected === id) return;
+  state.selected = id;
+  emit("selected");
+}

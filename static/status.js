@@ -1,0 +1,82 @@
+// @ts-check
+/** The lines around: recording, clock, buttons, status, progress, the pixel under the hand. */
+
+import { icon } from "./notices.js";
+import { toDevice, viewport, zoom } from "./geometry.js";
+import { on, state } from "./state.js";
+
+/** @param {string} id */
+const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+/** A return this near to the hand is spelt out [CSS px]. */
+const REACH = 8;
+
+export function startStatus() {
+  on(["recording"], drawRecording);
+  on(["view", "connection", "progress"], drawStatus);
+  on(["cursor", "shown", "recording"], drawClock);
+  on(["playing"], drawPlay);
+  on(["hover", "shown", "box"], drawReadout);
+}
+
+function drawRecording() {
+  const recording = state.recording;
+  if (!recording) return;
+  get("recording-name").textContent = recording.name;
+  get("recording-topics").textContent = [`radar ${recording.radar_topic}`, `camera ${recording.image_topic}`, `${recording.width_px} × ${recording.height_px}`].join("   ");
+  get("status-right").textContent = `cocalib ${recording.version}`;
+  get("status-right").dataset.hint = `Every click is kept at once in\n${recording.session.folder}`;
+}
+
+function drawStatus() {
+  const view = state.view;
+  get("connection").classList.toggle("off", !state.connected);
+  get("connection").dataset.hint = state.connected ? "Connected. Every click is kept on disk at once." : "Not connected.";
+  const words = view ? [view.status, view.hint].filter(Boolean).join("  ·  ") : "Opening the recording…";
+  get("status-text").textContent = words;
+  const undo = /** @type {HTMLButtonElement} */ (get("undo"));
+  const redo = /** @type {HTMLButtonElement} */ (get("redo"));
+  undo.disabled = !view?.can_undo;
+  redo.disabled = !view?.can_redo;
+  const progress = state.progress;
+  const running = progress !== null && progress.done < progress.total;
+  get("progress").hidden = !running;
+  if (!progress || !running) return;
+  get("progress-label").textContent = progress.label;
+  const bar = /** @type {HTMLProgressElement} */ (get("progress-bar"));
+  bar.max = progress.total;
+  bar.value = progress.done;
+}
+
+function drawClock() {
+  const index = state.shown?.index ?? state.cursor;
+  get("clock-time").textContent = (state.seconds[index] ?? 0).toFixed(3);
+  get("clock-frame").textContent = state.seconds.length ? `${index + 1} / ${state.seconds.length}` : "";
+}
+
+function drawPlay() {
+  const button = get("play");
+  button.replaceChildren(icon(state.playing ? "pause" : "play"));
+  button.setAttribute("aria-label", state.playing ? "Pause" : "Play");
+}
+
+function drawReadout() {
+  const point = state.hover;
+  const parts = [`${Math.round(zoom() * 100)} %`];
+  if (point && !state.playing) parts.push(`u ${point.u.toFixed(1)}  v ${point.v.toFixed(1)}`);
+  const near = point ? nearReturn(point) : null;
+  if (near) parts.push(near);
+  get("readout").textContent = state.shown ? parts.join("   ") : "";
+}
+
+/** The radar return under the hand, in words. @param {{u: number, v: number}} point */
+function nearReturn(point) {
+  const overlay = state.overlay;
+  if (!overlay?.returns || !state.layers.returns || overlay.index !== state.shown?.index) return null;
+  const [x, y] = toDevice(point.u, point.v);
+  for (const [u, v, range, doppler, snr] of overlay.returns) {
+    const [rx, ry] = toDevice(u, v);
+    if (Math.hypot(rx - x, ry - y) > REACH * viewport.ratio) continue;
+    return [`${range.toFixed(2)} m`, doppler === null ? "" : `${doppler.toFixed(2)} m/s`, snr === null ? "" : `${snr.toFixed(0)} dB`].filter(Boolean).join("  ");
+  }
+  return null;
+}
