@@ -52,18 +52,23 @@ class Workspace:
 
     A step is journalled before anybody is told of it. Views reach the subscribers in the order of the changes and outside
     the lock, so a subscriber may dispatch; it must return quickly and must not raise.
+
+    Attributes:
+        facts: the recording's frames.
+        restored: what was found in the session's folder at the start.
     """
 
-    def __init__(self, facts: RecordingFacts, history: History, journal: Journal, solver: Solver) -> None:
+    def __init__(self, facts: RecordingFacts, restored: Restored, journal: Journal, solver: Solver) -> None:
         self.facts = facts
-        self._history = history
+        self.restored = restored
+        self._history = restored.history
         self._journal = journal
         self._solver = solver
         self._lock = threading.Lock()
         self._subscribers: tuple[Subscriber, ...] = ()
         self._untold: deque[tuple[View, tuple[Subscriber, ...]]] = deque()
         self._telling = False
-        self._ask_for_answer(history.present)
+        self._ask_for_answer(restored.history.present)
 
     @property
     def history(self) -> History:
@@ -187,9 +192,7 @@ def recording_facts(recording: RecordingSource, name: str) -> RecordingFacts:
     return RecordingFacts(name, recording.image_times, picture.width_px, picture.height_px)
 
 
-def open_workspace(
-    recording: RecordingSource, *, camera: Camera | None, session_folder: Path, name: str
-) -> tuple[Workspace, Restored]:
+def open_workspace(recording: RecordingSource, *, camera: Camera | None, session_folder: Path, name: str) -> Workspace:
     """Open or begin the session of a recording, with a solver beside it.
 
     Args:
@@ -198,15 +201,10 @@ def open_workspace(
         session_folder: where the session is kept.
         name: what to call the recording.
 
-    Returns:
-        the workspace, and what was found in the folder.
-
     Raises:
         InputError: the recording has no frames.
         SessionFileError: the session cannot be opened.
     """
     facts = recording_facts(recording, name)
     session_file = open_session_file(session_folder, facts)
-    return Workspace(
-        facts, session_file.restored.history, session_file, SolverWorker(recording, camera)
-    ), session_file.restored
+    return Workspace(facts, session_file.restored, session_file, SolverWorker(recording, camera))

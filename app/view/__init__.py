@@ -2,5 +2,17 @@
 
 from app.view.drawing import view
 from app.view.drawn import CautionRow, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View
+from app.view.summary import summary_lines
 
-__all__ = ["CautionRow", "ClickRow", "ClickState", "Ellipse", "Figure", "Level", "Stage", "View", "view"]
+__all__ = [
+    "CautionRow",
+    "ClickRow",
+    "ClickState",
+    "Ellipse",
+    "Figure",
+    "Level",
+    "Stage",
+    "View",
+    "summary_lines",
+    "view",
+]

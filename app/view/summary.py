@@ -1,0 +1,21 @@
+"""A calibration in a few lines of text, for the command line: the same figures as on the page."""
+
+from app.view.drawn import Figure
+from app.view.figures import metric_figures, pose_figures
+from calib_core.results import Calibration
+
+__all__ = ["summary_lines"]
+
+
+def summary_lines(calibration: Calibration) -> tuple[str, ...]:
+    """Return the figures, one per line and aligned, then the cautions with what to do about them."""
+    figures = (*metric_figures(calibration), *pose_figures(calibration))
+    width = max(len(figure.label) for figure in figures)
+    lines = [_line(figure, width) for figure in figures]
+    lines += [f"caution: {caution.message} {caution.hint}" for caution in calibration.cautions]
+    lines += [f"unpaired: {row.id}: {row.reason} {row.hint}" for row in calibration.unpaired]
+    return tuple(lines)
+
+
+def _line(figure: Figure, width: int) -> str:
+    return f"{figure.label:<{width}}  {figure.value} {figure.unit}".rstrip()
