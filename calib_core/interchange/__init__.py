@@ -9,25 +9,41 @@ from calib_core.interchange.calibration_file import (
 )
 from calib_core.interchange.calibration_json import calibration_text, read_calibration, write_calibration
 from calib_core.interchange.cameras import camera_info_text, read_camera, read_camera_file
+from calib_core.interchange.checking import CheckReport, Finding, check
 from calib_core.interchange.clicks import read_clicks, write_clicks
+from calib_core.interchange.comparing import Comparison, PixelDifference, compare
 from calib_core.interchange.formats import FORMATS, ExportBytes, ExportText, Format, export, format_named
+from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
+from calib_core.interchange.importing import imported, read_any, read_any_file
 from calib_core.interchange.pairs import PairsFile, read_pairs, write_pairs
 
 __all__ = [
     "FORMATS",
     "CalibrationFile",
+    "CheckReport",
+    "Comparison",
     "ExportBytes",
     "ExportText",
+    "Finding",
     "Format",
     "FrameNames",
+    "ImportedCalibration",
     "InputFile",
     "PairsFile",
+    "PixelDifference",
     "Provenance",
+    "StatedCheckPoint",
+    "WrittenPose",
     "calibration_text",
     "camera_info_text",
+    "check",
     "choose_check_point",
+    "compare",
     "export",
     "format_named",
+    "imported",
+    "read_any",
+    "read_any_file",
     "read_calibration",
     "read_camera",
     "read_camera_file",

@@ -6,8 +6,20 @@ from difflib import get_close_matches
 from typing import Literal
 
 from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
+from calib_core.interchange.array_formats import MATLAB_NOTES, write_matlab, write_matrix, write_numpy
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.calibration_json import write_calibration
+from calib_core.interchange.colmap_format import COLMAP_NOTES, write_colmap
+from calib_core.interchange.dataset_formats import (
+    KITTI_NOTES,
+    NUSCENES_NOTES,
+    write_kitti,
+    write_nuscenes,
+    write_nuscenes_in_ego,
+)
+from calib_core.interchange.foxglove_format import FOXGLOVE_NOTES, write_foxglove
+from calib_core.interchange.opencv_format import write_opencv
 from calib_core.interchange.ros_formats import (
     write_launch_python,
     write_ros1_launch,
@@ -15,6 +27,7 @@ from calib_core.interchange.ros_formats import (
     write_tf2_command,
 )
 from calib_core.interchange.urdf_format import write_urdf
+from calib_core.interchange.yaml_formats import write_apollo, write_autoware, write_autoware_in_kit, write_kalibr
 
 __all__ = ["FORMATS", "ExportBytes", "ExportText", "Format", "export", "format_named"]
 
@@ -33,6 +46,7 @@ class Format:
         comment: how it says its frames and check point in words: "#", "<!-- -->", its own keys, or none.
         write: turns a calibration into the file's content; refuses in words what the format cannot carry.
         notes: what a person must know who uses it, one sentence each.
+        write_in_parent: the same under a known pose of the radar in a third frame (kit, ego); None where there is none.
     """
 
     name: str
@@ -42,6 +56,7 @@ class Format:
     comment: Comment
     write: Callable[[CalibrationFile], str | bytes]
     notes: tuple[str, ...] = ()
+    write_in_parent: Callable[[CalibrationFile, RigidTransform], str | bytes] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,17 +94,67 @@ class ExportBytes:
     notes: tuple[str, ...] = ()
 
 
-_CAMERA_APART = "carries the pose only; export the camera with --to opencv, or keep your camera_info"
+_POSE_ONLY = ("carries the pose only: keep your camera_info, or export the camera with --to opencv",)
+_KIT = (
+    "poses are in sensor_kit_base_link; without --parent-from-radar the radar sits at the kit's origin",
+    *_POSE_ONLY,
+)
+_KALIBR = ("T_cam_radar is our key: Kalibr itself has none for radars",)
 
 FORMATS: tuple[Format, ...] = (
-    Format("tf2", "ROS 2 command (static_transform_publisher)", "static_transform.sh", False, "#", write_tf2_command),
-    Format("tf2-launch-py", "ROS 2 launch file, Python", "radar_camera.launch.py", False, "#", write_launch_python),
-    Format(
-        "tf2-launch-xml", "ROS 2 launch file, XML", "radar_camera.launch.xml", False, "<!-- -->", write_ros2_launch_xml
-    ),
-    Format("tf1-launch", "ROS 1 launch file", "radar_camera.launch", False, "<!-- -->", write_ros1_launch),
-    Format("urdf", "URDF with camera_link and optical frame", "radar_camera.urdf", False, "<!-- -->", write_urdf),
     Format("json", "cocalib's own calibration-1", "calibration.json", True, "keys", write_calibration),
+    Format("tf2", "ROS 2 command", "static_transform.sh", False, "#", write_tf2_command, _POSE_ONLY),
+    Format(
+        "tf2-launch-py",
+        "ROS 2 launch file, Python",
+        "radar_camera.launch.py",
+        False,
+        "#",
+        write_launch_python,
+        _POSE_ONLY,
+    ),
+    Format(
+        "tf2-launch-xml",
+        "ROS 2 launch file, XML",
+        "radar_camera.launch.xml",
+        False,
+        "<!-- -->",
+        write_ros2_launch_xml,
+        _POSE_ONLY,
+    ),
+    Format("tf1-launch", "ROS 1 launch file", "radar_camera.launch", False, "<!-- -->", write_ros1_launch, _POSE_ONLY),
+    Format(
+        "urdf", "URDF: camera_link and optical frame", "radar_camera.urdf", False, "<!-- -->", write_urdf, _POSE_ONLY
+    ),
+    Format(
+        "autoware",
+        "Autoware sensor kit",
+        "sensor_kit_calibration.yaml",
+        False,
+        "#",
+        write_autoware,
+        _KIT,
+        write_autoware_in_kit,
+    ),
+    Format("apollo", "Apollo extrinsics", "radar_camera_extrinsics.yaml", False, "#", write_apollo, _POSE_ONLY),
+    Format("kalibr", "Kalibr camera chain", "camchain.yaml", True, "#", write_kalibr, _KALIBR),
+    Format("opencv", "OpenCV FileStorage", "radar_camera.yml", True, "#", write_opencv),
+    Format("kitti", "KITTI and View-of-Delft calibration", "calib.txt", True, "none", write_kitti, KITTI_NOTES),
+    Format(
+        "nuscenes",
+        "nuScenes calibrated_sensor",
+        "calibrated_sensor.json",
+        True,
+        "none",
+        write_nuscenes,
+        NUSCENES_NOTES,
+        write_nuscenes_in_ego,
+    ),
+    Format("foxglove", "Foxglove messages", "foxglove.json", True, "none", write_foxglove, FOXGLOVE_NOTES),
+    Format("colmap", "COLMAP text model", "colmap.zip", True, "#", write_colmap, COLMAP_NOTES),
+    Format("matlab", "MATLAB mat file", "radar_camera.mat", True, "keys", write_matlab, MATLAB_NOTES),
+    Format("numpy", "NumPy arrays, no pickle", "radar_camera.npz", True, "keys", write_numpy),
+    Format("matrix", "4x4 matrix as text", "camera_from_radar.txt", False, "#", write_matrix, _POSE_ONLY),
 )
 
 
@@ -109,18 +174,27 @@ def format_named(name: str) -> Format:
     )
 
 
-def export(file: CalibrationFile, name: str) -> ExportText | ExportBytes:
+def export(
+    file: CalibrationFile, name: str, *, parent_from_radar: RigidTransform | None = None
+) -> ExportText | ExportBytes:
     """Write a calibration in another format: the same calibration gives the same bytes.
 
     Args:
         file: what to export.
         name: one of FORMATS.
+        parent_from_radar: the radar's pose in the third frame of "autoware" (kit) or "nuscenes" (ego).
 
     Raises:
         InputError: no such format, or it cannot carry this calibration: why, and what to take instead.
     """
     chosen = format_named(name)
-    content = chosen.write(file)
+    if parent_from_radar is None:
+        content = chosen.write(file)
+    elif chosen.write_in_parent is None:
+        able = ", ".join(known.name for known in FORMATS if known.write_in_parent)
+        raise InputError(f"the format {name} has no third frame to pose the radar in; those that have: {able}")
+    else:
+        content = chosen.write_in_parent(file, parent_from_radar)
     if isinstance(content, bytes):
         return ExportBytes(chosen.file_name, content, chosen.notes)
     return ExportText(chosen.file_name, content, chosen.notes)

@@ -1,6 +1,5 @@
 """What a reader found in somebody's file: the pose as written there, and what it means."""
 
-import dataclasses
 import re
 from dataclasses import dataclass
 from typing import Literal
@@ -14,7 +13,16 @@ from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, matrix_from_rpy, nearest_rotation
 
-__all__ = ["ImportedCalibration", "StatedCheckPoint", "WrittenPose", "posed_between"]
+__all__ = [
+    "Axes",
+    "Direction",
+    "Form",
+    "ImportedCalibration",
+    "Roles",
+    "StatedCheckPoint",
+    "WrittenPose",
+    "posed_between",
+]
 
 Form = Literal["matrix", "quaternion_xyzw", "quaternion_wxyz", "rpy"]
 Direction = Literal["camera_from_radar", "radar_from_camera"]
@@ -110,6 +118,7 @@ class ImportedCalibration:
         frames: the two frames' names; None where the file has none.
         check_point: None where the file states none.
         notes: what had to be assumed, one sentence each.
+        faults: where the file contradicts itself, one sentence each.
         file: everything else, when it is a calibration-1 file.
     """
 
@@ -119,6 +128,7 @@ class ImportedCalibration:
     frames: FrameNames | None = None
     check_point: StatedCheckPoint | None = None
     notes: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
     file: CalibrationFile | None = None
 
     @property
@@ -137,10 +147,6 @@ class ImportedCalibration:
         except ValueError as error:
             raise InputError(f"{source}: {error}; a proper rotation is needed") from None
         return self
-
-    def noted(self, *notes: str) -> "ImportedCalibration":
-        """Return the same with more notes."""
-        return dataclasses.replace(self, notes=(*self.notes, *notes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,9 +183,9 @@ def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
         frames = stated
     else:
         axes = "link" if camera.endswith("_link") and "optical" not in camera else "optical"
-        notes.append(
-            f"took {camera!r} for " + ("optical axes (z forward)" if axes == "optical" else "body axes (x forward)")
-        )
+        if "optical" not in camera:
+            meant = "optical axes (z forward)" if axes == "optical" else "body axes (x forward)"
+            notes.append(f"took {camera!r} for {meant}")
         frames = FrameNames(radar, camera if axes == "optical" else camera.removesuffix("_link") + "_optical")
     direction: Direction = "radar_from_camera" if parent == radar else "camera_from_radar"
     return Roles(direction, axes, frames, tuple(notes))

@@ -13,7 +13,7 @@ import msgspec
 
 from calib_core.errors import InputError
 
-__all__ = ["checked", "json_object", "parse_document"]
+__all__ = ["checked", "json_object", "json_value", "parse_document"]
 
 Document = TypeVar("Document")
 
@@ -66,19 +66,28 @@ def json_object(text: str, *, source: str) -> dict[str, Any]:
     Raises:
         InputError: it is something else.
     """
+    content = json_value(text, source=source)
+    if not isinstance(content, dict):
+        raise InputError(f"{source}: expected an object in braces, found {_shown(content)}; give a file of cocalib's")
+    return content
+
+
+def json_value(text: str, *, source: str) -> Any:
+    """Parse JSON text; keys may not repeat within an object.
+
+    Raises:
+        InputError: it is not JSON.
+    """
     if len(text) > MAX_CHARACTERS:
         raise InputError(f"{source}: {len(text):,} characters is too large for this kind of file; is it the right one?")
     try:
-        content = json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_without_repeats)
+        return json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_without_repeats)
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
         raise InputError(f"{source}: {where}: not JSON ({error.msg}); correct it there") from None
     except (ValueError, RecursionError) as error:
         reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise InputError(f"{source}: {reason}; correct the file") from None
-    if not isinstance(content, dict):
-        raise InputError(f"{source}: expected an object in braces, found {_shown(content)}; give a file of cocalib's")
-    return content
 
 
 def _without_repeats(items: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -1,0 +1,147 @@
+"""How far two calibrations lie apart: in degrees, in centimetres, and in pixels at distances that matter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Matrix66
+from calib_core.camera import Camera
+from calib_core.geometry import skew
+from calib_core.interchange.imported import ImportedCalibration
+
+__all__ = ["Comparison", "PixelDifference", "compare", "shown"]
+
+DISTANCES_M = (5.0, 20.0, 60.0)
+_GRID = 7
+_NOTHING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class PixelDifference:
+    """How far apart the two project points at one distance.
+
+    Attributes:
+        distance_m: from the camera.
+        rms_px: root mean square over the image.
+        max_px: the largest over the image.
+        sigma_px: the root mean square to be expected from the two covariances; NaN where neither is known.
+    """
+
+    distance_m: float
+    rms_px: float
+    max_px: float
+    sigma_px: float
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Two calibrations side by side.
+
+    Attributes:
+        rotation_deg: angle between the two rotations.
+        rotation_sigma_deg: its standard deviation by the covariances, along its own axis; NaN where neither is known.
+        position_cm: distance between the two camera positions in the radar frame.
+        position_sigma_cm: its standard deviation along its own direction; NaN where neither is known.
+        pixels: at 5, 20 and 60 m; empty without a camera.
+        chi2: squared distance in units of the covariances, 6 degrees of freedom; NaN where neither is known.
+        p_value: chance of a chi2 this large if the two were independent and right; NaN where chi2 is.
+    """
+
+    rotation_deg: float
+    rotation_sigma_deg: float
+    position_cm: float
+    position_sigma_cm: float
+    pixels: tuple[PixelDifference, ...]
+    chi2: float
+    p_value: float
+
+    def lines(self) -> tuple[str, ...]:
+        """Return the comparison as lines for people."""
+        rows = [
+            f"rotation: {shown(self.rotation_deg)} deg apart{_plus_minus(self.rotation_sigma_deg, 'deg')}",
+            f"camera position: {shown(self.position_cm)} cm apart{_plus_minus(self.position_sigma_cm, 'cm')}",
+        ]
+        for at in self.pixels:
+            expected = "" if np.isnan(at.sigma_px) else f", expected {at.sigma_px:.3g} px by the covariances"
+            rows.append(f"at {at.distance_m:g} m: {shown(at.rms_px)} px rms, {shown(at.max_px)} px at most{expected}")
+        if np.isfinite(self.chi2):
+            rows.append(
+                f"together: chi2 {shown(self.chi2)} for 6 degrees of freedom (p = {self.p_value:.2g} if the two are independent)"
+            )
+        return tuple(rows)
+
+
+def shown(value: float) -> str:
+    """Write a figure with three digits; what is below a millionth is rounding and shown as 0."""
+    return f"{value if abs(value) > 1e-6 else 0:.3g}"
+
+
+def _plus_minus(sigma: float, unit: str) -> str:
+    return "" if np.isnan(sigma) else f" (standard deviation {sigma:.2g} {unit})"
+
+
+def compare(a: ImportedCalibration, b: ImportedCalibration) -> Comparison:
+    """Compare two calibrations of the same sensors; the covariances of both add up, as for independent data."""
+    a_pose, b_pose = a.camera_from_radar, b.camera_from_radar
+    error = b_pose.error_from(a_pose)
+    covariance = _summed_covariance(a, b)
+    a_position_m, b_position_m = a_pose.inverse().translation_m, b_pose.inverse().translation_m
+    position_jacobian = -a_pose.rotation.T @ np.hstack([np.eye(3), skew(a_pose.translation_m)])
+    moved_m = b_position_m - a_position_m
+    chi2, p_value = _chi2(error, covariance)
+    camera = a.camera or b.camera
+    return Comparison(
+        rotation_deg=float(np.degrees(np.linalg.norm(error[3:]))),
+        rotation_sigma_deg=float(np.degrees(_sigma_along(error[3:], covariance[3:, 3:]))),
+        position_cm=float(np.linalg.norm(moved_m)) * 100.0,
+        position_sigma_cm=_sigma_along(moved_m, position_jacobian @ covariance @ position_jacobian.T) * 100.0,
+        pixels=tuple(_pixels(a, b, camera, distance_m, covariance) for distance_m in DISTANCES_M) if camera else (),
+        chi2=chi2,
+        p_value=p_value,
+    )
+
+
+def _summed_covariance(a: ImportedCalibration, b: ImportedCalibration) -> Matrix66:
+    known = [
+        side.file.calibration.covariance
+        for side in (a, b)
+        if side.file is not None and np.isfinite(side.file.calibration.covariance).all()
+    ]
+    return np.sum(known, axis=0) if known else np.full((6, 6), np.nan)
+
+
+def _sigma_along(direction: np.ndarray, covariance: np.ndarray) -> float:
+    length = float(np.linalg.norm(direction))
+    variance = np.trace(covariance) / 3 if length < _NOTHING else direction @ covariance @ direction / length**2
+    return float(np.sqrt(variance)) if variance >= 0 else float("nan")
+
+
+def _chi2(error: np.ndarray, covariance: Matrix66) -> tuple[float, float]:
+    from scipy.special import chdtrc
+
+    if not np.isfinite(covariance).all() or np.linalg.matrix_rank(covariance, hermitian=True) < 6:
+        return float("nan"), float("nan")
+    chi2 = float(error @ np.linalg.solve(covariance, error))
+    return chi2, float(chdtrc(6, chi2))
+
+
+def _pixels(
+    a: ImportedCalibration, b: ImportedCalibration, camera: Camera, distance_m: float, covariance: Matrix66
+) -> PixelDifference:
+    """Compare over a grid of pixels whose rays are followed for a distance."""
+    columns, rows = np.linspace(0, camera.width_px - 1, _GRID), np.linspace(0, camera.height_px - 1, _GRID)
+    grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    points_camera_m = camera.rays(grid) * distance_m
+    points_camera_m = points_camera_m[np.isfinite(points_camera_m).all(axis=1)]
+    pixels, jacobian = camera.project_with_jacobian(points_camera_m)
+    moved = camera.project(b.camera_from_radar @ (a.camera_from_radar.inverse() @ points_camera_m))
+    apart = np.linalg.norm(moved - pixels, axis=1)
+    apart = apart[np.isfinite(apart)]
+    if not len(apart):
+        return PixelDifference(distance_m, float("inf"), float("inf"), float("nan"))
+    motion = np.stack([np.hstack([np.eye(3), -skew(point)]) for point in points_camera_m])
+    by_pose = jacobian @ motion
+    variances = np.einsum("nij,jk,nik->n", by_pose, covariance, by_pose)
+    return PixelDifference(
+        distance_m, float(np.sqrt(np.mean(apart**2))), float(apart.max()), float(np.sqrt(np.mean(variances)))
+    )
