@@ -1,0 +1,122 @@
+"""Options by name: what is understood, what is refused, and how each is described."""
+
+import dataclasses
+
+import msgspec
+import pytest
+
+from app.option_changes import (
+    RANGES,
+    OptionChange,
+    changed_options,
+    changes_from_tree,
+    checked_options,
+    option_groups,
+    options_from_tree,
+)
+from calib_core.errors import OptionError
+from calib_core.options import CalibrationOptions, CameraPositionPrior, GatingOptions, PaperOptions, SolvingOptions
+
+DESCRIPTIONS = {option.path: option for group in option_groups() for option in group.options}
+
+
+def test_a_partial_tree_changes_what_it_names_and_nothing_else() -> None:
+    options = changed_options(
+        CalibrationOptions(),
+        changes_from_tree({"method": "paper", "gating": {"max_range_m": 20, "max_speed_mps": 0.0}}),
+    )
+    assert options == CalibrationOptions(method="paper", gating=GatingOptions(max_range_m=20.0, max_speed_mps=0.0))
+
+
+def test_all_options_come_back_from_their_own_tree() -> None:
+    options = CalibrationOptions(
+        method="paper",
+        solving=SolvingOptions(camera_position=CameraPositionPrior((0.1, -0.2, 0.3), 0.02), seed=7),
+        paper=PaperOptions(window="whole-second"),
+    )
+    text = msgspec.json.encode(msgspec.to_builtins(options))
+    assert options_from_tree(msgspec.json.decode(text)) == options
+
+
+def test_a_camera_position_is_set_and_forgotten_as_a_whole() -> None:
+    tree = {"solving": {"camera_position": {"position_m": [0.1, 0.2, 0.3], "sigma_m": 0.02}}}
+    options = options_from_tree(tree)
+    assert options.solving.camera_position == CameraPositionPrior((0.1, 0.2, 0.3), 0.02)
+    assert changed_options(options, changes_from_tree({"solving": {"camera_position": None}})) == CalibrationOptions()
+
+
+@pytest.mark.parametrize(
+    ("tree", "words"),
+    [
+        ({"noise": {"sigma_pixel": 1.0}}, "there is no option 'noise.sigma_pixel'; did you mean 'noise.sigma_px'?"),
+        ({"sigma_px": 1.0}, "did you mean 'noise.sigma_px'?"),
+        ({"xyzzy": 1.0}, "known: gating.max_range_m"),
+        ({"noise": {"sigma_px": "wide"}}, "option noise.sigma_px: expected `float`, got `str`"),
+        ({"noise": {"sigma_px": None}}, "option noise.sigma_px"),
+        ({"noise": {"estimate_scale": 1}}, "option noise.estimate_scale"),
+        ({"method": "best"}, "option method: invalid enum value 'best'"),
+        ({"noise": 3}, "options noise: expected an object of names and values"),
+        ([1, 2], "options: expected an object of names and values"),
+        ({"solving": {"camera_position": {"sigma_m": "x"}}}, "option solving.camera_position"),
+        ({"solving": {"seed": 1.5}}, "option solving.seed"),
+    ],
+)
+def test_what_is_not_understood_is_refused_in_words(tree, words: str) -> None:
+    with pytest.raises(OptionError) as refused:
+        options_from_tree(tree)
+    assert words in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("tree", "words"),
+    [
+        ({"noise": {"sigma_px": 0.0}}, "option noise.sigma_px: 0 is out of range; give 0.01 to 1000 px"),
+        ({"noise": {"sigma_px": -2.0}}, "option noise.sigma_px"),
+        ({"locating": {"max_candidates": 0}}, "option locating.max_candidates: 0 is out of range; give 1 to 50"),
+        ({"solving": {"camera_position": {"sigma_m": 0.0}}}, "option solving.camera_position.sigma_m"),
+        ({"solving": {"camera_position": {"position_m": [0, 0, 1e9]}}}, "option solving.camera_position.position_m"),
+        ({"gating": {"min_range_m": 70.0}}, "leaves nothing below gating.max_range_m, 60 m"),
+    ],
+)
+def test_a_number_out_of_range_is_refused_with_the_range(tree, words: str) -> None:
+    with pytest.raises(OptionError) as refused:
+        options_from_tree(tree)
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
+@pytest.mark.parametrize("path", sorted(path for path in RANGES if "camera_position" not in path))
+def test_no_number_may_be_infinite_or_missing(path: str, value: float) -> None:
+    with pytest.raises(OptionError, match="out of range"):
+        changed_options(CalibrationOptions(), [OptionChange(path, value)])
+
+
+def test_a_choice_that_was_put_in_by_hand_is_checked_too() -> None:
+    wrong = CalibrationOptions(method="best")  # type: ignore[arg-type]
+    with pytest.raises(OptionError, match="'best' is not one of its values; choose default or paper"):
+        checked_options(wrong)
+
+
+def test_the_defaults_are_in_range() -> None:
+    assert checked_options(CalibrationOptions()) == CalibrationOptions()
+
+
+def test_every_number_among_the_options_has_a_range_and_every_range_an_option() -> None:
+    numbers = {path for path, option in DESCRIPTIONS.items() if option.kind in ("number", "integer")}
+    prior = {f"solving.camera_position.{field.name}" for field in dataclasses.fields(CameraPositionPrior)}
+    assert set(RANGES) == numbers | prior
+
+
+def test_every_option_is_described_by_one_sentence() -> None:
+    assert all(len(option.hint) > 5 and "\n" not in option.hint for option in DESCRIPTIONS.values())
+    assert all(group.hint for group in option_groups())
+
+
+def test_a_description_says_all_that_a_field_needs() -> None:
+    option = DESCRIPTIONS["noise.sigma_azimuth_deg"]
+    assert (option.label, option.unit, option.kind) == ("sigma azimuth", "deg", "number")
+    assert (option.low, option.high, option.default) == (1e-3, 45.0, 0.5)
+    assert DESCRIPTIONS["paper.window"].choices == ("centred", "whole-second")
+    assert DESCRIPTIONS["solving.camera_position"].kind == "camera-position"
+    assert option_groups()[0].name == ""

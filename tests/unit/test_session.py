@@ -1,0 +1,260 @@
+"""What events do to a session, and what undo and redo do to a history."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.option_changes import OptionChange
+from app.session import (
+    Cleared,
+    ClickExcluded,
+    ClickMoved,
+    ClickPlaced,
+    ClickRemoved,
+    ClicksImported,
+    EventError,
+    History,
+    OptionsChanged,
+    OptionsEdited,
+    RecordingFacts,
+    Redo,
+    Session,
+    Solved,
+    Stamp,
+    Undo,
+    advance,
+    apply,
+    settled,
+)
+from calib_core.errors import CalibrationError, OptionError
+from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
+from calib_core.options import CalibrationOptions, NoiseOptions
+
+START_NS = 1_700_000_000_123_456_789
+FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)
+NO_ANSWER = Unsolvable("too-few-pairs", "1 of at least 4 pairs", "click more")
+
+
+def frame_time(index: int) -> TimeNs:
+    return TimeNs(int(FACTS.image_times[index]))
+
+
+def placed(*frames: int) -> Session:
+    session = Session()
+    for frame in frames:
+        session = apply(session, ClickPlaced(frame_time(frame), 10.0 + frame, 20.0), FACTS)
+    return session
+
+
+def lived(*steps) -> History:
+    history = History()
+    for step in steps:
+        history = advance(history, step, FACTS)
+    return history
+
+
+def test_a_placed_click_is_in_the_session_with_its_exact_stamp() -> None:
+    session = placed(3)
+    assert session.clicks == (ReflectorClick(frame_time(3), "c1", 13.0, 20.0),)
+    assert session.revision == 1
+
+
+def test_clicks_are_sorted_by_time_whatever_the_order_of_placing() -> None:
+    assert [click.id for click in placed(7, 2, 5).clicks] == ["c2", "c3", "c1"]
+
+
+def test_placing_again_in_the_same_frame_moves_the_click_and_keeps_its_id() -> None:
+    session = apply(placed(3), ClickPlaced(frame_time(3), 99.5, 88.25), FACTS)
+    assert session.clicks == (ReflectorClick(frame_time(3), "c1", 99.5, 88.25),)
+    assert session.next_click == 2
+
+
+def test_a_moved_click_is_where_it_was_moved_to() -> None:
+    assert apply(placed(3), ClickMoved("c1", 1.5, 2.5), FACTS).clicks[0] == ReflectorClick(
+        frame_time(3), "c1", 1.5, 2.5
+    )
+
+
+def test_a_removed_click_is_gone_and_its_id_is_not_given_again() -> None:
+    session = apply(placed(3, 4), ClickRemoved("c2"), FACTS)
+    session = apply(session, ClickPlaced(frame_time(9), 1.0, 1.0), FACTS)
+    assert [click.id for click in session.clicks] == ["c1", "c3"]
+
+
+def test_an_id_that_was_undone_is_not_given_again() -> None:
+    history = lived(
+        ClickPlaced(frame_time(1), 1.0, 1.0),
+        Undo(),
+        ClickPlaced(frame_time(2), 1.0, 1.0),
+        ClickPlaced(frame_time(3), 1, 1),
+    )
+    assert [click.id for click in history.present.clicks] == ["c2", "c3"]
+
+
+def test_an_excluded_click_stays_and_can_be_taken_in_again() -> None:
+    excluded = apply(placed(3), ClickExcluded("c1", True), FACTS)
+    assert excluded.clicks[0].excluded
+    assert apply(excluded, ClickExcluded("c1", False), FACTS).clicks == placed(3).clicks
+
+
+def test_clearing_removes_the_clicks_and_the_answer_and_keeps_the_options() -> None:
+    options = CalibrationOptions(method="paper")
+    session = apply(apply(placed(3), OptionsChanged(options), FACTS), Solved(2, NO_ANSWER), FACTS)
+    cleared = apply(session, Cleared(), FACTS)
+    assert (cleared.clicks, cleared.outcome, cleared.options) == ((), None, options)
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        ClickPlaced(frame_time(3), 13.0, 20.0),
+        ClickMoved("c1", 13.0, 20.0),
+        ClickExcluded("c1", False),
+        OptionsChanged(CalibrationOptions()),
+        ClicksImported(()),
+        Solved(7, NO_ANSWER),
+    ],
+)
+def test_an_event_that_changes_nothing_returns_the_very_same_session(event) -> None:
+    session = placed(3)
+    assert apply(session, event, FACTS) is session
+    history = History(session)
+    assert advance(history, event, FACTS) is history
+
+
+@pytest.mark.parametrize(
+    ("event", "words"),
+    [
+        (ClickPlaced(TimeNs(START_NS + 1), 1.0, 1.0), "no frame of drive has the stamp 1700000000.123456790 s"),
+        (ClickPlaced(TimeNs(START_NS - 1), 1.0, 1.0), "no frame"),
+        (ClickPlaced(TimeNs(START_NS + 10**12), 1.0, 1.0), "no frame"),
+        (ClickPlaced(frame_time(0), 639.6, 1.0), "(639.6, 1.0) px is outside the frame of 640 x 480 px"),
+        (ClickPlaced(frame_time(0), 1.0, -0.6), "outside the frame"),
+        (ClickPlaced(frame_time(0), float("nan"), 1.0), "outside the frame"),
+        (ClickMoved("c1", float("inf"), 1.0), "outside the frame"),
+        (ClickMoved("c9", 1.0, 1.0), "there is no click 'c9'"),
+        (ClickRemoved("c9"), "there is no click 'c9'"),
+        (ClickExcluded("c9", True), "there is no click 'c9'"),
+        (ClicksImported((ReflectorClick(TimeNs(5), "a", 1.0, 1.0),)), "no frame"),
+        (
+            ClicksImported(
+                (ReflectorClick(frame_time(0), "a", 1.0, 1.0), ReflectorClick(frame_time(0), "b", 2.0, 1.0))
+            ),
+            "two of the clicks lie in the frame",
+        ),
+    ],
+)
+def test_an_event_that_does_not_fit_is_refused_in_words(event, words: str) -> None:
+    with pytest.raises(EventError) as refused:
+        apply(placed(3), event, FACTS)
+    assert words in str(refused.value)
+    assert isinstance(refused.value, CalibrationError)
+
+
+@pytest.mark.parametrize(("u_px", "v_px"), [(-0.5, -0.5), (639.5, 479.5), (0.0, 0.0)])
+def test_the_frame_reaches_half_a_pixel_beyond_its_outermost_pixel_centres(u_px: float, v_px: float) -> None:
+    assert apply(Session(), ClickPlaced(frame_time(0), u_px, v_px), FACTS).clicks[0].u_px == u_px
+
+
+def test_imported_clicks_join_the_session_and_win_in_their_frames() -> None:
+    imported = ClicksImported((ReflectorClick(frame_time(4), "p1", 5.0, 5.0, sigma_px=0.5, excluded=True),))
+    session = apply(placed(3, 4), imported, FACTS)
+    assert session.clicks == (placed(3).clicks[0], imported.clicks[0])
+
+
+def test_imported_ids_are_kept_and_never_given_again() -> None:
+    session = apply(Session(), ClicksImported((ReflectorClick(frame_time(4), "c7", 5.0, 5.0),)), FACTS)
+    session = apply(session, ClickPlaced(frame_time(5), 1.0, 1.0), FACTS)
+    assert [click.id for click in session.clicks] == ["c7", "c8"]
+
+
+def test_an_imported_id_that_another_frame_has_already_is_replaced_by_a_new_one() -> None:
+    session = apply(placed(3), ClicksImported((ReflectorClick(frame_time(4), "c1", 5.0, 5.0),)), FACTS)
+    assert [click.id for click in session.clicks] == ["c1", "c2"]
+    assert session.next_click == 3
+
+
+def test_options_out_of_range_are_refused_and_the_session_stays() -> None:
+    wrong = CalibrationOptions(noise=NoiseOptions(sigma_px=float("nan")))
+    with pytest.raises(OptionError, match=r"noise\.sigma_px"):
+        apply(placed(3), OptionsChanged(wrong), FACTS)
+
+
+def test_edited_options_change_only_what_they_name() -> None:
+    event = OptionsEdited((OptionChange("noise.sigma_px", 3.5),))
+    session = apply(placed(3), event, FACTS)
+    assert session.options == replace(CalibrationOptions(), noise=replace(NoiseOptions(), sigma_px=3.5))
+    assert settled(event, placed(3)) == OptionsChanged(session.options)
+
+
+def test_an_answer_to_the_revision_of_now_is_kept() -> None:
+    session = apply(placed(3), Solved(1, NO_ANSWER), FACTS)
+    assert session.outcome is NO_ANSWER
+    assert session.is_solved
+    assert not session.needs_solving
+
+
+def test_an_answer_stays_shown_while_a_newer_one_is_worked_out() -> None:
+    session = apply(apply(placed(3), Solved(1, NO_ANSWER), FACTS), ClickMoved("c1", 1.0, 1.0), FACTS)
+    assert session.outcome is NO_ANSWER
+    assert session.needs_solving
+
+
+def test_an_answer_to_an_older_revision_changes_nothing() -> None:
+    session = placed(3, 4)
+    assert apply(session, Solved(1, NO_ANSWER), FACTS) is session
+
+
+def test_an_answer_is_no_step_that_can_be_undone() -> None:
+    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), Solved(1, NO_ANSWER))
+    assert len(history.past) == 1
+    assert history.present.outcome is NO_ANSWER
+
+
+def test_undo_takes_the_last_change_back_and_redo_makes_it_again() -> None:
+    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), ClickMoved("c1", 2.0, 2.0))
+    undone = advance(history, Undo(), FACTS)
+    assert undone.present.clicks[0].u_px == 1.0
+    assert advance(undone, Redo(), FACTS).present.clicks == history.present.clicks
+
+
+def test_undo_and_redo_with_nothing_to_do_return_the_very_same_history() -> None:
+    history = History()
+    assert advance(history, Undo(), FACTS) is history
+    assert advance(history, Redo(), FACTS) is history
+
+
+def test_a_new_change_forgets_what_was_taken_back() -> None:
+    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), Undo(), ClickPlaced(frame_time(2), 1.0, 1.0))
+    assert advance(history, Redo(), FACTS) is history
+
+
+def test_undo_brings_the_old_answer_back_without_asking_again() -> None:
+    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), Solved(1, NO_ANSWER), ClickMoved("c1", 2.0, 2.0), Undo())
+    assert history.present.is_solved
+    assert history.present.outcome is NO_ANSWER
+
+
+def test_undo_to_a_state_that_was_never_answered_asks_again() -> None:
+    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), ClickMoved("c1", 2.0, 2.0), Undo())
+    assert history.present.needs_solving
+
+
+def test_an_answer_under_way_during_undo_cannot_land_on_another_state() -> None:
+    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), ClickPlaced(frame_time(2), 1.0, 1.0))
+    revision = history.present.revision
+    history = advance(history, Undo(), FACTS)
+    history = advance(history, ClickPlaced(frame_time(3), 9.0, 9.0), FACTS)
+    assert advance(history, Solved(revision, NO_ANSWER), FACTS) is history
+
+
+def test_a_stamp_keeps_every_nanosecond() -> None:
+    assert Stamp.of(TimeNs(START_NS)) == Stamp(1_700_000_000, 123_456_789)
+    assert Stamp.of(TimeNs(START_NS)).time == START_NS
+
+
+def test_a_frame_is_found_by_its_exact_stamp_only() -> None:
+    assert FACTS.frame_at(frame_time(49)) == 49
+    assert FACTS.frame_at(TimeNs(START_NS + 1)) is None
+    assert RecordingFacts("empty", np.zeros(0, dtype=np.int64), 1, 1).frame_at(TimeNs(0)) is None
