@@ -14,13 +14,22 @@ from calib_core.arrays import Flags, Points2, Points3, Values, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_log, skew
 
-__all__ = ["PnPSolver", "RansacSolution", "project_points", "refine_lm", "solve_pnp", "solve_pnp_ransac"]
+__all__ = [
+    "PnPSolver",
+    "RansacSolution",
+    "project_points",
+    "refine_lm",
+    "solve_pnp",
+    "solve_pnp_ransac",
+    "spans_a_plane",
+]
 
 PnPSolver = Literal["iterative", "sqpnp"]
 
 _MINIMUM_POINTS = 4
 _MINIMUM_POINTS_FOR_DLT = 6
 _MINIMUM_POINTS_FOR_REFINEMENT = 3
+_FLATTEST = 1e-6  # second over first singular value of points that are more than a line
 _LM_STEPS = 100
 _LM_FIRST_DAMPING = 1e-3
 _LM_LARGEST_DAMPING = 1e12
@@ -74,6 +83,15 @@ def project_points(points_radar_m: Points3, camera_from_radar: RigidTransform, c
     return np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
 
 
+def spans_a_plane(points_radar_m: Points3) -> bool:
+    """Tell whether points (n, 3) are more than one point or one line: else a turn about that line goes unseen."""
+    points = np.asarray(points_radar_m, dtype=np.float64).reshape(-1, 3)
+    if len(points) < 3 or not np.all(np.isfinite(points)):
+        return False
+    first, second, _ = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[:3]
+    return bool(second > _FLATTEST * max(first, 1e-3))
+
+
 def solve_pnp(
     points_radar_m: Points3, pixels_px: Points2, camera: Camera, solver: PnPSolver = "iterative"
 ) -> RigidTransform | None:
@@ -86,10 +104,10 @@ def solve_pnp(
         solver: OpenCV's iterative solver (DLT or homography, then Levenberg-Marquardt) or SQPnP.
 
     Returns:
-        The pose, or None where there are too few points or OpenCV finds no finite pose.
+        The pose, or None where the points are too few or in one line, or OpenCV finds no finite pose.
     """
     view = _view(points_radar_m, pixels_px, camera)
-    if len(view.points) < _MINIMUM_POINTS:
+    if len(view.points) < _MINIMUM_POINTS or not spans_a_plane(view.points):
         return None
     start: dict[str, Any] = {}
     if solver == "iterative" and len(view.points) < _MINIMUM_POINTS_FOR_DLT:
@@ -122,12 +140,12 @@ def solve_pnp_ransac(
         confidence: stop early when an all-inlier sample has been drawn with this probability.
 
     Returns:
-        The pose and its inliers, or None where RANSAC finds none.
+        The pose and its inliers, or None where RANSAC finds none, or the points are too few or in one line.
     """
     import cv2
 
     view = _view(points_radar_m, pixels_px, camera)
-    if len(view.points) < _MINIMUM_POINTS:
+    if len(view.points) < _MINIMUM_POINTS or not spans_a_plane(view.points):
         return None
     try:
         found, rotation_vector, translation, rows = cv2.solvePnPRansac(

@@ -23,7 +23,7 @@ from calib_core.measurements import (
     Unsolvable,
 )
 from calib_core.metrics import aed, distances, metrics_of
-from calib_core.opencv import PnPSolver, refine_lm, solve_pnp_ransac
+from calib_core.opencv import PnPSolver, refine_lm, solve_pnp_ransac, spans_a_plane
 from calib_core.options import CalibrationOptions, PaperOptions
 from calib_core.results import Calibration, PairResult
 
@@ -238,7 +238,7 @@ def solve_pairs_as_printed(
     """Run Algorithm 1, lines 7 to 10, on pairs made elsewhere; of a pair's radar positions, the first one counts.
 
     Args:
-        pairs: in any order.
+        pairs: in any order; results come by image time, pairs without a time in the order given.
         camera: intrinsics.
         options: `paper` holds what the paper leaves open.
         excluded: ids of pairs that take no part, but appear in the result.
@@ -254,12 +254,16 @@ def _solved(
     excluded: frozenset[str],
     unpaired: tuple[Unpaired, ...],
 ) -> Calibration | Unsolvable:
-    ordered = sorted(pairs, key=lambda pair: (pair.image_time or 0, pair.id))
-    used = [pair for pair in ordered if pair.id not in excluded]
+    ordered = sorted(pairs, key=lambda pair: pair.image_time or 0)  # stable: pairs without a time stay as given
+    used = sorted(
+        (pair for pair in pairs if pair.id not in excluded), key=lambda pair: (pair.image_time or 0, pair.id)
+    )  # whatever order they come in, RANSAC draws the same samples
     if len(used) < MINIMUM_PAIRS:
         return _too_few(len(used), len(ordered) - len(used), len(unpaired))
     points_radar_m = np.stack([pair.candidates[0].position_radar_m for pair in used])
     pixels_px = np.stack([pair.pixel_px for pair in used])
+    if not spans_a_plane(points_radar_m):
+        return _in_one_line(len(used))
     iterative = pose_by_iterative_ransac(points_radar_m, pixels_px, camera, options.paper)
     sqpnp = pose_by_sqpnp_ransac(points_radar_m, pixels_px, camera, options.paper)
     better = pose_of_smaller_error(iterative, sqpnp)
@@ -274,7 +278,7 @@ def _solved(
         )
     inliers = frozenset(pair.id for pair, inlier in zip(used, better.inliers, strict=True) if inlier)
     results = tuple(_result(pair, camera, camera_from_radar, pair.id in inliers, excluded) for pair in ordered)
-    distances_px = np.array([result.distance_px for result in results if not result.excluded])
+    distances_px = np.sort([result.distance_px for result in results if not result.excluded])
     return Calibration(
         camera_from_radar=camera_from_radar,
         covariance=np.full((6, 6), np.nan),
@@ -347,6 +351,14 @@ def _too_few(used: int, excluded: int, unpaired: int) -> Unsolvable:
         "too-few-pairs",
         f"{used} of {MINIMUM_PAIRS} pairs{rest}",
         f"click the reflector at {MINIMUM_PAIRS - used} more placements at least; 10 to 20 spread over the picture are better",
+    )
+
+
+def _in_one_line(used: int) -> Unsolvable:
+    return Unsolvable(
+        "points-in-one-line",
+        f"the radar positions of all {used} pairs lie at one place or on one line",
+        "place the reflector to the left and to the right, near and far",
     )
 
 
