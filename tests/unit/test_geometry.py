@@ -1,0 +1,121 @@
+"""Rigid motion by example; its laws are in tests/properties."""
+
+import math
+
+import numpy as np
+import pytest
+
+from calib_core.geometry import (
+    RigidTransform,
+    matrix_from_quaternion_wxyz,
+    quaternion_wxyz_from_matrix,
+    rotation_angle_rad,
+    rotation_exp,
+    rotation_log,
+    skew,
+)
+
+QUARTER_ABOUT_Z = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def test_a_transform_moves_points_from_source_to_target() -> None:
+    camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([10.0, 0.0, 0.0]))
+    points_camera = camera_from_radar @ np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 3.0]])
+    np.testing.assert_allclose(points_camera, [[10.0, 1.0, 0.0], [8.0, 0.0, 3.0]])
+
+
+def test_transforms_compose_right_to_left() -> None:
+    turn = RigidTransform(QUARTER_ABOUT_Z, np.zeros(3))
+    shift = RigidTransform(np.eye(3), np.array([1.0, 0.0, 0.0]))
+    point = np.array([[1.0, 0.0, 0.0]])
+    np.testing.assert_allclose(turn @ shift @ point, [[0.0, 2.0, 0.0]], atol=1e-15)
+    np.testing.assert_allclose(shift @ turn @ point, [[1.0, 1.0, 0.0]], atol=1e-15)
+
+
+def test_the_translation_is_where_the_source_origin_lies_in_the_target() -> None:
+    camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([1.0, 2.0, 3.0]))
+    np.testing.assert_array_equal(camera_from_radar @ np.zeros((1, 3)), [[1.0, 2.0, 3.0]])
+
+
+def test_a_matrix_and_back_is_the_same_transform() -> None:
+    camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([1.0, 2.0, 3.0]))
+    matrix = camera_from_radar.as_matrix()
+    np.testing.assert_array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0])
+    again = RigidTransform.from_matrix(matrix)
+    np.testing.assert_array_equal(again.rotation, camera_from_radar.rotation)
+    np.testing.assert_array_equal(again.translation_m, camera_from_radar.translation_m)
+    np.testing.assert_array_equal(RigidTransform.from_matrix(matrix[:3]).as_matrix(), matrix)
+
+
+def test_a_mirrored_rotation_is_refused_and_the_message_says_so() -> None:
+    with pytest.raises(ValueError, match="left-handed"):
+        RigidTransform(np.diag([1.0, -1.0, 1.0]), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("rotation", "translation", "reason"),
+    [
+        (2.0 * np.eye(3), np.zeros(3), "orthonormal"),
+        (np.full((3, 3), np.nan), np.zeros(3), "finite"),
+        (np.eye(3), np.array([0.0, np.inf, 0.0]), "finite"),
+        (np.eye(4), np.zeros(3), "3 x 3"),
+        (np.eye(3), np.zeros(2), "expected an array of 3"),
+    ],
+)
+def test_what_is_no_rigid_motion_is_refused(rotation: np.ndarray, translation: np.ndarray, reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        RigidTransform(rotation, translation)
+
+
+def test_a_transform_cannot_be_changed_and_does_not_share_its_arrays() -> None:
+    rotation = np.eye(3)
+    camera_from_radar = RigidTransform(rotation, np.zeros(3))
+    rotation[0, 0] = 7.0
+    assert camera_from_radar.rotation[0, 0] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        camera_from_radar.rotation[0, 0] = 2.0
+
+
+def test_quaternions_are_w_first_with_w_positive() -> None:
+    half = math.sqrt(0.5)
+    np.testing.assert_allclose(quaternion_wxyz_from_matrix(QUARTER_ABOUT_Z), [half, 0.0, 0.0, half])
+    np.testing.assert_allclose(
+        matrix_from_quaternion_wxyz(np.array([-half, 0.0, 0.0, -half])), QUARTER_ABOUT_Z, atol=1e-15
+    )
+    np.testing.assert_allclose(matrix_from_quaternion_wxyz(np.array([2.0, 0.0, 0.0, 2.0])), QUARTER_ABOUT_Z, atol=1e-15)
+
+
+@pytest.mark.parametrize("quaternion", [np.zeros(4), np.array([np.nan, 0.0, 0.0, 1.0])])
+def test_a_quaternion_without_direction_is_refused(quaternion: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="not a rotation"):
+        matrix_from_quaternion_wxyz(quaternion)
+
+
+def test_skew_is_the_cross_product() -> None:
+    a, b = np.array([1.0, -2.0, 3.0]), np.array([0.5, 4.0, -1.0])
+    np.testing.assert_allclose(skew(a) @ b, np.cross(a, b))
+
+
+@pytest.mark.parametrize("axis", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, -0.8, 0.0]])
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-7, 1e-3, 1.0, math.pi - 1e-9, math.pi])
+def test_exp_and_log_keep_their_digits_next_to_zero_and_to_pi(axis: list[float], angle: float) -> None:
+    rotation = rotation_exp(angle * np.array(axis))
+    assert rotation_angle_rad(rotation) == pytest.approx(angle, rel=1e-9, abs=1e-15)
+    np.testing.assert_allclose(rotation_exp(rotation_log(rotation)), rotation, atol=1e-14)
+
+
+def test_a_perturbation_shifts_the_translation_and_turns_from_the_left() -> None:
+    camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([1.0, 2.0, 3.0]))
+    moved = camera_from_radar.perturbed(np.array([0.1, 0.2, 0.3, 0.01, 0.0, 0.0]))
+    np.testing.assert_allclose(moved.translation_m, [1.1, 2.2, 3.3])
+    np.testing.assert_allclose(moved.rotation, rotation_exp(np.array([0.01, 0.0, 0.0])) @ QUARTER_ABOUT_Z, atol=1e-15)
+
+
+def test_the_adjoint_carries_a_small_motion_into_the_target_frame() -> None:
+    camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([1.0, 2.0, 3.0]))
+    error = 1e-6 * np.array([1.0, -2.0, 0.5, 0.3, 0.7, -0.4])
+    motion = RigidTransform(rotation_exp(error[3:]), error[:3])
+    carried = camera_from_radar @ motion @ camera_from_radar.inverse()
+    expected = camera_from_radar.adjoint() @ error
+    np.testing.assert_allclose(carried.translation_m, expected[:3], atol=1e-11)
+    np.testing.assert_allclose(rotation_log(carried.rotation), expected[3:], atol=1e-11)
