@@ -1,5 +1,6 @@
 """Truth to test with: scenes, sensors and recordings whose camera_from_radar is known."""
 
+from calib_core.synthetic.files import write_recording
 from calib_core.synthetic.options import Clutter, Container, RadarMessage, RadarName, SceneName, SimulationOptions
 from calib_core.synthetic.pairs import (
     AISLE,
@@ -12,6 +13,7 @@ from calib_core.synthetic.pairs import (
     simulate_pairs,
 )
 from calib_core.synthetic.radar_profiles import RADAR_PROFILES, RadarProfile
+from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording, simulate
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
 from calib_core.synthetic.scans import SimulatedPlacement, SimulatedScans, simulate_scans
 
@@ -31,12 +33,16 @@ __all__ = [
     "Rig",
     "RigOptions",
     "SceneName",
+    "SimulatedFrame",
     "SimulatedPairs",
     "SimulatedPlacement",
+    "SimulatedRecording",
     "SimulatedScans",
     "SimulationOptions",
     "random_rig",
+    "simulate",
     "simulate_pairs",
     "simulate_scans",
     "typical_camera",
+    "write_recording",
 ]

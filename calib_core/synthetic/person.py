@@ -9,11 +9,12 @@ from calib_core.arrays import Vector2, Vector3
 
 __all__ = ["Capsule", "PersonState", "Surface", "capsules", "hand_position"]
 
-Surface = Literal["skin", "hair", "jacket", "vest", "trousers", "shoe", "stripe"]
+Surface = Literal["skin", "helmet", "jacket", "vest", "yoke", "trousers", "shoe", "stripe"]
 
-_HIP_M, _THIGH_M, _SHIN_M = 0.93, 0.46, 0.47
+_HIP_M, _THIGH_M, _SHIN_M = 0.985, 0.46, 0.47
 _TORSO_M, _UPPER_ARM_M, _FOREARM_M = 0.52, 0.29, 0.30
 _STRIDE_M = 1.45
+_TORSO = ((1.0, -6.0), (0.0, -5.0), (-1.0, -6.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,15 +131,14 @@ def capsules(state: PersonState) -> tuple[Capsule, ...]:
     lean = 0.05 * state.pace + 0.95 * state.crouch
     spine = np.cos(lean) * up + np.sin(lean) * forward
     shoulders = hips + _TORSO_M * spine
-    chest = hips + 0.36 * spine
+    chest = hips + 0.39 * spine
     head = shoulders + 0.23 * (np.cos(0.5 * lean) * up + np.sin(0.5 * lean) * forward) + 0.03 * forward
     torso = [
         Capsule(hips - 0.06 * left, hips + 0.06 * left, 0.125, 0.125, "trousers", -9.0),
-        Capsule(hips + 0.05 * spine, chest, 0.135, 0.165, "vest", -4.0),
-        Capsule(chest, shoulders, 0.165, 0.12, "vest", -6.0),
-        Capsule(shoulders - 0.15 * left - 0.02 * up, shoulders + 0.15 * left - 0.02 * up, 0.085, 0.085, "vest"),
+        *(Capsule(hips + s * 0.05 * left, chest + s * 0.075 * left, 0.112, 0.118, "vest", rcs) for s, rcs in _TORSO),
+        Capsule(shoulders - 0.14 * left - 0.03 * up, shoulders + 0.14 * left - 0.03 * up, 0.078, 0.078, "yoke"),
         Capsule(shoulders, shoulders + 0.12 * spine, 0.055, 0.052, "skin"),
-        Capsule(head - 0.035 * up, head + 0.03 * up, 0.088, 0.098, "skin", -14.0),
-        Capsule(head + 0.045 * up - 0.018 * forward, head + 0.055 * up - 0.01 * forward, 0.103, 0.100, "hair"),
+        Capsule(head - 0.045 * up, head + 0.03 * up, 0.080, 0.092, "skin", -14.0),
+        Capsule(head + 0.055 * up - 0.012 * forward, head + 0.075 * up - 0.005 * forward, 0.112, 0.106, "helmet"),
     ]
     return (*_legs(state, hips), *torso, *_arms(state, shoulders))

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.arrays import Vector2, Vector3
+from calib_core.arrays import Values, Vector2, Vector3
 from calib_core.synthetic.person import PersonState, hand_position
 
 __all__ = ["Moment", "Resting", "Story", "tell_story"]
@@ -17,6 +17,7 @@ _SPEED_MPS = 1.25
 _PUT_DOWN_S = 0.8
 _STEP_AWAY_S = 1.3
 _LEAD_IN_S = 0.6
+_TURNING_S = 0.5
 _BEHIND_M = 0.52
 """How far behind the reflector, seen from the radar, the person stands to put it down."""
 
@@ -44,12 +45,21 @@ class Resting:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """Where everybody is at one time. `resting` is None while the reflector is carried."""
+    """Where everybody is at one time.
+
+    Attributes:
+        person: where the person is and what they do.
+        reflector_m: (3,) its apex in the world.
+        facing_rad: where it looks, as a heading in the world.
+        resting: the placement it rests at; None while a person's hands are on it.
+        next_height_m: height of the apex at the placement it rests at, comes from or goes to.
+    """
 
     person: PersonState
     reflector_m: Vector3
     facing_rad: float
     resting: Resting | None
+    next_height_m: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,21 +82,30 @@ class Story:
     restings: tuple[Resting, ...]
     duration_s: float
     _legs: tuple[_Leg, ...]
+    _ends_s: Values
 
     def at(self, time_s: float) -> Moment:
         """Return where everybody is."""
-        ends = [leg.end_s for leg in self._legs]
-        leg = self._legs[min(int(np.searchsorted(ends, time_s, side="right")), len(self._legs) - 1)]
-        person = _person(leg, time_s)
-        resting = self.restings[leg.placement] if leg.placement >= 0 else None
-        if resting is None or leg.carrying:
-            return Moment(person, hand_position(person) + np.array([0.0, 0.0, 0.03]), leg.heading_rad + np.pi, None)
+        number = min(int(np.searchsorted(self._ends_s, time_s, side="right")), len(self._legs) - 1)
+        leg = self._legs[number]
+        person = _person(leg, self._legs[number - 1] if number else leg, time_s)
+        resting = self.restings[min(max(leg.placement, 0), len(self.restings) - 1)]
+        height_m = float(resting.position_m[2])
+        held = hand_position(_upright(person)) + np.array([0.0, 0.0, 0.03])
+        if leg.carrying:
+            return Moment(person, held, person.heading_rad, None, height_m)
         if leg.action in ("put", "pick"):
             share = _eased((time_s - leg.start_s) / (leg.end_s - leg.start_s))
             down = share if leg.action == "put" else 1.0 - share
-            held = hand_position(_upright(person)) + np.array([0.0, 0.0, 0.03])
-            return Moment(person, (1.0 - down) * held + down * resting.position_m, resting.facing_rad, None)
-        return Moment(person, resting.position_m, resting.facing_rad, resting)
+            place = (1.0 - down) * held + down * resting.position_m
+            facing = person.heading_rad + down * _turn(resting.facing_rad - person.heading_rad)
+            return Moment(person, place, facing, None, height_m)
+        return Moment(person, resting.position_m, resting.facing_rad, resting, height_m)
+
+
+def _turn(angle_rad: float) -> float:
+    """Bring an angle into -pi to pi: the short way round."""
+    return float((angle_rad + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def _upright(person: PersonState) -> PersonState:
@@ -98,20 +117,21 @@ def _eased(share: float) -> float:
     return s * s * s * (s * (6.0 * s - 15.0) + 10.0)
 
 
-def _person(leg: _Leg, time_s: float) -> PersonState:
+def _person(leg: _Leg, before: _Leg, time_s: float) -> PersonState:
     share = (time_s - leg.start_s) / max(leg.end_s - leg.start_s, 1e-9)
     eased = _eased(share)
     place = leg.start_m + eased * (leg.end_m - leg.start_m)
     length_m = float(np.linalg.norm(leg.end_m - leg.start_m))
     pace = min(1.0, 4.0 * eased * (1.0 - eased) * 1.6) if leg.action == "walk" else 0.0
-    crouch = {"put": eased, "pick": 1.0 - eased}.get(leg.action, 0.0)
-    if leg.action == "put" or leg.action == "pick":
-        down = share if leg.action == "put" else 1.0 - share
-        crouch = _eased(min(1.0, 1.25 * down))
+    crouch = 0.0
+    if leg.action in ("put", "pick"):
+        crouch = _eased(1.25 * (share if leg.action == "put" else 1.0 - share))
+    turned = _eased((time_s - leg.start_s) / _TURNING_S)
+    heading = before.heading_rad + turned * _turn(leg.heading_rad - before.heading_rad)
     if leg.action == "stand":  # nobody stands like a post: sway by a centimetre
         place = place + 0.008 * np.array([np.sin(1.9 * time_s), np.cos(1.3 * time_s)])
     return PersonState(
-        float(place[0]), float(place[1]), leg.heading_rad, leg.walked_m + eased * length_m, pace, crouch, leg.carrying
+        float(place[0]), float(place[1]), heading, leg.walked_m + eased * length_m, pace, crouch, leg.carrying
     )
 
 
@@ -190,7 +210,7 @@ def tell_story(
         position = positions_m[chosen]
         away = position[:2] / np.linalg.norm(position[:2])
         behind = position[:2] + _BEHIND_M * away
-        script.walk(behind, carrying=True)
+        script.walk(behind, carrying=True, placement=index)
         script.stay("put", _PUT_DOWN_S, carrying=False, placement=index, facing_m=position[:2])
         start_s = script.time_s
         script.walk(_aside(rng, behind, away, narrow), carrying=False, placement=index, duration_s=_STEP_AWAY_S)
@@ -200,8 +220,10 @@ def tell_story(
         facing_rad = float(np.arctan2(-away[1], -away[0]) + np.deg2rad(6.0) * rng.standard_normal())
         restings.append(Resting(index, start_s, script.time_s, position, facing_rad))
         script.stay("pick", _PUT_DOWN_S, carrying=False, placement=index, facing_m=position[:2])
-    script.walk(script.place_m + np.array([-1.0, 1.5 if script.place_m[1] < 0 else -1.5]), carrying=True)
-    return Story(tuple(restings), script.time_s + _LEAD_IN_S, tuple(script.legs))
+    home = script.place_m + np.array([-1.0, 1.5 if script.place_m[1] < 0 else -1.5])
+    script.walk(home, carrying=True, placement=len(restings) - 1)
+    ends_s = np.array([leg.end_s for leg in script.legs])
+    return Story(tuple(restings), script.time_s + _LEAD_IN_S, tuple(script.legs), ends_s)
 
 
 def _aside(rng: np.random.Generator, behind: Vector2, away: Vector2, narrow: bool) -> Vector2:

@@ -1,0 +1,331 @@
+"""Write recordings: ROS 1 bags, and ROS 2 bags as MCAP or SQLite. For simulated recordings and for tests."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from calib_core.arrays import frozen_array
+from calib_core.camera import Camera
+from calib_core.errors import RecordingError
+from calib_core.measurements import TimeNs, time_parts
+
+__all__ = [
+    "CameraInfoMessage",
+    "CloudMessage",
+    "CompressedImageMessage",
+    "ImageMessage",
+    "MessageBody",
+    "RadarReturnMessage",
+    "RecordedMessage",
+    "Ros1Compression",
+    "Ros2Container",
+    "write_ros1_bag",
+    "write_ros2",
+]
+
+Ros1Compression = Literal["none", "bz2", "lz4"]
+Ros2Container = Literal["mcap", "sqlite3"]
+
+RADAR_SCAN_TYPE = "ti_mmwave_rospkg/msg/RadarScan"
+RADAR_SCAN_DEFINITION = """\
+Header header
+uint16 point_id
+float32 x
+float32 y
+float32 z
+float32 range
+float32 velocity
+uint16 doppler_bin
+float32 bearing
+float32 intensity
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class CompressedImageMessage:
+    """A sensor_msgs/CompressedImage: the bytes of a JPEG or PNG file."""
+
+    stamp: TimeNs
+    frame_id: str
+    data: bytes
+    format: str = "jpeg"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImageMessage:
+    """A sensor_msgs/Image of encoding bgr8: pixels are (h, w, 3) uint8, blue first."""
+
+    stamp: TimeNs
+    frame_id: str
+    pixels: np.ndarray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pixels", frozen_array(self.pixels, (None, None, 3), dtype=np.uint8))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraInfoMessage:
+    """A sensor_msgs/CameraInfo."""
+
+    stamp: TimeNs
+    frame_id: str
+    camera: Camera
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CloudMessage:
+    """A sensor_msgs/PointCloud2 of little-endian float32 fields without holes: values are (n, k) for k names."""
+
+    stamp: TimeNs
+    frame_id: str
+    names: tuple[str, ...]
+    values: np.ndarray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", frozen_array(self.values, (None, len(self.names)), dtype=np.float32))
+
+
+@dataclass(frozen=True, slots=True)
+class RadarReturnMessage:
+    """A ti_mmwave_rospkg/RadarScan: one return; point_id 0 begins a scan.
+
+    Attributes:
+        stamp: when the driver parsed the return.
+        frame_id: of the radar.
+        point_id: place in its scan.
+        x_m: forward.
+        y_m: left.
+        z_m: up.
+        range_m: 0 in the stock driver, which never fills it; so are doppler_bin, bearing and intensity.
+        velocity_mps: positive moving away.
+        doppler_bin: 0 to the number of bins less one; half of them is standing still.
+        bearing_deg: positive to the left.
+        intensity_db: SNR.
+    """
+
+    stamp: TimeNs
+    frame_id: str
+    point_id: int
+    x_m: float
+    y_m: float
+    z_m: float
+    range_m: float
+    velocity_mps: float
+    doppler_bin: int
+    bearing_deg: float
+    intensity_db: float
+
+
+MessageBody: TypeAlias = CompressedImageMessage | ImageMessage | CameraInfoMessage | CloudMessage | RadarReturnMessage
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordedMessage:
+    """A message as the recorder got it."""
+
+    topic: str
+    receive_time: TimeNs
+    body: MessageBody
+
+
+_TYPES: dict[type, str] = {
+    CompressedImageMessage: "sensor_msgs/msg/CompressedImage",
+    ImageMessage: "sensor_msgs/msg/Image",
+    CameraInfoMessage: "sensor_msgs/msg/CameraInfo",
+    CloudMessage: "sensor_msgs/msg/PointCloud2",
+    RadarReturnMessage: RADAR_SCAN_TYPE,
+}
+
+
+def write_ros1_bag(path: Path, messages: Iterable[RecordedMessage], *, compression: Ros1Compression = "none") -> Path:
+    """Write a ROS 1 bag and return its path.
+
+    Args:
+        path: of a file that does not exist yet.
+        messages: in the order they are to be written, by receive time as a recorder would.
+        compression: "lz4" comes out in a form that ROS itself cannot read; "none" and "bz2" are for everybody.
+
+    Raises:
+        RecordingError: the file exists.
+    """
+    from rosbags.rosbag1 import Writer
+
+    _refuse_existing(path)
+    build = _Builder(1)
+    writer = Writer(path)
+    if compression != "none":
+        writer.set_compression(Writer.CompressionFormat[compression.upper()])
+    with writer:
+        _write_all(
+            messages,
+            lambda topic, kind: writer.add_connection(topic, kind, typestore=build.typestore),
+            lambda connection, message: writer.write(connection, int(message.receive_time), build.ros1(message.body)),
+        )
+    return path
+
+
+def write_ros2(path: Path, messages: Iterable[RecordedMessage], *, container: Ros2Container = "mcap") -> Path:
+    """Write a ROS 2 bag, a folder with metadata.yaml, and return the data file in it, which can also be read alone.
+
+    Args:
+        path: of a folder that does not exist yet.
+        messages: in the order they are to be written.
+        container: "mcap" or "sqlite3".
+
+    Raises:
+        RecordingError: the folder exists.
+    """
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    _refuse_existing(path)
+    build = _Builder(2)
+    writer = Writer(path, version=9, storage_plugin=StoragePlugin[container.upper()])
+    with writer:
+        _write_all(
+            messages,
+            lambda topic, kind: writer.add_connection(topic, kind, typestore=build.typestore),
+            lambda connection, message: writer.write(connection, int(message.receive_time), build.cdr(message.body)),
+        )
+    return path / f"{path.name}.{'mcap' if container == 'mcap' else 'db3'}"
+
+
+def _refuse_existing(path: Path) -> None:
+    if path.exists():
+        raise RecordingError(
+            f"{path} exists already; recordings are never overwritten, choose another name or delete it"
+        )
+
+
+def _write_all(
+    messages: Iterable[RecordedMessage],
+    connect: Callable[[str, str], Any],
+    write: Callable[[Any, RecordedMessage], None],
+) -> None:
+    """Write messages one by one, opening a connection at the first of each topic."""
+    connections: dict[str, Any] = {}
+    for message in messages:
+        if message.topic not in connections:
+            connections[message.topic] = connect(message.topic, _TYPES[type(message.body)])
+        write(connections[message.topic], message)
+
+
+class _Builder:
+    """Turns our message values into serialised ROS messages of one ROS generation."""
+
+    def __init__(self, generation: Literal[1, 2]) -> None:
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+        self.generation = generation
+        self.typestore: Any = get_typestore(Stores.ROS1_NOETIC if generation == 1 else Stores.ROS2_JAZZY)
+        definition = (
+            RADAR_SCAN_DEFINITION if generation == 1 else RADAR_SCAN_DEFINITION.replace("Header", "std_msgs/Header", 1)
+        )
+        self.typestore.register(get_types_from_msg(definition, RADAR_SCAN_TYPE))
+        self.sequence: dict[type, int] = {}
+
+    def ros1(self, body: MessageBody) -> bytes:
+        """Serialise for ROS 1."""
+        return bytes(self.typestore.serialize_ros1(self.message(body), _TYPES[type(body)]))
+
+    def cdr(self, body: MessageBody) -> bytes:
+        """Serialise for ROS 2."""
+        return bytes(self.typestore.serialize_cdr(self.message(body), _TYPES[type(body)]))
+
+    def message(self, body: MessageBody) -> Any:
+        """Build the ROS message of a value."""
+        if isinstance(body, RadarReturnMessage):
+            return self._radar_return(body)
+        if isinstance(body, CloudMessage):
+            return self._cloud(body)
+        if isinstance(body, CameraInfoMessage):
+            return self._camera_info(body)
+        if isinstance(body, ImageMessage):
+            return self._image(body)
+        data = np.frombuffer(body.data, dtype=np.uint8)
+        return self._new(body, header=self._header(body), format=body.format, data=data)
+
+    def _new(self, body: MessageBody, **fields: Any) -> Any:
+        return self.typestore.types[_TYPES[type(body)]](**fields)
+
+    def _header(self, body: MessageBody) -> Any:
+        sec, nanosec = time_parts(body.stamp)
+        stamp = self.typestore.types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec)
+        header = self.typestore.types["std_msgs/msg/Header"]
+        if self.generation == 2:
+            return header(stamp=stamp, frame_id=body.frame_id)
+        sequence = self.sequence.get(type(body), 0)
+        self.sequence[type(body)] = sequence + 1
+        return header(seq=sequence, stamp=stamp, frame_id=body.frame_id)
+
+    def _radar_return(self, body: RadarReturnMessage) -> Any:
+        return self._new(
+            body,
+            header=self._header(body),
+            point_id=body.point_id,
+            x=body.x_m,
+            y=body.y_m,
+            z=body.z_m,
+            range=body.range_m,
+            velocity=body.velocity_mps,
+            doppler_bin=body.doppler_bin,
+            bearing=body.bearing_deg,
+            intensity=body.intensity_db,
+        )
+
+    def _cloud(self, body: CloudMessage) -> Any:
+        field = self.typestore.types["sensor_msgs/msg/PointField"]
+        count, width = body.values.shape
+        return self._new(
+            body,
+            header=self._header(body),
+            height=1,
+            width=count,
+            fields=[field(name=name, offset=4 * i, datatype=7, count=1) for i, name in enumerate(body.names)],
+            is_bigendian=False,
+            point_step=4 * width,
+            row_step=4 * width * count,
+            data=np.frombuffer(body.values.astype("<f4").tobytes(), dtype=np.uint8),
+            is_dense=True,
+        )
+
+    def _image(self, body: ImageMessage) -> Any:
+        height, width = body.pixels.shape[:2]
+        return self._new(
+            body,
+            header=self._header(body),
+            height=height,
+            width=width,
+            encoding="bgr8",
+            is_bigendian=0,
+            step=3 * width,
+            data=body.pixels.reshape(-1),
+        )
+
+    def _camera_info(self, body: CameraInfoMessage) -> Any:
+        camera = body.camera
+        projection = np.zeros((3, 4))
+        projection[:, :3] = camera.matrix_px
+        distortion = np.zeros(5) if camera.model == "pinhole" else camera.distortion
+        if camera.model == "plumb_bob" and len(distortion) == 4:
+            distortion = np.append(distortion, 0.0)
+        arrays = {
+            "D": distortion,
+            "K": camera.matrix_px.reshape(-1),
+            "R": np.eye(3).reshape(-1),
+            "P": projection.reshape(-1),
+        }
+        region = self.typestore.types["sensor_msgs/msg/RegionOfInterest"]
+        return self._new(
+            body,
+            header=self._header(body),
+            height=camera.height_px,
+            width=camera.width_px,
+            distortion_model="plumb_bob" if camera.model == "pinhole" else camera.model,
+            **{(name if self.generation == 1 else name.lower()): values for name, values in arrays.items()},
+            binning_x=0,
+            binning_y=0,
+            roi=region(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
+        )

@@ -1,0 +1,41 @@
+"""Write a simulated recording to a folder, in the containers people use."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from calib_core.recordings.writing import write_ros1_bag, write_ros2
+from calib_core.synthetic.messages import all_messages, camera_messages, radar_messages
+from calib_core.synthetic.options import Container
+from calib_core.synthetic.recording import SimulatedRecording
+from calib_core.synthetic.truth import clicks_text, truth_text
+
+__all__ = ["write_recording"]
+
+
+def write_recording(
+    recording: SimulatedRecording, folder: Path, containers: Sequence[Container] = ("ros1",)
+) -> tuple[Path, ...]:
+    """Write recording, truth.json and clicks.json, and return the data files.
+
+    Args:
+        recording: what to write.
+        folder: made if it does not exist; files of the same name in it are not overwritten.
+        containers: "ros1" writes radar.bag and camera.bag; "mcap" and "db3" write a ROS 2 bag each, a folder with
+            metadata.yaml whose data file can also be opened alone.
+
+    Raises:
+        RecordingError: a file exists already.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written: list[Path] = []
+    for container in containers:
+        if container == "ros1":
+            written.append(write_ros1_bag(folder / "radar.bag", radar_messages(recording, 1)))
+            written.append(write_ros1_bag(folder / "camera.bag", camera_messages(recording)))
+        else:
+            name = folder / f"recording_{container}"
+            messages = all_messages(recording, 2)
+            written.append(write_ros2(name, messages, container="mcap" if container == "mcap" else "sqlite3"))
+    (folder / "truth.json").write_text(truth_text(recording), encoding="utf-8")
+    (folder / "clicks.json").write_text(clicks_text(recording), encoding="utf-8")
+    return tuple(written)

@@ -1,0 +1,118 @@
+"""Simulated measurements as the messages real drivers send."""
+
+import heapq
+from collections.abc import Iterable, Iterator
+from typing import Literal
+
+import numpy as np
+
+from calib_core.measurements import RadarScan, TimeNs
+from calib_core.recordings.writing import (
+    CameraInfoMessage,
+    CloudMessage,
+    CompressedImageMessage,
+    ImageMessage,
+    RadarReturnMessage,
+    RecordedMessage,
+)
+from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
+
+__all__ = [
+    "CAMERA_FRAME",
+    "CAMERA_INFO_TOPIC",
+    "CLOUD_TOPIC",
+    "IMAGE_TOPIC",
+    "RADAR_FRAME",
+    "RADAR_SCAN_TOPIC",
+    "RAW_IMAGE_TOPIC",
+    "all_messages",
+    "camera_messages",
+    "radar_messages",
+]
+
+RADAR_SCAN_TOPIC = "/ti_mmwave/radar_scan"
+CLOUD_TOPIC = "/ti_mmwave/radar_scan_pcl"
+RAW_IMAGE_TOPIC = "/camera/image_raw"
+IMAGE_TOPIC = "/camera/image_raw/compressed"
+CAMERA_INFO_TOPIC = "/camera/camera_info"
+RADAR_FRAME = "ti_mmwave_0"
+CAMERA_FRAME = "camera_optical_frame"
+
+_PARSE_NS = 6_000
+"""The driver stamps each return when it parses it; one takes about this long."""
+
+
+def camera_messages(
+    recording: SimulatedRecording, frames: Iterable[SimulatedFrame] | None = None
+) -> Iterator[RecordedMessage]:
+    """Turn frames into image and camera-info messages, in the order they arrive.
+
+    Args:
+        recording: whose camera.
+        frames: other than all of the recording's.
+    """
+    options = recording.options
+    for frame in recording.frames() if frames is None else frames:
+        info = CameraInfoMessage(frame.time, CAMERA_FRAME, recording.camera)
+        yield RecordedMessage(CAMERA_INFO_TOPIC, frame.receive_time, info)
+        if options.raw_images:
+            raw = ImageMessage(frame.time, CAMERA_FRAME, frame.pixels)
+            yield RecordedMessage(RAW_IMAGE_TOPIC, frame.receive_time, raw)
+        else:
+            jpeg = CompressedImageMessage(
+                frame.time, CAMERA_FRAME, frame.jpeg(options.jpeg_quality), "bgr8; jpeg compressed bgr8"
+            )
+            yield RecordedMessage(IMAGE_TOPIC, frame.receive_time, jpeg)
+
+
+def radar_messages(recording: SimulatedRecording, generation: Literal[1, 2]) -> Iterator[RecordedMessage]:
+    """Turn scans into messages, in the order they arrive.
+
+    Args:
+        recording: whose radar.
+        generation: of ROS; 1 gives what options.radar_message says, 2 gives clouds.
+    """
+    options = recording.options
+    cloud = generation == 2 or options.radar_message == "cloud" or options.radar == "imaging"
+    for scan, receive in zip(recording.scans(), recording.stage.scan_times.receive_ns, strict=True):
+        if cloud:
+            yield _cloud(scan, TimeNs(int(receive)))
+        else:
+            yield from _returns(recording, scan, int(receive))
+
+
+def all_messages(recording: SimulatedRecording, generation: Literal[1, 2]) -> Iterator[RecordedMessage]:
+    """Merge both sensors' messages as one recorder would get them."""
+    return heapq.merge(
+        camera_messages(recording), radar_messages(recording, generation), key=lambda message: message.receive_time
+    )
+
+
+def _cloud(scan: RadarScan, receive: TimeNs) -> RecordedMessage:
+    values = np.column_stack([scan.points_radar_m, scan.snr_db, scan.doppler_mps])
+    body = CloudMessage(scan.time, RADAR_FRAME, ("x", "y", "z", "intensity", "velocity"), values)
+    return RecordedMessage(CLOUD_TOPIC, receive, body)
+
+
+def _returns(recording: SimulatedRecording, scan: RadarScan, receive: int) -> Iterator[RecordedMessage]:
+    """Yield one message per return, each stamped a moment later, as the TI driver does."""
+    filled = recording.options.radar_message == "filled"
+    profile = recording.stage.profile
+    ranges = np.linalg.norm(scan.points_radar_m, axis=1)
+    bearings = np.rad2deg(np.arctan2(scan.points_radar_m[:, 1], scan.points_radar_m[:, 0]))
+    bins = np.round(scan.doppler_mps / profile.doppler_bin_mps).astype(int) + profile.doppler_bins // 2
+    for i, point in enumerate(scan.points_radar_m.tolist()):
+        body = RadarReturnMessage(
+            TimeNs(scan.time + i * _PARSE_NS),
+            RADAR_FRAME,
+            i,
+            point[0],
+            point[1],
+            point[2],
+            range_m=float(ranges[i]) if filled else 0.0,
+            velocity_mps=float(scan.doppler_mps[i]),
+            doppler_bin=int(bins[i]) if filled else 0,
+            bearing_deg=float(bearings[i]) if filled else 0.0,
+            intensity_db=float(scan.snr_db[i]) if filled else 0.0,
+        )
+        yield RecordedMessage(RADAR_SCAN_TOPIC, TimeNs(receive + i * _PARSE_NS), body)

@@ -1,0 +1,101 @@
+"""A simulated recording: frames are rendered as they are asked for, so memory stays bounded."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import RadarScan, ReflectorClick, TimeNs
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.rendering.frames import FrameRenderer
+from calib_core.synthetic.scans import SimulatedPlacement, clicks_of, placements_of, radar_scans
+from calib_core.synthetic.stage import Stage, child_rng, set_stage
+
+__all__ = ["SimulatedFrame", "SimulatedRecording", "simulate"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedFrame:
+    """One camera frame.
+
+    Attributes:
+        time: its header stamp.
+        receive_time: when the recorder got it.
+        pixels: (h, w, 3) uint8, blue first.
+    """
+
+    time: TimeNs
+    receive_time: TimeNs
+    pixels: np.ndarray
+
+    def jpeg(self, quality: int) -> bytes:
+        """Encode as JPEG."""
+        import cv2
+
+        good, data = cv2.imencode(
+            ".jpg", self.pixels, [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_OPTIMIZE, 1]
+        )
+        assert good, "OpenCV encodes every 8-bit picture"
+        return bytes(data)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedRecording:
+    """What two recorders would have written down, and the truth behind it.
+
+    Attributes:
+        stage: what was decided before a sensor measured.
+        placements: the truth about each placement, in order of time.
+        clicks: one example click per placement, with click noise.
+    """
+
+    stage: Stage
+    placements: tuple[SimulatedPlacement, ...]
+    clicks: tuple[ReflectorClick, ...]
+
+    @property
+    def options(self) -> SimulationOptions:
+        """What was asked for."""
+        return self.stage.options
+
+    @property
+    def camera(self) -> Camera:
+        """The intrinsics."""
+        return self.stage.rig.camera
+
+    @property
+    def camera_from_radar(self) -> RigidTransform:
+        """The true pose."""
+        return self.stage.rig.camera_from_radar
+
+    def scans(self) -> Iterator[RadarScan]:
+        """Measure scan by scan, by header stamps; the same scans every time."""
+        return radar_scans(self.stage)
+
+    def frames(self, limit: int | None = None) -> Iterator[SimulatedFrame]:
+        """Render frame by frame; the same frames every time.
+
+        Args:
+            limit: how many from the start; None for all.
+        """
+        stage, options = self.stage, self.options
+        renderer = FrameRenderer.of(stage.scene, stage.rig)
+        rng = child_rng(options, 11)
+        for i, moment_s in enumerate(stage.frame_times.moment_s[:limit]):
+            moment = stage.story.at(float(moment_s))
+            pixels = renderer.render(moment, person=options.person, noise_grey=options.sensor_noise_grey, rng=rng)
+            header, receive = int(stage.frame_times.header_ns[i]), int(stage.frame_times.receive_ns[i])
+            yield SimulatedFrame(TimeNs(header), TimeNs(receive), pixels)
+
+
+def simulate(options: SimulationOptions | None = None) -> SimulatedRecording:
+    """Decide on a recording; nothing is measured or rendered before it is asked for.
+
+    Args:
+        options: what to simulate; None takes the defaults.
+    """
+    stage = set_stage(options or SimulationOptions())
+    placements = placements_of(stage)
+    return SimulatedRecording(stage, placements, clicks_of(stage, placements))

@@ -1,0 +1,115 @@
+"""What lies beyond: sky, clouds, a city's skyline, trees."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from calib_core.synthetic.rendering.noise import fractal_noise, hash_random, value_noise
+from calib_core.synthetic.scenes import Backdrop
+
+__all__ = ["HAZE", "backdrop_colour"]
+
+HAZE = np.array([0.66, 0.75, 0.84], dtype=np.float32)
+_ZENITH = np.array([0.085, 0.22, 0.60], dtype=np.float32)
+
+
+def backdrop_colour(backdrop: Backdrop, directions: np.ndarray, footprint_rad: float) -> np.ndarray:
+    """Return colours (n, 3) of what is far away.
+
+    Args:
+        backdrop: which place it is.
+        directions: (n, 3) unit vectors in the world.
+        footprint_rad: size of a pixel.
+    """
+    return _BACKDROPS[backdrop](directions.astype(np.float32), footprint_rad)
+
+
+def _sky(directions: np.ndarray, footprint_rad: float) -> np.ndarray:
+    height = np.clip(directions[:, 2], 0.0, 1.0)
+    colour = _ZENITH + (HAZE - _ZENITH) * np.exp(-height / 0.20)[:, None]
+    level = 420.0 / (height + 0.12)  # clouds lie on a level sheet, seen ever flatter towards the horizon
+    u, v = directions[:, 0] * level, directions[:, 1] * level
+    footprint = (footprint_rad * level / (height + 0.12)).astype(np.float32)
+    billow = fractal_noise(u, v, size_m=620.0, octaves=4, footprint_m=footprint, seed=17, fall=0.5)
+    cover = np.clip((billow - 0.12) / 0.75, 0.0, 1.0) * np.clip(height / 0.05, 0.0, 1.0)
+    cover = cover * cover * (3.0 - 2.0 * cover) * 0.85
+    white = np.array([0.93, 0.94, 0.96], dtype=np.float32)
+    return colour + (white - colour) * cover[:, None]
+
+
+def _skyline(
+    azimuth: np.ndarray, elevation: np.ndarray, *, width_rad: float, tallest_rad: float, seed: int, footprint_rad: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return one row of houses: how much of each pixel they cover (n,), and their colour before haze (n, 3)."""
+    cell = np.floor(azimuth / width_rad).astype(np.int32)
+    inside = azimuth / width_rad - cell
+    top = tallest_rad * (0.35 + 0.65 * hash_random(cell, cell * 0, seed) ** 1.5)
+    set_back = (inside > 0.55) & (hash_random(cell, cell * 0 + 2, seed) > 0.5)
+    top = np.where(set_back, top * (0.62 + 0.2 * hash_random(cell, cell * 0 + 3, seed)), top)
+    cover = np.clip((top - elevation) / footprint_rad + 0.5, 0.0, 1.0)
+    tone = 0.20 + 0.22 * hash_random(cell, cell * 0 + 1, seed)
+    warm = hash_random(cell, cell * 0 + 5, seed)[:, None]
+    tint = np.array([1.0, 0.92, 0.82]) * warm + np.array([0.82, 0.92, 1.0]) * (1.0 - warm)
+    floors = width_rad / 7.0
+    pane_u, pane_v = (inside * 9.0) % 1.0, (elevation / floors) % 1.0
+    pane = (
+        (pane_u > 0.25) & (pane_u < 0.75) & (pane_v > 0.3) & (pane_v < 0.75) & (elevation < top - 0.6 * floors)
+    ).astype(np.float32)
+    visible = float(np.clip(width_rad / 9.0 / (3.0 * footprint_rad) - 0.9, 0.0, 1.0))
+    lit = 1.0 - visible * pane * (0.16 + 0.26 * hash_random(np.floor(inside * 9.0).astype(np.int32), cell, seed))
+    side = np.where(inside > 0.72, 0.80, 1.0)
+    return cover, (tone * lit * side)[:, None] * tint
+
+
+def _city(directions: np.ndarray, footprint_rad: float) -> np.ndarray:
+    colour = _sky(directions, footprint_rad)
+    azimuth = np.arctan2(directions[:, 1], directions[:, 0]) + np.float32(4.0)
+    elevation = np.arcsin(np.clip(directions[:, 2], -1.0, 1.0))
+    for width_rad, tallest_rad, haze, seed in (
+        (0.050, 0.125, 0.80, 3),
+        (0.078, 0.095, 0.62, 11),
+        (0.118, 0.068, 0.42, 23),
+    ):
+        cover, house = _skyline(
+            azimuth + 0.013 * seed,
+            elevation,
+            width_rad=width_rad,
+            tallest_rad=tallest_rad,
+            seed=seed,
+            footprint_rad=footprint_rad,
+        )
+        colour += ((house + (HAZE - house) * haze) - colour) * cover[:, None]
+    ground = np.clip(0.5 - elevation / footprint_rad, 0.0, 1.0)[:, None]
+    return colour + (0.6 * HAZE - colour) * ground
+
+
+def _trees(directions: np.ndarray, footprint_rad: float) -> np.ndarray:
+    colour = _sky(directions, footprint_rad)
+    azimuth = np.arctan2(directions[:, 1], directions[:, 0]) + np.float32(4.0)
+    elevation = np.arcsin(np.clip(directions[:, 2], -1.0, 1.0))
+    flat = np.full_like(azimuth, footprint_rad)
+    hills = 0.030 + 0.022 * value_noise(azimuth * 2.3, azimuth * 0.0, 41)
+    rows = (
+        (hills, 0.0, 0.72, 0.12),
+        (0.045 + 0.0 * hills, 0.030, 0.30, 0.10),
+        (0.030 + 0.0 * hills, 0.026, 0.10, 0.075),
+    )
+    for row, (height, rough, haze, tone) in enumerate(rows):
+        crowns = fractal_noise(
+            azimuth, 0.0 * azimuth, size_m=0.09, octaves=6, footprint_m=flat, seed=51 + row, fall=0.62
+        )
+        edge = height + rough * crowns
+        cover = np.clip((edge - elevation) / (1.5 * footprint_rad) + 0.5, 0.0, 1.0)
+        leaves = fractal_noise(azimuth, elevation, size_m=0.022, octaves=4, footprint_m=flat, seed=61 + row)
+        shade = tone * (1.0 + 0.45 * leaves) * (0.55 + 0.6 * np.clip(elevation / np.maximum(edge, 1e-3), 0.0, 1.0))
+        tree = np.maximum(shade, 0.01)[:, None] * np.array([0.58, 0.95, 0.38])
+        colour += ((tree + (HAZE - tree) * haze * 0.75) - colour) * cover[:, None]
+    return colour
+
+
+def _hall(directions: np.ndarray, footprint_rad: float) -> np.ndarray:
+    del footprint_rad
+    return np.broadcast_to(np.array([0.30, 0.30, 0.29], dtype=np.float32), directions.shape).copy()
+
+
+_BACKDROPS: dict[Backdrop, Callable[[np.ndarray, float], np.ndarray]] = {"city": _city, "trees": _trees, "hall": _hall}

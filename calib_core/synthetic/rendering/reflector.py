@@ -1,0 +1,157 @@
+"""The trihedral corner reflector in the picture.
+
+Three square-cut facets meet at the apex. The apex is the phase centre: every path by three bounces is as long as the
+path to the apex and back. It is what a person clicks, and what truth.json calls the reflector's position.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Points3, Vector3
+from calib_core.synthetic.person import Capsule
+from calib_core.synthetic.rendering.light import lit
+from calib_core.synthetic.scenes import Scene
+
+__all__ = ["EDGE_M", "Facet", "apex_edges", "on_block", "reflector_facets", "shadow_limbs", "stand_limbs"]
+
+EDGE_M = 0.16
+"""Length of the three edges that meet at the apex [m]."""
+
+_BASE_HALF_M = 0.095
+_GROUND_STAND_M = 0.35
+_ALUMINIUM = np.array([0.80, 0.82, 0.85], dtype=np.float32)
+_ORANGE = np.array([0.92, 0.23, 0.02], dtype=np.float32)
+_RIM = np.array([0.95, 0.96, 0.97], dtype=np.float32)
+_FACET_LEVEL = (0.62, 1.0, 0.36)
+"""How bright the lower, the left and the right facet are: polished sheets show sky, sun and ground."""
+_STEPS = 6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Facet:
+    """A flat polygon with one colour.
+
+    Attributes:
+        corners_m: (n, 3) in the world, outline subdivided so that the lens may bend it.
+        colour: (3,) linear.
+    """
+
+    corners_m: Points3
+    colour: np.ndarray
+
+
+def apex_edges(facing_rad: float, elevation_rad: float) -> np.ndarray:
+    """Return the edges from the apex as unit rows (3, 3): up, lower left, lower right, as seen by who it faces."""
+    c, s = np.cos(facing_rad), np.sin(facing_rad)
+    ce, se = np.cos(elevation_rad), np.sin(elevation_rad)
+    axis = np.array([ce * c, ce * s, se])
+    up = np.array([-se * c, -se * s, ce])
+    right = np.array([-s, c, 0.0])  # of the viewer, who looks against the axis
+    turns = np.deg2rad([0.0, 120.0, 240.0])
+    around = np.cos(turns)[:, None] * up - np.sin(turns)[:, None] * right
+    return axis / np.sqrt(3.0) + np.sqrt(2.0 / 3.0) * around
+
+
+def _subdivided(corners: np.ndarray) -> np.ndarray:
+    """Put points between the corners of an outline."""
+    shares = np.arange(_STEPS)[:, None] / _STEPS
+    following = np.roll(corners, -1, axis=0)
+    return np.concatenate([a + shares * (b - a) for a, b in zip(corners, following, strict=True)])
+
+
+def reflector_facets(
+    apex_m: Vector3, facing_rad: float, *, scene: Scene, towards: Vector3, eye_m: Vector3, ground_stand: bool
+) -> list[Facet]:
+    """Build the polygons of reflector and base block, farthest first.
+
+    Args:
+        apex_m: (3,) in the world.
+        facing_rad: heading it looks along.
+        scene: whose light it is.
+        towards: (3,) direction of the sun.
+        eye_m: (3,) the camera.
+        ground_stand: whether it sits on its block (else on a tripod).
+    """
+    edges = EDGE_M * apex_edges(facing_rad, np.deg2rad(9.0))
+    facets: list[Facet] = []
+    if ground_stand:
+        facets += _base(apex_m, edges, facing_rad, scene, towards, eye_m)
+    up, left, right = edges
+    for level, (one, two) in zip(_FACET_LEVEL, ((left, right), (up, left), (right, up)), strict=True):
+        facets += _sheet(apex_m, one, two, level, eye_m)
+    return facets
+
+
+def _sheet(apex: Vector3, one: Vector3, two: Vector3, level: float, eye: Vector3) -> list[Facet]:
+    """Build a triangular sheet with a gradient from apex to rim and a bright cut edge."""
+    inside = np.cross(one, two)
+    if float(inside @ (eye - apex)) < 0.0:  # seen from behind: the painted back
+        return [Facet(_subdivided(apex + np.array([np.zeros(3), one, two])), 0.22 * _ALUMINIUM)]
+    facets = []
+    for share in np.linspace(1.0, 0.14, 9):  # nested triangles: darker into the corner
+        gradient = 0.70 + 0.30 * share
+        corners = apex + share * np.array([np.zeros(3), one, two])
+        facets.append(Facet(_subdivided(corners), level * gradient * _ALUMINIUM))
+    rim = apex + np.array([one, two, 0.955 * two, 0.955 * one])
+    return [*facets, Facet(_subdivided(rim), (0.35 + 0.65 * level) * _RIM)]
+
+
+def _base(
+    apex: Vector3, edges: np.ndarray, facing_rad: float, scene: Scene, towards: Vector3, eye: Vector3
+) -> list[Facet]:
+    """Build the orange block below, from the ground to the sheets' lowest corner."""
+    forward = np.array([np.cos(facing_rad), np.sin(facing_rad), 0.0])
+    left = np.array([-forward[1], forward[0], 0.0])
+    top = apex[2] + float(edges[:, 2].min()) - 0.004
+    bottom = top - 0.125
+    centre = apex + 0.055 * forward
+    normals = [forward, left, -forward, -left, np.array([0.0, 0.0, 1.0])]
+    facets = []
+    for normal in normals:
+        if abs(normal[2]) > 0.5:
+            ring = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
+            corners = np.array([centre + _BASE_HALF_M * (a * forward + b * left) for a, b in ring])
+            corners[:, 2] = top
+        else:
+            across = np.cross([0.0, 0.0, 1.0], normal)
+            middle = centre + _BASE_HALF_M * normal
+            corners = np.array([middle + _BASE_HALF_M * s * across for s in (-1.0, 1.0, 1.0, -1.0)])
+            corners[:, 2] = [bottom, bottom, top, top]
+        if float(normal @ (eye - corners.mean(axis=0))) <= 0.0:
+            continue
+        light = lit(scene, normal[None], np.array([max(0.0, float(normal @ towards))]))[0]
+        facets.append(Facet(_subdivided(corners), _ORANGE * light))
+        if abs(normal[2]) < 0.5:  # a white band for the eye
+            band = corners.copy()
+            band[:, 2] = [bottom + 0.045, bottom + 0.045, bottom + 0.075, bottom + 0.075]
+            facets.append(Facet(_subdivided(band), np.array([0.85, 0.85, 0.83]) * light))
+    return facets
+
+
+def stand_limbs(apex_m: Vector3, *, at_rest: bool) -> tuple[Capsule, ...]:
+    """Build the tripod below a raised reflector; folded while it is carried."""
+    hub = apex_m - np.array([0.0, 0.0, 0.11])
+    limbs = [Capsule(hub, hub + np.array([0.0, 0.0, 0.05]), 0.022, 0.018, "shoe")]
+    for turn in np.deg2rad([30.0, 150.0, 270.0]):
+        out = np.array([np.cos(turn), np.sin(turn), 0.0])
+        foot = hub + 0.42 * min(1.0, hub[2] / 0.9) * out if at_rest else hub + 0.03 * out
+        foot = np.array([foot[0], foot[1], 0.012 if at_rest else hub[2] - 0.6])
+        limbs.append(Capsule(hub, foot, 0.014, 0.010, "shoe"))
+    return tuple(limbs)
+
+
+def on_block(height_m: float) -> bool:
+    """Tell whether a reflector whose apex rests at this height sits on its block (else on a tripod)."""
+    return height_m < _GROUND_STAND_M
+
+
+def shadow_limbs(apex_m: Vector3, facing_rad: float) -> tuple[Capsule, ...]:
+    """Return rounded stand-ins for sheets and block that throw about the same shadow."""
+    edges = EDGE_M * apex_edges(facing_rad, np.deg2rad(9.0))
+    tips = apex_m + edges
+    low = np.array([0.0, 0.0, 0.0])
+    centre = np.array([apex_m[0] + 0.055 * np.cos(facing_rad), apex_m[1] + 0.055 * np.sin(facing_rad), 0.0])
+    bottom = centre + np.array([0.0, 0.0, max(0.05, float(tips[:, 2].min()) - 0.09)])
+    limbs = [Capsule(apex_m, tip + low, 0.045, 0.02, "shoe") for tip in tips]
+    return (*limbs, Capsule(bottom, bottom + np.array([0.0, 0.0, 0.03]), 0.085, 0.085, "shoe"))

@@ -1,0 +1,219 @@
+"""What surfaces look like: a colour (linear red, green, blue) for each point of a face."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.synthetic.rendering.noise import cell_random, fractal_noise, line_coverage
+from calib_core.synthetic.scenes import Ground, Material
+
+__all__ = ["Patch", "ground_colour", "material_colour"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patch:
+    """Points of one face: where on it, how big the face is, how big a pixel is there.
+
+    Attributes:
+        u_m: (n,) across.
+        v_m: (n,) up, or away from the camera on level faces.
+        width_m: of the face.
+        height_m: of the face.
+        footprint_m: (n,) size of a pixel.
+        seed: which face it is.
+    """
+
+    u_m: np.ndarray
+    v_m: np.ndarray
+    width_m: float
+    height_m: float
+    footprint_m: np.ndarray
+    seed: int
+
+    def noise(self, size_m: float, octaves: int, salt: int = 0, stretch: float = 1.0) -> np.ndarray:
+        """Return fractal noise on the face."""
+        return fractal_noise(
+            self.u_m,
+            self.v_m / stretch,
+            size_m=size_m,
+            octaves=octaves,
+            footprint_m=self.footprint_m,
+            seed=self.seed * 31 + salt,
+        )
+
+    def plain(self, *rgb: float) -> np.ndarray:
+        """Return one colour for all points: (n, 3)."""
+        return np.broadcast_to(np.array(rgb, dtype=np.float32), (len(self.u_m), 3)).copy()
+
+    def border(self, width_m: float) -> np.ndarray:
+        """Return 1 within a width of the face's rim, else 0."""
+        inset = np.minimum(
+            np.minimum(self.u_m, self.width_m - self.u_m), np.minimum(self.v_m, self.height_m - self.v_m)
+        )
+        return np.clip((width_m - inset) / np.maximum(self.footprint_m, 1e-4) + 0.5, 0.0, 1.0)
+
+
+def _mixed(low: np.ndarray, high: np.ndarray | tuple[float, ...], share: np.ndarray) -> np.ndarray:
+    return low + (np.asarray(high, dtype=np.float32) - low) * share[:, None]
+
+
+def _tiles(p: Patch) -> np.ndarray:
+    size = 0.6
+    tone = cell_random(p.u_m / size + 0.5, p.v_m / size + 0.5, 5)
+    warm = cell_random(p.u_m / size + 0.5, p.v_m / size + 0.5, 6)
+    joint = np.maximum(
+        line_coverage(p.u_m + size / 2, period_m=size, width_m=0.012, footprint_m=p.footprint_m),
+        line_coverage(p.v_m + size / 2, period_m=size, width_m=0.012, footprint_m=3.0 * p.footprint_m),
+    )
+    stain = np.clip(p.noise(2.6, 4, 1), -1.0, 1.0)
+    level = 0.40 * (1.0 + 0.13 * (tone - 0.5) + 0.10 * stain)
+    colour = level[:, None] * (
+        np.array([1.0, 0.955, 0.87], dtype=np.float32) + 0.05 * (warm[:, None] - 0.5) * np.array([1.0, 0.0, -1.0])
+    )
+    return _mixed(colour, (0.13, 0.125, 0.115), 0.85 * joint)
+
+
+def _grass(p: Patch) -> np.ndarray:
+    stripe = np.where(np.floor(p.v_m / 2.4) % 2 == 0, 1.0, -1.0)
+    soft = np.clip(1.3 - p.footprint_m * 2.0, 0.0, 1.0)
+    patchy = p.noise(3.0, 4, 1)
+    blades = p.noise(0.10, 3, 2, stretch=2.0)
+    level = 0.17 * (1.0 + 0.07 * stripe * soft + 0.14 * patchy + 0.16 * blades)
+    dry = np.clip(0.35 * p.noise(1.4, 3, 3) + 0.12, 0.0, 0.5)
+    colour = level[:, None] * np.array([0.62, 1.0, 0.30], dtype=np.float32)
+    colour = _mixed(colour, (0.24, 0.22, 0.10), dry)
+    near = p.footprint_m
+    line = np.clip((0.06 - np.abs(p.u_m - 19.0)) / near + 0.5, 0.0, 1.0)
+    box = (np.abs(p.v_m) < 9.16) * np.clip((0.06 - np.abs(p.u_m - 13.5)) / near + 0.5, 0.0, 1.0)
+    side = (p.u_m > 13.44) * (p.u_m < 19.06) * np.clip((0.06 - np.abs(np.abs(p.v_m) - 9.16)) / near + 0.5, 0.0, 1.0)
+    chalk = np.maximum(line, np.maximum(box, side)) * (0.85 + 0.15 * np.clip(blades, -1.0, 1.0))
+    return _mixed(colour, (0.72, 0.74, 0.70), np.clip(chalk, 0.0, 1.0))
+
+
+def _floor(p: Patch) -> np.ndarray:
+    level = 0.30 * (1.0 + 0.10 * p.noise(1.7, 4, 1) + 0.03 * p.noise(0.06, 2, 2))
+    colour = level[:, None] * np.array([0.98, 0.99, 1.0], dtype=np.float32)
+    seam = line_coverage(p.u_m - 1.0, period_m=4.0, width_m=0.012, footprint_m=4.0 * p.footprint_m)
+    colour = _mixed(colour, (0.10, 0.10, 0.10), seam)
+    paint = np.clip((0.05 - np.abs(np.abs(p.v_m) - 1.40)) / p.footprint_m + 0.5, 0.0, 1.0)
+    worn = np.clip(0.85 + 0.5 * p.noise(0.25, 3, 3), 0.3, 1.0)
+    return _mixed(colour, (0.78, 0.55, 0.05), paint * worn)
+
+
+def _asphalt(p: Patch) -> np.ndarray:
+    level = 0.155 * (1.0 + 0.13 * p.noise(2.2, 4, 1) + 0.10 * p.noise(0.05, 2, 2))
+    colour = level[:, None] * np.array([1.0, 0.99, 0.97], dtype=np.float32)
+    inside = np.clip((p.u_m - 5.6) / p.footprint_m, 0.0, 1.0)
+    bay = line_coverage(p.v_m - 1.3, period_m=2.6, width_m=0.11, footprint_m=p.footprint_m) * inside
+    front = np.clip((0.055 - np.abs(p.u_m - 5.6)) / (2.0 * p.footprint_m) + 0.5, 0.0, 1.0)
+    worn = np.clip(0.8 + 0.45 * p.noise(0.3, 3, 3), 0.25, 1.0)
+    return _mixed(colour, (0.66, 0.66, 0.63), np.maximum(bay, front) * worn)
+
+
+_GROUNDS: dict[Ground, Callable[[Patch], np.ndarray]] = {
+    "tiles": _tiles,
+    "grass": _grass,
+    "floor": _floor,
+    "asphalt": _asphalt,
+}
+
+
+def ground_colour(ground: Ground, patch: Patch) -> np.ndarray:
+    """Return the ground's colours (n, 3); u_m is x and v_m is y of the world here."""
+    return _GROUNDS[ground](patch)
+
+
+def _louvre(p: Patch) -> np.ndarray:
+    slat = 0.5 + 0.5 * np.cos(2.0 * np.pi * p.v_m / 0.14)
+    seen = np.clip(0.14 / (3.0 * p.footprint_m) - 0.5, 0.0, 1.0)
+    level = 0.33 + seen * (0.20 * slat - 0.10)
+    colour = level[:, None] * np.array([0.95, 0.98, 1.0], dtype=np.float32)
+    post = line_coverage(p.u_m, period_m=0.8, width_m=0.05, footprint_m=p.footprint_m)
+    return _mixed(colour, (0.52, 0.53, 0.54), np.maximum(p.border(0.07), post))
+
+
+def _brick(p: Patch) -> np.ndarray:
+    row = np.floor(p.v_m / 0.077)
+    across = p.u_m / 0.24 + 0.5 * (row % 2)
+    tone = cell_random(across, p.v_m / 0.077, p.seed)
+    seen = np.clip(0.077 / (1.5 * p.footprint_m) - 0.4, 0.0, 1.0)
+    level = 0.26 * (1.0 + 0.40 * (tone - 0.5) * seen + 0.10 * p.noise(1.9, 3, 1))
+    colour = level[:, None] * np.array([1.0, 0.56, 0.42], dtype=np.float32)
+    bed = line_coverage(p.v_m, period_m=0.077, width_m=0.011, footprint_m=p.footprint_m)
+    head = line_coverage(across * 0.24, period_m=0.24, width_m=0.011, footprint_m=p.footprint_m)
+    return _mixed(colour, (0.42, 0.39, 0.35), np.maximum(bed, head))
+
+
+def _cartons(p: Patch) -> np.ndarray:
+    across, up = p.width_m / max(1, round(p.width_m / 0.48)), p.height_m / max(1, round(p.height_m / 0.36))
+    tone = cell_random(p.u_m / across, p.v_m / up, p.seed)
+    kind = cell_random(p.u_m / across, p.v_m / up, p.seed + 7)
+    level = (0.30 + 0.16 * (tone - 0.5)) * (1.0 + 0.05 * p.noise(0.3, 2, 1))
+    colour = level[:, None] * np.array([1.0, 0.74, 0.47], dtype=np.float32)
+    colour = np.where((kind > 0.86)[:, None], 0.42 * np.array([0.9, 0.95, 1.0], dtype=np.float32), colour)
+    gap = np.maximum(
+        line_coverage(p.u_m, period_m=across, width_m=0.014, footprint_m=p.footprint_m),
+        line_coverage(p.v_m, period_m=up, width_m=0.014, footprint_m=p.footprint_m),
+    )
+    tape = line_coverage(p.u_m - across / 2, period_m=across, width_m=0.05, footprint_m=p.footprint_m)
+    return _mixed(_mixed(colour, (0.46, 0.38, 0.27), 0.6 * tape), (0.05, 0.04, 0.03), gap)
+
+
+def _checkerboard(p: Patch) -> np.ndarray:
+    square = 0.30
+    odd = (np.floor(p.u_m / square) + np.floor(p.v_m / square)) % 2
+    return _mixed(p.plain(0.70, 0.70, 0.69), (0.025, 0.025, 0.028), odd)
+
+
+def _render(p: Patch) -> np.ndarray:
+    streak = p.noise(0.5, 3, 1, stretch=5.0)
+    foot = np.exp(-np.maximum(p.v_m, 0.0) / 0.18)
+    level = 0.50 * (1.0 + 0.06 * p.noise(2.0, 3, 2) + 0.05 * streak - 0.20 * foot)
+    return level[:, None] * np.array([1.0, 0.955, 0.87], dtype=np.float32)
+
+
+def _plaster(p: Patch) -> np.ndarray:
+    level = 0.58 * (1.0 + 0.04 * p.noise(1.5, 3, 1))
+    return level[:, None] * np.array([1.0, 0.93, 0.80], dtype=np.float32)
+
+
+def _wood(p: Patch) -> np.ndarray:
+    level = 0.27 * (1.0 + 0.16 * p.noise(0.3, 3, 1, stretch=0.12))
+    return level[:, None] * np.array([1.0, 0.73, 0.46], dtype=np.float32)
+
+
+def _metal(p: Patch) -> np.ndarray:
+    level = 0.44 * (1.0 + 0.05 * p.noise(0.8, 3, 1))
+    return level[:, None] * np.array([0.97, 0.99, 1.0], dtype=np.float32)
+
+
+def _door(p: Patch) -> np.ndarray:
+    colour = _mixed(p.plain(0.10, 0.15, 0.19), (0.24, 0.27, 0.29), p.border(0.06))
+    handle = (np.abs(p.u_m - 0.12) < 0.05) & (np.abs(p.v_m - 1.02) < 0.025)
+    return _mixed(colour, (0.6, 0.6, 0.6), handle.astype(np.float32))
+
+
+_MATERIALS: dict[Material, Callable[[Patch], np.ndarray]] = {
+    "render": _render,
+    "concrete": _render,
+    "metal": _metal,
+    "louvre": _louvre,
+    "white": lambda p: p.plain(0.72, 0.72, 0.70),
+    "dark": lambda p: p.plain(0.09, 0.09, 0.09),
+    "wood": _wood,
+    "cartons": _cartons,
+    "rack": lambda p: p.plain(0.05, 0.12, 0.35),
+    "brick": _brick,
+    "plaster": _plaster,
+    "checkerboard": _checkerboard,
+    "blue": lambda p: p.plain(0.06, 0.17, 0.42),
+    "yellow": lambda p: p.plain(0.70, 0.42, 0.04),
+    "door": _door,
+    "lamp": lambda p: p.plain(6.0, 6.0, 5.8),
+}
+
+
+def material_colour(material: Material, patch: Patch) -> np.ndarray:
+    """Return a solid's colours (n, 3)."""
+    return _MATERIALS[material](patch)

@@ -1,0 +1,81 @@
+"""Make the sample recording again, bit for bit: python -m calib_core.synthetic.sample sample_data."""
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+from calib_core.synthetic.files import write_recording
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.recording import simulate
+from calib_core.synthetic.rig import RigOptions
+
+__all__ = ["SAMPLE_NAME", "SAMPLE_OPTIONS", "main", "write_sample"]
+
+SAMPLE_NAME = "rooftop"
+SAMPLE_OPTIONS = SimulationOptions(
+    scene="rooftop",
+    radar="awr1843",
+    placements=20,
+    dwell_s=4.6,
+    width_px=960,
+    height_px=600,
+    camera_rate_hz=1.5,
+    radar_rate_hz=10.0,
+    jpeg_quality=70,
+    seed=2,
+    rig=RigOptions(camera_offset_m=(-0.02, 0.03, 0.11)),
+)
+
+_README = """\
+# The rooftop sample
+
+A simulated recording: a TI AWR1843 radar and a camera on one mast, and a person who puts a trihedral corner reflector
+down {placements} times on a rooftop. Nothing in it was recorded by a real sensor.
+
+| file | what |
+|---|---|
+| `radar.bag` | ROS 1, `/ti_mmwave/radar_scan`: one `ti_mmwave_rospkg/RadarScan` per return, {radar_rate:g} scans a second |
+| `camera.bag` | ROS 1, `/camera/image_raw/compressed` ({width} x {height}, {camera_rate:g} a second), `/camera/camera_info` |
+| `clicks.json` | example clicks: one per placement, {click_sigma:g} px of click noise |
+| `truth.json` | the true `camera_from_radar`, and where and when the reflector rested: for tests and benchmarks only |
+
+The reflector's position is its apex, the inner corner where the three sheets meet: that is its phase centre, and what
+to click. Made by `make sample` (`python -m calib_core.synthetic.sample sample_data`), the same bytes every time with
+the pinned packages.
+"""
+
+
+def write_sample(folder: Path) -> tuple[Path, ...]:
+    """Write the sample into a folder of its own below another, replacing what is there, and return its files.
+
+    Args:
+        folder: the parent, such as sample_data.
+    """
+    target = folder / SAMPLE_NAME
+    if target.exists():
+        shutil.rmtree(target)
+    write_recording(simulate(SAMPLE_OPTIONS), target)
+    text = _README.format(
+        placements=SAMPLE_OPTIONS.placements,
+        radar_rate=SAMPLE_OPTIONS.radar_rate_hz,
+        width=SAMPLE_OPTIONS.width_px,
+        height=SAMPLE_OPTIONS.height_px,
+        camera_rate=SAMPLE_OPTIONS.camera_rate_hz,
+        click_sigma=SAMPLE_OPTIONS.click_sigma_px,
+    )
+    (target / "README.md").write_text(text, encoding="utf-8")
+    return tuple(sorted(target.iterdir()))
+
+
+def main(arguments: list[str]) -> int:
+    """Write the sample where the command line says."""
+    parser = argparse.ArgumentParser(prog="calib_core.synthetic.sample", description="Make the sample recording again.")
+    parser.add_argument("folder", type=Path, help="the folder to write it below, such as sample_data")
+    for path in write_sample(parser.parse_args(arguments).folder):
+        print(f"{path}  {path.stat().st_size / 1e6:.2f} MB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,62 @@
+"""The two small files beside a simulated recording: truth.json for tests, clicks.json as an example."""
+
+import json
+from typing import Any
+
+from calib_core.camera import Camera
+from calib_core.measurements import TimeNs, time_parts
+from calib_core.synthetic.recording import SimulatedRecording
+
+__all__ = ["clicks_text", "truth_text"]
+
+
+def truth_text(recording: SimulatedRecording) -> str:
+    """Write down what is true about a recording (schema cocalib/truth-1). Nothing that estimates may read it."""
+    pose = recording.camera_from_radar
+    document = {
+        "schema": "cocalib/truth-1",
+        "camera_from_radar": {"rotation": pose.rotation.tolist(), "translation_m": pose.translation_m.tolist()},
+        "camera": _camera(recording.camera),
+        "radar_stamps_ahead_s": recording.stage.profile.latency_s + recording.options.clock_offset_s,
+        "seed": recording.options.seed,
+        "placements": [
+            {
+                "id": placement.id,
+                "start": _time(placement.start),
+                "end": _time(placement.end),
+                "position_radar_m": placement.position_radar_m.tolist(),
+                "pixel_px": placement.pixel_px.tolist(),
+                "best_image_time": _time(placement.best_image_time),
+            }
+            for placement in recording.placements
+        ],
+    }
+    return _text(document)
+
+
+def clicks_text(recording: SimulatedRecording) -> str:
+    """Write the example clicks (schema cocalib/clicks-1)."""
+    clicks = [
+        {"id": click.id, "image_time": _time(click.image_time), "pixel_px": [click.u_px, click.v_px]}
+        for click in recording.clicks
+    ]
+    return _text({"schema": "cocalib/clicks-1", "clicks": clicks})
+
+
+def _time(time: TimeNs) -> dict[str, int]:
+    sec, nanosec = time_parts(time)
+    return {"sec": sec, "nanosec": nanosec}
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    return {
+        "model": camera.model,
+        "width_px": camera.width_px,
+        "height_px": camera.height_px,
+        "matrix_px": camera.matrix_px.tolist(),
+        "distortion": camera.distortion.tolist(),
+    }
+
+
+def _text(document: dict[str, Any]) -> str:
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"
