@@ -4,6 +4,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# The same examples on every run, and no time limit on a single one: a busy machine is no failure.
+settings.register_profile("cocalib", deadline=None, derandomize=True)
+settings.load_profile("cocalib")
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -1,0 +1,106 @@
+"""The camera by example; its laws, with OpenCV as the second opinion, are in tests/properties."""
+
+import numpy as np
+import pytest
+
+from calib_core.camera import CAMERA_MODELS, Camera, CameraModel
+from calib_core.synthetic import typical_camera
+
+MATRIX_PX = np.array([[500.0, 0.0, 319.5], [0.0, 510.0, 239.5], [0.0, 0.0, 1.0]])
+
+
+def pinhole() -> Camera:
+    return Camera("pinhole", 640, 480, MATRIX_PX)
+
+
+def test_a_pinhole_projects_by_similar_triangles() -> None:
+    pixels = pinhole().project(np.array([[0.0, 0.0, 4.0], [1.0, -2.0, 5.0]]))
+    np.testing.assert_allclose(pixels, [[319.5, 239.5], [319.5 + 100.0, 239.5 - 204.0]])
+
+
+@pytest.mark.parametrize("model", ["pinhole", "plumb_bob", "rational_polynomial"])
+def test_points_behind_or_beside_the_camera_have_no_pixel(model: CameraModel) -> None:
+    pixels = typical_camera(model).project(np.array([[0.0, 0.0, -4.0], [1.0, 0.0, 0.0], [0.0, 0.0, 2.0]]))
+    assert np.isnan(pixels).all(axis=1).tolist() == [True, True, False]
+
+
+def test_a_fisheye_sees_beyond_ninety_degrees() -> None:
+    camera = Camera(
+        "equidistant", 2000, 2000, np.array([[500.0, 0.0, 999.5], [0.0, 500.0, 999.5], [0.0, 0.0, 1.0]]), np.zeros(4)
+    )
+    theta = np.deg2rad(100.0)
+    pixels = camera.project(np.array([[np.sin(theta), 0.0, np.cos(theta)]]))
+    np.testing.assert_allclose(pixels, [[999.5 + 500.0 * theta, 999.5]])
+
+
+@pytest.mark.parametrize("model", CAMERA_MODELS)
+def test_no_points_give_no_pixels(model: CameraModel) -> None:
+    camera = typical_camera(model)
+    pixels, jacobian = camera.project_with_jacobian(np.zeros((0, 3)))
+    assert pixels.shape == (0, 2)
+    assert jacobian.shape == (0, 2, 3)
+    assert camera.rays(np.zeros((0, 2))).shape == (0, 3)
+    assert camera.sees(np.zeros((0, 3))).shape == (0,)
+
+
+def test_skew_moves_columns_by_rows() -> None:
+    matrix = MATRIX_PX.copy()
+    matrix[0, 1] = 30.0
+    camera = Camera("pinhole", 640, 480, matrix)
+    pixels = camera.project(np.array([[0.0, 0.2, 1.0]]))
+    np.testing.assert_allclose(pixels, [[319.5 + 6.0, 239.5 + 102.0]])
+    np.testing.assert_allclose(np.cross(camera.rays(pixels)[0], [0.0, 0.2, 1.0]), 0.0, atol=1e-15)
+
+
+def test_the_image_ends_half_a_pixel_outside_the_outermost_centres() -> None:
+    pixels = np.array([[-0.5, -0.5], [639.5, 479.5], [-0.51, 10.0], [10.0, 479.51], [np.nan, 10.0]])
+    assert pinhole().in_image(pixels).tolist() == [True, True, False, False, False]
+    assert pinhole().in_image(pixels, margin_px=0.1).tolist() == [True, True, True, True, False]
+    assert pinhole().in_image(pixels, margin_px=-1.0).tolist() == [False] * 5
+
+
+@pytest.mark.parametrize("model", CAMERA_MODELS)
+def test_a_camera_sees_what_is_ahead_and_not_what_is_behind_or_aside(model: CameraModel) -> None:
+    points = np.array([[0.1, -0.1, 5.0], [0.0, 0.0, -5.0], [50.0, 0.0, 1.0]])
+    assert typical_camera(model).sees(points).tolist() == [True, False, False]
+
+
+def test_a_point_beyond_the_fold_of_the_distortion_is_not_seen_though_it_projects_into_the_image() -> None:
+    camera = Camera("plumb_bob", 640, 480, MATRIX_PX, np.array([-0.4, 0.0, 0.0, 0.0]))
+    beyond = np.array([[1.6, 0.0, 1.0]])  # r (1 - 0.4 r^2) has its summit at r = 0.91
+    assert camera.in_image(camera.project(beyond)).all()
+    assert not camera.sees(beyond).any()
+    assert camera.sees(np.array([[0.5, 0.0, 1.0]])).all()
+
+
+def test_a_pixel_outside_the_lens_has_no_ray() -> None:
+    camera = Camera("plumb_bob", 640, 480, MATRIX_PX, np.array([-0.4, 0.0, 0.0, 0.0]))
+    rays = camera.rays(np.array([[319.5 + 500.0 * 0.7, 239.5], [400.0, 239.5]]))  # the summit lies at 0.61
+    assert np.isnan(rays).all(axis=1).tolist() == [True, False]
+
+
+def test_half_the_picture_keeps_the_centres_of_pixels_in_place() -> None:
+    half = pinhole().scaled(0.5)
+    assert (half.width_px, half.height_px) == (320, 240)
+    # columns 0 and 1 of the full picture make column 0 of the half: 0.5 becomes 0
+    full_px = pinhole().project(np.array([[-0.638, 0.0, 1.0]]))
+    np.testing.assert_allclose(full_px, [[0.5, 239.5]])
+    np.testing.assert_allclose(half.project(np.array([[-0.638, 0.0, 1.0]])), [[0.0, 119.5]])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (("fisheye", 640, 480, MATRIX_PX, np.zeros(4)), "unknown camera model"),
+        (("plumb_bob", 640, 480, MATRIX_PX, np.zeros(3)), "4 or 5"),
+        (("equidistant", 640, 480, MATRIX_PX, np.zeros(5)), "takes 4"),
+        (("pinhole", 640, 480, MATRIX_PX, np.zeros(5)), "takes 0"),
+        (("pinhole", 0, 480, MATRIX_PX), "image size"),
+        (("pinhole", 640, 480, np.zeros((3, 3))), "not calibrated"),
+        (("pinhole", 640, 480, np.full((3, 3), np.nan)), "finite"),
+        (("pinhole", 640, 480, np.eye(4)), "3 x 3"),
+    ],
+)
+def test_what_is_no_camera_is_refused_with_a_reason(arguments: tuple[object, ...], reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        Camera(*arguments)  # type: ignore[arg-type]
