@@ -52,8 +52,8 @@ const readers = {
     emit("progress");
   },
   error(message) {
-    if (message.request === null || message.request === undefined) toast(message.message, message.hint);
-    frameFailed();
+    toast(message.message, message.hint);
+    frameFailed(message.request);
   },
 };
 

@@ -2,16 +2,16 @@
 /** Which frame is on the screen: stepping, playing, and the requests for frames (few on their way, the newest wins). */
 
 import { clicks, emit, select, state } from "./state.js";
-import { tell } from "./socket.js";
+import { requestNumber, tell } from "./socket.js";
 
 const KEPT = 12;
 /** Frames asked for and not here yet, while playing. */
 const CREDIT = 2;
 /** @type {Map<number, import("./state.js").Shown>} */
 const kept = new Map();
-let nextRequest = 1;
 let newest = 0;
-let coming = 0;
+/** Requests on their way; an answer to one is an answer to all before it. @type {number[]} */
+let coming = [];
 let startedAt = 0;
 let startedFrom = 0;
 let asked = -1;
@@ -55,7 +55,7 @@ function restart() {
   startedAt = performance.now();
   startedFrom = state.seconds[state.cursor];
   asked = state.cursor;
-  coming = 0;
+  coming = [];
 }
 
 /** Scrub while playing or not. @param {number} index */
@@ -68,7 +68,7 @@ function tick() {
   if (!state.playing) return;
   const time = startedFrom + (performance.now() - startedAt) / 1000;
   const due = indexAt(time);
-  if (due > asked && coming < CREDIT) {
+  if (due > asked && coming.length < CREDIT) {
     asked = due;
     const ready = kept.get(due);
     if (ready) show(ready);
@@ -98,14 +98,14 @@ export function nearestIndex(time) {
 
 /** @param {number} index */
 function request(index) {
-  newest = nextRequest++;
+  newest = requestNumber();
   const sent = tell({ type: "frame", index, request: newest, playing: state.playing, size: state.playing ? "half" : "full" });
-  if (sent) coming += 1;
+  if (sent) coming.push(newest);
 }
 
 /** Ask again after the line came back. */
 export function requestAgain() {
-  coming = 0;
+  coming = [];
   kept.clear();
   if (state.playing) restart();
   request(state.cursor);
@@ -114,7 +114,7 @@ export function requestAgain() {
 
 /** A frame arrived. @param {any} header @param {Uint8Array<ArrayBuffer>} data */
 export async function receiveFrame(header, data) {
-  coming = Math.max(0, coming - 1);
+  coming = coming.filter((request) => request > header.request);
   const stale = header.request < newest && !state.playing;
   if (stale) return;
   const blob = new Blob([data], { type: `image/${header.format}` });
@@ -125,9 +125,9 @@ export async function receiveFrame(header, data) {
   if (wanted) show(shown);
 }
 
-/** A frame could not be read. */
-export function frameFailed() {
-  coming = Math.max(0, coming - 1);
+/** A frame could not be read. @param {number|null} request */
+export function frameFailed(request) {
+  coming = coming.filter((number) => request === null || number > request);
 }
 
 /** @param {import("./state.js").Shown} shown */

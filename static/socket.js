@@ -24,14 +24,14 @@ export function connect(given) {
 }
 
 function open() {
-  const address = new URL("ws", location.href);
+  const address = new URL(`ws/${tab}`, location.href);
   address.protocol = address.protocol.replace("http", "ws");
   socket = new WebSocket(address);
   socket.binaryType = "arraybuffer";
   socket.onopen = () => {
     delay = 250;
     opened = true;
-    socket?.send(JSON.stringify({ type: "hello", tab }));
+    socket?.send(JSON.stringify({ type: "hello" }));
     for (const [request, { message }] of waiting) socket?.send(JSON.stringify({ ...message, request }));
     reader.connection(true);
   };
@@ -54,11 +54,9 @@ function lost() {
 /** @param {any} message */
 function receive(message) {
   const request = waiting.get(message.request);
-  if (request && (message.type === "done" || message.type === "error")) {
-    waiting.delete(message.request);
-    request.resolve(message.type === "done" ? null : message.message);
-  }
-  if (message.type !== "done") reader.message(message);
+  if (!request || (message.type !== "done" && message.type !== "error")) return reader.message(message);
+  waiting.delete(message.request);
+  request.resolve(message.type === "done" ? null : message.message);
 }
 
 /** @param {ArrayBuffer} buffer */
@@ -95,6 +93,9 @@ export function tell(message) {
   socket.send(JSON.stringify(message));
   return true;
 }
+
+/** A number for a request that is answered by other means. */
+export const requestNumber = () => nextRequest++;
 
 /** How many events the server has not confirmed. */
 export const unconfirmed = () => waiting.size;

@@ -1,0 +1,45 @@
+"""What waits to be sent to one page: a newer message of a kind takes the place of the older, so a slow page never piles up."""
+
+import asyncio
+from collections import OrderedDict
+from collections.abc import Awaitable, Callable, Hashable
+
+__all__ = ["Outbox"]
+
+_MOST = 2000
+"""A page that leaves this many answers unread is not there any more."""
+
+
+class Outbox:
+    """Messages to one page, in order. Lives on one event loop."""
+
+    def __init__(self) -> None:
+        self._waiting: OrderedDict[Hashable, str | bytes] = OrderedDict()
+        self._something = asyncio.Event()
+        self._number = 0
+
+    def put(self, message: str | bytes, *, kind: str | None = None) -> None:
+        """Send this next. A message with a kind replaces the one of that kind that still waits; others are all sent."""
+        self._number += 1
+        key: Hashable = kind if kind is not None else self._number
+        self._waiting.pop(key, None)
+        self._waiting[key] = message
+        self._something.set()
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    async def deliver(self, send: Callable[[str | bytes], Awaitable[None]]) -> None:
+        """Hand over one message after the other for ever.
+
+        Raises:
+            BufferError: the page has left too many unread.
+        """
+        while True:
+            await self._something.wait()
+            while self._waiting:
+                if len(self._waiting) > _MOST:
+                    raise BufferError(f"the page has left {len(self._waiting)} messages unread")
+                _, message = self._waiting.popitem(last=False)
+                await send(message)
+            self._something.clear()

@@ -1,0 +1,102 @@
+"""What the radar saw at a frame, and what of it the calibrated camera should see."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from app.session import Session
+from app.web.messages import Overlay, OverlayReturn
+from calib_core.arrays import Flags, Points3
+from calib_core.gating import static_returns
+from calib_core.measurements import RadarScan, RadarScans, TimeNs
+from calib_core.options import CalibrationOptions, GatingOptions
+from calib_core.placements import Placement
+from calib_core.results import Calibration
+
+__all__ = ["RadarSight", "Scans", "overlay_of", "still_returns"]
+
+_NEAREST_WITHIN_S = 0.3
+
+
+class Scans(Protocol):
+    """The part of a Recording that holds radar scans."""
+
+    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class RadarSight:
+    """Reads the radar around single moments."""
+
+    recording: Scans
+
+    def scan_at(self, time: TimeNs) -> RadarScan | None:
+        """Return the scan nearest to a moment, rows without a position dropped; None when none is near."""
+        scans = self.recording.radar_scans_around([time], _NEAREST_WITHIN_S)
+        return _finite(scans.scan(scans.nearest(time))) if len(scans) else None
+
+    def window(self, time: TimeNs, options: CalibrationOptions) -> Points3:
+        """Return the still returns (n, 3) [m] of the window around a click."""
+        scans = self.recording.radar_scans_around([time], options.locating.window_s / 2)
+        return static_returns(scans, options.gating).points_radar_m
+
+
+def still_returns(scan: RadarScan, options: GatingOptions) -> Flags:
+    """Tell which returns are slow enough to be the reflector; a radar without Doppler calls all of them still."""
+    return ~(np.abs(scan.doppler_mps) > options.max_speed_mps)
+
+
+def overlay_of(index: int, session: Session, scan: RadarScan | None, placements: Sequence[Placement]) -> Overlay:
+    """Carry the returns of a scan, and the placements of the moment, into a frame.
+
+    Args:
+        index: of the frame.
+        session: its newest calibration is used.
+        scan: the nearest one; None when there is none.
+        placements: those that the frame lies in.
+    """
+    calibration = session.outcome
+    if not isinstance(calibration, Calibration):
+        return Overlay(index, session.revision, None, ())
+    returns = () if scan is None else _returns(calibration, scan, session.options.gating)
+    return Overlay(index, session.revision, returns, _guesses(calibration, placements))
+
+
+def _returns(calibration: Calibration, scan: RadarScan, options: GatingOptions) -> tuple[OverlayReturn, ...]:
+    points_camera = calibration.camera_from_radar @ scan.points_radar_m
+    seen = calibration.camera.sees(points_camera)
+    pixels = calibration.camera.project(points_camera[seen])
+    ranges = np.linalg.norm(scan.points_radar_m[seen], axis=1)
+    columns = (pixels, ranges, scan.doppler_mps[seen], scan.snr_db[seen], still_returns(scan, options)[seen])
+    return tuple(
+        OverlayReturn(
+            u_px=round(float(pixel[0]), 2),
+            v_px=round(float(pixel[1]), 2),
+            range_m=round(float(range_m), 3),
+            doppler_mps=_number(doppler),
+            snr_db=_number(snr),
+            static=bool(still),
+        )
+        for pixel, range_m, doppler, snr, still in zip(*columns, strict=True)
+    )
+
+
+def _guesses(calibration: Calibration, placements: Sequence[Placement]) -> tuple[tuple[float, float], ...]:
+    if not placements:
+        return ()
+    points_camera = calibration.camera_from_radar @ np.stack([placement.position_radar_m for placement in placements])
+    pixels = calibration.camera.project(points_camera)
+    return tuple((float(u), float(v)) for u, v in pixels[calibration.camera.in_image(pixels)])
+
+
+def _number(value: float) -> float | None:
+    return None if np.isnan(value) else round(float(value), 3)
+
+
+def _finite(scan: RadarScan) -> RadarScan:
+    kept = np.all(np.isfinite(scan.points_radar_m), axis=1)
+    return RadarScan(
+        scan.time, scan.points_radar_m[kept], scan.doppler_mps[kept], scan.snr_db[kept], scan.sigma_polar[kept]
+    )

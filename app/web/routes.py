@@ -1,0 +1,184 @@
+"""What the port answers to GET: the page's files, downloads, and viser's own page; nothing else exists."""
+
+import asyncio
+import gzip
+import http
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Protocol
+
+import msgspec
+
+from app.solving import RecordingSource, calibration_text
+from app.web.survey import Survey
+from app.workspace import Workspace
+from calib_core.errors import CalibrationError
+from calib_core.interchange import FORMATS, export, read_calibration
+from calib_core.measurements import Unsolvable
+from calib_core.results import Calibration
+
+__all__ = ["Reply", "Routes", "refusal"]
+
+_TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".json": "application/json",
+}
+_ALWAYS = (
+    ("X-Content-Type-Options", "nosniff"),
+    ("X-Frame-Options", "SAMEORIGIN"),
+    ("Referrer-Policy", "no-referrer"),
+    ("Cross-Origin-Resource-Policy", "same-origin"),
+    ("Cross-Origin-Opener-Policy", "same-origin"),
+    ("Cache-Control", "no-cache"),
+)
+_OWN_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+    "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+_VISER_POLICY = (
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; worker-src blob: data: 'self'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'self'"
+)
+_VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
+_VISER_STYLE = b"""<style>
+.mantine-Notifications-root, .mantine-Paper-root, [data-portal], [data-dock-root] > :not(:first-child) {
+  display: none !important;
+}
+html, body, #root, #root div { background-color: transparent !important; }
+html { background: #0d1014 !important; }
+html[data-theme="light"] { background: #e9ecf0 !important; }
+</style>
+</head>"""
+
+
+class Surveyor(Protocol):
+    """Who knows the survey of the radar, once it is made."""
+
+    @property
+    def survey(self) -> Survey | None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """An HTTP answer.
+
+    Attributes:
+        status: such as 200.
+        headers: all of them but the length.
+        body: the content.
+    """
+
+    status: http.HTTPStatus
+    headers: tuple[tuple[str, str], ...]
+    body: bytes
+
+
+def _reply(
+    body: bytes,
+    content_type: str,
+    *,
+    status: int = 200,
+    policy: str = _OWN_POLICY,
+    more: tuple[tuple[str, str], ...] = (),
+) -> Reply:
+    headers = (("Content-Type", content_type), *_ALWAYS, ("Content-Security-Policy", policy), *more)
+    return Reply(http.HTTPStatus(status), headers, body)
+
+
+def refusal(status: int, reason: str) -> Reply:
+    """Refuse in plain text."""
+    return _reply(f"{reason}\n".encode(), "text/plain; charset=utf-8", status=status)
+
+
+class Routes:
+    """Answers by path; every path that is served is known by name."""
+
+    def __init__(self, static: Path, workspace: Workspace, recording: RecordingSource, hub: Surveyor) -> None:
+        self._files = {f"/{path.name}": path for path in static.iterdir() if path.suffix in _TYPES and path.is_file()}
+        self._files["/"] = self._files["/index.html"]
+        self._workspace = workspace
+        self._recording = recording
+        self._hub = hub
+        self._made: dict[str, Callable[[], Reply]] = {
+            "/api/calibration.json": self._calibration,
+            "/api/clicks.json": self._clicks,
+            "/api/formats.json": _formats,
+            "/api/activity.json": self._activity,
+            **{f"/api/export/{form.name}": lambda name=form.name: self._export(name) for form in FORMATS},  # type: ignore[misc]
+        }
+
+    async def answer(self, path: str) -> Reply:
+        """Answer a GET; files and exports are made off the event loop.
+
+        Args:
+            path: as sent, without the query.
+        """
+        make = self._made.get(path)
+        if path in self._files:
+            make = lambda: _file(self._files[path])  # noqa: E731
+        elif _VISER_PAGE.fullmatch(path):
+            make = _viser_page
+        if make is None:
+            return refusal(404, "There is nothing here.")
+        return await asyncio.get_running_loop().run_in_executor(None, make)
+
+    def _calibration(self) -> Reply:
+        outcome = self._workspace.session.outcome
+        if not isinstance(outcome, Calibration):
+            return refusal(409, _why_none(outcome))
+        return _download(calibration_text(outcome, self._recording).encode(), "calibration.json")
+
+    def _export(self, name: str) -> Reply:
+        outcome = self._workspace.session.outcome
+        if not isinstance(outcome, Calibration):
+            return refusal(409, _why_none(outcome))
+        try:
+            exported = export(read_calibration(calibration_text(outcome, self._recording), "the calibration"), name)
+        except CalibrationError as error:
+            return refusal(409, str(error))
+        return _download(exported.data, exported.file_name)
+
+    def _clicks(self) -> Reply:
+        return _download(self._workspace.clicks_text().encode(), "clicks.json")
+
+    def _activity(self) -> Reply:
+        survey = self._hub.survey
+        if survey is None:
+            return refusal(409, "The radar is still being read.")
+        return _reply(msgspec.json.encode(survey.activity), _TYPES[".json"])
+
+
+def _file(path: Path) -> Reply:
+    return _reply(path.read_bytes(), _TYPES[path.suffix])
+
+
+def _download(data: bytes, name: str) -> Reply:
+    kind = _TYPES.get(Path(name).suffix, "application/octet-stream")
+    return _reply(data, kind, more=(("Content-Disposition", f'attachment; filename="{name}"'),))
+
+
+def _formats() -> Reply:
+    rows = [{"key": form.name, "label": form.title, "hint": form.file_name} for form in FORMATS if form.name != "json"]
+    return _reply(msgspec.json.encode(rows), _TYPES[".json"])
+
+
+@cache
+def _viser_page() -> Reply:
+    """Return viser's own client, its panels hidden: our page has them."""
+    import viser
+
+    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
+    body = gzip.compress(page.replace(b"</head>", _VISER_STYLE, 1), mtime=0)
+    return _reply(body, _TYPES[".html"], policy=_VISER_POLICY, more=(("Content-Encoding", "gzip"),))
+
+
+def _why_none(outcome: Unsolvable | None) -> str:
+    if outcome is None:
+        return "There is no calibration yet: click the reflector in at least four placements."
+    return f"{outcome.reason} {outcome.hint}"

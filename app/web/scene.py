@@ -1,0 +1,248 @@
+"""The 3D view of one tab, in viser: radar axes, the scan of the frame, chosen returns, and the camera with its live picture."""
+
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from app.session import Session
+from app.view import View
+from app.web.frames import Frame
+from app.web.radar_sight import still_returns
+from app.web.scene_shapes import (
+    MOVING,
+    STILL,
+    Lines,
+    coloured,
+    ellipsoids,
+    nominal_camera_from_radar,
+    range_rings,
+    rays_to,
+    residual_colours,
+    vertical_field_of_view_rad,
+)
+from calib_core.arrays import Points3
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+from calib_core.measurements import RadarScan
+from calib_core.results import Calibration, PairResult
+
+if TYPE_CHECKING:
+    import viser
+
+__all__ = ["LOOK_AT", "STAND_AT", "Sight", "TabScene"]
+
+STAND_AT, LOOK_AT = (-5.5, 0.0, 3.0), (6.0, 0.0, 0.0)
+"""Where the 3D view's camera begins: behind and above the radar, looking forward."""
+
+_VIEWPOINTS = {
+    "behind": (STAND_AT, LOOK_AT),
+    "above": ((6.0, 0.0, 19.0), (6.01, 0.0, 0.0)),
+    "side": ((6.0, -13.0, 3.5), (6.0, 0.0, 0.5)),
+}
+_RINGS_EVERY_M, _RINGS_UP_TO_M = 5.0, 30.0
+_LIT, _DIM = (87, 182, 242), (92, 103, 115)
+_NOWHERE = np.zeros((1, 3))
+_NO_LINE = np.zeros((1, 2, 3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """Everything that one 3D view shows at one moment.
+
+    Attributes:
+        session: with the newest answer.
+        view: of the same session.
+        selected: id of the selected click; None without one.
+        scan: of the frame; None when there is none.
+        window: (n, 3) still returns around the selected click [m].
+        picture: a thumbnail of the frame; None when it cannot be read.
+        camera: the recording's intrinsics, for the time before a calibration.
+    """
+
+    session: Session
+    view: View
+    selected: str | None
+    scan: RadarScan | None
+    window: Points3
+    picture: Frame | None
+    camera: Camera | None
+
+
+class TabScene:
+    """The nodes of one tab's 3D view. Properties are assigned, nodes are never added twice. Any one thread at a time."""
+
+    def __init__(self, client: "viser.ClientHandle") -> None:
+        self._client = client
+        self._lock = threading.Lock()
+        self._pictured: int | None = None
+        self._posed: object = self
+        self._radar_from_camera = nominal_camera_from_radar().inverse()
+        scene = client.scene
+        scene.add_frame("/radar", axes_length=0.6, axes_radius=0.018, origin_radius=0.03)
+        scene.add_label("/radar/name", "radar", position=(0.0, 0.0, -0.12), anchor="top-center", font_screen_scale=0.8)
+        self._add_ground(scene)
+        self._scan = _cloud(scene, "/scan", 0.11)
+        self._window = _cloud(scene, "/window", 0.06)
+        self._chosen = _cloud(scene, "/chosen", 0.22)
+        self._rays = _lines(scene, "/rays", 1.0)
+        self._ray = _lines(scene, "/ray", 2.5)
+        self._ellipsoids = _lines(scene, "/ellipsoids", 1.0)
+        self._name = scene.add_label("/selected", "", visible=False, anchor="bottom-left", font_screen_scale=0.9)
+        self._frustum = scene.add_camera_frustum(
+            "/camera",
+            fov=0.9,
+            aspect=16 / 9,
+            scale=0.9,
+            thickness=1.5,
+            thickness_units="screen",
+            color=_DIM,
+            format="jpeg",
+        )
+        self._camera_name = scene.add_label(
+            "/camera/name", "camera (not yet calibrated)", anchor="bottom-center", font_screen_scale=0.8
+        )
+
+    def _add_ground(self, scene: "viser.SceneApi") -> None:
+        rings = coloured(range_rings(every_m=_RINGS_EVERY_M, up_to_m=_RINGS_UP_TO_M), (62, 74, 88))
+        self._grid = scene.add_grid(
+            "/ground", width=60.0, height=60.0, position=(15.0, 0.0, 0.0), cell_size=1.0, section_size=5.0,
+            cell_color=(38, 46, 55), section_color=(50, 60, 71), cell_thickness=0.6, section_thickness=0.8,
+            shadow_opacity=0.0, fade_distance=45.0,
+        )  # fmt: skip
+        scene.add_line_segments("/ground/rings", rings.points, rings.colours, thickness=1.0, thickness_units="screen",
+                                position=(-15.0, 0.0, 0.0))  # fmt: skip
+        for range_m in (5.0, 10.0, 20.0, 30.0):
+            scene.add_label(f"/ground/{range_m:.0f}", f"{range_m:.0f} m", position=(range_m - 15.0, 0.0, 0.0),
+                            anchor="center-center", font_screen_scale=0.7)  # fmt: skip
+
+    def show(self, sight: Sight) -> None:
+        """Show this."""
+        with self._lock, self._client.atomic():
+            self._show_scan(sight)
+            self._show_pose(sight)
+            self._show_pairs(sight)
+            self._show_picture(sight)
+        self._client.flush()
+
+    def look_from(self, viewpoint: str) -> None:
+        """Move the view's own camera: "behind", "above", "side" or "camera"."""
+        camera = self._client.camera
+        with self._client.atomic():
+            if viewpoint == "camera":
+                rotation, position = self._radar_from_camera.rotation, self._radar_from_camera.translation_m
+                camera.up_direction = tuple(-rotation[:, 1])
+                camera.position = tuple(position - 0.02 * rotation[:, 2])
+                camera.look_at = tuple(position + 8.0 * rotation[:, 2])
+                return
+            stand, target = _VIEWPOINTS[viewpoint]
+            camera.up_direction = (1.0, 0.0, 0.0) if viewpoint == "above" else (0.0, 0.0, 1.0)
+            camera.position, camera.look_at = stand, target
+
+    def _show_scan(self, sight: Sight) -> None:
+        if sight.scan is None:
+            self._scan.visible = False
+            return
+        still = still_returns(sight.scan, sight.session.options.gating)
+        colours = np.where(still[:, None], np.array(STILL), np.array(MOVING)).astype(np.uint8)
+        _fill_cloud(self._scan, sight.scan.points_radar_m, colours)
+        _fill_cloud(
+            self._window, sight.window, np.tile(np.array([[222, 232, 240]], dtype=np.uint8), (len(sight.window), 1))
+        )
+
+    def _show_pose(self, sight: Sight) -> None:
+        """Move the frustum, and the ground below the lowest chosen return; nothing moves while the answer stays."""
+        outcome = sight.session.outcome
+        if outcome is self._posed:
+            return
+        self._posed = outcome
+        calibration = outcome if isinstance(outcome, Calibration) else None
+        camera = calibration.camera if calibration else sight.camera
+        camera_from_radar = calibration.camera_from_radar if calibration else nominal_camera_from_radar()
+        self._radar_from_camera = camera_from_radar.inverse()
+        _place(self._frustum, self._radar_from_camera)
+        self._frustum.color = _LIT if calibration else _DIM
+        self._camera_name.text = "camera" if calibration else "camera (not yet calibrated)"
+        if camera is not None:
+            self._frustum.fov = vertical_field_of_view_rad(camera)
+            self._frustum.aspect = camera.width_px / camera.height_px
+        heights = [float(pair.point_radar_m[2]) for pair in calibration.pairs if pair.inlier] if calibration else []
+        self._grid.position = (15.0, 0.0, min([0.0, *heights]))
+
+    def _show_pairs(self, sight: Sight) -> None:
+        calibration = sight.session.outcome
+        if not isinstance(calibration, Calibration):
+            for node in (self._chosen, self._rays, self._ray, self._ellipsoids, self._name):
+                node.visible = False
+            return
+        pairs = calibration.pairs
+        points = np.array([pair.point_radar_m for pair in pairs]).reshape(-1, 3)
+        residuals = np.array([pair.distance_px for pair in pairs])
+        _fill_cloud(self._chosen, points, residual_colours(residuals, sight.view.residual_limit_px or 20.0))
+        used = tuple(pair for pair in pairs if pair.inlier and pair.id != sight.selected)
+        _fill_lines(self._rays, coloured(rays_to(calibration, used), (58, 84, 104)))
+        self._show_selected(sight, calibration)
+
+    def _show_selected(self, sight: Sight, calibration: Calibration) -> None:
+        chosen = tuple(pair for pair in calibration.pairs if pair.id == sight.selected)
+        _fill_lines(self._ray, _ray_and_gap(calibration, chosen))
+        shown = chosen or tuple(pair for pair in calibration.pairs if pair.inlier)
+        points = np.array([pair.point_radar_m for pair in shown]).reshape(-1, 3)
+        colour = (255, 180, 84) if chosen else (70, 86, 102)
+        shells = ellipsoids(points, calibration.options.noise, calibration.noise_scale)
+        _fill_lines(self._ellipsoids, coloured(shells, colour))
+        self._name.visible = bool(chosen)
+        if chosen:
+            self._name.position = tuple(chosen[0].point_radar_m + np.array([0.0, 0.0, 0.15]))
+            self._name.text = (
+                f"{chosen[0].id}: {np.linalg.norm(chosen[0].point_radar_m):.2f} m, {chosen[0].distance_px:.1f} px"
+            )
+
+    def _show_picture(self, sight: Sight) -> None:
+        picture = sight.picture
+        if picture is None or picture.index == self._pictured:
+            return
+        self._pictured = picture.index
+        self._frustum._format = "jpeg"
+        self._frustum._image_data = picture.data  # the compressed bytes as they are; the public property encodes again
+
+
+def _ray_and_gap(calibration: Calibration, pairs: tuple[PairResult, ...]) -> Lines:
+    """Return the click's ray of the selected pair, and from its end to the return."""
+    rays = rays_to(calibration, pairs)
+    if not len(rays):
+        return coloured(np.zeros((0, 2, 3)), _LIT)
+    gap = np.stack([rays[0, 1], pairs[0].point_radar_m])[None]
+    line, residual = coloured(rays[:1], (255, 255, 255)), coloured(gap, (255, 180, 84))
+    return Lines(np.concatenate([line.points, residual.points]), np.concatenate([line.colours, residual.colours]))
+
+
+def _cloud(scene: "viser.SceneApi", name: str, size_m: float) -> Any:
+    return scene.add_point_cloud(
+        name, _NOWHERE, (255, 255, 255), point_size=size_m, point_shape="circle", precision="float32", visible=False
+    )
+
+
+def _lines(scene: "viser.SceneApi", name: str, thickness_px: float) -> Any:
+    return scene.add_line_segments(
+        name, _NO_LINE, (255, 255, 255), thickness=thickness_px, thickness_units="screen", visible=False
+    )
+
+
+def _fill_cloud(node: Any, points: Points3, colours: np.ndarray) -> None:
+    """Assign points and colours; viser has no empty cloud, so an empty one is hidden."""
+    node.visible = len(points) > 0
+    if len(points):
+        node.points, node.colors = points, colours
+
+
+def _fill_lines(node: Any, lines: Lines) -> None:
+    node.visible = len(lines.points) > 0
+    if len(lines.points):
+        node.points, node.colors = lines.points, lines.colours
+
+
+def _place(node: Any, target_from_node: RigidTransform) -> None:
+    node.wxyz = quaternion_wxyz_from_matrix(target_from_node.rotation)
+    node.position = target_from_node.translation_m

@@ -1,0 +1,121 @@
+"""Shapes of the 3D view as arrays: rings, rays, ellipsoids, colours. All in the radar frame, all pure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Points3, Values
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
+from calib_core.options import NoiseOptions
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
+from calib_core.results import Calibration, PairResult
+
+__all__ = [
+    "MOVING",
+    "STILL",
+    "Lines",
+    "coloured",
+    "ellipsoids",
+    "nominal_camera_from_radar",
+    "range_rings",
+    "rays_to",
+    "residual_colours",
+    "vertical_field_of_view_rad",
+]
+
+STILL, MOVING, GREY = (108, 199, 255), (255, 157, 92), (120, 132, 145)
+_RAMP_AT = np.array([0.0, 0.35, 0.6, 0.8, 1.0])
+_RAMP = np.array([[74, 170, 235], [143, 200, 226], [236, 214, 150], [240, 158, 66], [226, 82, 44]], dtype=np.float64)
+_CHI2_95_3D = 7.814727903251178  # 95 % quantile of chi-squared with 3 degrees of freedom
+_CIRCLE = 28
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lines:
+    """Line segments with a colour each.
+
+    Attributes:
+        points: (n, 2, 3) [m].
+        colours: (n, 2, 3) of 0 to 255.
+    """
+
+    points: np.ndarray
+    colours: np.ndarray
+
+
+def coloured(points: np.ndarray, colour: tuple[int, int, int]) -> Lines:
+    """Give every segment (n, 2, 3) the same colour."""
+    return Lines(points, np.broadcast_to(np.array(colour, dtype=np.uint8), points.shape).copy())
+
+
+def residual_colours(residuals_px: Values, limit_px: float) -> np.ndarray:
+    """Return (n, 3) colours of residuals: blue for small ones, sand at the limit's neighbourhood, red for large; NaN grey."""
+    share = np.clip(residuals_px / max(limit_px, 1e-9), 0.0, 1.0)
+    colours = np.stack([np.interp(share, _RAMP_AT, channel) for channel in _RAMP.T], axis=1)
+    colours[np.isnan(residuals_px)] = GREY
+    return np.rint(colours).astype(np.uint8)
+
+
+def range_rings(*, every_m: float, up_to_m: float, half_angle_rad: float = np.deg2rad(70.0)) -> np.ndarray:
+    """Return arcs of equal range around the radar, forward side: segments (n, 2, 3)."""
+    azimuths = np.linspace(-half_angle_rad, half_angle_rad, 49)
+    arcs = []
+    for range_m in np.arange(every_m, up_to_m + 1e-9, every_m):
+        polar = np.stack([np.full_like(azimuths, range_m), azimuths, np.zeros_like(azimuths)], axis=1)
+        arc = cartesian_from_polar(polar)
+        arcs.append(np.stack([arc[:-1], arc[1:]], axis=1))
+    return np.concatenate(arcs)
+
+
+def rays_to(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:
+    """Return, for each pair, the click's ray from the camera to the depth of the return: segments (n, 2, 3).
+
+    The gap between a ray's end and the return is the residual, in space.
+    """
+    radar_from_camera = calibration.camera_from_radar.inverse()
+    pixels = np.array([pair.pixel_px for pair in pairs]).reshape(-1, 2)
+    points = np.array([pair.point_radar_m for pair in pairs]).reshape(-1, 3)
+    distance_m = np.linalg.norm(calibration.camera_from_radar @ points, axis=1)
+    ends = radar_from_camera @ (calibration.camera.rays(pixels) * distance_m[:, None])
+    starts = np.broadcast_to(radar_from_camera.translation_m, ends.shape)
+    segments = np.stack([starts, ends], axis=1)
+    return segments[np.all(np.isfinite(segments), axis=(1, 2))]
+
+
+def ellipsoids(
+    points_radar_m: Points3, noise: NoiseOptions, noise_scale: tuple[float, float, float, float]
+) -> np.ndarray:
+    """Return three great circles of each point's 95 % ellipsoid by the noise model: segments (n, 2, 3).
+
+    Args:
+        points_radar_m: (m, 3).
+        noise: standard deviations assumed of range, azimuth and elevation.
+        noise_scale: estimated over assumed standard deviation of (click, range, azimuth, elevation).
+    """
+    sigma = np.array(
+        [noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), np.deg2rad(noise.sigma_elevation_deg)]
+    ) * np.array(noise_scale[1:])
+    covariances = covariance_from_sigma_polar(points_radar_m, np.broadcast_to(sigma, points_radar_m.shape))
+    squares, axes = np.linalg.eigh(covariances)
+    half_axes = axes * np.sqrt(np.maximum(squares, 0.0) * _CHI2_95_3D)[:, None, :]
+    angles = np.linspace(0.0, 2.0 * np.pi, _CIRCLE + 1)
+    segments = []
+    for first, second in ((0, 1), (0, 2), (1, 2)):
+        circle = (
+            points_radar_m[:, None, :]
+            + np.cos(angles)[None, :, None] * half_axes[:, None, :, first]
+            + np.sin(angles)[None, :, None] * half_axes[:, None, :, second]
+        )
+        segments.append(np.stack([circle[:, :-1], circle[:, 1:]], axis=2).reshape(-1, 2, 3))
+    return np.concatenate(segments)
+
+
+def nominal_camera_from_radar() -> RigidTransform:
+    """Return the pose of a camera at the radar's place that looks along its x axis: where to begin without a calibration."""
+    return RigidTransform(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]), np.zeros(3))
+
+
+def vertical_field_of_view_rad(camera: Camera) -> float:
+    """Return the angle that the picture's height spans, lens distortion left aside."""
+    return 2.0 * float(np.arctan2(camera.height_px / 2.0, camera.matrix_px[1, 1]))
