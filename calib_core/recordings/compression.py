@@ -1,0 +1,98 @@
+"""Unpack the chunks of a recording, never to more than they declare."""
+
+import bz2
+import sys
+from typing import Protocol
+
+from calib_core.errors import RecordingError
+
+__all__ = ["MAX_CHUNK_BYTES", "unpack", "unpack_message"]
+
+MAX_CHUNK_BYTES = 1 << 30
+"""Recorders write chunks of about 1 MB; one that declares more than 1 GiB is damaged or made to harm."""
+
+
+class _Unpacker(Protocol):
+    def decompress(self, data: bytes, max_length: int = -1) -> bytes: ...
+
+    @property
+    def eof(self) -> bool: ...
+
+    @property
+    def unused_data(self) -> bytes | None: ...
+
+
+def unpack(data: bytes, kind: str, size: int, *, where: str) -> bytes:
+    """Decompress one chunk.
+
+    Args:
+        data: the compressed bytes.
+        kind: "none", "", "bz2", "lz4" or "zstd".
+        size: how many bytes it declares to hold.
+        where: the file and place, for the error.
+
+    Raises:
+        RecordingError: an unknown compression, damaged bytes, another size than declared, or more than 1 GiB.
+    """
+    if size > MAX_CHUNK_BYTES:
+        raise RecordingError(f"{where}: a chunk declares {size / 2**30:.1f} GiB; over 1 GiB is refused as damaged")
+    if kind in ("", "none"):
+        return data
+    parts: list[bytes] = []
+    left = size
+    while data and left > 0:
+        unpacker = _unpacker(kind, where)
+        try:
+            part = unpacker.decompress(data, max_length=left)
+        except (OSError, RuntimeError, ValueError, EOFError, _zstd_error()) as error:
+            raise RecordingError(f"{where}: a {kind} chunk is damaged ({error}); copy the file again") from error
+        parts.append(part)
+        left -= len(part)
+        data = (unpacker.unused_data or b"") if unpacker.eof else b""
+    if left:
+        raise RecordingError(
+            f"{where}: a {kind} chunk holds {size - left} bytes, but declares {size}; the file is damaged: copy it again"
+        )
+    return parts[0] if len(parts) == 1 else b"".join(parts)
+
+
+def unpack_message(data: bytes, *, where: str) -> bytes:
+    """Decompress one Zstandard frame that may not declare its size; refuse more than 1 GiB.
+
+    Raises:
+        RecordingError: damaged, or too large.
+    """
+    unpacker = _unpacker("zstd", where)
+    try:
+        message = unpacker.decompress(data, max_length=MAX_CHUNK_BYTES)
+    except _zstd_error() as error:
+        raise RecordingError(f"{where}: a zstd message is damaged ({error}); copy the file again") from error
+    if not unpacker.eof:
+        raise RecordingError(f"{where}: a zstd message is cut short or over 1 GiB; copy the file again")
+    return message
+
+
+def _unpacker(kind: str, where: str) -> _Unpacker:
+    if kind == "bz2":
+        return bz2.BZ2Decompressor()
+    if kind == "lz4":
+        from lz4.frame import LZ4FrameDecompressor
+
+        unpacker: _Unpacker = LZ4FrameDecompressor()
+        return unpacker
+    if kind == "zstd":
+        if sys.version_info >= (3, 14):
+            from compression.zstd import ZstdDecompressor
+        else:
+            from backports.zstd import ZstdDecompressor
+
+        return ZstdDecompressor()
+    raise RecordingError(f"{where}: compression '{kind}' is unknown; none, bz2, lz4 and zstd can be read")
+
+
+def _zstd_error() -> type[Exception]:
+    if sys.version_info >= (3, 14):
+        from compression.zstd import ZstdError
+    else:
+        from backports.zstd import ZstdError
+    return ZstdError

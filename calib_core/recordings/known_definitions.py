@@ -1,0 +1,45 @@
+"""Definitions of standard messages, for recordings that carry none (ROS 2 before Iron wrote SQLite bags without).
+
+The field lists are those of ROS 2; only types whose layout has not changed since Foxy are here.
+"""
+
+from collections.abc import Mapping
+
+__all__ = ["KNOWN_DEFINITIONS"]
+
+_POINT = "float64 x\nfloat64 y\nfloat64 z\n"
+_SEPARATOR = "================\n"
+
+KNOWN_DEFINITIONS: Mapping[str, str] = {
+    "sensor_msgs/Image": (
+        "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n"
+    ),
+    "sensor_msgs/CompressedImage": "std_msgs/Header header\nstring format\nuint8[] data\n",
+    "sensor_msgs/CameraInfo": (
+        "std_msgs/Header header\nuint32 height\nuint32 width\nstring distortion_model\nfloat64[] d\nfloat64[9] k\n"
+        "float64[9] r\nfloat64[12] p\nuint32 binning_x\nuint32 binning_y\nRegionOfInterest roi\n"
+        f"{_SEPARATOR}MSG: sensor_msgs/RegionOfInterest\n"
+        "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n"
+    ),
+    "sensor_msgs/PointCloud2": (
+        "std_msgs/Header header\nuint32 height\nuint32 width\nPointField[] fields\nbool is_bigendian\nuint32 point_step\n"
+        "uint32 row_step\nuint8[] data\nbool is_dense\n"
+        f"{_SEPARATOR}MSG: sensor_msgs/PointField\nstring name\nuint32 offset\nuint8 datatype\nuint32 count\n"
+    ),
+    "radar_msgs/RadarScan": (
+        "std_msgs/Header header\nRadarReturn[] returns\n"
+        f"{_SEPARATOR}MSG: radar_msgs/RadarReturn\n"
+        "float32 range\nfloat32 azimuth\nfloat32 elevation\nfloat32 doppler_velocity\nfloat32 amplitude\n"
+    ),
+    "radar_msgs/RadarTracks": (
+        "std_msgs/Header header\nRadarTrack[] tracks\n"
+        f"{_SEPARATOR}MSG: radar_msgs/RadarTrack\n"
+        "unique_identifier_msgs/UUID uuid\ngeometry_msgs/Point position\ngeometry_msgs/Vector3 velocity\n"
+        "geometry_msgs/Vector3 acceleration\ngeometry_msgs/Vector3 size\nuint16 classification\n"
+        "float32[6] position_covariance\nfloat32[6] velocity_covariance\nfloat32[6] acceleration_covariance\n"
+        "float32[6] size_covariance\n"
+        f"{_SEPARATOR}MSG: unique_identifier_msgs/UUID\nuint8[16] uuid\n"
+        f"{_SEPARATOR}MSG: geometry_msgs/Point\n{_POINT}"
+        f"{_SEPARATOR}MSG: geometry_msgs/Vector3\n{_POINT}"
+    ),
+}

@@ -1,0 +1,198 @@
+"""Radar messages that are a list of returns, targets or tracks, and drivers that send one return per message."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.recordings.decoding import decode, fixed_part
+from calib_core.recordings.definitions import PRIMITIVES, Definition
+from calib_core.recordings.radar_columns import ColumnPlan, Returns, no_returns, plan_columns, returns_from
+
+__all__ = ["ListLayout", "PointLayout", "first_of_scans"]
+
+_FRAME_NUMBERS = ("radar_frame_idx", "frame_idx", "frame_number", "frame_id_number", "frame_counter")
+_POINT_NUMBERS = ("point_id", "detection_id", "target_id", "index")
+_DEGREE_PACKAGES = ("ainstein_radar_msgs",)
+_TENTH_OF_DB = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ListLayout:
+    """Reads messages of a header and one list: radar_msgs, Ainstein, Continental, object lists."""
+
+    definition: Definition
+    list_name: str
+    plan: ColumnPlan
+
+    one_per_message = False
+    lidar_like = False
+
+    @classmethod
+    def recognise(cls, definition: Definition) -> "ListLayout | None":
+        """Find the one list whose elements have a position and something only a radar has."""
+        for field in definition.fields:
+            if field.count != 0 or field.type not in definition.types:
+                continue
+            degrees = definition.type.partition("/")[0] in _DEGREE_PACKAGES
+            plan = plan_columns(leaf_names(definition, field.type), degrees=degrees)
+            if plan is not None and plan.looks_like_radar:
+                return cls(definition, field.name, plan)
+        return None
+
+    @property
+    def description(self) -> str:
+        """Say what is read."""
+        return f"list '{self.list_name}': {self.plan.describe()}"
+
+    def returns(self, payload: bytes) -> Returns:
+        """Read one list.
+
+        Raises:
+            MessageError: the bytes do not fit the definition.
+        """
+        message = decode(self.definition, payload)
+        if not message.count(self.list_name):
+            return no_returns()
+        return returns_from(self.plan, lambda name: message.column(self.list_name, name))
+
+
+def leaf_names(definition: Definition, kind: str, prefix: str = "") -> list[str]:
+    """Return the dotted names of all single numbers of a type."""
+    names: list[str] = []
+    for field in definition.types[kind]:
+        if field.count is None and field.type in PRIMITIVES:
+            names.append(prefix + field.name)
+        elif field.count is None and field.type in definition.types:
+            names.extend(leaf_names(definition, field.type, f"{prefix}{field.name}."))
+    return names
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointLayout:
+    """Reads drivers that publish every return as a message of its own (ti_mmwave_rospkg and its forks).
+
+    Attributes:
+        frame_number: the field that numbers scans, or None.
+        point_number: the field that numbers returns within a scan, or None.
+        frame_length: the four bytes that give the length of frame_id.
+    """
+
+    definition: Definition
+    plan: ColumnPlan
+    dtype: np.dtype[Any]
+    frame_number: str | None
+    point_number: str | None
+    frame_length: bytes
+
+    one_per_message = True
+    lidar_like = False
+
+    @classmethod
+    def recognise(cls, definition: Definition, payload: bytes) -> "PointLayout | None":
+        """Look at the fields of fixed size: a position and a speed make a radar return."""
+        dtype = fixed_part(definition, payload)
+        names = dtype.names or ()
+        plan = plan_columns(names)
+        if plan is None or plan.doppler is None or any("." in name for name in plan.position):
+            return None
+        if plan.amplitude == "intensity" and "noise" in names:
+            plan = replace(plan, amplitude_scale=_TENTH_OF_DB)  # these forks pass the chip's 0.1 dB on
+        return cls(
+            definition,
+            plan,
+            dtype,
+            next((name for name in _FRAME_NUMBERS if name in names), None),
+            next((name for name in _POINT_NUMBERS if name in names), None),
+            payload[12:16],
+        )
+
+    @property
+    def description(self) -> str:
+        """Say what is read."""
+        how = self.frame_number or self.point_number or "pauses"
+        return f"one return per message, scans told apart by {how}: {self.plan.describe()}"
+
+    def returns_of_rows(self, rows: np.ndarray) -> Returns:
+        """Read many returns from the first bytes (n, dtype.itemsize) of their messages."""
+        points = self.view(rows)
+        found = returns_from(self.plan, lambda name: points[name].astype(np.float64))
+        # The stock driver never fills in the intensity: zero there means unknown.
+        snr_db = np.where(found.snr_db == 0.0, np.nan, found.snr_db)
+        moved = self.misfits(rows)
+        if moved.any():
+            found.points_radar_m[moved] = np.nan
+        return replace(found, snr_db=snr_db)
+
+    def misfits(self, rows: np.ndarray) -> np.ndarray:
+        """Tell which rows have a frame_id of another length than the first, so that their fields lie elsewhere."""
+        return np.asarray((rows[:, 12:16] != np.frombuffer(self.frame_length, dtype=np.uint8)).any(axis=1))
+
+    def view(self, rows: np.ndarray) -> np.ndarray:
+        """View raw rows (n, dtype.itemsize) as records."""
+        return np.ascontiguousarray(rows).view(self.dtype)[:, 0]
+
+    def offset_after(self, name: str) -> int:
+        """Return where a field ends in a message."""
+        code, offset = self._place(name)
+        return offset + code.itemsize
+
+    def column(self, rows: np.ndarray, name: str) -> np.ndarray:
+        """Read one field from rows that reach at least to its end: (n,)."""
+        code, offset = self._place(name)
+        return np.ascontiguousarray(rows[:, offset : offset + code.itemsize]).view(code)[:, 0]
+
+    def _place(self, name: str) -> tuple[np.dtype[Any], int]:
+        assert self.dtype.fields is not None
+        place = self.dtype.fields[name]
+        return place[0], place[1]
+
+
+def first_of_scans(
+    times_ns: TimesNs, frame_numbers: np.ndarray | None = None, point_numbers: np.ndarray | None = None
+) -> np.ndarray:
+    """Find the message that begins each scan, in drivers that send one message per return.
+
+    A scan ends where the frame number changes; without one, where the point number does not rise; and in any case at a
+    pause longer than half the usual time between scans (a scan of one return has no number to tell it from the next).
+
+    Args:
+        times_ns: (n,) stamps in the order of the recording.
+        frame_numbers: (n,) or None.
+        point_numbers: (n,) or None.
+
+    Returns:
+        (m,) indices, ascending, the first is 0; empty where n is 0.
+    """
+    n = len(times_ns)
+    if n < 2:
+        return np.zeros(n, dtype=np.int64)
+    pauses_ns = np.diff(times_ns)
+    if frame_numbers is not None:
+        begins = np.diff(frame_numbers.astype(np.int64)) != 0
+        return np.concatenate([[0], np.flatnonzero(begins) + 1])
+    if point_numbers is not None:
+        begins = np.diff(point_numbers.astype(np.int64)) <= 0
+        usual_ns = float(np.median(np.diff(times_ns[np.flatnonzero(begins) + 1]))) if begins.sum() > 2 else np.inf
+    else:
+        begins = np.zeros(n - 1, dtype=bool)
+        usual_ns = 2.0 * _between_scans_ns(pauses_ns)
+    if usual_ns > 0:
+        begins = begins | (pauses_ns > 0.5 * usual_ns)
+    return np.concatenate([[0], np.flatnonzero(begins) + 1])
+
+
+def _between_scans_ns(pauses_ns: np.ndarray) -> float:
+    """Return a pause that lies between those within a scan and those between scans: the widest gap of their logarithms."""
+    positive = np.sort(pauses_ns[pauses_ns > 0]).astype(np.float64)
+    if len(positive) < 2:
+        return float(positive[0]) / 2 if len(positive) else np.inf
+    logs = np.log(positive)
+    if np.any(pauses_ns <= 0):
+        logs = np.concatenate([[logs[0] - 1.0], logs])
+    steps = np.diff(logs)
+    cut = int(np.argmax(steps))
+    if steps[cut] < np.log(2.0):
+        return float(positive[0]) / 2  # every message is a scan of its own
+    return float(np.exp((logs[cut] + logs[cut + 1]) / 2))

@@ -1,0 +1,206 @@
+"""A recording: one or more files seen as a radar, a camera, and the time both share."""
+
+import hashlib
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.camera import Camera
+from calib_core.errors import RecordingError
+from calib_core.measurements import RadarScans, TimeNs
+from calib_core.recordings.assembly import Assembly, assemble
+from calib_core.recordings.images import EncodedImage
+from calib_core.recordings.opening import open_sources
+from calib_core.recordings.selection import RecordingOptions
+from calib_core.recordings.sources import Source
+from calib_core.recordings.topics import TopicSummary
+from calib_core.results import Caution
+
+__all__ = ["InputFile", "Recording", "open_recording"]
+
+_HASH_BYTES = 1 << 22
+
+
+@dataclass(frozen=True, slots=True)
+class InputFile:
+    """A file by its contents: what a calibration was made from."""
+
+    name: str
+    size_bytes: int
+    sha256: str
+
+
+class Recording:
+    """An open recording. Made by open_recording; use it in a with statement.
+
+    Reading is safe from several threads. Memory stays bounded whatever the file's size: frames are read one at a time,
+    radar scans in blocks; unpacked chunks and decoded blocks are kept in small caches.
+
+    Attributes:
+        paths: as they were given.
+        sources: the files behind them.
+        topics: every topic, those in use marked as chosen.
+        radar_topic: in use; None where there is none.
+        image_topic: likewise.
+        camera_info_topic: likewise.
+        radar_frame: frame_id of the radar, without a leading slash; "" where unknown.
+        camera_frame: frame_id of the images.
+        image_times: (m,) stamps of the frames, ascending and unique.
+        radar_times: (k,) stamps of the scans, ascending.
+    """
+
+    def __init__(self, paths: tuple[Path, ...], sources: tuple[Source, ...], assembly: Assembly) -> None:
+        self.paths = paths
+        self.sources = sources
+        self._assembly = assembly
+        self._closed = threading.Event()
+        self.topics: tuple[TopicSummary, ...] = assembly.topics
+        self.radar_topic = assembly.radar_topic
+        self.image_topic = assembly.image_topic
+        self.camera_info_topic = assembly.camera_info_topic
+        self.radar_frame = assembly.radar_frame
+        self.camera_frame = assembly.camera_frame
+        nothing: TimesNs = np.zeros(0, dtype=np.int64)
+        self.image_times: TimesNs = assembly.images.times_ns if assembly.images else nothing
+        self.radar_times: TimesNs = assembly.radar.times_ns if assembly.radar else nothing
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close all files."""
+        self._closed.set()
+        for source in self.sources:
+            source.close()
+
+    @property
+    def name(self) -> str:
+        """Name the recording for people."""
+        return " + ".join(path.name for path in self.paths)
+
+    @property
+    def cautions(self) -> tuple[Caution, ...]:
+        """What a person must know; messages found unreadable so far are counted in."""
+        radar = self._assembly.radar
+        if radar is None or not radar.unreadable:
+            return self._assembly.cautions
+        row, why = next(iter(sorted(radar.unreadable.items())))
+        unreadable = Caution(
+            "unreadable-messages",
+            f"{len(radar.unreadable)} radar messages could not be read and count as empty; the first is number {row}: {why}",
+            "if they are many, copy the file again from its source",
+        )
+        return (*self._assembly.cautions, unreadable)
+
+    def image_bytes(self, index: int) -> EncodedImage:
+        """Return a frame as a file: the recorded JPEG or PNG, or raw pixels encoded as JPEG.
+
+        Args:
+            index: into image_times.
+
+        Raises:
+            MessageError: the frame cannot be read.
+            IndexError: there is no such frame.
+        """
+        self._check(index)
+        assert self._assembly.images is not None
+        return self._assembly.images.encoded(index)
+
+    def image(self, index: int) -> np.ndarray:
+        """Return a frame's pixels: uint8 (h, w, 3), blue first as OpenCV has it.
+
+        Args:
+            index: into image_times.
+
+        Raises:
+            MessageError: the frame cannot be read.
+            IndexError: there is no such frame.
+        """
+        self._check(index)
+        assert self._assembly.images is not None
+        return self._assembly.images.picture(index)
+
+    def _check(self, index: int) -> None:
+        self._check_open()
+        if not 0 <= index < len(self.image_times):
+            raise IndexError(f"frame {index} of {len(self.image_times)}")
+
+    def _check_open(self) -> None:
+        if self._closed.is_set():
+            raise RecordingError(f"{self.name}: the recording is closed")
+
+    def camera(self) -> Camera | None:
+        """Return the intrinsics the recording carries; None where it has none that can be used (see cautions)."""
+        return self._assembly.camera
+
+    def radar_scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
+        """Decode the scans with start <= stamp <= end; all of them by default.
+
+        Args:
+            start: None for the beginning.
+            end: None for the end.
+        """
+        self._check_open()
+        return self._assembly.radar.scans(start, end) if self._assembly.radar else RadarScans()
+
+    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float) -> RadarScans:
+        """Decode the scans within half_window_s [s] of any of the times, each scan once, in order of time."""
+        self._check_open()
+        return self._assembly.radar.around(times, half_window_s) if self._assembly.radar else RadarScans()
+
+    def fingerprint(self, progress: Callable[[int, int], None] | None = None) -> tuple[InputFile, ...]:
+        """Hash all files.
+
+        Args:
+            progress: called with bytes done and bytes in all.
+        """
+        total = sum(source.size_bytes for source in self.sources)
+        done = 0
+        files = []
+        for source in self.sources:
+            digest = hashlib.sha256()
+            try:
+                with source.path.open("rb") as file:
+                    while piece := file.read(_HASH_BYTES):
+                        digest.update(piece)
+                        done += len(piece)
+                        if progress:
+                            progress(done, total)
+            except OSError as error:
+                raise RecordingError(f"{source.path}: cannot be read any more: {error.strerror}") from error
+            files.append(InputFile(source.path.name, source.size_bytes, digest.hexdigest()))
+        return tuple(files)
+
+
+def open_recording(paths: "str | Path | Sequence[str | Path]", options: RecordingOptions | None = None) -> Recording:
+    """Open files and folders, in any mix of formats, as one recording.
+
+    Opening reads the indexes, and of the radar's and the camera's messages the stamps: of chunks stored as they are a
+    few bytes per message, of packed chunks that hold such messages everything, once.
+
+    Args:
+        paths: ROS 1 .bag, ROS 2 .mcap and .db3 files, and folders of them.
+        options: topics and clock.
+
+    Raises:
+        RecordingError: it cannot be opened, or lacks what the options require.
+    """
+    chosen = (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
+    sources = open_sources(chosen)
+    try:
+        return Recording(chosen, sources, assemble(chosen, sources, options or RecordingOptions()))
+    except BaseException:
+        for source in sources:
+            source.close()
+        raise

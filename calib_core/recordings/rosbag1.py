@@ -1,0 +1,190 @@
+"""ROS 1 bags, version 2.0: the index from the file's tail, messages by position."""
+
+import re
+import struct
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calib_core.errors import RecordingError
+from calib_core.recordings.chunks import Chunk, ChunkedSource
+from calib_core.recordings.sources import Channel, MessageIndex
+
+if TYPE_CHECKING:
+    from calib_core.recordings.files import FileBytes
+
+__all__ = ["Rosbag1Source"]
+
+_MAGIC = re.compile(rb"#ROSBAG V(\d+)\.(\d+)\n")
+_MESSAGE, _BAG_HEADER, _INDEX, _CHUNK, _CHUNK_INFO, _CONNECTION = 2, 3, 4, 5, 6, 7
+_U32 = struct.Struct("<I")
+_ENTRY = np.dtype([("sec", "<u4"), ("nanosec", "<u4"), ("offset", "<u4")])
+_MESSAGE_HEADER_BYTES = 38  # conn, op and time fields, in any order
+_MAX_HEADER_BYTES = 1 << 24
+
+
+class Rosbag1Source(ChunkedSource):
+    """One ROS 1 bag. Opening reads its tail and one index block per chunk."""
+
+    format_name = "ROS 1 bag"
+    lead_bytes = 4 + _MESSAGE_HEADER_BYTES + 4
+
+    def __init__(self, file: "FileBytes") -> None:
+        super().__init__(file)
+        head = file.up_to(0, 4096)
+        magic = _MAGIC.match(head)
+        if not magic or magic.groups() != (b"2", b"0"):
+            version = ".".join(part.decode() for part in magic.groups()) if magic else "?"
+            raise RecordingError(f"{file.path}: a ROS 1 bag of version {version}; only 2.0 can be read: rosbag migrate")
+        header, _ = self._record(magic.end(), _BAG_HEADER)
+        if header.get("encryptor"):
+            raise RecordingError(f"{file.path}: the bag is encrypted; decrypt it first: rosbag decrypt")
+        index_position = _number(header.get("index_pos", b""), 8)
+        if not 0 < index_position <= file.size_bytes:
+            raise RecordingError(
+                f"{file.path}: the bag was not closed properly and has no index (recorder killed, or copy cut short); "
+                f"repair it first: rosbag reindex {file.path.name}"
+            )
+        infos = self._read_tail(index_position)
+        self._read_indexes(sorted(infos), index_position)
+
+    # -- opening
+
+    def _record(self, position: int, expected: int | None = None) -> tuple[dict[str, bytes], tuple[int, int]]:
+        """Read a record's header; return its fields, and the position and size of its data."""
+        length = _U32.unpack(self.file.at(position, 4))[0]
+        if length > _MAX_HEADER_BYTES:
+            raise self._damaged(position)
+        raw = self.file.at(position + 4, length + 4)
+        fields = _fields(raw[:length])
+        if fields is None or (expected is not None and _number(fields.get("op", b""), 1) != expected):
+            raise self._damaged(position)
+        return fields, (position + 8 + length, _U32.unpack_from(raw, length)[0])
+
+    def _damaged(self, position: int) -> RecordingError:
+        return RecordingError(
+            f"{self.path}: the record at byte {position} is damaged, or the bag was not closed properly; "
+            f"repair it first: rosbag reindex {self.path.name}"
+        )
+
+    def _read_tail(self, position: int) -> list[int]:
+        """Read connections and chunk positions, which follow one another until the file's end."""
+        channels: dict[int, Channel] = {}
+        infos: list[int] = []
+        while position < self.size_bytes:
+            header, (data, size) = self._record(position)
+            kind = _number(header.get("op", b""), 1)
+            if kind == _CONNECTION:
+                channel = self._channel(header, self.file.at(data, size), position)
+                channels[channel.id] = channel
+            elif kind == _CHUNK_INFO:
+                infos.append(_number(header.get("chunk_pos", b""), 8))
+            position = data + size
+        self.channels = tuple(channels.values())
+        return infos
+
+    def _channel(self, header: dict[str, bytes], data: bytes, position: int) -> Channel:
+        fields = _fields(data)
+        if fields is None or "conn" not in header:
+            raise self._damaged(position)
+        return Channel(
+            id=_number(header["conn"], 4),
+            topic=_text(header.get("topic", b"")),
+            type=_text(fields.get("type", b"")),
+            encoding="ros1",
+            definition=_text(fields.get("message_definition", b"")),
+            definition_format="msg" if fields.get("message_definition") else "",
+        )
+
+    def _read_indexes(self, positions: list[int], end: int) -> None:
+        """Read the index blocks that follow each chunk."""
+        found: dict[int, list[tuple[int, np.ndarray]]] = {}
+        for number, (position, following) in enumerate(zip(positions, [*positions[1:], end], strict=True)):
+            header, (data, size) = self._record(position, _CHUNK)
+            compression = _text(header.get("compression", b""))
+            self.chunks.append(Chunk(data, size, _number(header.get("size", b""), 4), compression))
+            block = self.file.at(data + size, following - data - size) if following > data + size else b""
+            for connection, entries in self._index_records(block, data + size):
+                found.setdefault(connection, []).append((number, entries))
+        for connection, parts in found.items():
+            entries = np.concatenate([entries for _, entries in parts])
+            receive_ns = entries["sec"].astype(np.int64) * 1_000_000_000 + entries["nanosec"]
+            chunk = np.repeat([number for number, _ in parts], [len(entries) for _, entries in parts])
+            self.indexes[connection] = MessageIndex.sorted_from(
+                receive_ns, chunk.astype(np.int64), entries["offset"].astype(np.int64)
+            )
+
+    def _index_records(self, block: bytes, position: int) -> list[tuple[int, np.ndarray]]:
+        records: list[tuple[int, np.ndarray]] = []
+        place = 0
+        while place + 8 <= len(block):
+            length = _U32.unpack_from(block, place)[0]
+            header = block[place + 4 : place + 4 + length]
+            start = place + 8 + length
+            if start > len(block):
+                raise self._damaged(position + place)
+            size = _U32.unpack_from(block, start - 4)[0]
+            mark = header.find(b"conn=")
+            if b"op=\x04" in header and mark >= 0:
+                if start + size > len(block) or size % _ENTRY.itemsize:
+                    raise self._damaged(position + place)
+                entries = np.frombuffer(block, dtype=_ENTRY, count=size // _ENTRY.itemsize, offset=start)
+                records.append((_U32.unpack_from(header, mark + 5)[0], entries))
+            place = start + size
+        return records
+
+    # -- reading
+
+    def locate(self, chunk: int, offset: int) -> tuple[int, int]:
+        """Return where the message begins; connection records in front of it are passed over."""
+        for _ in range(1000):
+            head = self.piece(chunk, offset, 256)
+            length = _U32.unpack_from(head)[0] if len(head) >= 4 else _MAX_HEADER_BYTES
+            if length < _MAX_HEADER_BYTES and length + 8 > len(head):
+                head = self.piece(chunk, offset, length + 8)
+            if length + 8 > len(head):
+                break
+            fields = _fields(head[4 : 4 + length])
+            size = _U32.unpack_from(head, 4 + length)[0]
+            kind = _number(fields.get("op", b""), 1) if fields else 0
+            if kind == _MESSAGE:
+                return offset + 8 + length, size
+            if kind != _CONNECTION:
+                break
+            offset += 8 + length + size
+        raise RecordingError(
+            f"{self.path}: no message where the index says (chunk {chunk}, byte {offset}); the bag is damaged: "
+            f"rosbag reindex {self.path.name}"
+        )
+
+    def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Recognise plain message records: a header of 38 bytes with op=2 where the first record has it."""
+        words = np.ascontiguousarray(rows[:, [0, 1, 2, 3, 42, 43, 44, 45]]).view("<u4")
+        mark = rows[0].tobytes().find(b"op=\x02")
+        usual = words[:, 0] == _MESSAGE_HEADER_BYTES
+        if mark < 0:
+            return np.zeros(len(rows), dtype=bool), words[:, 1].astype(np.int64)
+        usual &= (rows[:, mark : mark + 4] == np.frombuffer(b"op=\x02", dtype=np.uint8)).all(axis=1)
+        return usual, words[:, 1].astype(np.int64)
+
+
+def _fields(raw: bytes) -> dict[str, bytes] | None:
+    """Split a record header into its name=value fields; None where it is not one."""
+    fields: dict[str, bytes] = {}
+    place = 0
+    while place + 4 <= len(raw):
+        length = _U32.unpack_from(raw, place)[0]
+        name, equals, value = raw[place + 4 : place + 4 + length].partition(b"=")
+        if not equals or place + 4 + length > len(raw):
+            return None
+        fields[name.decode("ascii", "replace")] = value
+        place += 4 + length
+    return fields if place == len(raw) else None
+
+
+def _number(value: bytes, size: int) -> int:
+    return int.from_bytes(value, "little") if len(value) == size else -1
+
+
+def _text(value: bytes) -> str:
+    return value.decode("utf-8", "replace")

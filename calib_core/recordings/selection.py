@@ -1,0 +1,159 @@
+"""Which topics to use: asked for by name, or guessed; wrong choices are answered with what there is."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from calib_core.errors import MessageError, RecordingError
+from calib_core.recordings.clocks import Clock
+from calib_core.recordings.radar_lists import PointLayout
+from calib_core.recordings.topics import Topic, TopicKind, Usage
+
+__all__ = ["Inventory", "RecordingOptions", "Selection", "select"]
+
+Need = Literal["radar", "image"]
+_WORDS = {"radar": "radar", "image": "camera image", "camera-info": "camera info"}
+_FLAGS = {"radar": "--radar-topic", "image": "--image-topic", "camera-info": "--camera-info-topic"}
+_RADAR_WORDS = ("radar", "mmwave", "ars4", "ars5", "srr", "umrr", "esr", "oculii")
+_NOT_PICTURES = ("depth", "disparity", "mask", "infra", "debug")
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingOptions:
+    """How to open a recording."""
+
+    radar_topic: str | None = None
+    """The radar's topic; guessed when not given."""
+    image_topic: str | None = None
+    """The camera's image topic; guessed when not given."""
+    camera_info_topic: str | None = None
+    """The topic with the camera's intrinsics; the one beside the images when not given."""
+    clock: Clock = "auto"
+    """Times to go by: stamps in the messages, receive times, or auto: stamps unless they cannot be right."""
+    require: tuple[Need, ...] = ("radar", "image")
+    """What the recording must have; empty to look into any recording."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inventory:
+    """All topics with what each can be used for, and the name of the whole for messages."""
+
+    name: str
+    topics: tuple[Topic, ...]
+    usages: Mapping[str, Usage]
+
+    def of_kind(self, kind: TopicKind) -> list[Topic]:
+        """Return the topics of a kind that can be read."""
+        return [t for t in self.topics if self.usages[t.name].kind == kind and self.usages[t.name].problem is None]
+
+    def list_topics(self) -> str:
+        """Name all topics with their types, for a message."""
+        return ", ".join(f"{topic.name} ({topic.type})" for topic in self.topics) or "none"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Selection:
+    """The topics in use; None where there is none."""
+
+    radar: Topic | None
+    image: Topic | None
+    camera_info: Topic | None
+
+
+def select(inventory: Inventory, options: RecordingOptions) -> Selection:
+    """Choose the topics.
+
+    Raises:
+        RecordingError: a topic asked for is not there or cannot be used, or one that is required is missing.
+    """
+    radar = _chosen(inventory, "radar", options.radar_topic) or _best(
+        inventory.of_kind("radar"), inventory, _radar_rank
+    )
+    image = _chosen(inventory, "image", options.image_topic) or _best(
+        inventory.of_kind("image"), inventory, _image_rank
+    )
+    for kind, topic in (("radar", radar), ("image", image)):
+        if topic is None and kind in options.require:
+            raise _missing(inventory, "radar" if kind == "radar" else "image")
+    info = _chosen(inventory, "camera-info", options.camera_info_topic)
+    return Selection(radar, image, info or _info_beside(image, inventory))
+
+
+def _chosen(inventory: Inventory, kind: TopicKind, name: str | None) -> Topic | None:
+    """Return the topic a person named."""
+    if name is None:
+        return None
+    topic = next((topic for topic in inventory.topics if topic.name == name), None)
+    able = ", ".join(topic.name for topic in inventory.of_kind(kind)) or "none"
+    if topic is None:
+        raise RecordingError(f"{inventory.name}: there is no topic {name}; {_WORDS[kind]} topics: {able}")
+    usage = inventory.usages[name]
+    if usage.problem is not None:
+        raise MessageError(f"{inventory.name}: {_with_topic(name, usage.problem)}")
+    if usage.kind != kind:
+        raise RecordingError(
+            f"{inventory.name}: topic {name} ({topic.type}) is not a {_WORDS[kind]} topic; {_WORDS[kind]} topics: {able}"
+        )
+    return topic
+
+
+def _with_topic(name: str, problem: str) -> str:
+    return problem if name in problem else f"topic {name}: {problem}"
+
+
+def _missing(inventory: Inventory, kind: TopicKind) -> RecordingError:
+    problems = [
+        _with_topic(topic.name, str(usage.problem))
+        for topic in inventory.topics
+        if (usage := inventory.usages[topic.name]).kind == kind and usage.problem is not None
+    ]
+    why = f"; {'; '.join(problems[:3])}" if problems else ""
+    return RecordingError(
+        f"{inventory.name}: no {_WORDS[kind]} topic that can be read{why}; topics: {inventory.list_topics()}; "
+        f"give the file that has it too, or choose one with {_FLAGS[kind]}"
+    )
+
+
+def _best(
+    topics: Sequence[Topic], inventory: Inventory, rank: Callable[[Topic, Inventory], tuple[int, ...]]
+) -> Topic | None:
+    return max(topics, key=lambda topic: rank(topic, inventory), default=None)
+
+
+def _radar_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
+    """Prefer radars over lidars, then a speed, then returns over objects, then names, then the number of messages."""
+    layout = inventory.usages[topic.name].radar
+    assert layout is not None
+    name = f"{topic.name} {topic.type}".lower()
+    named = any(word in name for word in _RADAR_WORDS)
+    objects = any(word in name for word in ("object", "track"))
+    return (
+        not layout.lidar_like or named,
+        layout.plan.doppler is not None or bool(layout.plan.velocity),
+        named,
+        not objects,
+        isinstance(layout, PointLayout),
+        len(topic),
+    )
+
+
+def _image_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
+    """Prefer pictures over depth, calibrated cameras, many messages, then files over raw pixels."""
+    layout = inventory.usages[topic.name].image
+    assert layout is not None
+    picture = not any(word in topic.name.lower() for word in _NOT_PICTURES)
+    return picture, _info_beside(topic, inventory) is not None, len(topic), layout.compressed
+
+
+def _info_beside(image: Topic | None, inventory: Inventory) -> Topic | None:
+    """Return the camera info in the nearest namespace above the image topic; else the only one there is."""
+    infos = {topic.name: topic for topic in inventory.of_kind("camera-info") if len(topic)}
+    if image is None:
+        return None
+    parts = image.name.split("/")
+    for depth in range(len(parts) - 1, 0, -1):
+        name = "/".join([*parts[:depth], "camera_info"])
+        if name in infos:
+            return infos[name]
+    alone = len(infos) == 1 and len(inventory.of_kind("image")) == 1
+    return next(iter(infos.values())) if alone else None

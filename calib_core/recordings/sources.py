@@ -1,0 +1,121 @@
+"""What every container offers: channels, an index of messages, and their bytes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, Protocol
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.results import Caution
+
+__all__ = ["Channel", "Encoding", "Heads", "MessageIndex", "Source"]
+
+Encoding = Literal["ros1", "cdr"]
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One topic as one file declares it.
+
+    Attributes:
+        id: the file's own number for it.
+        topic: its name.
+        type: the message type as the file spells it.
+        encoding: how messages are laid out: "ros1" or "cdr"; another word (such as "protobuf") cannot be read.
+        definition: the embedded definition; empty where the file has none.
+        definition_format: "msg", "idl" or "" for none.
+    """
+
+    id: int
+    topic: str
+    type: str
+    encoding: str
+    definition: str
+    definition_format: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MessageIndex:
+    """Where the messages of one channel lie, in order of receive time.
+
+    Attributes:
+        receive_ns: (n,) when the recorder got them.
+        chunk: (n,) which chunk (or, in a database, row) holds them.
+        offset: (n,) where they begin in the unpacked chunk; 0 in a database.
+    """
+
+    receive_ns: TimesNs
+    chunk: TimesNs
+    offset: TimesNs
+
+    def __len__(self) -> int:
+        return len(self.receive_ns)
+
+    @classmethod
+    def sorted_from(cls, receive_ns: TimesNs, chunk: TimesNs, offset: TimesNs) -> "MessageIndex":
+        """Sort by receive time; messages of one instant keep the order of the file."""
+        order = np.lexsort((offset, chunk, receive_ns))
+        return cls(receive_ns[order], chunk[order], offset[order])
+
+    def take(self, rows: np.ndarray) -> "MessageIndex":
+        """Keep the given rows, in the given order."""
+        return MessageIndex(self.receive_ns[rows], self.chunk[rows], self.offset[rows])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Heads:
+    """The first bytes of many messages.
+
+    Attributes:
+        rows: (n, size) uint8; bytes past a message's end mean nothing.
+        lengths: (n,) how long each message is.
+    """
+
+    rows: np.ndarray
+    lengths: TimesNs
+
+
+class Source(Protocol):
+    """One file of a recording."""
+
+    @property
+    def path(self) -> Path:
+        """Where it lies."""
+        ...
+
+    @property
+    def size_bytes(self) -> int:
+        """How large it is."""
+        ...
+
+    @property
+    def container(self) -> str:
+        """Name the format for people, with its compression, such as "ROS 1 bag, lz4"."""
+        ...
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The topics it declares."""
+        ...
+
+    @property
+    def cautions(self) -> tuple[Caution, ...]:
+        """What opening it brought to light."""
+        ...
+
+    def index(self, channel_id: int) -> MessageIndex:
+        """Tell where the messages of a channel lie."""
+        ...
+
+    def read(self, chunk: int, offset: int) -> bytes:
+        """Read one message whole."""
+        ...
+
+    def heads(self, index: MessageIndex, size: int) -> Heads:
+        """Read the first bytes of many messages, in the order of the index, reading as little as the format allows."""
+        ...
+
+    def close(self) -> None:
+        """Close the file."""
+        ...

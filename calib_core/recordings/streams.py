@@ -1,0 +1,223 @@
+"""The two streams of a recording: radar scans by window, images by frame."""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calib_core.arrays import TimesNs, frozen_array
+from calib_core.errors import MessageError
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
+from calib_core.recordings.images import EncodedImage, ImageLayout
+from calib_core.recordings.radar_columns import Returns, no_returns
+from calib_core.recordings.radar_layouts import ScanLayout
+from calib_core.recordings.radar_lists import PointLayout, first_of_scans
+from calib_core.recordings.topics import Topic
+
+__all__ = ["ImageStream", "RadarStream", "join_scans"]
+
+_BLOCK_SCANS = 64
+_CACHED_RETURNS = 1_000_000
+
+
+class RadarStream:
+    """The scans of one radar topic, decoded in blocks when asked for.
+
+    Args:
+        topic: the radar topic.
+        layouts: one per part of the topic.
+        stamps_ns: (n,) one time per message, by the chosen clock.
+    """
+
+    def __init__(self, topic: Topic, layouts: Sequence[ScanLayout] | Sequence[PointLayout], stamps_ns: TimesNs) -> None:
+        self._topic = topic
+        self._layouts = layouts
+        self._blocks: OrderedDict[int, RadarScans] = OrderedDict()
+        self._lock = threading.Lock()
+        self.unreadable: Mapping[int, str] = {}
+        first = np.arange(len(topic))
+        if isinstance(layouts[0], PointLayout):
+            first = self._group(layouts[0], stamps_ns)
+        order = np.argsort(stamps_ns[first], kind="stable")
+        last = np.append(first[1:], len(topic))
+        self._first, self._last = first[order], last[order]
+        self.times_ns: TimesNs = frozen_array(stamps_ns[first][order], (None,), dtype=np.int64)
+
+    def _group(self, layout: PointLayout, stamps_ns: TimesNs) -> np.ndarray:
+        names = (layout.frame_number, layout.point_number)
+        numbers: list[np.ndarray | None] = [None, None]
+        if any(names):
+            reach = max(layout.offset_after(name) for name in names if name)
+            rows = self._topic.heads(np.arange(len(self._topic)), reach).rows
+            numbers = [layout.column(rows, name) if name else None for name in names]
+        return first_of_scans(stamps_ns, *numbers)
+
+    def scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
+        """Decode the scans with start <= stamp <= end."""
+        first = 0 if start is None else int(np.searchsorted(self.times_ns, start, side="left"))
+        last = len(self.times_ns) if end is None else int(np.searchsorted(self.times_ns, end, side="right"))
+        return self._between(first, max(first, last))
+
+    def around(self, times: Sequence[TimeNs], half_window_s: float) -> RadarScans:
+        """Decode the scans within half_window_s of any of the times, each once."""
+        half = round(half_window_s * NS_PER_S)
+        wanted = np.zeros(len(self.times_ns) + 1, dtype=np.int64)
+        for time in times:
+            wanted[np.searchsorted(self.times_ns, int(time) - half, side="left")] += 1
+            wanted[np.searchsorted(self.times_ns, int(time) + half, side="right")] -= 1
+        inside = np.concatenate([[False], np.cumsum(wanted)[:-1] > 0, [False]])
+        edges = np.flatnonzero(np.diff(inside.astype(np.int8)))
+        return join_scans([self._between(int(a), int(b)) for a, b in edges.reshape(-1, 2)])
+
+    def _between(self, first: int, last: int) -> RadarScans:
+        """Return the scans first to last - 1."""
+        pieces = []
+        for number in range(first // _BLOCK_SCANS, -(-last // _BLOCK_SCANS)):
+            block, base = self._block(number), number * _BLOCK_SCANS
+            pieces.append(_cut(block, max(first - base, 0), min(last - base, len(block))))
+        return join_scans(pieces)
+
+    def _block(self, number: int) -> RadarScans:
+        with self._lock:
+            if number in self._blocks:
+                self._blocks.move_to_end(number)
+                return self._blocks[number]
+        rows = slice(number * _BLOCK_SCANS, min((number + 1) * _BLOCK_SCANS, len(self.times_ns)))
+        layout = self._layouts[0]
+        block = self._decode_points(layout, rows) if isinstance(layout, PointLayout) else self._decode_scans(rows)
+        with self._lock:
+            self._blocks[number] = block
+            while len(self._blocks) > 2 and sum(len(b.points_radar_m) for b in self._blocks.values()) > _CACHED_RETURNS:
+                self._blocks.popitem(last=False)
+        return block
+
+    def _decode_scans(self, rows: slice) -> RadarScans:
+        scans = [self._returns(int(message)) for message in self._first[rows]]
+        return _stacked(self.times_ns[rows], [len(scan) for scan in scans], _joined(scans))
+
+    def _returns(self, message: int) -> Returns:
+        """Decode one message; one that cannot be read is an empty scan, and is told."""
+        layout = self._layouts[int(self._topic.part[message])]
+        assert not isinstance(layout, PointLayout)
+        try:
+            return layout.returns(self._topic.payload(message))
+        except MessageError as error:
+            self.unreadable = {**self.unreadable, message: str(error)}
+            return no_returns()
+
+    def _decode_points(self, layout: PointLayout, rows: slice) -> RadarScans:
+        counts = self._last[rows] - self._first[rows]
+        if not len(counts):
+            return RadarScans()
+        messages = np.concatenate([np.arange(a, b) for a, b in zip(self._first[rows], self._last[rows], strict=True)])
+        heads = self._topic.heads(messages, layout.dtype.itemsize)
+        short = heads.lengths < layout.dtype.itemsize
+        returns = layout.returns_of_rows(heads.rows)
+        if short.any():
+            returns.points_radar_m[short] = np.nan
+            self.unreadable = {**self.unreadable, **dict.fromkeys(messages[short].tolist(), "the message is cut short")}
+        return _stacked(self.times_ns[rows], counts.tolist(), returns)
+
+
+def _joined(scans: Sequence[Returns]) -> Returns:
+    if not scans:
+        return no_returns()
+    return Returns(
+        np.concatenate([scan.points_radar_m for scan in scans]),
+        np.concatenate([scan.doppler_mps for scan in scans]),
+        np.concatenate([scan.snr_db for scan in scans]),
+        np.concatenate([scan.sigma_polar for scan in scans]),
+    )
+
+
+def _stacked(times_ns: TimesNs, counts: Sequence[int], returns: Returns) -> RadarScans:
+    return RadarScans(
+        times_ns=times_ns,
+        first_return=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+        points_radar_m=returns.points_radar_m,
+        doppler_mps=returns.doppler_mps,
+        snr_db=returns.snr_db,
+        sigma_polar=returns.sigma_polar,
+    )
+
+
+def _cut(scans: RadarScans, first: int, last: int) -> RadarScans:
+    """Keep the scans first to last - 1."""
+    if first == 0 and last == len(scans):
+        return scans
+    low, high = int(scans.first_return[first]), int(scans.first_return[last])
+    return RadarScans(
+        times_ns=scans.times_ns[first:last],
+        first_return=scans.first_return[first : last + 1] - low,
+        points_radar_m=scans.points_radar_m[low:high],
+        doppler_mps=scans.doppler_mps[low:high],
+        snr_db=scans.snr_db[low:high],
+        sigma_polar=scans.sigma_polar[low:high],
+    )
+
+
+def join_scans(pieces: Sequence[RadarScans]) -> RadarScans:
+    """Put scans behind one another; the pieces must be in order of time."""
+    if len(pieces) < 2:
+        return pieces[0] if pieces else RadarScans()
+    counts = np.concatenate([np.diff(piece.first_return) for piece in pieces])
+    return RadarScans(
+        times_ns=np.concatenate([piece.times_ns for piece in pieces]),
+        first_return=np.concatenate([[0], np.cumsum(counts)]),
+        points_radar_m=np.concatenate([piece.points_radar_m for piece in pieces]),
+        doppler_mps=np.concatenate([piece.doppler_mps for piece in pieces]),
+        snr_db=np.concatenate([piece.snr_db for piece in pieces]),
+        sigma_polar=np.concatenate([piece.sigma_polar for piece in pieces]),
+    )
+
+
+def _no_layouts() -> dict[int, ImageLayout]:
+    return {}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImageStream:
+    """The frames of one image topic, read one at a time.
+
+    Attributes:
+        topic: the image topic.
+        layouts: one per part of the topic.
+        times_ns: (m,) stamps, ascending and unique.
+        row: (m,) the message of each frame.
+        repeated: how many messages were left out because another frame has the same stamp.
+    """
+
+    topic: Topic
+    layouts: Sequence[ImageLayout]
+    times_ns: TimesNs
+    row: TimesNs
+    repeated: int = field(default=0)
+
+    @classmethod
+    def build(cls, topic: Topic, layouts: Sequence[ImageLayout], stamps_ns: TimesNs) -> "ImageStream":
+        """Sort the frames by time; of several with one stamp keep the first received."""
+        times_ns, row = np.unique(stamps_ns, return_index=True)
+        return cls(
+            topic,
+            layouts,
+            frozen_array(times_ns, (None,), dtype=np.int64),
+            frozen_array(row, (None,), dtype=np.int64),
+            len(stamps_ns) - len(times_ns),
+        )
+
+    def encoded(self, index: int) -> EncodedImage:
+        """Return a frame as a file."""
+        row = int(self.row[index])
+        return self.layouts[int(self.topic.part[row])].encoded(self.topic.payload(row))
+
+    def picture(self, index: int) -> np.ndarray:
+        """Return a frame's pixels, blue first."""
+        row = int(self.row[index])
+        return self.layouts[int(self.topic.part[row])].picture(self.topic.payload(row))
+
+    def size_px(self, index: int) -> tuple[int, int]:
+        """Return a frame's width and height, without decoding it."""
+        row = int(self.row[index])
+        return self.layouts[int(self.topic.part[row])].size_px(self.topic.payload(row))

@@ -1,0 +1,203 @@
+"""Topics: the same name joined over all files, and what each can be used for."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.errors import MessageError, RecordingError
+from calib_core.measurements import TimeNs
+from calib_core.recordings.camera_info import is_camera_info
+from calib_core.recordings.definitions import Definition, definition_of
+from calib_core.recordings.images import ImageLayout, is_compressed_image, is_raw_image
+from calib_core.recordings.radar_layouts import RadarLayout, recognise
+from calib_core.recordings.sources import Channel, Heads, MessageIndex, Source
+from calib_core.results import Caution
+
+__all__ = ["Topic", "TopicKind", "TopicSummary", "Usage", "join_topics", "usage_of"]
+
+TopicKind = Literal["radar", "image", "camera-info", "other"]
+
+
+@dataclass(frozen=True, slots=True)
+class TopicSummary:
+    """A topic, for people and programs.
+
+    Attributes:
+        name: the topic.
+        type: of its messages, as the recording spells it.
+        count: messages.
+        kind: what it can be used for.
+        start: stamp of the first message by the topic's clock; None without messages.
+        end: of the last.
+        clock: "header" or "receive": what start and end are by.
+        problem: why it cannot be used although its kind is right; None where all is well.
+        chosen: it is the radar, image or camera-info topic in use.
+        layout: what is read from it, in a few words; "" for kinds that need none.
+    """
+
+    name: str
+    type: str
+    count: int
+    kind: TopicKind
+    start: TimeNs | None
+    end: TimeNs | None
+    clock: Literal["header", "receive"]
+    problem: str | None
+    chosen: bool
+    layout: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Topic:
+    """All messages of one topic, in order of receive time.
+
+    Attributes:
+        name: the topic.
+        parts: the channels it is made of, each with its file.
+        part: (n,) which part a message is of.
+        receive_ns: (n,) the recorder's clock.
+        chunk: (n,) see MessageIndex.
+        offset: (n,) see MessageIndex.
+        repeated: how many messages were left out because an earlier file has them too.
+    """
+
+    name: str
+    parts: tuple[tuple[Source, Channel], ...]
+    part: TimesNs
+    receive_ns: TimesNs
+    chunk: TimesNs
+    offset: TimesNs
+    repeated: int = 0
+
+    def __len__(self) -> int:
+        return len(self.receive_ns)
+
+    @property
+    def type(self) -> str:
+        """The message type as the recording spells it."""
+        return self.parts[0][1].type
+
+    def definition(self, part: int = 0) -> Definition:
+        """Return the definition of a part's messages.
+
+        Raises:
+            MessageError: there is none, or it cannot be understood.
+        """
+        return definition_of(self.parts[part][1])
+
+    def payload(self, row: int) -> bytes:
+        """Read one message."""
+        source = self.parts[int(self.part[row])][0]
+        return source.read(int(self.chunk[row]), int(self.offset[row]))
+
+    def heads(self, rows: np.ndarray, size: int) -> Heads:
+        """Read the first bytes of many messages, in the order of rows."""
+        out = np.zeros((len(rows), size), dtype=np.uint8)
+        lengths = np.zeros(len(rows), dtype=np.int64)
+        parts = self.part[rows]
+        for number, (source, _) in enumerate(self.parts):
+            mine = np.flatnonzero(parts == number)
+            if len(mine):
+                at = rows[mine]
+                heads = source.heads(MessageIndex(self.receive_ns[at], self.chunk[at], self.offset[at]), size)
+                out[mine], lengths[mine] = heads.rows, heads.lengths
+        return Heads(out, lengths)
+
+    def header_stamps(self) -> TimesNs | None:
+        """Read the stamp each message begins with; None where its type begins with none."""
+        offsets = [self.definition(number).stamp_offset for number in range(len(self.parts))]
+        if any(offset is None for offset in offsets) or not len(self):
+            return None
+        heads = self.heads(np.arange(len(self)), 12).rows
+        starts = np.array(offsets, dtype=np.int64)[self.part]
+        words = np.take_along_axis(heads, starts[:, None] + np.arange(8), axis=1)
+        big = self._big_endian(heads)
+        words[big] = words[big][:, [3, 2, 1, 0, 7, 6, 5, 4]]
+        pairs = np.ascontiguousarray(words).view("<u4").astype(np.int64)
+        return pairs[:, 0] * 1_000_000_000 + pairs[:, 1]
+
+    def _big_endian(self, heads: np.ndarray) -> np.ndarray:
+        cdr = np.array([channel.encoding == "cdr" for _, channel in self.parts])[self.part]
+        return np.asarray(cdr & (heads[:, 1] == 0))
+
+
+def join_topics(sources: tuple[Source, ...]) -> tuple[tuple[Topic, ...], tuple[Caution, ...]]:
+    """Join the channels of all files by topic, and say where files repeat one another."""
+    found: dict[str, list[tuple[Source, Channel]]] = {}
+    for source in sources:
+        for channel in source.channels:
+            found.setdefault(channel.topic, []).append((source, channel))
+    topics = tuple(_join(name, tuple(parts)) for name, parts in sorted(found.items()))
+    cautions = tuple(
+        Caution(
+            "repeated-messages",
+            f"{topic.repeated} messages of {topic.name} are in several of the files; each is used once",
+            "give each recording once: a folder that also holds a converted copy counts twice",
+        )
+        for topic in topics
+        if topic.repeated
+    )
+    return topics, cautions
+
+
+def _join(name: str, parts: tuple[tuple[Source, Channel], ...]) -> Topic:
+    columns: list[np.ndarray] = []
+    seen: dict[int, np.ndarray] = {}
+    repeated = 0
+    for number, (source, channel) in enumerate(parts):
+        index = source.index(channel.id)
+        keep = np.ones(len(index), dtype=bool)
+        for other, times in seen.items():
+            if other != id(source):
+                keep &= ~np.isin(index.receive_ns, times)
+        repeated += int(np.count_nonzero(~keep))
+        mine = seen.get(id(source))
+        seen[id(source)] = index.receive_ns if mine is None else np.concatenate([mine, index.receive_ns])
+        kept = index.take(np.flatnonzero(keep))
+        columns.append(np.stack([np.full(len(kept), number), kept.receive_ns, kept.chunk, kept.offset]))
+    part, receive_ns, chunk, offset = np.concatenate(columns, axis=1).astype(np.int64)
+    order = np.lexsort((part, receive_ns))  # stable: messages of one instant stay in the order of their file
+    return Topic(name, parts, part[order], receive_ns[order], chunk[order], offset[order], repeated)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Usage:
+    """What a topic can be used for.
+
+    Attributes:
+        kind: see TopicSummary.
+        problem: see TopicSummary.
+        radar: its layout where it is a radar.
+        image: its layout where it holds images.
+    """
+
+    kind: TopicKind
+    problem: str | None = None
+    radar: RadarLayout | None = None
+    image: ImageLayout | None = None
+
+
+def usage_of(topic: Topic) -> Usage:
+    """Find out what a topic can be used for, by its definition and its first message."""
+    kind: TopicKind = "other"
+    try:
+        definition = topic.definition()
+        if is_camera_info(definition):
+            return Usage("camera-info")
+        if is_raw_image(definition) or is_compressed_image(definition):
+            kind = "image"
+            layout = ImageLayout(definition, topic.name)
+            if len(topic):
+                layout.check(topic.payload(0))
+            return Usage("image", image=layout, problem=None if len(topic) else "no messages")
+        if len(topic):
+            kind = "radar" if "radar" in topic.name.lower() else "other"
+            radar = recognise(definition, topic.payload(0))
+            return Usage("radar", radar=radar) if radar is not None else Usage("other")
+    except MessageError as error:
+        return Usage(kind, problem=str(error))
+    except RecordingError as error:
+        return Usage(kind, problem=f"its first message cannot be read: {error}")
+    return Usage("other", problem="no messages")
