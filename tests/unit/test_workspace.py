@@ -1,0 +1,272 @@
+"""The one mutable cell: order of journal and telling, threads, answers, import and download."""
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.option_changes import OptionChange
+from app.session import (
+    ClickPlaced,
+    ClickRemoved,
+    EventError,
+    History,
+    OptionsChanged,
+    OptionsEdited,
+    RecordingFacts,
+    Solved,
+    Step,
+    Undo,
+)
+from app.session_file import Restored, SessionFileError
+from app.view import View, view
+from app.workspace import Workspace, open_workspace, recording_facts
+from calib_core.errors import InputError
+from calib_core.interchange import read_clicks
+from calib_core.measurements import RadarScans, TimeNs, Unsolvable
+
+FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), width_px=640, height_px=480)
+TIMES = [TimeNs(int(time)) for time in FACTS.image_times]
+NO_ANSWER = Unsolvable("too-few-pairs", "1 of at least 4 pairs", "click more")
+
+
+class ListJournal:
+    def __init__(self) -> None:
+        self.steps: list[Step] = []
+        self.refuse = False
+        self.closed = False
+
+    def append(self, step: Step, history: History) -> None:
+        if self.refuse:
+            raise SessionFileError("the disk is full")
+        self.steps.append(step)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class HeldSolver:
+    def __init__(self) -> None:
+        self.revisions: list[int] = []
+        self.closed = False
+
+    def request(self, revision: int, clicks, options, when_done: Callable[[Solved], None]) -> None:
+        self.revisions.append(revision)
+        self.when_done = when_done
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.fixture
+def journal() -> ListJournal:
+    return ListJournal()
+
+
+@pytest.fixture
+def solver() -> HeldSolver:
+    return HeldSolver()
+
+
+@pytest.fixture
+def workspace(journal: ListJournal, solver: HeldSolver) -> Workspace:
+    return Workspace(FACTS, Restored(Path("nowhere"), History()), journal, solver)
+
+
+def test_a_click_is_seen_at_once_and_the_answer_later(workspace: Workspace, solver: HeldSolver) -> None:
+    seen: list[View] = []
+    workspace.subscribe(seen.append)
+    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    assert [shown.stage for shown in seen] == ["collecting", "solving"]
+    solver.when_done(Solved(1, NO_ANSWER))
+    assert [shown.solving for shown in seen] == [False, True, False]
+    assert seen[-1] == workspace.view == view(workspace.history, FACTS)
+
+
+def test_a_step_is_journalled_before_anybody_is_told(workspace: Workspace, journal: ListJournal) -> None:
+    journalled: list[int] = []
+    workspace.subscribe(lambda shown: journalled.append(len(journal.steps)))
+    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    assert journalled == [0, 1]
+
+
+def test_a_step_that_cannot_be_kept_is_not_made(workspace: Workspace, journal: ListJournal, solver: HeldSolver) -> None:
+    seen: list[View] = []
+    workspace.subscribe(seen.append)
+    journal.refuse = True
+    with pytest.raises(SessionFileError):
+        workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    assert workspace.session.clicks == ()
+    assert len(seen) == 1
+    assert solver.revisions == []
+
+
+def test_a_step_that_does_not_fit_changes_nothing_and_is_not_journalled(
+    workspace: Workspace, journal: ListJournal
+) -> None:
+    with pytest.raises(EventError):
+        workspace.dispatch(ClickRemoved("c1"))
+    assert journal.steps == []
+    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    assert len(workspace.session.clicks) == 1
+
+
+def test_undo_and_redo_are_journalled_and_answers_are_not(workspace: Workspace, journal: ListJournal) -> None:
+    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    workspace.dispatch(Solved(1, NO_ANSWER))
+    workspace.undo()
+    workspace.undo()
+    workspace.redo()
+    assert [type(step).__name__ for step in journal.steps] == ["ClickPlaced", "Undo", "Redo"]
+
+
+def test_edited_options_are_journalled_as_the_whole_of_the_options(workspace: Workspace, journal: ListJournal) -> None:
+    workspace.dispatch(OptionsEdited((OptionChange("method", "paper"),)))
+    assert journal.steps == [OptionsChanged(workspace.session.options)]
+    assert workspace.session.options.method == "paper"
+
+
+def test_the_solver_is_asked_for_every_revision_with_clicks_and_only_for_those(
+    workspace: Workspace, solver: HeldSolver
+) -> None:
+    workspace.dispatch(OptionsEdited((OptionChange("method", "paper"),)))
+    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    workspace.dispatch(Solved(2, NO_ANSWER))
+    workspace.dispatch(ClickPlaced(TIMES[4], 1.0, 2.0))
+    workspace.undo()
+    assert solver.revisions == [2, 3]
+
+
+def test_a_restored_session_is_solved_at_once(journal: ListJournal, solver: HeldSolver) -> None:
+    first = Workspace(FACTS, Restored(Path("nowhere"), History()), journal, HeldSolver())
+    first.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    Workspace(FACTS, Restored(Path("nowhere"), first.history), journal, solver)
+    assert solver.revisions == [1]
+
+
+def test_an_answer_that_comes_within_the_request_does_not_lock_up(journal: ListJournal) -> None:
+    class Immediate(HeldSolver):
+        def request(self, revision: int, clicks, options, when_done: Callable[[Solved], None]) -> None:
+            when_done(Solved(revision, NO_ANSWER))
+
+    workspace = Workspace(FACTS, Restored(Path("nowhere"), History()), journal, Immediate())
+    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    assert workspace.session.is_solved
+
+
+def test_a_subscriber_may_dispatch(workspace: Workspace) -> None:
+    def tidy(shown: View) -> None:
+        if len(shown.clicks) > 1:
+            workspace.dispatch(ClickRemoved(shown.clicks[0].id))
+
+    seen: list[int] = []
+    workspace.subscribe(tidy)
+    workspace.subscribe(lambda shown: seen.append(len(shown.clicks)))
+    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    workspace.dispatch(ClickPlaced(TIMES[4], 1.0, 2.0))
+    assert seen == [0, 1, 2, 1]
+
+
+def test_an_ended_subscription_hears_nothing_more(workspace: Workspace) -> None:
+    seen: list[View] = []
+    end = workspace.subscribe(seen.append)
+    end()
+    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    assert len(seen) == 1
+
+
+def test_a_subscriber_that_fails_does_not_silence_the_workspace(workspace: Workspace) -> None:
+    def fail(shown: View) -> None:
+        raise ZeroDivisionError
+
+    seen: list[View] = []
+    with pytest.raises(ZeroDivisionError):
+        workspace.subscribe(fail)
+    workspace.subscribe(seen.append)
+    with pytest.raises(ZeroDivisionError):
+        workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    assert len(workspace.session.clicks) == 1
+
+
+def test_many_threads_at_once_lose_no_step_and_views_come_in_order(workspace: Workspace, journal: ListJournal) -> None:
+    seen: list[int] = []
+    workspace.subscribe(lambda shown: seen.append(shown.revision))
+    ready = threading.Barrier(4)
+
+    def click(start: int) -> None:
+        ready.wait()
+        for frame in range(start, 48, 4):
+            workspace.dispatch(ClickPlaced(TIMES[frame], 1.0, 2.0))
+
+    threads = [threading.Thread(target=click, args=(start,)) for start in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(workspace.session.clicks) == len(journal.steps) == 48
+    assert seen == list(range(49))
+
+
+def test_downloaded_clicks_can_be_imported_again(workspace: Workspace) -> None:
+    for frame in (3, 5):
+        workspace.dispatch(ClickPlaced(TIMES[frame], 1.5, 2.5))
+    text, clicks = workspace.clicks_text(), workspace.session.clicks
+    assert read_clicks(text) == clicks
+    workspace.undo()
+    workspace.undo()
+    workspace.import_clicks(text, "clicks.json")
+    assert workspace.session.clicks == clicks
+    workspace.dispatch(Undo())
+    assert workspace.session.clicks == ()
+
+
+def test_a_file_that_holds_no_clicks_is_refused_with_its_name(workspace: Workspace) -> None:
+    with pytest.raises(InputError, match=r"holiday\.json"):
+        workspace.import_clicks("[]", "holiday.json")
+
+
+def test_close_stops_the_solver_and_lets_go_of_the_journal(
+    workspace: Workspace, journal: ListJournal, solver: HeldSolver
+) -> None:
+    workspace.close()
+    assert journal.closed
+    assert solver.closed
+
+
+class Picture:
+    width_px, height_px = 640, 480
+
+
+class BareRecording:
+    radar_topic = image_topic = camera_info_topic = None
+    radar_frame, camera_frame = "radar", "camera"
+    image_times = FACTS.image_times
+
+    def camera(self) -> None:
+        return None
+
+    def image_bytes(self, index: int) -> Picture:
+        return Picture()
+
+    def fingerprint(self) -> tuple[()]:
+        return ()
+
+    def radar_scans_around(self, times, half_window_s: float) -> RadarScans:
+        return RadarScans()
+
+
+def test_a_workspace_opened_again_has_the_clicks_of_before(tmp_path: Path) -> None:
+    for expected in ([], ["c1"]):
+        workspace = open_workspace(BareRecording(), camera=None, session_folder=tmp_path / "s", name="drive")
+        assert [click.id for click in workspace.restored.history.present.clicks] == expected
+        workspace.dispatch(ClickPlaced(TIMES[3], 1.5, 2.5))
+        workspace.close()
+
+
+def test_a_recording_without_frames_is_refused_in_words() -> None:
+    recording = BareRecording()
+    recording.image_times = np.zeros(0, dtype=np.int64)
+    with pytest.raises(InputError, match="drive: has no frames to click in"):
+        recording_facts(recording, "drive")
