@@ -126,12 +126,13 @@ def _person(leg: _Leg, before: _Leg, time_s: float) -> PersonState:
     crouch = 0.0
     if leg.action in ("put", "pick"):
         crouch = _eased(1.25 * (share if leg.action == "put" else 1.0 - share))
+    holding = leg.carrying or leg.action in ("put", "pick")
     turned = _eased((time_s - leg.start_s) / _TURNING_S)
     heading = before.heading_rad + turned * _turn(leg.heading_rad - before.heading_rad)
     if leg.action == "stand":  # nobody stands like a post: sway by a centimetre
         place = place + 0.008 * np.array([np.sin(1.9 * time_s), np.cos(1.3 * time_s)])
     return PersonState(
-        float(place[0]), float(place[1]), heading, leg.walked_m + eased * length_m, pace, crouch, leg.carrying
+        float(place[0]), float(place[1]), heading, leg.walked_m + eased * length_m, pace, crouch, holding
     )
 
 

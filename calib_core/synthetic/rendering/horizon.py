@@ -83,25 +83,36 @@ def _city(directions: np.ndarray, footprint_rad: float) -> np.ndarray:
     return colour + (0.6 * HAZE - colour) * ground
 
 
+def _crowns(azimuth: np.ndarray, width_rad: float, seed: int) -> np.ndarray:
+    """Return the outline of a row of tree crowns, 0 to 1: round heads of different heights, two rows deep."""
+    outline = np.zeros_like(azimuth)
+    for shift in (0, 1):
+        across = azimuth / width_rad + 0.5 * shift
+        cell = np.floor(across).astype(np.int32)
+        wide = 0.75 + 0.5 * hash_random(cell, cell * 0 + shift, seed)
+        aside = (across - cell - 0.5 + 0.25 * (hash_random(cell, cell * 0 + 2 + shift, seed) - 0.5)) * 2.0 / wide
+        tall = 0.55 + 0.45 * hash_random(cell, cell * 0 + 4 + shift, seed)
+        outline = np.maximum(outline, tall * np.sqrt(np.maximum(0.0, 1.0 - aside * aside)) ** 0.8)
+    return outline
+
+
 def _trees(directions: np.ndarray, footprint_rad: float) -> np.ndarray:
     colour = _sky(directions, footprint_rad)
     azimuth = np.arctan2(directions[:, 1], directions[:, 0]) + np.float32(4.0)
     elevation = np.arcsin(np.clip(directions[:, 2], -1.0, 1.0))
     flat = np.full_like(azimuth, footprint_rad)
-    hills = 0.030 + 0.022 * value_noise(azimuth * 2.3, azimuth * 0.0, 41)
+    hills = 0.020 + 0.012 * value_noise(azimuth * 2.3, azimuth * 0.0, 41)
     rows = (
-        (hills, 0.0, 0.72, 0.12),
-        (0.045 + 0.0 * hills, 0.030, 0.30, 0.10),
-        (0.030 + 0.0 * hills, 0.026, 0.10, 0.075),
+        (hills, 0.0, 0.80, 0.11),
+        (np.full_like(azimuth, 0.030), 0.034, 0.36, 0.115),
+        (np.full_like(azimuth, 0.014), 0.040, 0.12, 0.095),
     )
     for row, (height, rough, haze, tone) in enumerate(rows):
-        crowns = fractal_noise(
-            azimuth, 0.0 * azimuth, size_m=0.09, octaves=6, footprint_m=flat, seed=51 + row, fall=0.62
-        )
-        edge = height + rough * crowns
+        twigs = fractal_noise(azimuth, elevation, size_m=0.016, octaves=4, footprint_m=flat, seed=51 + row)
+        edge = height + rough * _crowns(azimuth + 0.017 * row, 0.058 - 0.008 * row, 71 + row) + 0.10 * rough * twigs
         cover = np.clip((edge - elevation) / (1.5 * footprint_rad) + 0.5, 0.0, 1.0)
-        leaves = fractal_noise(azimuth, elevation, size_m=0.022, octaves=4, footprint_m=flat, seed=61 + row)
-        shade = tone * (1.0 + 0.45 * leaves) * (0.55 + 0.6 * np.clip(elevation / np.maximum(edge, 1e-3), 0.0, 1.0))
+        leaves = fractal_noise(azimuth, elevation, size_m=0.020, octaves=4, footprint_m=flat, seed=61 + row)
+        shade = tone * (1.0 + 0.45 * leaves) * (0.45 + 0.75 * np.clip(elevation / np.maximum(edge, 1e-3), 0.0, 1.0))
         tree = np.maximum(shade, 0.01)[:, None] * np.array([0.58, 0.95, 0.38])
         colour += ((tree + (HAZE - tree) * haze * 0.75) - colour) * cover[:, None]
     return colour

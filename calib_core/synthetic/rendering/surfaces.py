@@ -75,7 +75,7 @@ def _tiles(p: Patch) -> np.ndarray:
 
 
 def _grass(p: Patch) -> np.ndarray:
-    stripe = np.where(np.floor(p.v_m / 2.4) % 2 == 0, 1.0, -1.0)
+    stripe = np.tanh(9.0 * np.sin(np.pi * p.v_m / 2.4 + 0.6))
     soft = np.clip(1.3 - p.footprint_m * 2.0, 0.0, 1.0)
     patchy = p.noise(3.0, 4, 1)
     blades = p.noise(0.10, 3, 2, stretch=2.0)
