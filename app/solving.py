@@ -109,8 +109,8 @@ def solve_clicks(
     if camera is None:
         return Unsolvable(
             "no-camera",
-            "The camera's intrinsics are missing: the recording has none that can be used.",
-            "Start again with --camera FILE (camera_info YAML, OpenCV, Kalibr), or calibrate them with cocalib intrinsics.",
+            "the camera's intrinsics are missing: the recording has none that can be used",
+            "start again with --camera FILE (camera_info YAML, OpenCV, Kalibr), or calibrate them with cocalib intrinsics",
         )
     times = sorted({click.image_time for click in clicks})
     scans = recording.radar_scans_around(times, half_window_s(options))
@@ -268,10 +268,12 @@ def _deliver(request: _Request, future: "Future[Outcome | None]") -> None:
 
 def _failure(error: BaseException) -> Unsolvable:
     if isinstance(error, CalibrationError):
-        return Unsolvable("unreadable", str(error), "The clicks are kept; once that is put right, change any of them.")
+        return Unsolvable(
+            "unreadable", str(error), "the clicks are kept; put that right, then change any of them to try again"
+        )
     _log.error("the solver failed", exc_info=error)
     return Unsolvable(
         "internal-error",
-        f"The solver failed: {type(error).__name__}: {error}.",
-        "This is a fault of the program, not of your data. The clicks are kept; the log has the details for a report.",
+        f"the solver failed: {type(error).__name__}: {error}",
+        "this is a fault of the program, not of your data; the clicks are kept, and the log has the details for a report",
     )

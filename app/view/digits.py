@@ -8,12 +8,12 @@ _DASH = "–"
 
 
 def plain(value: float, digits: int = 3) -> str:
-    """Write a number with so many significant digits, never in powers of ten; a dash where it is not finite."""
+    """Write a number with so many digits that count, more only before the point; a dash where it is not finite."""
     if not math.isfinite(value):
         return _DASH
     if value == 0:
         return "0"
-    return _fixed(value, digits - 1 - _exponent(value, digits))
+    return _fixed(value, max(0, digits - 1 - _exponent(value, digits)))
 
 
 def with_sigma(value: float, sigma: float) -> str:

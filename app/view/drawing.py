@@ -4,6 +4,7 @@ from app.session import History, RecordingFacts, Session
 from app.view.drawn import CautionRow, Stage, View
 from app.view.figures import metric_figures, pose_figures, residual_limit_px
 from app.view.rows import click_rows
+from app.view.wording import sentence
 from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration
 
@@ -52,7 +53,7 @@ def _stage(session: Session) -> Stage:
         return "solving"
     if isinstance(session.outcome, Calibration):
         return "solved"
-    return "collecting" if _missing(session) else "unsolvable"
+    return "collecting" if _waits_for_clicks(session) else "unsolvable"
 
 
 def _missing(session: Session) -> int:
@@ -60,17 +61,23 @@ def _missing(session: Session) -> int:
     return max(0, MIN_PLACEMENTS - sum(not click.excluded for click in session.clicks))
 
 
+def _waits_for_clicks(session: Session) -> bool:
+    """Whether more placements are all that is missing, as far as the newest answer knows."""
+    blocked = isinstance(session.outcome, Unsolvable) and session.outcome.code != "too-few-pairs"
+    return _missing(session) > 0 and not blocked
+
+
 def _words(session: Session, stage: Stage) -> tuple[str, str]:
     """Return the status line and the next thing to do."""
     missing, outcome = _missing(session), session.outcome
-    if missing:
+    if _waits_for_clicks(session):
         return f"{missing} more placement{'s' if missing > 1 else ''} needed", _NEXT_CLICK
     if stage == "solving":
         return "solving…", ""
     if isinstance(outcome, Unsolvable):
-        return outcome.reason, outcome.hint
+        return outcome.reason, sentence(outcome.hint)
     if isinstance(outcome, Calibration):
-        return _agreement(outcome), outcome.cautions[0].hint if outcome.cautions else ""
+        return _agreement(outcome), sentence(outcome.cautions[0].hint) if outcome.cautions else ""
     return "", ""
 
 
@@ -86,4 +93,6 @@ def _agreement(calibration: Calibration) -> str:
 
 
 def _cautions(calibration: Calibration) -> tuple[CautionRow, ...]:
-    return tuple(CautionRow(caution.code, caution.message, caution.hint) for caution in calibration.cautions)
+    return tuple(
+        CautionRow(caution.code, sentence(caution.message), sentence(caution.hint)) for caution in calibration.cautions
+    )

@@ -7,6 +7,7 @@ import numpy as np
 from app.session import RecordingFacts, Session, Stamp
 from app.view.digits import plain
 from app.view.drawn import ClickRow, ClickState, Ellipse
+from app.view.wording import sentence
 from calib_core.arrays import Points2
 from calib_core.measurements import ReflectorClick, Unpaired
 from calib_core.radar import polar_from_cartesian
@@ -44,7 +45,7 @@ def _row(
     pair, lone = pairs.get(click.id), unpaired.get(click.id)
     if pair is None:
         state: ClickState = "excluded" if click.excluded else "unpaired" if lone else "pending"
-        note = f"{lone.reason} {lone.hint}" if lone else ""
+        note = f"{sentence(lone.reason)} {sentence(lone.hint)}" if lone else ""
         return ClickRow(click.id, stamp, frame, click.u_px, click.v_px, state, note=note)
     state = _state(click, pair)
     projected_px = _finite_pixel(pair)

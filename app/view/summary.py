@@ -2,6 +2,7 @@
 
 from app.view.drawn import Figure
 from app.view.figures import metric_figures, pose_figures
+from app.view.wording import sentence
 from calib_core.results import Calibration
 
 __all__ = ["summary_lines"]
@@ -12,8 +13,8 @@ def summary_lines(calibration: Calibration) -> tuple[str, ...]:
     figures = (*metric_figures(calibration), *pose_figures(calibration))
     width = max(len(figure.label) for figure in figures)
     lines = [_line(figure, width) for figure in figures]
-    lines += [f"caution: {caution.message} {caution.hint}" for caution in calibration.cautions]
-    lines += [f"unpaired: {row.id}: {row.reason} {row.hint}" for row in calibration.unpaired]
+    lines += [f"caution: {sentence(caution.message)} {sentence(caution.hint)}" for caution in calibration.cautions]
+    lines += [f"unpaired: {row.id}: {sentence(row.reason)} {sentence(row.hint)}" for row in calibration.unpaired]
     return tuple(lines)
 
 
