@@ -21,8 +21,9 @@ from calib_core.uncertainty import LeftOut, PoseUncertainty
 
 __all__ = ["Findings", "cautions_of", "handedness"]
 
-_CLEARLY = 12.0  # difference of twice the log-likelihood that settles a question
-_BARELY = 6.0
+_MIRRORED = 6.0  # differences of twice the log-likelihood
+_NOT_MIRRORED = -3.0
+_ALMOST_AS_LIKELY = 6.0
 _OTHER_POSE_RAD = np.deg2rad(5.0)
 _OTHER_POSE_SIGMAS = 6.0
 _NARROW_CONDITION = 5e5
@@ -97,17 +98,17 @@ def handedness(evidence: Evidence, best: Consensus, *, estimate_scale: bool, see
 
 
 def _mirrored_axes(f: Findings) -> list[Caution]:
-    if f.mirror_gain > _CLEARLY:
+    if f.mirror_gain > _MIRRORED:
         return [
             Caution(
                 "mirrored-axes",
-                "the pairs fit much better when one radar axis is mirrored "
-                f"(log-likelihood ratio {f.mirror_gain / 2:.0f}): the radar's axes look left-handed",
+                "pairs and expected camera position agree better when one radar axis is mirrored "
+                f"(log-likelihood ratio {f.mirror_gain / 2:.1f}): the radar's axes look left-handed",
                 "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) where the "
                 "positions come from; do not use this pose",
             )
         ]
-    if f.mirror_gain > -_BARELY:
+    if f.mirror_gain > _NOT_MIRRORED:
         return [
             Caution(
                 "handedness-open",
@@ -124,7 +125,7 @@ def _two_poses(f: Findings) -> list[Caution]:
         error = other.camera_from_radar.error_from(f.refined.camera_from_radar)
         apart_rad = float(np.linalg.norm(error[3:]))
         sigmas = float(np.sqrt(error @ f.uncertainty.information @ error))
-        if other.cost - best.cost < _BARELY and apart_rad > _OTHER_POSE_RAD and sigmas > _OTHER_POSE_SIGMAS:
+        if other.cost - best.cost < _ALMOST_AS_LIKELY and apart_rad > _OTHER_POSE_RAD and sigmas > _OTHER_POSE_SIGMAS:
             return [
                 Caution(
                     "two-poses",

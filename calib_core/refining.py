@@ -23,9 +23,10 @@ _MOST_ROUNDS = 80
 _ROUNDS_BEFORE_SCALES = 3
 _STEP_TOLERANCE = 1e-8  # in standard deviations of the pose
 _PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # pseudo-counts of the inlier share
-_PSEUDO_REDUNDANCY = 3.0  # pseudo-degrees of freedom that pull each noise scale to 1
+_PSEUDO_REDUNDANCY = 6.0  # pseudo-degrees of freedom that pull each noise scale to what it leans on
+_PSEUDO_SHARED = 4.0
 _SCALE_LIMITS = (0.1, 12.0)
-_LEAST_PAIRS_FOR_SCALES = 8.0
+_LEAST_PAIRS_FOR_SCALES = 5.0
 _NEAR = 6.0  # standard deviations beyond which a pair says nothing about its own true position
 
 
@@ -152,7 +153,15 @@ def _variance_components(evidence: Evidence, state: _State, model: Linearised, w
         along = (np.swapaxes(factor, 1, 2) @ model.residual[:, :, None])[:, :, 0]
         found[k] = weights @ (along**2).sum(axis=1)
         redundant[k] = weights @ np.einsum("nia,nij,nja->n", factor, projector, factor)
-    # the pseudo-redundancy belongs to the assumed sigma: in units of the present one it is 1 / scale^2
-    ratio = (found + _PSEUDO_REDUNDANCY / state.scale**2) / (np.maximum(redundant, 0.0) + _PSEUDO_REDUNDANCY)
-    scale = np.clip(state.scale * np.sqrt(ratio), *_SCALE_LIMITS)
-    return scale, float(redundant.sum() + 4 * _PSEUDO_REDUNDANCY)
+    return _shrunk(found * state.scale**2, np.maximum(redundant, 0.0)), float(redundant.sum()) + _PSEUDO_SHARED
+
+
+def _shrunk(squares: Values, redundant: Values) -> Values:
+    """Turn sums of squares, in assumed sigmas, into scales, each leaning on what is known better than itself.
+
+    The click leans on its assumed sigma; range, azimuth and elevation lean on the level they share, and that on 1.
+    """
+    shared = (squares[1:].sum() + _PSEUDO_SHARED) / (redundant[1:].sum() + _PSEUDO_SHARED)
+    towards = np.array([1.0, shared, shared, shared])
+    variance = (squares + _PSEUDO_REDUNDANCY * towards) / (redundant + _PSEUDO_REDUNDANCY)
+    return np.clip(np.sqrt(variance), *_SCALE_LIMITS)

@@ -50,10 +50,12 @@ def pose_uncertainty(refined: Refined) -> PoseUncertainty:
     information = _floored(plain, lost)
     prior_jacobian = refined.evidence.belief.rows(refined.camera_from_radar)[1]
     pairs_only = plain - prior_jacobian.T @ prior_jacobian
+    covariance = _symmetric_inverse(information)
+    from_pairs = 1.0 - float(np.trace(prior_jacobian @ covariance @ prior_jacobian.T)) / 6.0
     return PoseUncertainty(
-        covariance=_symmetric_inverse(information),
+        covariance=covariance,
         information=information,
-        quantile=_quantile(refined.degrees_of_freedom),
+        quantile=_quantile(refined.degrees_of_freedom, from_pairs),
         condition=_scaled_condition(pairs_only),
     )
 
@@ -79,13 +81,20 @@ def _scaled_condition(information: Matrix66) -> float:
     return float(values[-1] / max(values[0], 1e-16))
 
 
-def _quantile(degrees_of_freedom: float) -> float:
-    """Return the 95 % quantile for 6 parameters: chi-square with the noise known, 6 F(6, nu) with it estimated."""
+def _quantile(degrees_of_freedom: float, from_pairs: float) -> float:
+    """Return the 95 % quantile for 6 parameters: chi-square with the noise known, 6 F(6, nu) with it estimated.
+
+    What a measured camera position contributes needs no estimated noise; the two are mixed by their shares.
+
+    Args:
+        degrees_of_freedom: nu, behind the noise level; 0 where it was not estimated.
+        from_pairs: the share of the parameters that the pairs determine, 0 to 1.
+    """
     if degrees_of_freedom <= 0:
         return _CHI2_95_6
     from scipy.special import fdtri
 
-    return float(6.0 * fdtri(6.0, degrees_of_freedom, 0.95))
+    return float(_CHI2_95_6 + from_pairs * (6.0 * fdtri(6.0, degrees_of_freedom, 0.95) - _CHI2_95_6))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
