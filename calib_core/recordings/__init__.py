@@ -1,8 +1,17 @@
 """Recordings: ROS 1 and ROS 2 files in, radar scans, images and intrinsics out. Only here are containers known."""
 
 from calib_core.recordings.images import EncodedImage
-from calib_core.recordings.recording import InputFile, Recording, open_recording
+from calib_core.recordings.recording import InputFile, Recording, inspect_recording, open_recording, require_files
 from calib_core.recordings.selection import RecordingOptions
 from calib_core.recordings.topics import TopicSummary
 
-__all__ = ["EncodedImage", "InputFile", "Recording", "RecordingOptions", "TopicSummary", "open_recording"]
+__all__ = [
+    "EncodedImage",
+    "InputFile",
+    "Recording",
+    "RecordingOptions",
+    "TopicSummary",
+    "inspect_recording",
+    "open_recording",
+    "require_files",
+]

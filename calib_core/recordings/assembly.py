@@ -18,7 +18,7 @@ from calib_core.recordings.decoding import Message, decode
 from calib_core.recordings.images import ImageLayout
 from calib_core.recordings.radar_layouts import RadarLayout, recognise
 from calib_core.recordings.radar_lists import PointLayout
-from calib_core.recordings.selection import Inventory, RecordingOptions, Selection, select
+from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.sources import Source
 from calib_core.recordings.streams import ImageStream, RadarStream
 from calib_core.recordings.topics import Topic, TopicSummary, join_topics, usage_of
@@ -45,8 +45,16 @@ class Assembly:
     cautions: tuple[Caution, ...]
 
 
-def assemble(paths: Sequence[Path], sources: tuple[Source, ...], options: RecordingOptions) -> Assembly:
+def assemble(
+    paths: Sequence[Path], sources: tuple[Source, ...], options: RecordingOptions, require: Sequence[Need]
+) -> Assembly:
     """Choose topics and clocks and build the streams.
+
+    Args:
+        paths: as a person gave them, for messages.
+        sources: the open files.
+        options: topics and clock asked for.
+        require: what the recording must have; with both, also a time in common.
 
     Raises:
         RecordingError: the recording lacks what the options ask for.
@@ -54,16 +62,16 @@ def assemble(paths: Sequence[Path], sources: tuple[Source, ...], options: Record
     name = " + ".join(str(path) for path in paths)
     topics, repeated = join_topics(sources)
     cautions = [caution for source in sources for caution in source.cautions] + list(repeated)
-    if not any(len(topic) for topic in topics) and options.require:
+    if not any(len(topic) for topic in topics) and require:
         raise RecordingError(f"{name}: holds no messages; was the recorder told which topics to record?")
     inventory = Inventory(name, topics, {topic.name: usage_of(topic) for topic in topics})
-    selection = select(inventory, options)
+    selection = select(inventory, options, require)
     clocks, stamps, about_clocks = _clocks(selection, options)
     cautions.extend(about_clocks)
     radar = _radar_stream(selection.radar, inventory, stamps)
     images = _image_stream(selection.image, inventory, stamps)
     if radar and images:
-        cautions.extend(_check_overlap(name, radar, images, selection, required=bool(options.require)))
+        cautions.extend(_check_overlap(name, radar, images, selection, required=len(require) == 2))
     camera, about_camera = _camera(selection, images)
     cautions.extend([*about_camera, *_about_radar(radar, selection, inventory), *_about_images(images)])
     return Assembly(

@@ -27,10 +27,8 @@ def open_sources(paths: Sequence[Path]) -> tuple[Source, ...]:
     """Open every recording file that the paths name or hold.
 
     Raises:
-        RecordingError: a path does not exist, or holds nothing that can be read.
+        RecordingError: a path holds nothing that can be read.
     """
-    if not paths:
-        raise RecordingError(f"no recording given; {_KINDS}")
     files: dict[Path, bool] = {}
     for path in paths:
         for file, packed in _files(path):
@@ -48,8 +46,6 @@ def open_sources(paths: Sequence[Path]) -> tuple[Source, ...]:
 
 def _files(path: Path) -> list[tuple[Path, bool]]:
     """Return the files a path stands for, each with whether its messages are compressed one by one."""
-    if not path.exists():
-        raise RecordingError(f"{path}: no such file or folder; check the path")
     if not path.is_dir():
         return [(path, _packed_messages(path.parent / _METADATA, path))]
     if (path / _METADATA).is_file():

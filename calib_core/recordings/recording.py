@@ -17,12 +17,12 @@ from calib_core.measurements import RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.images import EncodedImage
 from calib_core.recordings.opening import open_sources
-from calib_core.recordings.selection import RecordingOptions
+from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.sources import Source
 from calib_core.recordings.topics import TopicSummary
 from calib_core.results import Caution
 
-__all__ = ["InputFile", "Recording", "open_recording"]
+__all__ = ["InputFile", "Recording", "inspect_recording", "open_recording", "require_files"]
 
 _HASH_BYTES = 1 << 22
 
@@ -183,7 +183,12 @@ class Recording:
         return tuple(files)
 
 
-def open_recording(paths: "str | Path | Sequence[str | Path]", options: RecordingOptions | None = None) -> Recording:
+def open_recording(
+    paths: "str | Path | Sequence[str | Path]",
+    options: RecordingOptions | None = None,
+    *,
+    require: Sequence[Need] = ("radar", "image"),
+) -> Recording:
     """Open files and folders, in any mix of formats, as one recording.
 
     Opening reads the indexes, and of the radar's and the camera's messages the stamps: of chunks stored as they are a
@@ -192,15 +197,39 @@ def open_recording(paths: "str | Path | Sequence[str | Path]", options: Recordin
     Args:
         paths: ROS 1 .bag, ROS 2 .mcap and .db3 files, and folders of them.
         options: topics and clock.
+        require: what it must have; intrinsics need only "image".
 
     Raises:
-        RecordingError: it cannot be opened, or lacks what the options require.
+        RecordingError: it cannot be opened, or lacks what is required.
     """
     chosen = (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
-    sources = open_sources(chosen)
+    sources = open_sources(require_files(chosen))
     try:
-        return Recording(chosen, sources, assemble(chosen, sources, options or RecordingOptions()))
+        return Recording(chosen, sources, assemble(chosen, sources, options or RecordingOptions(), require))
     except BaseException:
         for source in sources:
             source.close()
         raise
+
+
+def inspect_recording(paths: "str | Path | Sequence[str | Path]", options: RecordingOptions | None = None) -> Recording:
+    """Open files and folders to look into them; a radar, a camera or messages may be missing.
+
+    Raises:
+        RecordingError: a file cannot be opened, or a topic asked for is not there.
+    """
+    return open_recording(paths, options, require=())
+
+
+def require_files(paths: Sequence[Path]) -> tuple[Path, ...]:
+    """Return the paths if all of them exist.
+
+    Raises:
+        RecordingError: one does not, or none was given.
+    """
+    if not paths:
+        raise RecordingError("no recording given; name one or more .bag, .mcap, .db3 files or bag folders")
+    for path in paths:
+        if not path.exists():
+            raise RecordingError(f"{path}: no such file or folder; check the path")
+    return tuple(paths)

@@ -9,7 +9,7 @@ from calib_core.recordings.clocks import Clock
 from calib_core.recordings.radar_lists import PointLayout
 from calib_core.recordings.topics import Topic, TopicKind, Usage
 
-__all__ = ["Inventory", "RecordingOptions", "Selection", "select"]
+__all__ = ["Inventory", "Need", "RecordingOptions", "Selection", "select"]
 
 Need = Literal["radar", "image"]
 _WORDS = {"radar": "radar", "image": "camera image", "camera-info": "camera info"}
@@ -30,8 +30,6 @@ class RecordingOptions:
     """The topic with the camera's intrinsics; the one beside the images when not given."""
     clock: Clock = "auto"
     """Times to go by: stamps in the messages, receive times, or auto: stamps unless they cannot be right."""
-    require: tuple[Need, ...] = ("radar", "image")
-    """What the recording must have; empty to look into any recording."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,8 +58,13 @@ class Selection:
     camera_info: Topic | None
 
 
-def select(inventory: Inventory, options: RecordingOptions) -> Selection:
+def select(inventory: Inventory, options: RecordingOptions, require: Sequence[Need]) -> Selection:
     """Choose the topics.
+
+    Args:
+        inventory: what there is.
+        options: what a person asked for.
+        require: what there must be.
 
     Raises:
         RecordingError: a topic asked for is not there or cannot be used, or one that is required is missing.
@@ -73,7 +76,7 @@ def select(inventory: Inventory, options: RecordingOptions) -> Selection:
         inventory.of_kind("image"), inventory, _image_rank
     )
     for kind, topic in (("radar", radar), ("image", image)):
-        if topic is None and kind in options.require:
+        if topic is None and kind in require:
             raise _missing(inventory, "radar" if kind == "radar" else "image")
     info = _chosen(inventory, "camera-info", options.camera_info_topic)
     return Selection(radar, image, info or _info_beside(image, inventory))
