@@ -1,8 +1,10 @@
 """Recordings: ROS 1 and ROS 2 files in, radar scans, images and intrinsics out. Only here are containers known."""
 
+from calib_core.recordings.describing import describe
 from calib_core.recordings.images import EncodedImage
 from calib_core.recordings.recording import InputFile, Recording, inspect_recording, open_recording, require_files
 from calib_core.recordings.selection import RecordingOptions
+from calib_core.recordings.summary import RecordingSummary, recording_summary
 from calib_core.recordings.topics import TopicSummary
 
 __all__ = [
@@ -10,8 +12,11 @@ __all__ = [
     "InputFile",
     "Recording",
     "RecordingOptions",
+    "RecordingSummary",
     "TopicSummary",
+    "describe",
     "inspect_recording",
     "open_recording",
+    "recording_summary",
     "require_files",
 ]

@@ -21,7 +21,7 @@ from calib_core.recordings.radar_lists import PointLayout
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.sources import Source
 from calib_core.recordings.streams import ImageStream, RadarStream
-from calib_core.recordings.topics import Topic, TopicSummary, join_topics, usage_of
+from calib_core.recordings.topics import Rhythm, Topic, TopicSummary, join_topics, usage_of
 from calib_core.results import Caution
 
 __all__ = ["Assembly", "assemble"]
@@ -286,6 +286,7 @@ def _summary(
 ) -> TopicSummary:
     usage = inventory.usages[topic.name]
     times = stamps.get(topic.name, topic.receive_ns)
+    rhythm = Rhythm.of(times)
     return TopicSummary(
         name=topic.name,
         type=topic.type,
@@ -297,4 +298,7 @@ def _summary(
         problem=usage.problem,
         chosen=any(topic is chosen for chosen in (selection.radar, selection.image, selection.camera_info)),
         layout=usage.radar.description if usage.radar else "",
+        rate_hz=rhythm.rate_hz,
+        longest_gap_s=rhythm.longest_gap_s,
+        jitter_s=rhythm.jitter_s,
     )

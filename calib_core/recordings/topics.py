@@ -7,7 +7,7 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.camera_info import is_camera_info
 from calib_core.recordings.definitions import Definition, definition_of
 from calib_core.recordings.images import ImageLayout, is_compressed_image, is_raw_image
@@ -15,7 +15,7 @@ from calib_core.recordings.radar_layouts import RadarLayout, recognise
 from calib_core.recordings.sources import Channel, Heads, MessageIndex, Source
 from calib_core.results import Caution
 
-__all__ = ["Topic", "TopicKind", "TopicSummary", "Usage", "join_topics", "usage_of"]
+__all__ = ["Rhythm", "Topic", "TopicKind", "TopicSummary", "Usage", "join_topics", "usage_of"]
 
 TopicKind = Literal["radar", "image", "camera-info", "other"]
 
@@ -35,6 +35,9 @@ class TopicSummary:
         problem: why it cannot be used although its kind is right; None where all is well.
         chosen: it is the radar, image or camera-info topic in use.
         layout: what is read from it, in a few words; "" for kinds that need none.
+        rate_hz: messages per second from first to last; None with fewer than two.
+        longest_gap_s: longest time between neighbours [s]; None with fewer than two.
+        jitter_s: median deviation of that time from its median [s]; None with fewer than two.
     """
 
     name: str
@@ -47,6 +50,37 @@ class TopicSummary:
     problem: str | None
     chosen: bool
     layout: str = ""
+    rate_hz: float | None = None
+    longest_gap_s: float | None = None
+    jitter_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Rhythm:
+    """How regularly something comes; None each with fewer than two stamps.
+
+    Attributes:
+        rate_hz: per second, from first to last.
+        longest_gap_s: longest time between neighbours [s].
+        jitter_s: median deviation of that time from its median [s].
+    """
+
+    rate_hz: float | None = None
+    longest_gap_s: float | None = None
+    jitter_s: float | None = None
+
+    @classmethod
+    def of(cls, times_ns: TimesNs) -> "Rhythm":
+        """Measure stamps in any order."""
+        if len(times_ns) < 2:
+            return cls()
+        steps_s = np.diff(np.sort(times_ns)) / NS_PER_S
+        span_s = float(steps_s.sum())
+        return cls(
+            rate_hz=len(steps_s) / span_s if span_s > 0 else None,
+            longest_gap_s=float(steps_s.max()),
+            jitter_s=float(np.median(np.abs(steps_s - np.median(steps_s)))),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,138 @@
+"""A recording in words and columns: what `cocalib info` prints."""
+
+from collections.abc import Iterable, Sequence
+
+from calib_core.recordings.calendar import utc
+from calib_core.recordings.recording import Recording
+from calib_core.recordings.summary import CameraSummary, RadarSummary, RecordingSummary, TopicReport, recording_summary
+
+__all__ = ["describe", "summary_text"]
+
+_USE = {"radar": "radar", "image": "camera", "camera-info": "intrinsics"}
+
+
+def describe(recording: Recording) -> str:
+    """Describe an open recording for people."""
+    return summary_text(recording_summary(recording))
+
+
+def summary_text(summary: RecordingSummary) -> str:
+    """Write a summary as text: one fact per line, figures with units, cautions last."""
+    lines = [
+        *_labelled(
+            "files", _columns([(f.name, size_text(f.size_bytes), f.container) for f in summary.files], right={1})
+        ),
+        *_times(summary),
+        "",
+        *_topic_table(summary.topics),
+        "",
+        *_labelled("radar", _radar(summary.radar)),
+        *_labelled("camera", _camera(summary.camera)),
+    ]
+    if summary.cautions:
+        lines.append("")
+        for caution in summary.cautions:
+            lines.extend(_labelled("caution", [f"{caution.message}.", f"{caution.hint}. [{caution.code}]"]))
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _labelled(label: str, lines: Iterable[str]) -> list[str]:
+    return [f"{label if not number else '':<9} {line}" for number, line in enumerate(lines)]
+
+
+def _times(summary: RecordingSummary) -> list[str]:
+    if summary.start is None or summary.end is None:
+        return _labelled("time", ["no messages"])
+    lines = [f"{utc(summary.start.time)} to {utc(summary.end.time)}, {duration_text(summary.duration_s)}"]
+    if summary.overlap_s is not None:
+        lines.append(f"radar and camera share {duration_text(summary.overlap_s)}")
+    return _labelled("time", lines)
+
+
+def _topic_table(topics: Sequence[TopicReport]) -> list[str]:
+    if not topics:
+        return _labelled("topics", ["none"])
+    rows = [("used as", "topic", "type", "messages", "rate", "longest gap", "jitter", "stamps")]
+    for topic in topics:
+        rows.append(
+            (
+                _USE.get(topic.kind, "") if topic.chosen else "",
+                topic.name,
+                topic.type,
+                str(topic.count),
+                "" if topic.rate_hz is None else f"{topic.rate_hz:.1f} Hz",
+                "" if topic.longest_gap_s is None else f"{topic.longest_gap_s:.3f} s",
+                "" if topic.jitter_s is None else f"{topic.jitter_s * 1e3:.1f} ms",
+                {"header": "measured", "receive": "received"}[topic.clock] if topic.count else "",
+            )
+        )
+    lines = list(_columns(rows, right={3, 4, 5, 6}))
+    for topic in topics:
+        if topic.problem and topic.problem != "no messages":
+            lines.append(topic.problem if topic.name in topic.problem else f"{topic.name}: {topic.problem}")
+    return lines
+
+
+def _radar(radar: RadarSummary | None) -> list[str]:
+    if radar is None:
+        return ["none that can be read"]
+    low, middle, high = radar.returns_per_scan
+    rate = "" if radar.rate_hz is None else f" at {radar.rate_hz:.1f} Hz"
+    gap = "" if radar.longest_gap_s is None else f", longest gap {radar.longest_gap_s:.3f} s"
+    sample = "" if radar.sampled_scans >= radar.scans else f", from {radar.sampled_scans} scans"
+    return [
+        f"{radar.topic}, frame '{radar.frame}': {radar.scans} scans{rate}{gap}",
+        f"returns per scan: {middle:.0f} ({low} to {high}{sample})",
+        radar.layout,
+    ]
+
+
+def _camera(camera: CameraSummary | None) -> list[str]:
+    if camera is None:
+        return ["none that can be read"]
+    rate = "" if camera.rate_hz is None else f" at {camera.rate_hz:.1f} Hz"
+    gap = "" if camera.longest_gap_s is None else f", longest gap {camera.longest_gap_s:.3f} s"
+    size = "the first cannot be read"
+    if camera.width_px is not None:
+        size = f"{camera.width_px} x {camera.height_px} px, {camera.format}"
+    return [f"{camera.topic}, frame '{camera.frame}': {camera.frames} images{rate}{gap}", size, _intrinsics(camera)]
+
+
+def _intrinsics(camera: CameraSummary) -> str:
+    if camera.matrix_px is None or camera.distortion is None:
+        return "no usable intrinsics in the recording: give them with --camera FILE"
+    k = camera.matrix_px
+    lens = ", ".join(f"{value:.5g}" for value in camera.distortion)
+    return (
+        f"{camera.model} from {camera.camera_info_topic}: fx {k[0][0]:.2f} fy {k[1][1]:.2f} "
+        f"cx {k[0][2]:.2f} cy {k[1][2]:.2f} px" + (f"; distortion {lens}" if lens else "")
+    )
+
+
+def _columns(rows: Sequence[Sequence[str]], *, right: frozenset[int] | set[int] = frozenset()) -> Iterable[str]:
+    """Pad cells so that columns stand under one another."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)] if rows else []
+    for row in rows:
+        cells = [
+            cell.rjust(width) if number in right else cell.ljust(width)
+            for number, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        yield "  ".join(cells).rstrip()
+
+
+def size_text(size_bytes: int) -> str:
+    """Write a size with a unit that keeps it short."""
+    size = float(size_bytes)
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000 or unit == "GB":
+            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
+        size /= 1000
+    raise AssertionError
+
+
+def duration_text(seconds: float) -> str:
+    """Write a duration: seconds, from two minutes on with minutes before them."""
+    if seconds < 120:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(seconds, 60)
+    return f"{int(minutes)} min {rest:04.1f} s"

@@ -1,0 +1,245 @@
+"""What a recording holds, as plain values: for `cocalib info --json` and the text beside it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.errors import RecordingError
+from calib_core.measurements import NS_PER_S, TimeNs, time_parts
+from calib_core.recordings.recording import Recording
+from calib_core.recordings.topics import Rhythm, TopicSummary
+from calib_core.results import Caution
+
+__all__ = [
+    "CameraSummary",
+    "FileSummary",
+    "RadarSummary",
+    "RecordingSummary",
+    "Stamp",
+    "TopicReport",
+    "recording_summary",
+]
+
+_SAMPLED_SCANS = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """A time as files carry it."""
+
+    sec: int
+    nanosec: int
+
+    @classmethod
+    def of(cls, time: TimeNs | None) -> "Stamp | None":
+        """Split a stamp; None stays None."""
+        return None if time is None else cls(*time_parts(time))
+
+    @property
+    def time(self) -> TimeNs:
+        """The stamp in nanoseconds."""
+        return TimeNs(self.sec * NS_PER_S + self.nanosec)
+
+
+@dataclass(frozen=True, slots=True)
+class FileSummary:
+    """One file of the recording."""
+
+    name: str
+    size_bytes: int
+    container: str
+
+
+@dataclass(frozen=True, slots=True)
+class TopicReport:
+    """One topic; the attributes are those of TopicSummary."""
+
+    name: str
+    type: str
+    count: int
+    kind: str
+    chosen: bool
+    rate_hz: float | None
+    start: Stamp | None
+    end: Stamp | None
+    clock: str
+    longest_gap_s: float | None
+    jitter_s: float | None
+    layout: str
+    problem: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class RadarSummary:
+    """The radar in use.
+
+    Attributes:
+        topic: its topic.
+        frame: its frame_id.
+        layout: what is read from its messages.
+        scans: how many.
+        rate_hz: scans per second; None with fewer than two.
+        longest_gap_s: longest time between scans [s].
+        returns_per_scan: minimum, median and maximum over at most 200 scans spread over the recording.
+        sampled_scans: how many those were.
+    """
+
+    topic: str
+    frame: str
+    layout: str
+    scans: int
+    rate_hz: float | None
+    longest_gap_s: float | None
+    returns_per_scan: tuple[int, float, int]
+    sampled_scans: int
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSummary:
+    """The camera in use.
+
+    Attributes:
+        topic: its image topic.
+        frame: frame_id of the images.
+        frames: how many images.
+        rate_hz: images per second; None with fewer than two.
+        longest_gap_s: longest time between images [s].
+        format: how the page gets them: "jpeg" or "png"; None where the first cannot be read.
+        width_px: of the first image.
+        height_px: likewise.
+        camera_info_topic: where the intrinsics are from; None where there are none.
+        model: of the lens; None where there are no usable intrinsics.
+        matrix_px: K in rows.
+        distortion: coefficients.
+    """
+
+    topic: str
+    frame: str
+    frames: int
+    rate_hz: float | None
+    longest_gap_s: float | None
+    format: str | None
+    width_px: int | None
+    height_px: int | None
+    camera_info_topic: str | None
+    model: str | None
+    matrix_px: tuple[tuple[float, ...], ...] | None
+    distortion: tuple[float, ...] | None
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingSummary:
+    """Everything `cocalib info` knows.
+
+    Attributes:
+        files: as opened.
+        start: first stamp of any topic; of the topics in use where there are any.
+        end: last stamp likewise.
+        duration_s: between them.
+        overlap_s: time the radar and the camera share [s]; None where one is missing.
+        topics: by name.
+        radar: None where there is none.
+        camera: None where there is none.
+        cautions: what a person must know.
+    """
+
+    files: tuple[FileSummary, ...]
+    start: Stamp | None
+    end: Stamp | None
+    duration_s: float
+    overlap_s: float | None
+    topics: tuple[TopicReport, ...]
+    radar: RadarSummary | None
+    camera: CameraSummary | None
+    cautions: tuple[Caution, ...]
+
+
+def recording_summary(recording: Recording) -> RecordingSummary:
+    """Sum up an open recording; a few radar scans and one image are read."""
+    used = [topic for topic in recording.topics if topic.chosen and topic.kind in ("radar", "image")]
+    timed = [topic for topic in used or recording.topics if topic.start is not None and topic.end is not None]
+    start = min((topic.start for topic in timed if topic.start is not None), default=None)
+    end = max((topic.end for topic in timed if topic.end is not None), default=None)
+    return RecordingSummary(
+        files=tuple(FileSummary(s.path.name, s.size_bytes, s.container) for s in recording.sources),
+        start=Stamp.of(start),
+        end=Stamp.of(end),
+        duration_s=(end - start) / NS_PER_S if start is not None and end is not None else 0.0,
+        overlap_s=_overlap_s(recording),
+        topics=tuple(_report(topic) for topic in recording.topics),
+        radar=_radar(recording),
+        camera=_camera(recording),
+        cautions=recording.cautions,
+    )
+
+
+def _report(topic: TopicSummary) -> TopicReport:
+    return TopicReport(
+        name=topic.name,
+        type=topic.type,
+        count=topic.count,
+        kind=topic.kind,
+        chosen=topic.chosen,
+        rate_hz=topic.rate_hz,
+        start=Stamp.of(topic.start),
+        end=Stamp.of(topic.end),
+        clock=topic.clock,
+        longest_gap_s=topic.longest_gap_s,
+        jitter_s=topic.jitter_s,
+        layout=topic.layout,
+        problem=topic.problem,
+    )
+
+
+def _overlap_s(recording: Recording) -> float | None:
+    radar, images = recording.radar_times, recording.image_times
+    if not (len(radar) and len(images)):
+        return None
+    return max(0.0, (min(int(radar[-1]), int(images[-1])) - max(int(radar[0]), int(images[0]))) / NS_PER_S)
+
+
+def _radar(recording: Recording) -> RadarSummary | None:
+    topic = next((topic for topic in recording.topics if topic.name == recording.radar_topic), None)
+    times = recording.radar_times
+    if topic is None or not len(times):
+        return None
+    places = np.unique(np.linspace(0, len(times) - 1, min(_SAMPLED_SCANS, len(times))).astype(int))
+    stamps = np.unique(times[places])
+    scans = [recording.radar_scans(TimeNs(int(stamp)), TimeNs(int(stamp))) for stamp in stamps]
+    counts = np.concatenate([np.diff(scan.first_return) for scan in scans])
+    rhythm = Rhythm.of(times)
+    return RadarSummary(
+        topic=topic.name,
+        frame=recording.radar_frame,
+        layout=topic.layout,
+        scans=len(times),
+        rate_hz=rhythm.rate_hz,
+        longest_gap_s=rhythm.longest_gap_s,
+        returns_per_scan=(int(counts.min()), float(np.median(counts)), int(counts.max())),
+        sampled_scans=len(counts),
+    )
+
+
+def _camera(recording: Recording) -> CameraSummary | None:
+    if recording.image_topic is None or not len(recording.image_times):
+        return None
+    try:
+        image = recording.image_bytes(0)
+    except RecordingError:
+        image = None
+    camera = recording.camera()
+    rhythm = Rhythm.of(recording.image_times)
+    return CameraSummary(
+        topic=recording.image_topic,
+        frame=recording.camera_frame,
+        frames=len(recording.image_times),
+        rate_hz=rhythm.rate_hz,
+        longest_gap_s=rhythm.longest_gap_s,
+        format=image.format if image else None,
+        width_px=image.width_px if image else None,
+        height_px=image.height_px if image else None,
+        camera_info_topic=recording.camera_info_topic,
+        model=camera.model if camera else None,
+        matrix_px=tuple(tuple(float(value) for value in row) for row in camera.matrix_px) if camera else None,
+        distortion=tuple(float(value) for value in camera.distortion) if camera else None,
+    )
