@@ -100,6 +100,7 @@ def _imported(event: ClicksImported, session: Session, facts: RecordingFacts) ->
     for click in event.clicks:
         _require_frame(click.image_time, facts)
         _require_pixel(click.u_px, click.v_px, facts)
+        _require_sigma(click)
         if click.image_time in times:
             raise EventError(f"two of the clicks lie in the frame at {_seconds(click.image_time)}; keep one per frame")
         times.add(click.image_time)
@@ -138,6 +139,11 @@ def _require_pixel(u_px: float, v_px: float, facts: RecordingFacts) -> None:
         raise EventError(
             f"({u_px:.1f}, {v_px:.1f}) px is outside the frame of {facts.width_px} x {facts.height_px} px; click inside it"
         )
+
+
+def _require_sigma(click: ReflectorClick) -> None:
+    if click.sigma_px is not None and not 0.0 < click.sigma_px < math.inf:
+        raise EventError(f"click '{click.id}' has a sigma_px of {click.sigma_px:g}; give a number above 0, or none")
 
 
 def _seconds(time: TimeNs) -> str:

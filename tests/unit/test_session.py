@@ -138,6 +138,10 @@ def test_an_event_that_changes_nothing_returns_the_very_same_session(event) -> N
         (ClickExcluded("c9", True), "there is no click 'c9'"),
         (ClicksImported((ReflectorClick(TimeNs(5), "a", 1.0, 1.0),)), "no frame"),
         (
+            ClicksImported((ReflectorClick(frame_time(0), "a", 1.0, 1.0, sigma_px=0.0),)),
+            "click 'a' has a sigma_px of 0",
+        ),
+        (
             ClicksImported(
                 (ReflectorClick(frame_time(0), "a", 1.0, 1.0), ReflectorClick(frame_time(0), "b", 2.0, 1.0))
             ),

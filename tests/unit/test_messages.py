@@ -1,0 +1,263 @@
+"""The channel's words: what is understood, what is refused, and what is written."""
+
+import json
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.option_changes import OptionChange
+from app.session import (
+    Cleared,
+    ClickExcluded,
+    ClickMoved,
+    ClickPlaced,
+    ClickRemoved,
+    History,
+    OptionsEdited,
+    RecordingFacts,
+    Redo,
+    Stamp,
+    Undo,
+    advance,
+)
+from app.view import View, view
+from app.web.messages import (
+    MAX_TEXT_BYTES,
+    CursorMoved,
+    Done,
+    FrameHeader,
+    FrameWanted,
+    Hello,
+    ImportWanted,
+    Incoming,
+    Overlay,
+    OverlayReturn,
+    Problem,
+    Progress,
+    RecordingNote,
+    SessionNote,
+    StampColumns,
+    ViewpointWanted,
+    encode,
+    encode_frame,
+    parse,
+    request_of,
+)
+from app.web.messages.typescript import declarations
+from calib_core.errors import CalibrationError, InputError, OptionError
+from calib_core.measurements import TimeNs
+
+FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(3), width_px=640, height_px=480)
+
+
+@pytest.mark.parametrize(
+    ("text", "command"),
+    [
+        ('{"type":"hello"}', Hello()),
+        (
+            '{"type":"click_placed","image_time":{"sec":1700000000,"nanosec":123456789},"pixel_px":[1.5,2]}',
+            ClickPlaced(TimeNs(1_700_000_000_123_456_789), 1.5, 2.0),
+        ),
+        ('{"type":"click_moved","id":"c1","pixel_px":[1.5,2.5]}', ClickMoved("c1", 1.5, 2.5)),
+        ('{"type":"click_removed","id":"c1"}', ClickRemoved("c1")),
+        ('{"type":"click_excluded","id":"c1","excluded":true}', ClickExcluded("c1", True)),
+        (
+            '{"type":"options_changed","options":{"noise":{"sigma_px":3},"method":"paper"}}',
+            OptionsEdited((OptionChange("noise.sigma_px", 3.0), OptionChange("method", "paper"))),
+        ),
+        ('{"type":"cleared"}', Cleared()),
+        ('{"type":"undo"}', Undo()),
+        ('{"type":"redo"}', Redo()),
+        ('{"type":"cursor","index":7}', CursorMoved(7)),
+        ('{"type":"viewpoint","viewpoint":"above"}', ViewpointWanted("above")),
+        ('{"type":"import_clicks","text":"{}","name":"a.json"}', ImportWanted("{}", "a.json")),
+    ],
+)
+def test_every_message_of_the_page_is_understood_with_and_without_a_request(text: str, command) -> None:
+    assert parse(text) == Incoming(command)
+    assert parse(text[:-1] + ',"request":12}') == Incoming(command, 12)
+    assert parse(text.encode()) == Incoming(command)
+
+
+def test_a_frame_is_asked_for_with_the_number_its_picture_will_carry() -> None:
+    assert parse('{"type":"frame","index":3,"request":9,"playing":true,"size":"half"}') == Incoming(
+        FrameWanted(3, 9, playing=True, size="half")
+    )
+    assert parse('{"type":"frame","index":3,"request":9}').command == FrameWanted(3, 9, playing=False, size="full")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "not JSON"),
+        ("{", "not JSON"),
+        ("hello", "not JSON"),
+        ("[1]", "not a JSON object"),
+        ("null", "not a JSON object"),
+        ("{}", "no message of the type 'None'; known: click_placed"),
+        ('{"type":"click_place"}', "no message of the type 'click_place'; did you mean 'click_placed'?"),
+        ('{"type":["undo"]}', "no message of the type"),
+        (
+            '{"type":"undo","colour":"red"}',
+            "the message 'undo' is not as it should be: Object contains unknown field `colour`",
+        ),
+        ('{"type":"click_removed"}', "missing required field `id`"),
+        ('{"type":"click_removed","id":""}', "length >= 1"),
+        ('{"type":"click_removed","id":5}', "Expected `str`, got `int` - at `$.id`"),
+        ('{"type":"click_moved","id":"c1","pixel_px":[1]}', "`$.pixel_px`"),
+        ('{"type":"click_moved","id":"c1","pixel_px":["1","2"]}', "`$.pixel_px[0]`"),
+        ('{"type":"click_moved","id":"c1","pixel_px":[null,2]}', "`$.pixel_px[0]`"),
+        ('{"type":"click_moved","id":"c1","pixel_px":[NaN,2]}', "not JSON"),
+        ('{"type":"click_moved","id":"c1","pixel_px":[1e999,2]}', "not JSON"),
+        ('{"type":"click_placed","image_time":1.7e9,"pixel_px":[1,2]}', "`$.image_time`"),
+        (
+            '{"type":"click_placed","image_time":{"sec":1,"nanosec":1000000000},"pixel_px":[1,2]}',
+            "`$.image_time.nanosec`",
+        ),
+        ('{"type":"click_placed","image_time":{"sec":-1,"nanosec":0},"pixel_px":[1,2]}', "`$.image_time.sec`"),
+        ('{"type":"click_placed","image_time":{"sec":1e30,"nanosec":0},"pixel_px":[1,2]}', "`$.image_time.sec`"),
+        ('{"type":"undo","request":-1}', "not as it should be"),
+        ('{"type":"undo","request":"1"}', "not as it should be"),
+        ('{"type":"frame","index":-1,"request":1}', "`$.index`"),
+        ('{"type":"frame","index":1}', "missing required field `request`"),
+        ('{"type":"frame","index":1,"request":1,"size":"huge"}', "`$.size`"),
+        ('{"type":"options_changed","options":[]}', "`$.options`"),
+    ],
+)
+def test_what_is_not_understood_is_refused_in_words(text: str, words: str) -> None:
+    with pytest.raises(InputError) as refused:
+        parse(text)
+    assert words in str(refused.value)
+
+
+def test_an_option_that_does_not_exist_is_refused_with_the_nearest_one() -> None:
+    with pytest.raises(OptionError, match=r"did you mean 'noise\.sigma_px'\?"):
+        parse('{"type":"options_changed","options":{"noise":{"sigma":1}}}')
+
+
+def test_a_message_that_is_too_long_or_too_deep_is_refused() -> None:
+    with pytest.raises(InputError, match="longer than 4 MB"):
+        parse("x" * (MAX_TEXT_BYTES + 1))
+    with pytest.raises(InputError, match="not JSON"):
+        parse('{"type":"options_changed","options":' + '{"a":' * 100_000 + "1" + "}" * 100_001)
+
+
+@given(st.one_of(st.text(max_size=200), st.binary(max_size=200)))
+def test_nothing_that_arrives_can_do_more_than_be_refused(text: str | bytes) -> None:
+    with pytest.raises(CalibrationError):
+        parse(text)
+    assert request_of(text) is None or isinstance(request_of(text), int)
+
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=8),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(["sec", "noise", "x"]), inner, max_size=3)
+    ),
+    max_leaves=6,
+)
+
+
+@given(
+    st.sampled_from(["click_placed", "click_moved", "clicks_imported", "options_changed", "frame", "cursor", "undo"]),
+    st.dictionaries(
+        st.sampled_from(["id", "index", "request", "pixel_px", "image_time", "options", "clicks"]), json_values
+    ),
+)
+def test_a_known_type_with_odd_fields_is_understood_or_refused(kind: str, fields: dict[str, object]) -> None:
+    try:
+        parsed = parse(json.dumps({"type": kind, **fields}))
+    except CalibrationError:
+        return
+    assert isinstance(parsed, Incoming)
+
+
+@pytest.mark.parametrize(
+    ("text", "request_number"),
+    [
+        ('{"type":"clik","request":7}', 7),
+        ('{"type":"undo","request":"7"}', None),
+        ('{"type":"undo"}', None),
+        ("{", None),
+        ("[7]", None),
+        (b"\xff\xfe", None),
+    ],
+)
+def test_the_number_of_a_refused_message_is_found_where_it_can_be(
+    text: str | bytes, request_number: int | None
+) -> None:
+    assert request_of(text) == request_number
+
+
+def test_a_view_is_written_as_plain_json_with_its_type() -> None:
+    history = advance(History(), ClickPlaced(TimeNs(int(FACTS.image_times[1])), 1.5, 2.5), FACTS)
+    shown = view(history, FACTS)
+    written = json.loads(encode(shown))
+    assert written.pop("type") == "view"
+    assert msgspec.convert(written, View) == shown
+    assert written["clicks"][0]["image_time"] == {"sec": 1700000000, "nanosec": 223456789}
+    assert written["options"]["solving"]["camera_position"] is None
+
+
+def test_numbers_that_are_not_finite_become_null() -> None:
+    overlay = Overlay(3, 5, (OverlayReturn(1.0, 2.0, 3.0, float("nan"), float("inf"), True),), ((4.0, 5.0),))
+    assert json.loads(encode(overlay)) == {
+        "type": "overlay",
+        "index": 3,
+        "revision": 5,
+        "returns": [[1.0, 2.0, 3.0, None, None, True]],
+        "guesses": [[4.0, 5.0]],
+    }
+
+
+@pytest.mark.parametrize(
+    ("message", "written"),
+    [
+        (Done(4), {"type": "done", "request": 4}),
+        (Problem("a", "b"), {"type": "error", "message": "a", "hint": "b", "request": None}),
+        (Progress("reading", 1, 2), {"type": "progress", "label": "reading", "done": 1, "total": 2}),
+        (Overlay(1, 2, None, ()), {"type": "overlay", "index": 1, "revision": 2, "returns": None, "guesses": []}),
+    ],
+)
+def test_a_message_to_the_page_carries_its_type(message, written: dict[str, object]) -> None:
+    assert json.loads(encode(message)) == written
+
+
+def test_a_recording_is_told_with_every_nanosecond_and_every_option_described() -> None:
+    stamps = StampColumns.of(FACTS.image_times)
+    note = RecordingNote("d", "/r", "/i", 640, 480, stamps, Stamp(1, 2), stamps, (), SessionNote("/s", 0), "0.1")
+    written = json.loads(encode(note))
+    assert written["frame_times"] == {"sec": [1700000000] * 3, "nanosec": [123456789, 223456789, 323456789]}
+    assert [group["name"] for group in written["option_groups"]][:2] == ["", "gating"]
+
+
+def test_a_picture_travels_with_its_header_before_its_bytes() -> None:
+    message = encode_frame(FrameHeader(3, 9, 640, 480, 0.5, "jpeg"), b"\xff\xd8picture")
+    (length,) = struct.unpack("<I", message[:4])
+    assert json.loads(message[4 : 4 + length]) == {
+        "index": 3,
+        "request": 9,
+        "width_px": 640,
+        "height_px": 480,
+        "scale": 0.5,
+        "format": "jpeg",
+    }
+    assert message[4 + length :] == b"\xff\xd8picture"
+
+
+def test_the_types_of_the_page_are_those_of_the_program(project_root: Path) -> None:
+    kept = (project_root / "static" / "messages.d.ts").read_text(encoding="utf-8")
+    assert kept == declarations(), "run: python -m app.web.messages > static/messages.d.ts"
+
+
+def test_the_types_of_the_page_are_printed_by_one_command(project_root: Path) -> None:
+    command = [sys.executable, "-m", "app.web.messages"]
+    done = subprocess.run(command, cwd=project_root, capture_output=True, check=True, timeout=60)
+    assert done.stdout.decode() == declarations()
