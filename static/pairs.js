@@ -48,7 +48,7 @@ export function nextWorst() {
 function draw() {
   const rows = sorted();
   count.textContent = rows.length ? String(rows.length) : "";
-  const text = JSON.stringify([rows, state.selected, sorting, state.view?.residual_limit_px, state.placements.length, state.view?.solving]);
+  const text = JSON.stringify([rows, state.selected, sorting, state.view?.residual_limit_px, state.placements.length, state.placementsKnown]);
   if (text === drawn) return;
   drawn = text;
   if (!rows.length) return page.replaceChildren(drawSteps());

@@ -59,6 +59,7 @@ function takeSize() {
   viewport.imageWidth = shown.width;
   viewport.imageHeight = shown.height;
   geometry.fit();
+  emit("box");
 }
 
 /** Draw everything with the next screen frame. */

@@ -13,10 +13,9 @@ from app.web.radar_sight import still_returns
 from app.web.scene_shapes import (
     MOVING,
     STILL,
-    Lines,
-    coloured,
     ellipsoids,
     nominal_camera_from_radar,
+    range_numbers,
     range_rings,
     rays_to,
     residual_colours,
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LOOK_AT", "STAND_AT", "Sight", "TabScene"]
 
-STAND_AT, LOOK_AT = (-5.5, 0.0, 3.0), (6.0, 0.0, 0.0)
+STAND_AT, LOOK_AT = (-2.4, 0.0, 2.2), (6.0, 0.0, -1.0)
 """Where the 3D view's camera begins: behind and above the radar, looking forward."""
 
 _VIEWPOINTS = {
@@ -42,7 +41,7 @@ _VIEWPOINTS = {
     "side": ((6.0, -13.0, 3.5), (6.0, 0.0, 0.5)),
 }
 _RINGS_EVERY_M, _RINGS_UP_TO_M = 5.0, 30.0
-_LIT, _DIM = (87, 182, 242), (92, 103, 115)
+_LIT, _DIM, _ORANGE, _RINGS = (87, 182, 242), (112, 124, 136), (255, 180, 84), (84, 99, 115)
 _NOWHERE = np.zeros((1, 3))
 _NO_LINE = np.zeros((1, 2, 3))
 
@@ -81,41 +80,26 @@ class TabScene:
         self._radar_from_camera = nominal_camera_from_radar().inverse()
         scene = client.scene
         scene.add_frame("/radar", axes_length=0.6, axes_radius=0.018, origin_radius=0.03)
-        scene.add_label("/radar/name", "radar", position=(0.0, 0.0, -0.12), anchor="top-center", font_screen_scale=0.8)
-        self._add_ground(scene)
-        self._scan = _cloud(scene, "/scan", 0.11)
+        self._grid = _ground(scene)
+        self._scan = _cloud(scene, "/scan", 0.12)
         self._window = _cloud(scene, "/window", 0.06)
-        self._chosen = _cloud(scene, "/chosen", 0.22)
-        self._rays = _lines(scene, "/rays", 1.0)
-        self._ray = _lines(scene, "/ray", 2.5)
-        self._ellipsoids = _lines(scene, "/ellipsoids", 1.0)
+        self._chosen = _cloud(scene, "/chosen", 0.24)
+        self._rays = _lines(scene, "/rays", 1.0, (72, 110, 138))
+        self._ray = _lines(scene, "/ray", 2.0, (255, 255, 255))
+        self._gap = _lines(scene, "/gap", 3.0, _ORANGE)
+        self._ellipsoids = _lines(scene, "/ellipsoids", 1.0, (96, 118, 140))
+        self._ellipsoid = _lines(scene, "/ellipsoid", 1.5, _ORANGE)
         self._name = scene.add_label("/selected", "", visible=False, anchor="bottom-left", font_screen_scale=0.9)
         self._frustum = scene.add_camera_frustum(
             "/camera",
             fov=0.9,
-            aspect=16 / 9,
-            scale=0.9,
+            aspect=1.6,
+            scale=1.1,
             thickness=1.5,
             thickness_units="screen",
             color=_DIM,
             format="jpeg",
         )
-        self._camera_name = scene.add_label(
-            "/camera/name", "camera (not yet calibrated)", anchor="bottom-center", font_screen_scale=0.8
-        )
-
-    def _add_ground(self, scene: "viser.SceneApi") -> None:
-        rings = coloured(range_rings(every_m=_RINGS_EVERY_M, up_to_m=_RINGS_UP_TO_M), (62, 74, 88))
-        self._grid = scene.add_grid(
-            "/ground", width=60.0, height=60.0, position=(15.0, 0.0, 0.0), cell_size=1.0, section_size=5.0,
-            cell_color=(38, 46, 55), section_color=(50, 60, 71), cell_thickness=0.6, section_thickness=0.8,
-            shadow_opacity=0.0, fade_distance=45.0,
-        )  # fmt: skip
-        scene.add_line_segments("/ground/rings", rings.points, rings.colours, thickness=1.0, thickness_units="screen",
-                                position=(-15.0, 0.0, 0.0))  # fmt: skip
-        for range_m in (5.0, 10.0, 20.0, 30.0):
-            scene.add_label(f"/ground/{range_m:.0f}", f"{range_m:.0f} m", position=(range_m - 15.0, 0.0, 0.0),
-                            anchor="center-center", font_screen_scale=0.7)  # fmt: skip
 
     def show(self, sight: Sight) -> None:
         """Show this."""
@@ -163,41 +147,37 @@ class TabScene:
         self._radar_from_camera = camera_from_radar.inverse()
         _place(self._frustum, self._radar_from_camera)
         self._frustum.color = _LIT if calibration else _DIM
-        self._camera_name.text = "camera" if calibration else "camera (not yet calibrated)"
         if camera is not None:
             self._frustum.fov = vertical_field_of_view_rad(camera)
             self._frustum.aspect = camera.width_px / camera.height_px
         heights = [float(pair.point_radar_m[2]) for pair in calibration.pairs if pair.inlier] if calibration else []
-        self._grid.position = (15.0, 0.0, min([0.0, *heights]))
+        self._grid.position = (0.0, 0.0, min([0.0, *heights]))
 
     def _show_pairs(self, sight: Sight) -> None:
         calibration = sight.session.outcome
         if not isinstance(calibration, Calibration):
-            for node in (self._chosen, self._rays, self._ray, self._ellipsoids, self._name):
+            for node in (self._chosen, self._rays, self._ray, self._gap, self._ellipsoids, self._ellipsoid, self._name):
                 node.visible = False
             return
-        pairs = calibration.pairs
-        points = np.array([pair.point_radar_m for pair in pairs]).reshape(-1, 3)
-        residuals = np.array([pair.distance_px for pair in pairs])
+        points = np.array([pair.point_radar_m for pair in calibration.pairs]).reshape(-1, 3)
+        residuals = np.array([pair.distance_px for pair in calibration.pairs])
         _fill_cloud(self._chosen, points, residual_colours(residuals, sight.view.residual_limit_px or 20.0))
-        used = tuple(pair for pair in pairs if pair.inlier and pair.id != sight.selected)
-        _fill_lines(self._rays, coloured(rays_to(calibration, used), (58, 84, 104)))
-        self._show_selected(sight, calibration)
-
-    def _show_selected(self, sight: Sight, calibration: Calibration) -> None:
         chosen = tuple(pair for pair in calibration.pairs if pair.id == sight.selected)
-        _fill_lines(self._ray, _ray_and_gap(calibration, chosen))
-        shown = chosen or tuple(pair for pair in calibration.pairs if pair.inlier)
-        points = np.array([pair.point_radar_m for pair in shown]).reshape(-1, 3)
-        colour = (255, 180, 84) if chosen else (70, 86, 102)
-        shells = ellipsoids(points, calibration.options.noise, calibration.noise_scale)
-        _fill_lines(self._ellipsoids, coloured(shells, colour))
+        others = tuple(pair for pair in calibration.pairs if pair.inlier and pair.id != sight.selected)
+        _fill_lines(self._rays, rays_to(calibration, others))
+        _fill_lines(self._ellipsoids, _shells(calibration, others))
+        _fill_lines(self._ellipsoid, _shells(calibration, chosen))
+        self._show_selected(calibration, chosen)
+
+    def _show_selected(self, calibration: Calibration, chosen: tuple[PairResult, ...]) -> None:
+        rays = rays_to(calibration, chosen)
+        _fill_lines(self._ray, rays)
+        _fill_lines(self._gap, np.stack([rays[0, 1], chosen[0].point_radar_m])[None] if len(rays) else rays)
         self._name.visible = bool(chosen)
         if chosen:
-            self._name.position = tuple(chosen[0].point_radar_m + np.array([0.0, 0.0, 0.15]))
-            self._name.text = (
-                f"{chosen[0].id}: {np.linalg.norm(chosen[0].point_radar_m):.2f} m, {chosen[0].distance_px:.1f} px"
-            )
+            point = chosen[0].point_radar_m
+            self._name.position = tuple(point + np.array([0.0, 0.0, 0.15]))
+            self._name.text = f"{chosen[0].id}: {np.linalg.norm(point):.2f} m, {chosen[0].distance_px:.1f} px"
 
     def _show_picture(self, sight: Sight) -> None:
         picture = sight.picture
@@ -208,14 +188,21 @@ class TabScene:
         self._frustum._image_data = picture.data  # the compressed bytes as they are; the public property encodes again
 
 
-def _ray_and_gap(calibration: Calibration, pairs: tuple[PairResult, ...]) -> Lines:
-    """Return the click's ray of the selected pair, and from its end to the return."""
-    rays = rays_to(calibration, pairs)
-    if not len(rays):
-        return coloured(np.zeros((0, 2, 3)), _LIT)
-    gap = np.stack([rays[0, 1], pairs[0].point_radar_m])[None]
-    line, residual = coloured(rays[:1], (255, 255, 255)), coloured(gap, (255, 180, 84))
-    return Lines(np.concatenate([line.points, residual.points]), np.concatenate([line.colours, residual.colours]))
+def _ground(scene: "viser.SceneApi") -> Any:
+    """Add the grid with rings of equal range and their numbers; return the node that moves them all."""
+    grid = scene.add_grid(
+        "/ground", width=60.0, height=60.0, cell_size=1.0, section_size=5.0, cell_color=(40, 48, 57),
+        section_color=(52, 62, 73), cell_thickness=0.6, section_thickness=0.8, shadow_opacity=0.0, fade_distance=40.0,
+    )  # fmt: skip
+    extent = {"every_m": _RINGS_EVERY_M, "up_to_m": _RINGS_UP_TO_M}
+    for name, strokes in (("rings", range_rings(**extent)), ("numbers", range_numbers(**extent))):
+        scene.add_line_segments(f"/ground/{name}", strokes, _RINGS, thickness=1.2, thickness_units="screen")
+    return grid
+
+
+def _shells(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:
+    points = np.array([pair.point_radar_m for pair in pairs]).reshape(-1, 3)
+    return ellipsoids(points, calibration.options.noise, calibration.noise_scale)
 
 
 def _cloud(scene: "viser.SceneApi", name: str, size_m: float) -> Any:
@@ -224,9 +211,10 @@ def _cloud(scene: "viser.SceneApi", name: str, size_m: float) -> Any:
     )
 
 
-def _lines(scene: "viser.SceneApi", name: str, thickness_px: float) -> Any:
+def _lines(scene: "viser.SceneApi", name: str, thickness_px: float, colour: tuple[int, int, int]) -> Any:
+    """Add line segments of one colour: viser takes the colours of single points for linear light, one colour as it is."""
     return scene.add_line_segments(
-        name, _NO_LINE, (255, 255, 255), thickness=thickness_px, thickness_units="screen", visible=False
+        name, _NO_LINE, colour, thickness=thickness_px, thickness_units="screen", visible=False
     )
 
 
@@ -237,10 +225,10 @@ def _fill_cloud(node: Any, points: Points3, colours: np.ndarray) -> None:
         node.points, node.colors = points, colours
 
 
-def _fill_lines(node: Any, lines: Lines) -> None:
-    node.visible = len(lines.points) > 0
-    if len(lines.points):
-        node.points, node.colors = lines.points, lines.colours
+def _fill_lines(node: Any, segments: np.ndarray) -> None:
+    node.visible = len(segments) > 0
+    if len(segments):
+        node.points = segments
 
 
 def _place(node: Any, target_from_node: RigidTransform) -> None:

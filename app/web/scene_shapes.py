@@ -1,7 +1,5 @@
 """Shapes of the 3D view as arrays: rings, rays, ellipsoids, colours. All in the radar frame, all pure."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from calib_core.arrays import Points3, Values
@@ -14,10 +12,9 @@ from calib_core.results import Calibration, PairResult
 __all__ = [
     "MOVING",
     "STILL",
-    "Lines",
-    "coloured",
     "ellipsoids",
     "nominal_camera_from_radar",
+    "range_numbers",
     "range_rings",
     "rays_to",
     "residual_colours",
@@ -29,24 +26,19 @@ _RAMP_AT = np.array([0.0, 0.35, 0.6, 0.8, 1.0])
 _RAMP = np.array([[74, 170, 235], [143, 200, 226], [236, 214, 150], [240, 158, 66], [226, 82, 44]], dtype=np.float64)
 _CHI2_95_3D = 7.814727903251178  # 95 % quantile of chi-squared with 3 degrees of freedom
 _CIRCLE = 28
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Lines:
-    """Line segments with a colour each.
-
-    Attributes:
-        points: (n, 2, 3) [m].
-        colours: (n, 2, 3) of 0 to 255.
-    """
-
-    points: np.ndarray
-    colours: np.ndarray
-
-
-def coloured(points: np.ndarray, colour: tuple[int, int, int]) -> Lines:
-    """Give every segment (n, 2, 3) the same colour."""
-    return Lines(points, np.broadcast_to(np.array(colour, dtype=np.uint8), points.shape).copy())
+_SEGMENTS = {  # strokes of a seven-segment digit: (right, up) of both ends, in units of its height
+    "a": ((0.0, 1.0), (0.5, 1.0)),
+    "b": ((0.5, 1.0), (0.5, 0.5)),
+    "c": ((0.5, 0.5), (0.5, 0.0)),
+    "d": ((0.0, 0.0), (0.5, 0.0)),
+    "e": ((0.0, 0.5), (0.0, 0.0)),
+    "f": ((0.0, 1.0), (0.0, 0.5)),
+    "g": ((0.0, 0.5), (0.5, 0.5)),
+}
+_STROKES = {
+    "0": "abcdef", "1": "bc", "2": "abged", "3": "abgcd", "4": "fgbc",
+    "5": "afgcd", "6": "afgedc", "7": "abc", "8": "abcdefg", "9": "abcdfg",
+}  # fmt: skip
 
 
 def residual_colours(residuals_px: Values, limit_px: float) -> np.ndarray:
@@ -66,6 +58,18 @@ def range_rings(*, every_m: float, up_to_m: float, half_angle_rad: float = np.de
         arc = cartesian_from_polar(polar)
         arcs.append(np.stack([arc[:-1], arc[1:]], axis=1))
     return np.concatenate(arcs)
+
+
+def range_numbers(*, every_m: float, up_to_m: float, height_m: float = 0.5) -> np.ndarray:
+    """Write the ranges flat on the ground at the left ends of their rings, as strokes: segments (n, 2, 3)."""
+    strokes = []
+    for range_m in np.arange(every_m, up_to_m + 1e-9, every_m):
+        for place, digit in enumerate(f"{range_m:.0f}"):
+            segments = np.array([_SEGMENTS[name] for name in _STROKES[digit]], dtype=np.float64) * height_m
+            ahead, right = segments[..., 1], segments[..., 0] + 0.8 * height_m * place
+            corner = cartesian_from_polar(np.array([range_m, np.deg2rad(24.0), 0.0]))
+            strokes.append(np.stack([corner[0] + 0.1 + ahead, corner[1] - right, np.zeros_like(ahead)], axis=-1))
+    return np.concatenate(strokes)
 
 
 def rays_to(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:
