@@ -60,6 +60,7 @@ class Recording:
         self.sources = sources
         self._assembly = assembly
         self._closed = threading.Event()
+        self._fingerprint: tuple[InputFile, ...] = ()
         self.topics: tuple[TopicSummary, ...] = assembly.topics
         self.radar_topic = assembly.radar_topic
         self.image_topic = assembly.image_topic
@@ -160,11 +161,13 @@ class Recording:
         return self._assembly.radar.around(times, half_window_s) if self._assembly.radar else RadarScans()
 
     def fingerprint(self, progress: Callable[[int, int], None] | None = None) -> tuple[InputFile, ...]:
-        """Hash all files.
+        """Hash all files; once, since it takes about a second per gigabyte.
 
         Args:
             progress: called with bytes done and bytes in all.
         """
+        if self._fingerprint:
+            return self._fingerprint
         total = sum(source.size_bytes for source in self.sources)
         done = 0
         files = []
@@ -180,7 +183,8 @@ class Recording:
             except OSError as error:
                 raise RecordingError(f"{source.path}: cannot be read any more: {error.strerror}") from error
             files.append(InputFile(source.path.name, source.size_bytes, digest.hexdigest()))
-        return tuple(files)
+        self._fingerprint = tuple(files)
+        return self._fingerprint
 
 
 def open_recording(
