@@ -1,7 +1,9 @@
 """Zip archives whose bytes depend on their content only, and a reader that lets none grow."""
 
 import io
+import struct
 import zipfile
+import zlib
 from collections.abc import Mapping
 
 from calib_core.errors import InputError
@@ -10,6 +12,7 @@ __all__ = ["pack", "unpack"]
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _MAX_BYTES = 8 * 1024 * 1024
+_DAMAGED = (EOFError, LookupError, NotImplementedError, OSError, RuntimeError, ValueError, struct.error, zlib.error)
 
 
 def pack(members: Mapping[str, bytes]) -> bytes:
@@ -32,5 +35,5 @@ def unpack(data: bytes, *, source: str) -> dict[str, bytes]:
             if sum(member.file_size for member in archive.infolist()) > _MAX_BYTES:
                 raise InputError(f"{source}: unpacks to more than a calibration holds; is it the right file?")
             return {member.filename: archive.read(member)[:_MAX_BYTES] for member in archive.infolist()}
-    except (zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError, OSError) as error:
+    except (*_DAMAGED, zipfile.BadZipFile) as error:
         raise InputError(f"{source}: not a whole zip archive ({error}); export it again") from None

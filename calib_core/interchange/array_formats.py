@@ -11,6 +11,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.archives import pack, unpack
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
+from calib_core.interchange.mat_file import load_mat
 from calib_core.interchange.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.yaml_text import numbers_text
 
@@ -174,13 +175,7 @@ def read_matlab(data: bytes, source: str) -> ImportedCalibration:
     Raises:
         InputError: it holds neither, or is not a mat file of level 5.
     """
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    try:
-        content = loadmat(io.BytesIO(data), simplify_cells=True)  # type: ignore[arg-type]
-    except (MatReadError, ValueError, TypeError, KeyError, NotImplementedError, OSError, EOFError) as error:
-        raise InputError(f"{source}: cannot be read as a mat file ({error}); save it with -v7 or -v6") from None
+    content = load_mat(data, source=source)
     arrays: dict[str, Any] = {}
     matrix = content.get("camera_from_radar")
     if matrix is not None:

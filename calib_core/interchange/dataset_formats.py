@@ -121,9 +121,10 @@ def read_nuscenes(records: list[Any], source: str) -> ImportedCalibration:
     if not radars:
         notes.append("no record of a radar; took the ego frame for the radar's")
         return ImportedCalibration("nuscenes", camera_pose, notes=tuple(notes)).checked(source)
-    ego_from_radar = _posed(radars[0], source=source).camera_from_radar().inverse()
+    ego_from_radar = _posed(radars[0], source=source).as_written()
     if np.abs(ego_from_radar.as_matrix() - np.eye(4)).max() > 0:
-        radar_from_camera = ego_from_radar.inverse() @ camera_pose.camera_from_radar().inverse()
+        ego_from_camera = camera_pose.as_written()
+        radar_from_camera = ego_from_radar.inverse() @ ego_from_camera
         camera_pose = WrittenPose(
             "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"
         )

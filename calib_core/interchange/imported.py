@@ -71,18 +71,23 @@ class WrittenPose:
             raise ValueError(f"the quaternion {self.rotation.tolist()} has length {np.linalg.norm(wxyz):.4g}, not 1")
         return matrix_from_quaternion_wxyz(wxyz)
 
+    def as_written(self) -> RigidTransform:
+        """Return the numbers as they stand, whichever two frames they connect.
+
+        Raises:
+            ValueError: the rotation is none.
+        """
+        return RigidTransform(self.rotation_matrix(), self.translation_m)
+
     def camera_from_radar(self) -> RigidTransform:
         """Return the pose in our one meaning: p_camera = R p_radar + t, camera optical.
 
         Raises:
             ValueError: the rotation is none.
         """
-        written = RigidTransform(self.rotation_matrix(), self.translation_m)
-        camera_from_radar = written if self.direction == "camera_from_radar" else written.inverse()
-        if self.axes == "link":
-            optical_from_link = LINK_FROM_OPTICAL.inverse()
-            return optical_from_link @ camera_from_radar
-        return camera_from_radar
+        written = self.as_written()
+        meant = written if self.direction == "camera_from_radar" else written.inverse()
+        return LINK_FROM_OPTICAL.inverse() @ meant if self.axes == "link" else meant
 
 
 @dataclass(frozen=True, slots=True, eq=False)

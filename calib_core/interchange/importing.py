@@ -53,6 +53,15 @@ def read_any(content: str | bytes, source: str = "calibration") -> ImportedCalib
     Raises:
         InputError: it holds no pose that we know how to read; what was looked for.
     """
+    try:
+        return _read(content, source)
+    except InputError as error:
+        if str(error).startswith(f"{source}: "):
+            raise
+        raise InputError(f"{source}: {error}") from None  # a frame's name is refused without knowing the file
+
+
+def _read(content: str | bytes, source: str) -> ImportedCalibration:
     if isinstance(content, bytes):
         if content.startswith(b"PK"):
             names = unpack(content, source=source)

@@ -5,10 +5,12 @@ import re
 import shlex
 from xml.sax.saxutils import quoteattr
 
+import numpy as np
+
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.camera_fields import floats
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
+from calib_core.interchange.imported import Form, ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.opencv_xml import parse_xml
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.statement import (
@@ -162,7 +164,7 @@ def _from_arguments(arguments: list[str], text: str, *, source: str, name: str) 
     roles = posed_between(parent.lstrip("/"), child.lstrip("/"), stated_frames(text))
     return ImportedCalibration(
         format=name,
-        pose=WrittenPose(form, rotation, translation, roles.direction, roles.axes),  # type: ignore[arg-type]
+        pose=WrittenPose(form, np.array(rotation), np.array(translation), roles.direction, roles.axes),
         frames=roles.frames,
         check_point=stated_check_point(text),
         notes=roles.notes,
@@ -180,7 +182,7 @@ def _flags(arguments: list[str]) -> dict[str, str]:
     }
 
 
-def _by_name(flags: dict[str, str], *, source: str) -> tuple[str, tuple[float, ...], tuple[float, ...]]:
+def _by_name(flags: dict[str, str], *, source: str) -> tuple[Form, tuple[float, ...], tuple[float, ...]]:
     def numbers(*labels: str) -> tuple[float, ...]:
         return tuple(
             value
@@ -194,17 +196,18 @@ def _by_name(flags: dict[str, str], *, source: str) -> tuple[str, tuple[float, .
     return "rpy", numbers("roll", "pitch", "yaw"), translation
 
 
-def _by_place(arguments: list[str], *, source: str) -> tuple[str, tuple[float, ...], tuple[float, ...], str, str]:
-    """Read the positional form: x y z, then yaw pitch roll (this order) or qx qy qz qw, then the frames."""
-    count = next((index for index, word in enumerate(arguments) if not _is_number(word)), len(arguments))
-    if count not in (6, 7) or len(arguments) < count + 2:
+def _by_place(arguments: list[str], *, source: str) -> tuple[Form, tuple[float, ...], tuple[float, ...], str, str]:
+    """Read the positional form: x y z, then yaw pitch roll (this order) or qx qy qz qw, the frames, perhaps a period."""
+    words = [word for word in arguments if ":=" not in word]
+    angles = len(words) == 8 or (len(words) == 9 and not _is_number(words[6]))
+    count = 6 if angles else 7
+    if not count + 2 <= len(words) <= count + 3:
         raise InputError(
-            f"{source}: expected 6 or 7 numbers and two frames, found {count} numbers; correct the command"
+            f"{source}: expected 6 or 7 numbers and two frames, found {len(words)} words; correct the command"
         )
-    numbers = floats(arguments[:count], source=source, place="the command's numbers")
-    form = "rpy" if count == 6 else "quaternion_xyzw"
-    rotation = numbers[5:2:-1] if count == 6 else numbers[3:]
-    return form, rotation, numbers[:3], arguments[count], arguments[count + 1]
+    numbers = floats(words[:count], source=source, place="the command's numbers")
+    rotation = numbers[5:2:-1] if angles else numbers[3:]
+    return "rpy" if angles else "quaternion_xyzw", rotation, numbers[:3], words[count], words[count + 1]
 
 
 def _is_number(word: str) -> bool:

@@ -59,7 +59,10 @@ def xml_comment(lines: tuple[str, ...]) -> str:
 def stated_frames(text: str) -> FrameNames | None:
     """Find the two frames' names in a file's words."""
     match = _FRAMES.search(text)
-    return FrameNames(json.loads(match[1]), json.loads(match[2])) if match else None
+    try:
+        return FrameNames(json.loads(match[1]), json.loads(match[2])) if match else None
+    except ValueError:
+        return None
 
 
 def stated_check_point(text: str) -> StatedCheckPoint | None:

@@ -62,8 +62,9 @@ def read_autoware(content: Mapping[str, Any], text: str, source: str) -> Importe
     Raises:
         InputError: it holds others, or a number is missing.
     """
-    kit_name, kit = next((str(key), value) for key, value in content.items() if _is_kit(value))
+    kit_name, kit = next(((str(key), value) for key, value in content.items() if _is_kit(value)), ("", {}))
     stated = stated_frames(text)
+    kit = {str(name): entry for name, entry in kit.items() if isinstance(entry, Mapping)}
     radars = [name for name in kit if (stated.radar == name if stated else "radar" in name.lower())]
     cameras = [name for name in kit if name not in radars and (stated or "cam" in name.lower())]
     if len(radars) != 1 or len(cameras) != 1:
@@ -83,12 +84,8 @@ def read_autoware(content: Mapping[str, Any], text: str, source: str) -> Importe
     )
     pose = WrittenPose("rpy", camera_numbers[3:], camera_numbers[:3], "radar_from_camera", roles.axes)
     if radar_numbers.any():
-        kit_from_radar = WrittenPose(
-            "rpy", radar_numbers[3:], radar_numbers[:3], "camera_from_radar"
-        ).camera_from_radar()
-        kit_from_camera = WrittenPose(
-            "rpy", camera_numbers[3:], camera_numbers[:3], "camera_from_radar"
-        ).camera_from_radar()
+        kit_from_radar = WrittenPose("rpy", radar_numbers[3:], radar_numbers[:3], "radar_from_camera").as_written()
+        kit_from_camera = WrittenPose("rpy", camera_numbers[3:], camera_numbers[:3], "radar_from_camera").as_written()
         radar_from_camera = kit_from_radar.inverse() @ kit_from_camera
         pose = WrittenPose(
             "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera", roles.axes
@@ -99,9 +96,7 @@ def read_autoware(content: Mapping[str, Any], text: str, source: str) -> Importe
 
 
 def _is_kit(value: Any) -> bool:
-    return isinstance(value, Mapping) and any(
-        isinstance(entry, Mapping) and {"x", "roll", "yaw"} <= set(entry) for entry in value.values()
-    )
+    return isinstance(value, Mapping) and any(isinstance(entry, Mapping) and "yaw" in entry for entry in value.values())
 
 
 def write_apollo(file: CalibrationFile) -> str:
@@ -197,7 +192,7 @@ def read_kalibr(content: Mapping[str, Any], text: str, source: str) -> ImportedC
     Raises:
         InputError: a number is missing.
     """
-    key = next(str(key) for key, value in content.items() if isinstance(value, Mapping) and "T_cam_radar" in value)
+    key = next(key for key, value in content.items() if isinstance(value, Mapping) and "T_cam_radar" in value)
     matrix = floats(content[key]["T_cam_radar"], source=source, place=f"{key}.T_cam_radar", length=16)
     rows = np.reshape(matrix, (4, 4))
     cameras = find_cameras({key: content[key]}, source=source) if "intrinsics" in content[key] else ()

@@ -34,7 +34,7 @@ def load_yaml(text: str, *, source: str) -> Any:
     plain = re.sub(r"\A\ufeff?%YAML[: ][\d.]+[^\n]*\n(---[^\n]*\n)?", "", text)
     try:
         return yaml.load(plain)
-    except (YAMLError, ValueError, RecursionError) as error:
+    except (YAMLError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1 + text.count(chr(10)) - plain.count(chr(10))}: " if mark else ""
         raise InputError(f"{source}: {where}not YAML ({_problem(error)}); correct it there") from None

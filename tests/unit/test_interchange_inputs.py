@@ -1,5 +1,6 @@
 """clicks-1, pairs-1 and calibration-1: what they hold comes back, and what they cannot hold is refused in words."""
 
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -261,8 +262,6 @@ def test_the_check_point_is_the_inlier_nearest_to_the_image_centre(golden_text):
 
 
 def test_the_stamp_of_a_pair_comes_from_its_click_where_the_pair_has_none(golden_text):
-    import dataclasses
-
     calibration = read_calibration(golden_text).calibration
     bare = dataclasses.replace(calibration, pairs=(dataclasses.replace(calibration.pairs[0], image_time=None),))
     click = ReflectorClick(time_from_parts(12, 5), "c1", 0.0, 0.0)

@@ -1,0 +1,294 @@
+"""One published transform in every format, against numbers worked out apart from this code, read by other people's readers.
+
+The transform is the one the paper's authors print with their code: rvec 1.30927651 -1.29183232 1.09104368,
+tvec -0.00115773 -0.0608874 -0.01496503. Expected numbers are given to the digits that were printed.
+"""
+
+import io
+import json
+import shlex
+import xml.etree.ElementTree as ElementTree
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ruamel.yaml import YAML
+from scipy.io import loadmat
+from scipy.spatial.transform import Rotation
+
+from calib_core.interchange import FORMATS, CalibrationFile, export, read_any, read_calibration
+
+RADAR_FROM_CAMERA_M = [0.006418, 0.000900, -0.062374]
+QUATERNION_XYZW = [-0.536832, 0.529679, -0.447351, 0.480758]
+RPY_RAD = [-1.708788, 0.028995, -1.532137]
+LINK_QUATERNION_XYZW = [0.013127, 0.069200, 0.020280, 0.997310]
+LINK_RPY_RAD = [0.029273, 0.137933, 0.042686]
+CAMERA_FROM_RADAR_XYZ_M = [-0.001158, -0.060887, -0.014965]
+CAMERA_FROM_RADAR_XYZW = [0.536832, -0.529679, 0.447351, 0.480758]
+ROWS = [
+    [0.03863361, -0.99883281, -0.02899066, -0.00115773],
+    [-0.13856096, 0.02337719, -0.99007796, -0.06088740],
+    [0.98960007, 0.04226726, -0.13749609, -0.01496503],
+]
+P_RADAR_M, P_CAMERA_M = [5.0, 1.0, -0.5], [-0.792327, -0.235276, 5.044051]
+PIXEL_PX = [212.918515, 239.443277]
+SIX = {"atol": 6e-7, "rtol": 0}
+EIGHT = {"atol": 6e-9, "rtol": 0}
+
+
+@pytest.fixture(scope="module")
+def published(project_root: Path) -> CalibrationFile:
+    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+
+
+def text_of(file: CalibrationFile, name: str) -> str:
+    return export(file, name).data.decode()
+
+
+def origin_of(joint: ElementTree.Element) -> tuple[list[float], list[float]]:
+    origin = joint.find("origin")
+    assert origin is not None
+    return [float(n) for n in origin.get("xyz", "").split()], [float(n) for n in origin.get("rpy", "").split()]
+
+
+def yaml_of(text: str) -> dict:
+    return YAML(typ="safe", pure=True).load(text)
+
+
+def test_the_published_vectors_are_what_they_say(published):
+    pose = published.calibration.camera_from_radar
+
+    np.testing.assert_allclose(pose.as_matrix()[:3], ROWS, **EIGHT)
+    np.testing.assert_allclose((pose @ np.array([P_RADAR_M]))[0], P_CAMERA_M, **SIX)
+    np.testing.assert_allclose(published.calibration.reproject(np.array([P_RADAR_M]))[0], PIXEL_PX, **SIX)
+    np.testing.assert_allclose(pose.translation_m, CAMERA_FROM_RADAR_XYZ_M, **SIX)
+    np.testing.assert_allclose(Rotation.from_matrix(pose.rotation).as_quat(), CAMERA_FROM_RADAR_XYZW, **SIX)
+
+
+@pytest.mark.parametrize(
+    "form", [form.name for form in FORMATS if form.comment in ("#", "<!-- -->") and form.name != "colmap"]
+)
+def test_a_file_that_may_hold_comments_says_frames_equation_and_check_point(published, form):
+    text = text_of(published, form)
+
+    assert "p_camera = R p_radar + t" in text
+    assert 'radar frame "radar"' in text
+    assert 'camera frame "camera_optical"' in text
+    assert "check point: p_radar [5.0, 1.0, -0.5] m -> p_camera [-0.792327" in text
+    assert "-> pixel [212.918515" in text
+
+
+def test_the_command_publishes_the_camera_in_the_radar_frame(published):
+    command = text_of(published, "tf2").partition("ros2 run")[2].replace("\\\n", " ")
+
+    words = shlex.split(command)
+
+    assert words[:2] == ["tf2_ros", "static_transform_publisher"]
+    said = dict(zip(words[2::2], words[3::2], strict=True))
+    np.testing.assert_allclose([float(said[f"--{axis}"]) for axis in "xyz"], RADAR_FROM_CAMERA_M, **SIX)
+    np.testing.assert_allclose([float(said[f"--q{axis}"]) for axis in "xyzw"], QUATERNION_XYZW, **SIX)
+    assert (said["--frame-id"], said["--child-frame-id"]) == ("radar", "camera_optical")
+
+
+def test_the_launch_files_publish_the_same(published):
+    ros2 = ElementTree.fromstring(text_of(published, "tf2-launch-xml")).find("node")
+    ros1 = ElementTree.fromstring(text_of(published, "tf1-launch")).find("node")
+    assert ros2 is not None
+    assert ros1 is not None
+
+    assert (ros2.get("pkg"), ros2.get("exec")) == ("tf2_ros", "static_transform_publisher")
+    words = ros2.get("args", "").split()
+    np.testing.assert_allclose([float(word) for word in words[1:14:2]], RADAR_FROM_CAMERA_M + QUATERNION_XYZW, **SIX)
+    assert (ros1.get("pkg"), ros1.get("type")) == ("tf2_ros", "static_transform_publisher")
+    *numbers, parent, child = ros1.get("args", "").split()
+    np.testing.assert_allclose([float(word) for word in numbers], RADAR_FROM_CAMERA_M + QUATERNION_XYZW, **SIX)
+    assert (parent, child) == ("radar", "camera_optical")
+
+
+def test_the_python_launch_file_is_a_node_with_these_arguments(published, monkeypatch):
+    import sys
+    import types
+
+    built = {}
+    launch, launch_ros, actions = (
+        types.ModuleType("launch"),
+        types.ModuleType("launch_ros"),
+        types.ModuleType("actions"),
+    )
+    launch.LaunchDescription = list  # type: ignore[attr-defined]
+    actions.Node = lambda **given: built.update(given)  # type: ignore[attr-defined]
+    for name, module in (("launch", launch), ("launch_ros", launch_ros), ("launch_ros.actions", actions)):
+        monkeypatch.setitem(sys.modules, name, module)
+    scope: dict = {}
+    exec(compile(text_of(published, "tf2-launch-py"), "radar_camera.launch.py", "exec"), scope)
+
+    scope["generate_launch_description"]()
+
+    assert (built["package"], built["executable"]) == ("tf2_ros", "static_transform_publisher")
+    numbers = [float(word) for word in built["arguments"][1:14:2]]
+    np.testing.assert_allclose(numbers, RADAR_FROM_CAMERA_M + QUATERNION_XYZW, **SIX)
+    assert built["arguments"][-4:] == ["--frame-id", "radar", "--child-frame-id", "camera_optical"]
+
+
+def test_urdf_hangs_the_optical_frame_on_the_body_frame(published):
+    robot = ElementTree.fromstring(text_of(published, "urdf"))
+
+    assert [link.get("name") for link in robot.findall("link")] == ["radar", "camera_link", "camera_optical"]
+    body, optical = robot.findall("joint")
+    body_xyz, body_rpy = origin_of(body)
+    optical_xyz, optical_rpy = origin_of(optical)
+    np.testing.assert_allclose(body_xyz, RADAR_FROM_CAMERA_M, **SIX)
+    np.testing.assert_allclose(body_rpy, LINK_RPY_RAD, **SIX)
+    np.testing.assert_allclose(Rotation.from_euler("xyz", body_rpy).as_quat(), LINK_QUATERNION_XYZW, **SIX)
+    assert optical_xyz == [0, 0, 0]
+    np.testing.assert_allclose(optical_rpy, [-1.570796, 0, -1.570796], **SIX)
+    whole = Rotation.from_euler("xyz", body_rpy) * Rotation.from_euler("xyz", optical_rpy)
+    np.testing.assert_allclose(whole.as_euler("xyz"), RPY_RAD, **SIX)
+
+
+def test_autoware_gets_the_body_frame_in_the_kit(published):
+    kit = yaml_of(text_of(published, "autoware"))["sensor_kit_base_link"]
+
+    assert kit["radar"] == dict.fromkeys(("x", "y", "z", "roll", "pitch", "yaw"), 0.0)
+    camera = [kit["camera_link"][key] for key in ("x", "y", "z", "roll", "pitch", "yaw")]
+    np.testing.assert_allclose(camera, RADAR_FROM_CAMERA_M + LINK_RPY_RAD, **SIX)
+
+
+def test_kalibr_gets_the_matrix_and_four_coefficients(published):
+    cam0 = yaml_of(text_of(published, "kalibr"))["cam0"]
+
+    np.testing.assert_allclose(cam0["T_cam_radar"], [*ROWS, [0, 0, 0, 1]], **EIGHT)
+    assert cam0["intrinsics"] == [554.4203610, 556.5392197, 299.0464167, 265.1770865]
+    assert cam0["distortion_coeffs"] == [-0.3941065568, 0.1667170599, -0.0035270543, 0.0018664127]
+    assert (cam0["camera_model"], cam0["distortion_model"], cam0["resolution"]) == ("pinhole", "radtan", [640, 480])
+
+
+def test_kitti_has_its_seven_lines_in_order(published):
+    lines = [line.split(": ") for line in text_of(published, "kitti").splitlines()]
+
+    assert [key for key, _ in lines] == ["P0", "P1", "P2", "P3", "R0_rect", "Tr_velo_to_cam", "Tr_imu_to_velo"]
+    values = {key: np.array(numbers.split(), dtype=float) for key, numbers in lines}
+    np.testing.assert_allclose(values["Tr_velo_to_cam"].reshape(3, 4), ROWS, **EIGHT)
+    np.testing.assert_allclose(
+        values["P2"], [554.420361, 0, 299.046417, 0, 0, 556.53922, 265.177087, 0, 0, 0, 1, 0], **SIX
+    )
+    np.testing.assert_array_equal(values["R0_rect"].reshape(3, 3), np.eye(3))
+
+
+def test_view_of_delft_s_own_calibration_is_read():
+    text = "P2: 1495.468642 0 961.272442 0 0 1495.468642 624.89592 0 0 0 1 0\nTr_velo_to_cam: " + (
+        "-0.013857 -0.9997468 0.01772762 0.05283124 0.10934269 -0.01913807 -0.99381983 0.98100483 "
+        "0.99390751 -0.01183297 0.1095802 1.44445002"
+    )
+
+    pose = read_any(text).camera_from_radar
+
+    np.testing.assert_allclose(pose.translation_m, [0.05283124, 0.98100483, 1.44445002], rtol=1e-12)
+    np.testing.assert_allclose(pose.rotation[0], [-0.013857, -0.9997468, 0.01772762], atol=1e-6)
+
+
+def test_nuscenes_gets_w_first_and_the_camera_in_ego(published):
+    radar, camera = json.loads(text_of(published, "nuscenes"))
+
+    assert radar["camera_intrinsic"] == []
+    np.testing.assert_allclose(camera["translation"], RADAR_FROM_CAMERA_M, **SIX)
+    np.testing.assert_allclose(camera["rotation"], [0.480758, -0.536832, 0.529679, -0.447351], **SIX)
+    assert camera["camera_intrinsic"][0] == [554.4203610, 0.0, 299.0464167]
+
+
+def test_opencv_reads_its_file_and_projects_the_check_point(published, tmp_path):
+    import cv2
+
+    path = tmp_path / "radar_camera.yml"
+    path.write_bytes(export(published, "opencv").data)
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+    read = {key: storage.getNode(key).mat() for key in ("camera_matrix", "distortion_coefficients", "R", "T", "rvec")}
+    point = storage.getNode("check_point_radar_m").mat()
+
+    np.testing.assert_allclose(read["R"], np.array(ROWS)[:, :3], **EIGHT)
+    np.testing.assert_allclose(read["rvec"].ravel(), [1.30927651, -1.29183232, 1.09104368], **EIGHT)
+    pixels, _ = cv2.projectPoints(
+        point.reshape(1, 1, 3), read["rvec"], read["T"], read["camera_matrix"], read["distortion_coefficients"]
+    )
+    np.testing.assert_allclose(pixels.ravel(), PIXEL_PX, **SIX)
+    assert storage.getNode("radar_frame").string() == "radar"
+    assert int(storage.getNode("image_width").real()) == 640
+
+
+def test_foxglove_gets_the_pose_of_the_child_and_all_five_coefficients(published):
+    messages = json.loads(text_of(published, "foxglove"))
+
+    transform, camera = messages["FrameTransform"], messages["CameraCalibration"]
+    assert (transform["parent_frame_id"], transform["child_frame_id"]) == ("radar", "camera_optical")
+    np.testing.assert_allclose([transform["translation"][k] for k in "xyz"], RADAR_FROM_CAMERA_M, **SIX)
+    np.testing.assert_allclose([transform["rotation"][k] for k in "xyzw"], QUATERNION_XYZW, **SIX)
+    assert camera["D"] == [-0.3941065568, 0.1667170599, -0.0035270543, 0.0018664127, 0.0]
+    assert (len(camera["K"]), len(camera["R"]), len(camera["P"])) == (9, 9, 12)
+
+
+def test_apollo_gets_the_pose_of_the_child(published):
+    content = yaml_of(text_of(published, "apollo"))
+
+    assert (content["header"]["frame_id"], content["child_frame_id"]) == ("radar", "camera_optical")
+    transform = content["transform"]
+    np.testing.assert_allclose([transform["translation"][k] for k in "xyz"], RADAR_FROM_CAMERA_M, **SIX)
+    np.testing.assert_allclose([transform["rotation"][k] for k in "xyzw"], QUATERNION_XYZW, **SIX)
+
+
+def test_matlab_counts_pixels_from_one(published):
+    content = loadmat(io.BytesIO(export(published, "matlab").data), simplify_cells=True)
+
+    np.testing.assert_allclose(content["camera_from_radar"]["A"][:3], ROWS, **EIGHT)
+    np.testing.assert_allclose(content["camera"]["PrincipalPoint"], [300.0464167, 266.1770865], rtol=1e-12)
+    assert content["camera"]["ImageSize"].tolist() == [480, 640]
+    assert content["frames"] == {"radar": "radar", "camera": "camera_optical"}
+    assert content["check_point"]["radar_m"].tolist() == P_RADAR_M
+
+
+def test_numpy_loads_its_file_without_pickle(published):
+    arrays = np.load(io.BytesIO(export(published, "numpy").data), allow_pickle=False)
+
+    np.testing.assert_allclose(arrays["camera_from_radar"][:3], ROWS, **EIGHT)
+    assert str(arrays["equation"]) == "p_camera = R p_radar + t"
+    assert arrays["image_size_px"].tolist() == [640, 480]
+
+
+def test_loadtxt_reads_the_matrix(published):
+    np.testing.assert_allclose(np.loadtxt(io.StringIO(text_of(published, "matrix")))[:3], ROWS, **EIGHT)
+
+
+def test_colmap_puts_the_principal_point_half_a_pixel_on(published):
+    archive = zipfile.ZipFile(io.BytesIO(export(published, "colmap").data))
+    camera, image = (
+        next(line for line in archive.read(name).decode().splitlines() if line and not line.startswith("#")).split()
+        for name in ("cameras.txt", "images.txt")
+    )
+
+    assert camera[1:4] == ["OPENCV", "640", "480"]
+    np.testing.assert_allclose([float(n) for n in camera[6:8]], [299.5464167, 265.6770865], rtol=1e-12)
+    np.testing.assert_allclose([float(n) for n in image[1:5]], np.roll(CAMERA_FROM_RADAR_XYZW, 1), **SIX)
+    np.testing.assert_allclose([float(n) for n in image[5:8]], CAMERA_FROM_RADAR_XYZ_M, **SIX)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "ros2 run tf2_ros static_transform_publisher --x 0.006418 --y 0.000900 --z -0.062374 --qx -0.536832 --qy 0.529679 "
+        "--qz -0.447351 --qw 0.480758 --frame-id radar --child-frame-id camera_optical",
+        "ros2 run tf2_ros static_transform_publisher --x=0.006418 --y=0.0009 --z=-0.062374 --roll=-1.708788 --pitch=0.028995 "
+        "--yaw=-1.532137 --frame-id=radar --child-frame-id=camera_optical",
+        "ros2 run tf2_ros static_transform_publisher 0.006418 0.0009 -0.062374 -1.532137 0.028995 -1.708788 radar camera_optical",
+        "rosrun tf static_transform_publisher 0.006418 0.0009 -0.062374 -0.536832 0.529679 -0.447351 0.480758 "
+        "/radar /camera_optical 100",
+        "rosrun tf2_ros static_transform_publisher -0.001158 -0.060887 -0.014965 0.536832 -0.529679 0.447351 0.480758 "
+        "camera_optical radar",
+        "static_transform_publisher --x 0.006418 --y 0.0009 --z -0.062374 --roll 0.029273 --pitch 0.137933 --yaw 0.042686 "
+        "--frame-id radar --child-frame-id camera_link",
+    ],
+    ids=["named", "named-rpy", "positional-yaw-pitch-roll", "ros1-with-period", "camera-as-parent", "body-frame"],
+)
+def test_every_way_to_write_the_command_means_the_same(command):
+    pose = read_any(command).camera_from_radar
+
+    np.testing.assert_allclose(pose.as_matrix()[:3], ROWS, atol=3e-6)
