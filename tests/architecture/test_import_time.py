@@ -1,0 +1,40 @@
+"""Heavy libraries are imported when they are needed, not when the package is: `cocalib --help` must not wait for OpenCV."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HEAVY = ("viser", "cv2", "rosbags", "rerun", "scipy", "websockets", "tyro")
+
+
+def heavy_modules_after(statement: str) -> str:
+    """Run a statement in a fresh interpreter and name the heavy packages it has pulled in."""
+    program = f"{statement}\nimport sys\nprint(*sorted(set({HEAVY!r}) & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_the_core_imports_nothing_heavy() -> None:
+    assert heavy_modules_after("import calib_core") == ""
+
+
+def test_the_mathematics_imports_nothing_heavy(project_root: Path) -> None:
+    modules = sorted(path.stem for path in (project_root / "calib_core").glob("[!_]*.py"))
+    assert {"opencv", "paper", "refining"} <= set(modules)
+    assert heavy_modules_after("".join(f"import calib_core.{module}\n" for module in modules)) == ""
+
+
+def test_session_and_view_import_nothing_heavy() -> None:
+    assert heavy_modules_after("import app.session\nimport app.view") == ""
+
+
+@pytest.mark.parametrize("package", ["calib_core.interchange", "calib_core.synthetic", "calib_core.recordings"])
+def test_the_borders_of_the_core_import_nothing_heavy(package: str) -> None:
+    assert heavy_modules_after(f"import {package}") == ""
+
+
+def test_a_heavy_import_would_be_seen() -> None:
+    assert heavy_modules_after("import cv2") == "cv2"
