@@ -1,0 +1,66 @@
+"""The command line: reads what was typed, runs it, and turns every refusal into one line and an exit code.
+
+Exit codes: 0 done; 1 the data cannot give a calibration; 2 wrong usage or unreadable input.
+"""
+
+import sys
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import tyro
+
+from app.cli.exporting import Check, Export
+from app.cli.inspecting import Info
+from app.cli.opening import Demo, Open
+from app.cli.printing import refuse
+from app.cli.simulating import Simulate
+from app.cli.solving import Solve
+from calib_core.errors import CalibrationError
+
+__all__ = ["run"]
+
+_DESCRIPTION = "Radar-camera calibration: click the corner reflector, get camera_from_radar and how far to trust it."
+
+_Command = (
+    Annotated[Demo, tyro.conf.subcommand("demo")]
+    | Annotated[Open, tyro.conf.subcommand("open")]
+    | Annotated[Info, tyro.conf.subcommand("info")]
+    | Annotated[Solve, tyro.conf.subcommand("solve")]
+    | Annotated[Export, tyro.conf.subcommand("export")]
+    | Annotated[Check, tyro.conf.subcommand("check")]
+    | Annotated[Simulate, tyro.conf.subcommand("simulate")]
+)
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command.
+
+    Args:
+        arguments: what was typed after `cocalib`.
+
+    Returns:
+        The exit code: 0, 1 or 2.
+    """
+    if list(arguments) == ["--version"]:
+        from app.resources import version
+
+        print(f"cocalib {version()}")
+        return 0
+    try:
+        command: Any = tyro.cli(
+            _Command,
+            prog="cocalib",
+            description=_DESCRIPTION,
+            args=list(arguments) or ["--help"],
+            config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff),
+        )
+        return int(command.run())
+    except CalibrationError as error:
+        return refuse(str(error))
+    except OSError as error:
+        return refuse(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
+    except KeyboardInterrupt:
+        print(file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        return 0

@@ -1,0 +1,69 @@
+"""`cocalib export` and `cocalib check`: a calibration in the words of another stack, and the proof that it was read right."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from app.cli.printing import read_text, write_whole
+from calib_core.errors import InputError
+
+__all__ = ["Check", "Export"]
+
+
+@dataclass(frozen=True, slots=True)
+class Export:
+    """Write a calibration as another stack reads it; `--to list` names the formats."""
+
+    calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="CALIBRATION.json")] = ()
+    """A calibration that cocalib wrote (cocalib/calibration-1 JSON)."""
+    to: str = "list"
+    """The format: tf2, urdf, ...; "list" names them all."""
+    out: Path | None = None
+    """Where it goes, a file or a folder; without it, text goes to stdout."""
+
+    def run(self) -> int:
+        """Write the export; return the exit code."""
+        from calib_core.interchange import FORMATS, ExportBytes, export, format_named, read_calibration
+
+        if self.to == "list":
+            width = max(len(known.name) for known in FORMATS)
+            print("\n".join(f"{known.name:<{width}}  {known.title}" for known in FORMATS))
+            return 0
+        format_named(self.to)
+        if len(self.calibration) != 1:
+            raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
+        path = self.calibration[0]
+        written = export(read_calibration(read_text(path), source=str(path)), self.to)
+        for note in written.notes:
+            print(f"note: {note}", file=sys.stderr)
+        if self.out is not None:
+            target = self.out / written.file_name if self.out.is_dir() else self.out
+            write_whole(target, written.data)
+            print(f"written to {target}")
+        elif isinstance(written, ExportBytes):
+            raise InputError(f"{self.to} is a binary format; say where it goes: --out {written.file_name}")
+        else:
+            print(written.text, end="")
+        return 0
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """Read a calibration back, recompute its check point, and say what is wrong with it; or compare two."""
+
+    calibration: Annotated[Path, tyro.conf.Positional]
+    """A calibration in any format that export writes."""
+    against: Path | None = None
+    """Another one to compare with: in degrees, centimetres, and pixels at 5, 20 and 60 m."""
+
+    def run(self) -> int:
+        """Print the findings; return 0 when all is well, 1 when something is wrong."""
+        from calib_core.interchange import check, read_any_file
+
+        other = read_any_file(self.against) if self.against else None
+        report = check(read_any_file(self.calibration), against=other)
+        print("\n".join(report.lines()))
+        return 0 if report.ok else 1

@@ -1,0 +1,35 @@
+"""`cocalib info`: what is in a recording."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from calib_core.recordings import RecordingOptions
+
+__all__ = ["Info"]
+
+
+@dataclass(frozen=True, slots=True)
+class Info:
+    """Say what a recording holds: files, topics, types, rates, stamps, overlap, camera, warnings."""
+
+    recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")]
+    """One or more .bag, .mcap, .db3 files or bag folders; several together are one recording."""
+    json: bool = False
+    """Print the same as JSON on stdout."""
+    topics: Annotated[RecordingOptions, tyro.conf.arg(name="")] = field(default_factory=RecordingOptions)
+
+    def run(self) -> int:
+        """Print the description; return the exit code."""
+        import msgspec
+
+        from calib_core.recordings import describe, inspect_recording, recording_summary
+
+        with inspect_recording(self.recording, self.topics) as recording:
+            if self.json:
+                print(msgspec.json.format(msgspec.json.encode(recording_summary(recording)), indent=2).decode())
+            else:
+                print(describe(recording))
+        return 0

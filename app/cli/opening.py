@@ -1,0 +1,132 @@
+"""`cocalib demo` and `cocalib open`: the page."""
+
+import dataclasses
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from app.cli.printing import read_text, required_camera
+from calib_core.options import CalibrationOptions
+from calib_core.recordings import RecordingOptions
+
+__all__ = ["Demo", "Open"]
+
+
+@dataclass(frozen=True, slots=True)
+class ServingFlags:
+    """Where the page is served."""
+
+    host: str = "127.0.0.1"
+    """Address to bind; anything but loopback lets other machines in, who then need the token."""
+    port: int = 8080
+    """Port; 0 takes any free one."""
+    token: str | None = None
+    """The token to ask for; without it, one is made and printed in the link."""
+    no_browser: bool = False
+    """Print the link and do not open a browser."""
+
+
+@dataclass(frozen=True, slots=True)
+class Demo:
+    """Open the sample recording in the browser."""
+
+    session: Path | None = None
+    """Folder of the session; without it, one in your user folder, kept from run to run."""
+    fresh: bool = False
+    """Begin without the clicks of the last time; they are kept beside."""
+    serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
+
+    def run(self) -> int:
+        """Serve until Ctrl+C; return the exit code."""
+        from app.resources import sample_folder
+        from app.session_file import user_session_folder
+
+        sample = sample_folder() / "rooftop"
+        return _serve(
+            (sample / "radar.bag", sample / "camera.bag"),
+            session=self.session or user_session_folder("demo"),
+            fresh=self.fresh,
+            serving=self.serving,
+            name="the sample recording",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Open:
+    """Calibrate your own recording in the browser."""
+
+    recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")]
+    """One or more .bag, .mcap, .db3 files or bag folders; several together are one recording."""
+    camera: Path | None = None
+    """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    clicks: Path | None = None
+    """Clicks that join the session (cocalib/clicks-1 JSON)."""
+    session: Path | None = None
+    """Folder of the session; without it, beside the recording where that can be written, else in your user folder."""
+    fresh: bool = False
+    """Begin without the clicks of the last time; they are kept beside."""
+    topics: Annotated[RecordingOptions, tyro.conf.arg(name="")] = field(default_factory=RecordingOptions)
+    options: Annotated[CalibrationOptions, tyro.conf.arg(name="")] = field(default_factory=CalibrationOptions)
+    serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
+
+    def run(self) -> int:
+        """Serve until Ctrl+C; return the exit code."""
+        from app.session_file import recording_session_folder
+        from calib_core.recordings import require_files
+
+        paths = require_files(self.recording)
+        return _serve(
+            paths,
+            session=self.session or recording_session_folder(paths),
+            fresh=self.fresh,
+            serving=self.serving,
+            name=paths[0].name,
+            camera_file=self.camera,
+            clicks_file=self.clicks,
+            topics=self.topics,
+            options=self.options,
+        )
+
+
+def _serve(
+    paths: Sequence[Path],
+    *,
+    session: Path,
+    fresh: bool,
+    serving: ServingFlags,
+    name: str,
+    camera_file: Path | None = None,
+    clicks_file: Path | None = None,
+    topics: RecordingOptions | None = None,
+    options: CalibrationOptions | None = None,
+) -> int:
+    """Open everything, serve until Ctrl+C, close everything.
+
+    Raises:
+        CalibrationError: the recording, the intrinsics, the clicks or the session cannot be used.
+    """
+    from app.resources import check_installation
+    from app.session import OptionsChanged
+    from app.session_file import set_aside
+    from app.web.server import ServerOptions, serve
+    from app.workspace import open_workspace
+    from calib_core.recordings import open_recording
+
+    check_installation()
+    with ExitStack() as stack:
+        recording = stack.enter_context(open_recording(paths, topics or RecordingOptions()))
+        camera = required_camera(recording, camera_file)
+        if fresh and (kept := set_aside(session)) is not None:
+            print(f"The session of the last time is kept in {kept}")
+        workspace = open_workspace(recording, camera=camera, session_folder=session, name=name)
+        stack.callback(workspace.close)
+        if options is not None and options != CalibrationOptions():
+            workspace.dispatch(OptionsChanged(options))
+        if clicks_file is not None:
+            workspace.import_clicks(read_text(clicks_file), source=str(clicks_file))
+        serve(workspace, recording, ServerOptions(**dataclasses.asdict(serving)))
+    return 0

@@ -1,0 +1,90 @@
+"""What commands share: reading and writing files, refusing in one line, and what a recording must bring."""
+
+import sys
+from pathlib import Path
+
+from app import whole_file
+from app.solving import camera_for
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.measurements import TimeNs, Unsolvable, time_parts
+from calib_core.recordings import Recording
+
+__all__ = [
+    "explain_unsolvable",
+    "read_text",
+    "refuse",
+    "required_camera",
+    "seconds_text",
+    "write_whole",
+]
+
+_MAX_TEXT_BYTES = 64 * 1024 * 1024
+
+
+def refuse(reason: str) -> int:
+    """Say on stderr, in one line, why a command cannot run; return exit code 2."""
+    print(f"cocalib: {' '.join(reason.split())}", file=sys.stderr)
+    return 2
+
+
+def explain_unsolvable(outcome: Unsolvable) -> int:
+    """Say on stderr why the data cannot give a calibration and what would help; return exit code 1."""
+    print(f"cocalib: no calibration: {outcome.reason} {outcome.hint}", file=sys.stderr)
+    return 1
+
+
+def read_text(path: Path) -> str:
+    """Read a text file whole.
+
+    Raises:
+        InputError: it is missing, a folder, unreadable, too large or not text.
+    """
+    try:
+        if path.stat().st_size > _MAX_TEXT_BYTES:
+            raise InputError(f"{path}: larger than {_MAX_TEXT_BYTES // 2**20} MB, which no file of clicks or pairs is")
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; check the path") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not a text file (byte {error.start} is not UTF-8)") from error
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file so that it is either the old one or the new one, never a part.
+
+    Raises:
+        InputError: the folder is missing or not writable.
+    """
+    try:
+        whole_file.write_whole(path, content.encode("utf-8") if isinstance(content, str) else content)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
+
+
+def required_camera(recording: Recording, camera_file: Path | None) -> Camera:
+    """Return the intrinsics: the file's where one is given, else the recording's.
+
+    Raises:
+        InputError: there are none.
+    """
+    camera = camera_for(recording, camera_file)
+    if camera is None:
+        found = (
+            f"{recording.camera_info_topic} holds none that can be used"
+            if recording.camera_info_topic
+            else "it has no CameraInfo topic"
+        )
+        raise InputError(
+            f"{recording.paths[0].name}: no intrinsics for {recording.image_topic}: {found}; "
+            "give them with --camera FILE (ROS camera_info YAML, OpenCV YAML or XML, Kalibr camchain, JSON)"
+        )
+    return camera
+
+
+def seconds_text(time: TimeNs) -> str:
+    """Write a stamp as seconds with all its digits."""
+    sec, nanosec = time_parts(time)
+    return f"{sec}.{nanosec:09d} s"

@@ -1,0 +1,1 @@
+"""Measurements: accuracy against peers, speed as ratios within one run."""

@@ -1,0 +1,27 @@
+"""Measure everything and write docs/speed.md."""
+
+import sys
+import tempfile
+from pathlib import Path
+
+from app.resources import sample_folder
+from benchmarks.speed.paging import measure_page
+from benchmarks.speed.rows import page
+from benchmarks.speed.solving import measure_solving
+from benchmarks.speed.starting import measure_starting
+
+_PAGE = Path(__file__).resolve().parents[2] / "docs" / "speed.md"
+
+
+def main() -> int:
+    """Run every measurement; the exit code is 0 whatever the figures are."""
+    with tempfile.TemporaryDirectory() as scratch:
+        tables = [*measure_page(Path(scratch)), measure_solving(), measure_starting(sample_folder() / "rooftop")]
+    text = page(tables)
+    _PAGE.write_text(text, encoding="utf-8")
+    print(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,89 @@
+// Runs in the page: measures from the pointer's release to the painted picture. Evaluated by benchmarks/speed/paging.py.
+() => {
+  const { state, clicks, clickIn, goTo, toCss } = window.__cocalib;
+  const painted = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  const until = async (condition, limitMs = 20000) => {
+    const start = performance.now();
+    while (!condition()) {
+      if (performance.now() - start > limitMs) throw new Error("waited in vain for " + condition);
+      await new Promise((done) => requestAnimationFrame(done));
+    }
+  };
+  const solved = () => state.view && !state.view.solving && state.view.solved_revision === state.view.revision;
+  const canvas = () => document.querySelector("canvas");
+  const press = (type, x, y) =>
+    canvas().dispatchEvent(
+      new PointerEvent(type, { clientX: x, clientY: y, button: 0, buttons: type === "pointerup" ? 0 : 1, pointerId: 1, isPrimary: true, bubbles: true, cancelable: true }),
+    );
+  const settled = async () => {
+    await until(() => state.shown && state.connected);
+    if (state.view && state.view.clicks.length) await until(solved);
+    await new Promise((done) => setTimeout(done, 1500));
+  };
+  window.__measures = {
+    settled,
+    /** Move the mark of one click by a fraction of a pixel, as a person does by clicking again. */
+    async click(number) {
+      const click = state.view.clicks[number % state.view.clicks.length];
+      goTo(click.frame);
+      await until(() => state.shown.index === click.frame && solved());
+      await new Promise((done) => setTimeout(done, 100));
+      const box = canvas().getBoundingClientRect();
+      const place = toCss(click.u_px + (number % 2 ? 12 : -12), click.v_px);
+      const [x, y] = [box.left + place.x, box.top + place.y];
+      const revision = state.view.revision;
+      press("pointerdown", x, y);
+      press("pointerup", x, y);
+      const start = performance.now();
+      await until(() => Math.abs(clickIn(click.frame).u_px - click.u_px) > 0.01);
+      await painted();
+      const mark = performance.now() - start;
+      await until(() => state.view.revision > revision && solved());
+      await painted();
+      return { mark, solved: performance.now() - start };
+    },
+    /** Step one frame forward. */
+    async step() {
+      const target = state.cursor + 1;
+      const start = performance.now();
+      goTo(target);
+      await until(() => state.shown.index === target);
+      await painted();
+      const taken = performance.now() - start;
+      await new Promise((done) => setTimeout(done, 50));
+      return taken;
+    },
+    /** Play for some seconds, from the start again at the end. */
+    async play(seconds) {
+      goTo(0);
+      await until(() => state.shown.index === 0);
+      const start = performance.now();
+      let [shown, last, lastAt, longest] = [0, 0, start, 0];
+      document.getElementById("play").click();
+      while (performance.now() - start < seconds * 1000) {
+        await new Promise((done) => requestAnimationFrame(done));
+        if (!state.playing) document.getElementById("play").click();
+        if (state.shown.index === last) continue;
+        const now = performance.now();
+        longest = Math.max(longest, now - lastAt);
+        [last, lastAt, shown] = [state.shown.index, now, shown + 1];
+      }
+      const taken = (performance.now() - start) / 1000;
+      if (state.playing) document.getElementById("play").click();
+      return { shown, seconds: taken, longest_gap_ms: longest };
+    },
+    /** Ask for many frames at once, as a held key does, and see whether the last one comes. */
+    async push(count) {
+      const first = Math.max(0, Math.min(state.cursor, state.seconds.length - count - 1));
+      const seen = new Set();
+      const start = performance.now();
+      for (let k = 1; k <= count; k++) goTo(first + k);
+      const until_ms = start + 10000;
+      while (state.shown.index !== first + count && performance.now() < until_ms) {
+        seen.add(state.shown.index);
+        await new Promise((done) => requestAnimationFrame(done));
+      }
+      return { settled: state.shown.index === first + count, settled_ms: performance.now() - start, shown: seen.size };
+    },
+  };
+}

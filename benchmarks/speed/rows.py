@@ -1,0 +1,77 @@
+"""What a measurement says, and the page of tables that docs show."""
+
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+__all__ = ["Row", "Table", "page", "spread"]
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of a table.
+
+    Attributes:
+        what: what was measured.
+        figure: the measured value as text, with its unit.
+        ratio: against what was measured beside it in the same run; "" where there is nothing to compare with.
+        aim: what it should be; "" where there is none.
+        met: whether it is.
+    """
+
+    what: str
+    figure: str
+    ratio: str = ""
+    aim: str = ""
+    met: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Some rows under one heading, and how they were measured."""
+
+    title: str
+    how: str
+    rows: tuple[Row, ...]
+
+
+def spread(values_ms: Sequence[float]) -> str:
+    """Write a sample of times as its median and 95th percentile."""
+    return f"{np.median(values_ms):.0f} ms (p95 {np.percentile(values_ms, 95):.0f})"
+
+
+def page(tables: Sequence[Table]) -> str:
+    """Write the page of tables in Markdown."""
+    lines = [
+        "# Speed",
+        "",
+        f"Written by `make bench`. Machine: {_machine()}. Read times as ratios within this one run.",
+    ]
+    for table in tables:
+        lines += ["", f"## {table.title}", "", table.how, "", "| what | measured | ratio | aim |", "|---|---|---|---|"]
+        lines += [f"| {row.what} | {row.figure} | {row.ratio} | {_aim(row)} |" for row in table.rows]
+    return "\n".join(lines) + "\n"
+
+
+def _aim(row: Row) -> str:
+    return f"{row.aim}: {'met' if row.met else '**missed**'}" if row.aim else ""
+
+
+def _machine() -> str:
+    model = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        named = [
+            line.partition(":")[2].strip() for line in cpuinfo.read_text().splitlines() if line.startswith("model name")
+        ]
+        model = named[0] if named else model
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return (
+        f"{model}, {cores} cores, no GPU (WebGL in software), {platform.system()}, Python {platform.python_version()}, "
+        f"NumPy {version('numpy')}, OpenCV {version('opencv-python-headless')}, viser {version('viser')}"
+    )

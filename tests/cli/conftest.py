@@ -1,0 +1,176 @@
+"""Small recordings, made to be good or to be wrong in one way."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.cli import run
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.measurements import NS_PER_S, TimeNs, time_parts
+from calib_core.recordings.writing import (
+    CameraInfoMessage,
+    CloudMessage,
+    CompressedImageMessage,
+    RecordedMessage,
+    write_ros2,
+)
+
+START = TimeNs(1_700_000_000 * NS_PER_S)
+DWELL_S = 4
+FRAME_TIMES_S = 0.5
+SCAN_TIMES_S = 0.1
+
+
+@dataclass(frozen=True)
+class Made:
+    """A recording to make: six placements, four seconds each."""
+
+    camera: Camera = field(
+        default_factory=lambda: Camera(
+            "plumb_bob",
+            320,
+            240,
+            np.array([[260.0, 0, 160], [0, 260, 120], [0, 0, 1]]),
+            np.array([-0.1, 0.02, 0.001, -0.001]),
+        )
+    )
+    camera_from_radar: RigidTransform = field(
+        default_factory=lambda: RigidTransform(
+            rotation_exp(np.array([0.02, -0.03, 0.01])) @ np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
+            np.array([0.05, -0.06, 0.02]),
+        )
+    )
+    placements: int = 8
+    with_camera_info: bool = True
+    with_images: bool = True
+    with_radar: bool = True
+    radar_late_s: float = 0.0
+    nan_scans: int = 0
+
+    @property
+    def positions_radar_m(self) -> np.ndarray:
+        """Where the reflector stands: spread over the view, some of them raised."""
+        rng = np.random.default_rng(5)
+        n = self.placements
+        x = np.linspace(3.0, 11.0, n)
+        y = x * np.linspace(-0.4, 0.4, n)[rng.permutation(n)]
+        return np.stack([x, y, np.where(np.arange(n) % 2, -1.0, 0.4)], axis=1)
+
+    def clicks(self) -> str:
+        """Write the clicks: each placement's pixel in the frame at the middle of its dwell."""
+        pixels = self.camera.project(self.camera_from_radar @ self.positions_radar_m)
+        clicks = []
+        for index, (u, v) in enumerate(pixels):
+            time = TimeNs(START + int((index * DWELL_S + DWELL_S / 2) * NS_PER_S))
+            sec, nanosec = time_parts(time)
+            clicks.append({"id": f"c{index}", "image_time": {"sec": sec, "nanosec": nanosec}, "pixel_px": [u, v]})
+        return json.dumps({"schema": "cocalib/clicks-1", "clicks": clicks})
+
+    def messages(self) -> Iterator[RecordedMessage]:
+        """Yield the messages in order of time."""
+        jpeg = cv2.imencode(".jpg", np.full((self.camera.height_px, self.camera.width_px, 3), 90, np.uint8))[
+            1
+        ].tobytes()
+        late = int(self.radar_late_s * NS_PER_S)
+        made: list[RecordedMessage] = []
+        for k in range(int(self.placements * DWELL_S / FRAME_TIMES_S) + 1):
+            time = TimeNs(START + int(k * FRAME_TIMES_S * NS_PER_S))
+            if self.with_images:
+                made.append(
+                    RecordedMessage("/camera/image/compressed", time, CompressedImageMessage(time, "cam", jpeg))
+                )
+            if self.with_camera_info:
+                made.append(RecordedMessage("/camera/camera_info", time, CameraInfoMessage(time, "cam", self.camera)))
+        rng = np.random.default_rng(7)
+        for k in range(int(self.placements * DWELL_S / SCAN_TIMES_S)) if self.with_radar else ():
+            time = TimeNs(START + late + int(k * SCAN_TIMES_S * NS_PER_S))
+            index = int(k * SCAN_TIMES_S / DWELL_S)
+            points = self.positions_radar_m[[index]] + rng.normal(0, 0.003, (1, 3))
+            values = np.concatenate([points, [[0.0, 20.0]]], axis=1)
+            if k % 7 < self.nan_scans:
+                values[:, 0] = np.nan
+            made.append(
+                RecordedMessage(
+                    "/radar/points", time, CloudMessage(time, "radar", ("x", "y", "z", "velocity", "snr"), values)
+                )
+            )
+        return iter(sorted(made, key=lambda message: message.receive_time))
+
+
+@dataclass(frozen=True)
+class Typed:
+    """What a command answered."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def cocalib(capsys: pytest.CaptureFixture[str]) -> Callable[..., Typed]:
+    """Return the command as a function: arguments in, exit code and texts out."""
+
+    def typed(*arguments: object) -> Typed:
+        capsys.readouterr()
+        try:
+            code = run([str(argument) for argument in arguments])
+        except SystemExit as left:
+            code = int(left.code or 0)
+        captured = capsys.readouterr()
+        return Typed(code, captured.out, captured.err)
+
+    return typed
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that writes a recording, changed in the ways named, and gives its path."""
+
+    def write(name: str = "made", **changes: object) -> Path:
+        return write_ros2(tmp_path / f"{name}.mcap", replace(Made(), **changes).messages(), container="mcap")  # type: ignore[arg-type]
+
+    return write
+
+
+@pytest.fixture
+def clicks_file(tmp_path: Path) -> Path:
+    """Return a file of clicks that fit the recordings of `made`."""
+    path = tmp_path / "clicks.json"
+    path.write_text(Made().clicks())
+    return path
+
+
+@pytest.fixture
+def pairs_file(tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that writes a file of exact pairs, after a change to its document."""
+
+    def write(count: int = 8, change: Callable[[dict[str, object]], None] = lambda document: None) -> Path:
+        recording = Made()
+        positions: Sequence[Sequence[float]] = recording.positions_radar_m[:count].tolist()
+        pixels = recording.camera.project(recording.camera_from_radar @ recording.positions_radar_m)[:count].tolist()
+        document: dict[str, object] = {
+            "schema": "cocalib/pairs-1",
+            "camera": {
+                "model": "plumb_bob",
+                "width_px": 320,
+                "height_px": 240,
+                "matrix_px": recording.camera.matrix_px.tolist(),
+                "distortion": recording.camera.distortion.tolist(),
+            },
+            "pairs": [
+                {"id": f"p{i}", "radar_m": position, "pixel_px": pixel}
+                for i, (position, pixel) in enumerate(zip(positions, pixels, strict=True))
+            ],
+        }
+        change(document)
+        path = tmp_path / "pairs.json"
+        path.write_text(json.dumps(document))
+        return path
+
+    return write

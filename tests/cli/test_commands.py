@@ -1,0 +1,142 @@
+"""The commands on good input."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calib_core.geometry import rotation_angle_rad
+from tests.cli.conftest import Made
+
+Cocalib = Callable[..., Any]
+
+
+@pytest.fixture
+def calibration(cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path) -> Path:
+    """Return a calibration solved from a made recording."""
+    out = tmp_path / "calibration.json"
+    answer = cocalib("solve", made(), "--clicks", clicks_file, "--out", out)
+    assert answer.code == 0, answer.err
+    return out
+
+
+def test_solve_finds_the_pose_the_recording_was_made_with(calibration: Path) -> None:
+    document = json.loads(calibration.read_text())
+    truth = Made().camera_from_radar
+    turned = np.array(document["camera_from_radar"]["rotation"]) @ truth.rotation.T
+    assert np.rad2deg(rotation_angle_rad(turned)) < 0.1
+    assert document["camera_from_radar"]["translation_m"] == pytest.approx(truth.translation_m, abs=0.01)
+
+
+def test_solve_gives_the_same_bytes_twice_and_for_shuffled_clicks(
+    cocalib: Cocalib, clicks_file: Path, calibration: Path, tmp_path: Path
+) -> None:
+    document = json.loads(clicks_file.read_text())
+    document["clicks"].reverse()
+    clicks_file.write_text(json.dumps(document))
+    again = tmp_path / "again.json"
+    assert cocalib("solve", tmp_path / "made.mcap", "--clicks", clicks_file, "--out", again).code == 0
+    assert again.read_bytes() == calibration.read_bytes()
+
+
+def test_solve_without_out_prints_the_calibration(
+    cocalib: Cocalib, clicks_file: Path, calibration: Path, tmp_path: Path
+) -> None:
+    answer = cocalib("solve", tmp_path / "made.mcap", "--clicks", clicks_file)
+    assert answer.code == 0
+    assert answer.out.encode() == calibration.read_bytes()
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_solve_takes_pairs_by_either_method(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path, method: str
+) -> None:
+    out = tmp_path / "calibration.json"
+    answer = cocalib("solve", "--pairs", pairs_file(), "--out", out, "--method", method)
+    assert answer.code == 0, answer.err
+    document = json.loads(out.read_text())
+    assert document["options"]["method"] == method
+    assert document["metrics"]["aed_px"] < 0.01
+
+
+def test_a_measured_camera_position_pulls_the_answer_to_it(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    truth_m = Made().camera_from_radar.inverse().translation_m
+    out = tmp_path / "calibration.json"
+    flags = ["--camera-position-m", *truth_m, "--camera-position-sigma-m", 0.005]
+    assert cocalib("solve", "--pairs", pairs_file(), "--out", out, *flags).code == 0
+    sigma = json.loads(out.read_text())["sigma"]
+    assert max(sigma["x_m"], sigma["y_m"], sigma["z_m"]) < 0.01
+
+
+def test_info_names_topics_rates_and_choices(cocalib: Cocalib, made: Callable[..., Path]) -> None:
+    answer = cocalib("info", made())
+    assert answer.code == 0
+    for expected in ("/radar/points", "/camera/image/compressed", "/camera/camera_info", "made.mcap"):
+        assert expected in answer.out
+
+
+def test_info_as_json_is_one_document(cocalib: Cocalib, made: Callable[..., Path]) -> None:
+    answer = cocalib("info", made(), "--json")
+    assert answer.code == 0
+    topics = json.loads(answer.out)["topics"]
+    assert {topic["name"] for topic in topics} == {"/radar/points", "/camera/image/compressed", "/camera/camera_info"}
+
+
+def test_info_describes_a_recording_that_cannot_be_calibrated(cocalib: Cocalib, made: Callable[..., Path]) -> None:
+    answer = cocalib("info", made(with_radar=False))
+    assert answer.code == 0
+    assert "/camera/image/compressed" in answer.out
+    assert re.search(r"^radar +none that can be read", answer.out, re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", ["tf2", "urdf", "json"])
+def test_export_writes_what_check_reads_back(cocalib: Cocalib, calibration: Path, tmp_path: Path, name: str) -> None:
+    out = tmp_path / f"export.{name}"
+    assert cocalib("export", calibration, "--to", name, "--out", out).code == 0
+    answer = cocalib("check", out, "--against", calibration)
+    assert answer.code == 0, answer.out
+
+
+def test_export_list_names_every_format(cocalib: Cocalib) -> None:
+    answer = cocalib("export", "--to", "list")
+    assert answer.code == 0
+    assert {"tf2", "urdf", "json"} <= {line.split()[0] for line in answer.out.splitlines()}
+
+
+def test_export_without_out_prints_and_into_a_folder_names_itself(
+    cocalib: Cocalib, calibration: Path, tmp_path: Path
+) -> None:
+    printed = cocalib("export", calibration, "--to", "urdf").out
+    folder = tmp_path / "exports"
+    folder.mkdir()
+    assert cocalib("export", calibration, "--to", "urdf", "--out", folder).code == 0
+    (written,) = folder.iterdir()
+    assert written.read_text() == printed
+
+
+def test_check_finds_a_transposed_rotation(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+    document = json.loads(calibration.read_text())
+    rotation = np.array(document["camera_from_radar"]["rotation"])
+    document["camera_from_radar"]["rotation"] = rotation.T.tolist()
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text(json.dumps(document))
+    answer = cocalib("check", wrong)
+    assert answer.code == 1
+    assert "transposed" in answer.out
+
+
+def test_version_is_printed(cocalib: Cocalib) -> None:
+    assert cocalib("--version").out.startswith("cocalib ")
+
+
+@pytest.mark.parametrize("command", ["demo", "open", "info", "solve", "export", "check", "simulate"])
+def test_help_shows_every_command(cocalib: Cocalib, command: str) -> None:
+    answer = cocalib(command, "--help")
+    assert answer.code == 0
+    assert f"cocalib {command}" in answer.out
