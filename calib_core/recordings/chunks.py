@@ -87,6 +87,21 @@ class ChunkedSource:
         empty = np.zeros(0, dtype=np.int64)
         return self.indexes.get(channel_id, MessageIndex(empty, empty, empty))
 
+    def note_index(self, channel_id: int, index: MessageIndex) -> None:
+        """Keep the index of a channel.
+
+        Raises:
+            RecordingError: it points out of the chunks.
+        """
+        sizes = np.array([chunk.size_bytes for chunk in self.chunks], dtype=np.float64)
+        wrong = (index.offset < 0) | (index.offset >= sizes[index.chunk])
+        if wrong.any():
+            raise RecordingError(
+                f"{self.path}: {np.count_nonzero(wrong)} of {len(index)} index entries point past the end of their chunk; "
+                "the file is damaged: copy it again"
+            )
+        self.indexes[channel_id] = index
+
     def close(self) -> None:
         """Close the file and drop the cache."""
         self.file.close()

@@ -52,7 +52,7 @@ class McapSource(ChunkedSource):
         self.channels = tuple(self._channels.values())
         for channel, parts in self._found.items():
             columns = np.concatenate(parts)
-            self.indexes[channel] = MessageIndex.sorted_from(columns[:, 0], columns[:, 1], columns[:, 2])
+            self.note_index(channel, MessageIndex.sorted_from(columns[:, 0], columns[:, 1], columns[:, 2]))
         self._found.clear()
 
     # -- opening

@@ -2,6 +2,7 @@
 
 import re
 import struct
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -99,7 +100,7 @@ class Rosbag1Source(ChunkedSource):
     def _read_indexes(self, positions: list[int], end: int) -> None:
         """Read the index blocks that follow each chunk."""
         found: dict[int, list[tuple[int, np.ndarray]]] = {}
-        for number, (position, following) in enumerate(zip(positions, [*positions[1:], end], strict=True)):
+        for number, (position, following) in enumerate(pairwise([*positions, end])):
             header, (data, size) = self._record(position, _CHUNK)
             compression = _text(header.get("compression", b""))
             self.chunks.append(Chunk(data, size, _number(header.get("size", b""), 4), compression))
@@ -110,9 +111,8 @@ class Rosbag1Source(ChunkedSource):
             entries = np.concatenate([entries for _, entries in parts])
             receive_ns = entries["sec"].astype(np.int64) * 1_000_000_000 + entries["nanosec"]
             chunk = np.repeat([number for number, _ in parts], [len(entries) for _, entries in parts])
-            self.indexes[connection] = MessageIndex.sorted_from(
-                receive_ns, chunk.astype(np.int64), entries["offset"].astype(np.int64)
-            )
+            offset = entries["offset"].astype(np.int64)
+            self.note_index(connection, MessageIndex.sorted_from(receive_ns, chunk.astype(np.int64), offset))
 
     def _index_records(self, block: bytes, position: int) -> list[tuple[int, np.ndarray]]:
         records: list[tuple[int, np.ndarray]] = []

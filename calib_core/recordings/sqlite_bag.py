@@ -49,19 +49,18 @@ class SqliteSource:
         """Open for reading only. A write-ahead log left by a killed recorder is read too, never passed over."""
         log = Path(f"{self.path}-wal")
         mode = "mode=ro" if log.exists() and log.stat().st_size else "mode=ro&immutable=1"
+        address = f"file:{quote(str(self.path.resolve()))}?{mode}"
         try:
-            return sqlite3.connect(
-                f"file:{quote(str(self.path.resolve()))}?{mode}",
-                uri=True,
-                check_same_thread=False,
-                isolation_level=None,
-            )
+            connection = sqlite3.connect(address, uri=True, check_same_thread=False, isolation_level=None)
         except sqlite3.Error as error:
             raise self._damaged(error) from error
+        connection.text_factory = lambda raw: raw.decode("utf-8", "replace")
+        return connection
 
     def _damaged(self, error: object) -> RecordingError:
+        why = " ".join(str(error).split())[:200]
         return RecordingError(
-            f"{self.path}: not a readable ROS 2 SQLite bag ({error}); if the recorder was killed, keep the -wal file "
+            f"{self.path}: not a readable ROS 2 SQLite bag ({why}); if the recorder was killed, keep the -wal file "
             "beside it in a writable folder; otherwise copy the file again"
         )
 
@@ -69,7 +68,7 @@ class SqliteSource:
         try:
             with self._lock:
                 return self._connection.execute(query, values).fetchall()
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:  # the second where a damaged name is in the message
             raise self._damaged(error) from error
 
     def _read_channels(self) -> tuple[Channel, ...]:
@@ -79,20 +78,24 @@ class SqliteSource:
                 f"{self.path}: an SQLite file without the tables of a ROS 2 bag (messages, topics); "
                 "give a file that ros2 bag record wrote"
             )
-        definitions: dict[str, tuple[str, str]] = {}
+        definitions: dict[Any, tuple[str, str]] = {}
         if "message_definitions" in tables:
             query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions ORDER BY id DESC"
-            definitions = {name: (_FORMATS.get(encoding, ""), text) for name, encoding, text in self._rows(query)}
+            definitions = {name: (_FORMATS.get(form, ""), str(text or "")) for name, form, text in self._rows(query)}
         channels = []
         for number, topic, kind, encoding in self._rows("SELECT id, name, type, serialization_format FROM topics"):
             form, text = definitions.get(kind, ("", ""))
-            channels.append(Channel(number, topic, kind, encoding, text, form if text.strip() else ""))
+            form = form if text.strip() else ""
+            channels.append(Channel(number, str(topic), str(kind), str(encoding), text, form))
         return tuple(channels)
 
     def index(self, channel_id: int) -> MessageIndex:
         """Tell where the messages of a channel lie: SQLite walks over all rows' heads once."""
         rows = self._rows("SELECT timestamp, id FROM messages WHERE topic_id = ?", channel_id)
-        columns = np.array(rows, dtype=np.int64).reshape(-1, 2)
+        try:
+            columns = np.array(rows, dtype=np.int64).reshape(-1, 2)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise self._damaged(f"a row without a time: {error}") from error
         return MessageIndex.sorted_from(columns[:, 0], columns[:, 1], np.zeros(len(columns), dtype=np.int64))
 
     def read(self, chunk: int, offset: int) -> bytes:
@@ -100,7 +103,9 @@ class SqliteSource:
         rows = self._rows("SELECT data FROM messages WHERE id = ?", chunk)
         if not rows:
             raise self._damaged(f"row {chunk} is gone")
-        return self._unpacked(bytes(rows[0][0]), chunk)
+        if not isinstance(rows[0][0], bytes):
+            raise self._damaged(f"row {chunk} holds no bytes")
+        return self._unpacked(rows[0][0], chunk)
 
     def _unpacked(self, data: bytes, row: int) -> bytes:
         return unpack_message(data, where=f"{self.path}: row {row}") if self._packed else data
@@ -121,8 +126,8 @@ class SqliteSource:
         if not len(index):
             return 0.0
         some = index.chunk[:: max(1, len(index) // 20)].tolist()
-        lengths = [self._rows("SELECT length(data) FROM messages WHERE id = ?", number)[0][0] for number in some]
-        return float(np.mean(lengths))
+        query = "SELECT length(data) FROM messages WHERE id = ?"
+        return float(np.mean([row[0] or 0 for number in some for row in self._rows(query, number)] or [0]))
 
     def _short_heads(self, index: MessageIndex, size: int) -> dict[int, tuple[bytes, int]]:
         """Read the heads of short messages in one query per 100,000 rows."""

@@ -164,16 +164,16 @@ def join_topics(sources: tuple[Source, ...]) -> tuple[tuple[Topic, ...], tuple[C
         for channel in source.channels:
             found.setdefault(channel.topic, []).append((source, channel))
     topics = tuple(_join(name, tuple(parts)) for name, parts in sorted(found.items()))
-    cautions = tuple(
-        Caution(
-            "repeated-messages",
-            f"{topic.repeated} messages of {topic.name} are in several of the files; each is used once",
-            "give each recording once: a folder that also holds a converted copy counts twice",
-        )
-        for topic in topics
-        if topic.repeated
+    repeated = sum(topic.repeated for topic in topics)
+    if not repeated:
+        return topics, ()
+    where = ", ".join(topic.name for topic in topics if topic.repeated)
+    caution = Caution(
+        "repeated-messages",
+        f"{repeated} messages of {where} are in several of the files; each is used once",
+        "give each recording once: a folder that also holds a converted copy counts twice",
     )
-    return topics, cautions
+    return topics, (caution,)
 
 
 def _join(name: str, parts: tuple[tuple[Source, Channel], ...]) -> Topic:
