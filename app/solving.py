@@ -31,7 +31,6 @@ from calib_core.results import Calibration
 __all__ = [
     "RadarSource",
     "RecordingSource",
-    "RememberedScans",
     "SolverWorker",
     "calibration_text",
     "calibration_text_of_pairs",
@@ -168,7 +167,17 @@ def calibration_text(calibration: Calibration, recording: RecordingSource) -> st
         camera_info_topic=recording.camera_info_topic,
         version=version(),
     )
-    return interchange_text(calibration, FrameNames(recording.radar_frame, recording.camera_frame), provenance)
+    return interchange_text(calibration, _frame_names(recording), provenance)
+
+
+def _frame_names(recording: RecordingSource) -> FrameNames:
+    """Take the recording's names; a calibration must not be lost because a recorder named both frames alike."""
+    usual = FrameNames()
+    try:
+        return FrameNames(recording.radar_frame or usual.radar, recording.camera_frame or usual.camera)
+    except InputError as error:
+        _log.warning("the recording's frame names cannot be used, so %s and %s: %s", usual.radar, usual.camera, error)
+        return usual
 
 
 def calibration_text_of_pairs(calibration: Calibration, text: str, name: str) -> str:
@@ -184,23 +193,6 @@ def calibration_text_of_pairs(calibration: Calibration, text: str, name: str) ->
     return interchange_text(calibration, provenance=Provenance(inputs=(pairs_file,), version=version()))
 
 
-class RememberedScans:
-    """Radar scans as a solve last asked for them: moving a mark or changing an option reads nothing again."""
-
-    def __init__(self, recording: RadarSource) -> None:
-        self._recording = recording
-        self._asked: tuple[tuple[TimeNs, ...], float] | None = None
-        self._scans = RadarScans()
-
-    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float) -> RadarScans:
-        """Return the scans within the half window of any of the times, each once, in order of time."""
-        asked = (tuple(times), half_window_s)
-        if asked != self._asked:
-            self._scans = self._recording.radar_scans_around(times, half_window_s)
-            self._asked = asked
-        return self._scans
-
-
 @dataclass(frozen=True, slots=True)
 class _Request:
     revision: int
@@ -213,7 +205,7 @@ class SolverWorker:
     """Solves in one thread of its own; of several requests waiting, only the newest is worked on."""
 
     def __init__(self, recording: RadarSource, camera: Camera | None) -> None:
-        self._scans = RememberedScans(recording)
+        self._recording = recording
         self._camera = camera
         self._lock = threading.Lock()
         self._newest_revision = -1
@@ -253,7 +245,7 @@ class SolverWorker:
     def _answer(self, request: _Request) -> Outcome | None:
         if request.revision != self._newest_revision:
             return None
-        return solve_clicks(self._scans, request.clicks, self._camera, request.options)
+        return solve_clicks(self._recording, request.clicks, self._camera, request.options)
 
 
 def _deliver(request: _Request, future: "Future[Outcome | None]") -> None:

@@ -1,5 +1,7 @@
 """The figures beside the picture, each with one sentence that explains it."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from app.view.digits import plain, with_sigma
@@ -18,51 +20,39 @@ def metric_figures(calibration: Calibration) -> tuple[Figure, ...]:
     """Return the figures that say how well the pairs agree."""
     metrics = calibration.metrics
     used = sum(not pair.excluded for pair in calibration.pairs)
-    leaning = metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px
-    held_out_hint = (
-        "Mean distance when each pair is predicted from all the others: the error to expect at a new placement."
-    )
-    if leaning:
-        held_out_hint += " It is well above AED, so the pose leans on single pairs: add placements."
+    agreeing = sum(pair.inlier and not pair.excluded for pair in calibration.pairs)
+    over = f"over {metrics.n} pairs"
     return (
-        Figure(
-            "aed",
-            "AED",
-            plain(metrics.aed_px),
-            "px",
-            "Mean distance between the clicks and their reprojections (paper: AED).",
-        ),
-        Figure(
-            "held_out_aed",
-            "held-out AED",
-            plain(metrics.held_out_aed_px),
-            "px",
-            held_out_hint,
-            "caution" if leaning else "plain",
-        ),
-        Figure(
-            "cdsd",
-            "CDSD",
-            plain(metrics.cdsd_px),
-            "px",
-            "Standard deviation of these distances, divided by N - 1 (paper: CDSD).",
-        ),
-        Figure(
-            "rms",
-            "RMS",
-            plain(metrics.rms_px),
-            "px",
-            "Root mean square of these distances: large ones weigh more than in AED.",
+        _figure("aed", "AED", metrics.aed_px, f"Mean distance between click and reprojection {over} (paper: AED)."),
+        _held_out_figure(calibration),
+        _figure("cdsd", "CDSD", metrics.cdsd_px, "Standard deviation of these distances, over N - 1 (paper: CDSD)."),
+        _figure(
+            "rms", "RMS", metrics.rms_px, "Root mean square of these distances: large ones weigh more than in AED."
         ),
         Figure(
             "inliers",
             "pairs that agree",
-            f"{metrics.n} of {used}",
+            f"{agreeing} of {used}",
             "",
-            "Pairs that took part in the final pose, of all that were not excluded by hand.",
-            "good" if metrics.n == used else "plain",
+            "Pairs that agree on the pose, of all that were not excluded by hand.",
+            "good" if agreeing == used else "plain",
         ),
     )
+
+
+def _figure(key: str, label: str, value_px: float, hint: str) -> Figure:
+    return Figure(key, label, plain(value_px), "px", hint)
+
+
+def _held_out_figure(calibration: Calibration) -> Figure:
+    """Return the honest error, and say so when it is far above the fitted one."""
+    metrics = calibration.metrics
+    hint = "Mean distance when each pair is predicted from all the others: the error to expect at a new placement."
+    figure = _figure("held_out_aed", "held-out AED", metrics.held_out_aed_px, hint)
+    if metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px:
+        warning = "It is well above AED, so the pose leans on single pairs: add placements."
+        return replace(figure, hint=f"{hint} {warning}", level="caution")
+    return figure
 
 
 def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:

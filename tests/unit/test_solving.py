@@ -1,0 +1,303 @@
+"""From clicks to an answer: the shared function, the calibration's text, and the worker."""
+
+import json
+import logging
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.resources import version
+from app.session import ClicksImported, OptionsChanged, Solved
+from app.solving import (
+    SolverWorker,
+    calibration_text,
+    calibration_text_of_pairs,
+    camera_for,
+    half_window_s,
+    solve_clicks,
+    solve_pairs,
+)
+from app.workspace import open_workspace
+from calib_core.camera import Camera
+from calib_core.errors import InputError, RecordingError
+from calib_core.interchange import camera_info_text, read_calibration, read_clicks
+from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
+from calib_core.options import CalibrationOptions, LocatingOptions
+from calib_core.recordings import Recording, open_recording
+from calib_core.results import Calibration
+
+CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
+CLICK = ReflectorClick(TimeNs(10**18), "c1", 1.0, 2.0)
+
+
+class Radar:
+    """A radar recording that notes what it was asked for."""
+
+    def __init__(self, answer: Callable[[], RadarScans] = RadarScans) -> None:
+        self.asked: list[tuple[tuple[int, ...], float]] = []
+        self._answer = answer
+
+    def radar_scans_around(self, times, half_window_s: float) -> RadarScans:
+        self.asked.append((tuple(times), half_window_s))
+        return self._answer()
+
+
+@pytest.fixture(scope="module")
+def sample(project_root: Path) -> Path:
+    return project_root / "sample_data" / "rooftop"
+
+
+@pytest.fixture(scope="module")
+def recording(sample: Path) -> Iterator[Recording]:
+    with open_recording([sample / "camera.bag", sample / "radar.bag"]) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def clicks(sample: Path) -> tuple[ReflectorClick, ...]:
+    return read_clicks((sample / "clicks.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def solved(recording: Recording, clicks: tuple[ReflectorClick, ...]) -> Calibration:
+    outcome = solve_clicks(recording, clicks, recording.camera(), CalibrationOptions())
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+def test_without_intrinsics_the_answer_says_that_they_are_missing() -> None:
+    outcome = solve_clicks(Radar(), [CLICK], None, CalibrationOptions())
+    assert isinstance(outcome, Unsolvable)
+    assert outcome.code == "no-camera"
+    assert "--camera" in outcome.hint
+
+
+def test_scans_are_read_around_every_click_once_excluded_ones_too() -> None:
+    radar = Radar()
+    later = replace(CLICK, id="c2", image_time=TimeNs(2 * 10**18), excluded=True)
+    outcome = solve_clicks(radar, [later, CLICK, replace(CLICK, id="c3")], CAMERA, CalibrationOptions())
+    assert radar.asked == [((10**18, 2 * 10**18), half_window_s(CalibrationOptions()))]
+    assert isinstance(outcome, Unsolvable)
+
+
+def test_the_scans_read_reach_as_far_as_any_window_can() -> None:
+    options = CalibrationOptions(locating=LocatingOptions(window_s=10.0, max_time_gap_s=2.0))
+    assert half_window_s(options) >= 10.0 / 2 + 2.0
+
+
+def test_reading_more_scans_than_needed_does_not_change_the_answer(
+    recording: Recording, clicks: tuple[ReflectorClick, ...], solved: Calibration
+) -> None:
+    everything = Radar(recording.radar_scans)
+    outcome = solve_clicks(everything, clicks, recording.camera(), CalibrationOptions())
+    assert isinstance(outcome, Calibration)
+    assert calibration_text(outcome, recording) == calibration_text(solved, recording)
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_page_and_command_line_give_the_same_bytes(
+    tmp_path: Path, recording: Recording, clicks: tuple[ReflectorClick, ...], method: str
+) -> None:
+    options = CalibrationOptions(method=method)  # type: ignore[arg-type]
+    by_command = solve_clicks(recording, clicks, recording.camera(), options)
+    assert isinstance(by_command, Calibration)
+    answered = threading.Event()
+    workspace = open_workspace(recording, camera=recording.camera(), session_folder=tmp_path / "s", name="sample")
+    workspace.dispatch(OptionsChanged(options))
+    workspace.dispatch(ClicksImported(clicks))
+    workspace.subscribe(lambda shown: answered.set() if shown.stage == "solved" else None)
+    assert answered.wait(60)
+    by_page = workspace.session.outcome
+    workspace.close()
+    assert isinstance(by_page, Calibration)
+    assert calibration_text(by_page, recording) == calibration_text(by_command, recording)
+
+
+def test_the_text_says_what_went_in(sample: Path, recording: Recording, solved: Calibration) -> None:
+    file = read_calibration(calibration_text(solved, recording))
+    assert {row.name: row.sha256 for row in file.provenance.inputs} == {
+        name: sha256((sample / name).read_bytes()).hexdigest() for name in ("camera.bag", "radar.bag")
+    }
+    assert file.provenance.radar_topic == recording.radar_topic
+    assert file.provenance.image_topic == recording.image_topic
+    assert file.provenance.version == version()
+    assert (file.frames.radar, file.frames.camera) == (recording.radar_frame, recording.camera_frame)
+
+
+class Renamed:
+    """A recording whose recorder named its frames oddly."""
+
+    def __init__(self, recording: Recording, radar_frame: str, camera_frame: str) -> None:
+        self._recording = recording
+        self.radar_frame, self.camera_frame = radar_frame, camera_frame
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._recording, name)
+
+
+@pytest.mark.parametrize(
+    ("radar_frame", "camera_frame", "names"),
+    [
+        ("", "", ("radar", "camera_optical")),
+        ("r", "", ("r", "camera_optical")),
+        ("same", "same", ("radar", "camera_optical")),
+        ("$(evil)", "c", ("radar", "camera_optical")),
+    ],
+)
+def test_odd_frame_names_do_not_cost_the_calibration(
+    recording: Recording, solved: Calibration, radar_frame: str, camera_frame: str, names: tuple[str, str]
+) -> None:
+    text = calibration_text(solved, Renamed(recording, radar_frame, camera_frame))
+    frames = json.loads(text)["frames"]
+    assert (frames["radar"], frames["camera"]) == names
+
+
+def test_the_recordings_own_camera_is_used_unless_a_file_is_given(tmp_path: Path, recording: Recording) -> None:
+    assert camera_for(recording, None) is recording.camera()
+    given = recording.camera()
+    assert given is not None
+    other = Camera("pinhole", given.width_px, given.height_px, given.matrix_px * [[1.1], [1.1], [1.0]])
+    (tmp_path / "camera.yaml").write_text(camera_info_text(other), encoding="utf-8")
+    read = camera_for(recording, tmp_path / "camera.yaml")
+    assert read is not None
+    assert read.matrix_px == pytest.approx(other.matrix_px)
+
+
+def test_intrinsics_of_another_image_size_are_refused_with_both_sizes(tmp_path: Path, recording: Recording) -> None:
+    (tmp_path / "camera.yaml").write_text(
+        camera_info_text(replace(CAMERA, width_px=123, height_px=45)), encoding="utf-8"
+    )
+    with pytest.raises(InputError, match=r"camera\.yaml: calibrated for 123 x 45 px, but the frames have"):
+        camera_for(recording, tmp_path / "camera.yaml")
+
+
+def pairs_text(solved: Calibration, count: int) -> str:
+    camera = solved.camera
+    return json.dumps(
+        {
+            "schema": "cocalib/pairs-1",
+            "camera": {
+                "model": camera.model,
+                "width_px": camera.width_px,
+                "height_px": camera.height_px,
+                "matrix_px": camera.matrix_px.tolist(),
+                "distortion": camera.distortion.tolist(),
+            },
+            "pairs": [
+                {"id": pair.id, "radar_m": pair.point_radar_m.tolist(), "pixel_px": pair.pixel_px.tolist()}
+                for pair in solved.pairs[:count]
+            ],
+        }
+    )
+
+
+def test_a_file_of_pairs_is_solved_and_named_in_the_text(solved: Calibration) -> None:
+    text = pairs_text(solved, 20)
+    outcome = solve_pairs(text, "pairs.json", CalibrationOptions())
+    assert isinstance(outcome, Calibration)
+    inputs = json.loads(calibration_text_of_pairs(outcome, text, "pairs.json"))["provenance"]["inputs"]
+    assert [(row["name"], row["sha256"]) for row in inputs] == [("pairs.json", sha256(text.encode()).hexdigest())]
+
+
+def test_too_few_pairs_in_a_file_are_an_answer_and_no_file_of_pairs_is_an_error(solved: Calibration) -> None:
+    outcome = solve_pairs(pairs_text(solved, 3), "pairs.json", CalibrationOptions())
+    assert isinstance(outcome, Unsolvable)
+    with pytest.raises(InputError, match=r"pairs\.json"):
+        solve_pairs("{}", "pairs.json", CalibrationOptions())
+
+
+class Gate:
+    """A radar that reads nothing until it is let."""
+
+    def __init__(self) -> None:
+        self.entered, self.open = threading.Event(), threading.Event()
+
+    def __call__(self) -> RadarScans:
+        self.entered.set()
+        assert self.open.wait(60)
+        return RadarScans()
+
+
+class Answers:
+    """Collects answers and lets a test wait for them."""
+
+    def __init__(self) -> None:
+        self.all: list[Solved] = []
+        self._some = threading.Semaphore(0)
+
+    def __call__(self, solved: Solved) -> None:
+        self.all.append(solved)
+        self._some.release()
+
+    def wait(self) -> Solved:
+        assert self._some.acquire(timeout=60)
+        return self.all[-1]
+
+
+def test_of_several_waiting_requests_only_the_newest_is_worked_on() -> None:
+    gate, answers = Gate(), Answers()
+    radar = Radar(gate)
+    worker = SolverWorker(radar, CAMERA)
+    worker.request(1, [CLICK], CalibrationOptions(), answers)
+    assert gate.entered.wait(60)
+    for revision in (2, 3, 5, 4):
+        worker.request(revision, [CLICK], CalibrationOptions(), answers)
+    gate.open.set()
+    while answers.wait().revision != 5:
+        pass
+    worker.close()
+    assert [solved.revision for solved in answers.all] == [1, 5]
+    assert len(radar.asked) == 2
+
+
+def test_a_recording_that_cannot_be_read_is_told_as_the_answer() -> None:
+    def broken() -> RadarScans:
+        raise RecordingError("radar.bag: chunk 7 is damaged; copy the file again")
+
+    answers = Answers()
+    worker = SolverWorker(Radar(broken), CAMERA)
+    worker.request(1, [CLICK], CalibrationOptions(), answers)
+    outcome = answers.wait().outcome
+    worker.close()
+    assert isinstance(outcome, Unsolvable)
+    assert (outcome.code, outcome.reason) == ("unreadable", "radar.bag: chunk 7 is damaged; copy the file again")
+
+
+def test_a_fault_of_the_program_is_logged_and_told_and_the_worker_goes_on(caplog: pytest.LogCaptureFixture) -> None:
+    faults = iter([True])
+
+    def faulty() -> RadarScans:
+        if next(faults, False):
+            raise ZeroDivisionError("by zero")
+        return RadarScans()
+
+    answers = Answers()
+    worker = SolverWorker(Radar(faulty), CAMERA)
+    with caplog.at_level(logging.ERROR):
+        worker.request(1, [CLICK], CalibrationOptions(), answers)
+        outcome = answers.wait().outcome
+    assert isinstance(outcome, Unsolvable)
+    assert (outcome.code, outcome.reason) == ("internal-error", "the solver failed: ZeroDivisionError: by zero")
+    assert "ZeroDivisionError" in caplog.text
+    worker.request(2, [CLICK], CalibrationOptions(), answers)
+    assert answers.wait().revision == 2
+    worker.close()
+
+
+def test_after_close_nothing_is_answered() -> None:
+    gate, answers = Gate(), Answers()
+    worker = SolverWorker(Radar(gate), CAMERA)
+    worker.request(1, [CLICK], CalibrationOptions(), answers)
+    assert gate.entered.wait(60)
+    worker.request(2, [CLICK], CalibrationOptions(), answers)
+    gate.open.set()
+    worker.close()
+    count = len(answers.all)
+    worker.request(3, [CLICK], CalibrationOptions(), answers)
+    assert len(answers.all) == count
+    assert all(solved.revision == 1 for solved in answers.all)
