@@ -1,0 +1,66 @@
+"""A recording made of given pictures and an empty radar: for tests of page and port that need other pictures than the sample."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.camera import Camera
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
+
+START = 1_760_000_000 * NS_PER_S + 123_456_789
+
+
+@dataclass(frozen=True)
+class Picture:
+    data: bytes
+    format: Literal["jpeg", "png"]
+    width_px: int
+    height_px: int
+
+
+@dataclass
+class PictureRecording:
+    """Frames at 10 Hz from arrays (h, w, 3) of uint8."""
+
+    pictures: Sequence[np.ndarray]
+    radar_topic: str = "/radar"
+    image_topic: str = "/camera"
+    camera_info_topic: str | None = None
+    radar_frame: str = "radar"
+    camera_frame: str = "camera_optical"
+    cautions: tuple[Any, ...] = ()
+    paths: tuple[Path, ...] = ()
+    radar_times: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def __post_init__(self) -> None:
+        self._data = [cv2.imencode(".png", picture)[1].tobytes() for picture in self.pictures]
+        self.image_times = START + np.arange(len(self.pictures), dtype=np.int64) * (NS_PER_S // 10)
+
+    def image_bytes(self, index: int) -> Picture:
+        height_px, width_px = self.pictures[index].shape[:2]
+        return Picture(self._data[index], "png", width_px, height_px)
+
+    def camera(self) -> Camera | None:
+        height_px, width_px = self.pictures[0].shape[:2]
+        return Camera(
+            "pinhole", width_px, height_px, np.array([[500, 0, width_px / 2], [0, 500, height_px / 2], [0, 0, 1]])
+        )
+
+    def radar_scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
+        return RadarScans()
+
+    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float) -> RadarScans:
+        return RadarScans()
+
+    def fingerprint(self) -> tuple[Any, ...]:
+        return ()
+
+
+def grey_pictures(count: int, width_px: int = 320, height_px: int = 240) -> list[np.ndarray]:
+    """Return plain pictures, each of another grey."""
+    return [np.full((height_px, width_px, 3), 20 + 10 * index % 200, dtype=np.uint8) for index in range(count)]

@@ -1,0 +1,278 @@
+"""The port as a client meets it: the contract with viser's server, the attacks, and the words of the channel."""
+
+import http.client
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from app.web.server import RunningServer, ServerOptions, start
+from app.workspace import open_workspace
+from tests.picture_recording import START, PictureRecording, grey_pictures
+
+HOSTILE = '<img src=x onerror="alert(1)">'
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
+    patch = pytest.MonkeyPatch()
+    patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+    recording = PictureRecording(grey_pictures(5), image_topic=HOSTILE)
+    folder = tmp_path_factory.mktemp("session") / "s"
+    workspace = open_workspace(recording, camera=recording.camera(), session_folder=folder, name="five greys")
+    running = start(workspace, recording, ServerOptions(port=0, no_browser=True))
+    yield running
+    running.close()
+    workspace.close()
+    patch.undo()
+
+
+@pytest.fixture(scope="module")
+def cookie(server: RunningServer) -> str:
+    """Come in by the link."""
+    answer = get(server, server.url.removeprefix(server.origin))
+    assert answer.status == 303
+    assert answer.headers["Location"] == "/"
+    return answer.headers["Set-Cookie"].partition(";")[0]
+
+
+class Answer:
+    def __init__(self, response: http.client.HTTPResponse) -> None:
+        self.status, self.headers, self.body = response.status, response.headers, response.read()
+
+
+def get(server: RunningServer, path: str, **headers: str) -> Answer:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
+    connection.request("GET", path, headers=headers)
+    answer = Answer(connection.getresponse())
+    connection.close()
+    return answer
+
+
+@contextmanager
+def channel(server: RunningServer, cookie: str, path: str = "/ws/tab1") -> Iterator[ClientConnection]:
+    address = server.origin.replace("http", "ws") + path
+    with connect(address, origin=server.origin, additional_headers={"Cookie": cookie}, max_size=None) as socket:
+        yield socket
+
+
+def wanted(socket: ClientConnection, kind: str) -> Any:
+    """Read on until a message of this kind comes."""
+    while True:
+        message = socket.recv(timeout=20)
+        if isinstance(message, str) and json.loads(message)["type"] == kind:
+            return json.loads(message)
+
+
+def stamp(index: int) -> dict[str, int]:
+    time = START + index * 100_000_000
+    return {"sec": time // 10**9, "nanosec": time % 10**9}
+
+
+def test_the_page_and_its_parts_are_served_with_their_types_and_no_inline_script(
+    server: RunningServer, cookie: str, project_root: Path
+) -> None:
+    for path, kind in (
+        ("/", "text/html"),
+        ("/main.js", "text/javascript"),
+        ("/look.css", "text/css"),
+        ("/icon.svg", "image/svg+xml"),
+    ):
+        answer = get(server, path, Cookie=cookie)
+        assert answer.status == 200
+        assert answer.headers["Content-Type"].startswith(kind)
+        assert answer.headers["X-Content-Type-Options"] == "nosniff"
+        assert "script-src 'self';" in answer.headers["Content-Security-Policy"]
+        assert "unsafe" not in answer.headers["Content-Security-Policy"]
+    assert get(server, "/", Cookie=cookie).body == (project_root / "static" / "index.html").read_bytes()
+
+
+def test_viser_still_starts_the_way_the_hook_takes(server: RunningServer, cookie: str) -> None:
+    import viser
+
+    page = get(server, "/viser/tab1/", Cookie=cookie)
+    assert page.status == 200
+    assert page.headers["X-Frame-Options"] == "SAMEORIGIN"
+    address = server.origin.replace("http", "ws") + "/viser/tab1"
+    protocol: Any = f"viser-v{viser.__version__}"
+    with connect(
+        address, origin=server.origin, subprotocols=[protocol], additional_headers={"Cookie": cookie}
+    ) as socket:  # type: ignore[arg-type]
+        assert socket.subprotocol == protocol
+        assert isinstance(socket.recv(timeout=20), bytes)
+
+
+@pytest.mark.parametrize("path", ["/", "/main.js", "/api/clicks.json", "/viser/tab1/"])
+def test_without_a_cookie_there_is_nothing(server: RunningServer, path: str) -> None:
+    assert get(server, path).status == 401
+
+
+def test_a_link_works_once(server: RunningServer, cookie: str) -> None:
+    used = server.url.removeprefix(server.origin)
+    assert get(server, used).status == 303
+    assert get(server, used).status == 401
+
+
+def test_a_strange_host_name_is_not_answered(server: RunningServer, cookie: str) -> None:
+    assert get(server, "/", Cookie=cookie, Host="evil.example").status == 421
+
+
+@pytest.mark.parametrize("path", ["/ws/tab1", "/viser/tab1", "/viser"])
+@pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:1", None])
+def test_a_websocket_from_elsewhere_is_refused(server: RunningServer, cookie: str, path: str, origin: Any) -> None:
+    address = server.origin.replace("http", "ws") + path
+    with (
+        pytest.raises(InvalidStatus) as refused,
+        connect(address, origin=origin, additional_headers={"Cookie": cookie}),
+    ):
+        pass
+    assert refused.value.response.status_code == 403
+
+
+def test_a_websocket_without_the_cookie_is_refused(server: RunningServer) -> None:
+    with pytest.raises(InvalidStatus) as refused, channel(server, "cocalib=no"):
+        pass
+    assert refused.value.response.status_code == 401
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/../pyproject.toml", "/..%2fpyproject.toml", "/%2e%2e/pyproject.toml", "/..\\pyproject.toml", "//etc/passwd",
+     "/static/main.js", "/viser/../../app/web/server.py", "/viser/", "/viser/a/b/", "/viser/%2e%2e/", "/api/",
+     "/api/export/nothing", "/api/export/../clicks.json"],
+)  # fmt: skip
+def test_no_other_path_exists(server: RunningServer, cookie: str, path: str) -> None:
+    assert get(server, path, Cookie=cookie).status == 404
+
+
+@pytest.mark.parametrize("path", ["/", "/etc", "/ws"])
+def test_there_is_no_other_websocket(server: RunningServer, cookie: str, path: str) -> None:
+    with pytest.raises(InvalidStatus) as refused, channel(server, cookie, path):
+        pass
+    assert refused.value.response.status_code == 404
+
+
+def test_no_tunnel_can_be_asked_for(server: RunningServer) -> None:
+    from viser import _messages
+
+    handled = server._viser._websock_server._incoming_handlers
+    assert _messages.ShareUrlRequest not in handled
+    assert _messages.ShareUrlDisconnect not in handled
+
+
+def test_a_redirect_never_leaves_the_server(server: RunningServer) -> None:
+    token = server.url.partition("=")[2]
+    assert get(server, f"//evil.example/?token={token}").headers["Location"] == "/"
+
+
+def test_a_page_is_greeted_with_recording_and_view(server: RunningServer, cookie: str) -> None:
+    with channel(server, cookie) as socket:
+        socket.send('{"type":"hello"}')
+        recording = wanted(socket, "recording")
+        assert recording["name"] == "five greys"
+        assert recording["image_topic"] == HOSTILE
+        assert {"sec": recording["frame_times"]["sec"][2], "nanosec": recording["frame_times"]["nanosec"][2]} == stamp(
+            2
+        )
+        assert wanted(socket, "view")["clicks"] == []
+        assert wanted(socket, "placements")["placements"] == []
+
+
+def test_a_click_reaches_the_other_tab_and_undo_takes_it_from_both(server: RunningServer, cookie: str) -> None:
+    with channel(server, cookie, "/ws/tab1") as one, channel(server, cookie, "/ws/tab2") as two:
+        for socket in (one, two):
+            socket.send('{"type":"hello"}')
+            wanted(socket, "view")
+        one.send(json.dumps({"type": "click_placed", "image_time": stamp(1), "pixel_px": [12.25, 34.5], "request": 7}))
+        seen = wanted(one, "view")
+        assert [(row["frame"], row["u_px"], row["v_px"]) for row in seen["clicks"]] == [(1, 12.25, 34.5)]
+        assert wanted(one, "done")["request"] == 7
+        assert wanted(two, "view")["clicks"] == seen["clicks"]
+        two.send('{"type":"undo","request":1}')
+        while wanted(one, "view")["clicks"]:
+            pass
+        assert wanted(two, "done")["request"] == 1
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        ({"type": "click_placed", "image_time": {"sec": 1, "nanosec": 2}, "pixel_px": [1, 1]}, "no frame"),
+        ({"type": "click_placed", "image_time": stamp(0), "pixel_px": [5000, 1]}, "outside"),
+        ({"type": "click_removed", "id": "c99"}, "c99"),
+        ({"type": "options_changed", "options": {"noise": {"sigma_pix": 1}}}, "sigma_px"),
+        ({"type": "frame", "index": 99}, "request"),
+        ({"type": "nonsense"}, "nonsense"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_words_and_the_channel_lives_on(
+    server: RunningServer, cookie: str, message: dict[str, Any], words: str
+) -> None:
+    with channel(server, cookie) as socket:
+        socket.send(json.dumps({**message, **({} if message["type"] == "frame" else {"request": 3})}))
+        assert words in wanted(socket, "error")["message"]
+        socket.send('{"type":"hello","request":4}')
+        assert wanted(socket, "done")["request"] == 4
+
+
+def test_a_frame_comes_as_its_header_and_the_recorded_bytes(server: RunningServer, cookie: str) -> None:
+    with channel(server, cookie) as socket:
+        socket.send('{"type":"frame","index":3,"request":11}')
+        while not isinstance(message := socket.recv(timeout=20), bytes):
+            pass
+    length = int.from_bytes(message[:4], "little")
+    header = json.loads(message[4 : 4 + length])
+    assert (header["index"], header["request"], header["scale"], header["width_px"]) == (3, 11, 1.0, 320)
+    assert message[4 + length :] == PictureRecording(grey_pictures(5)).image_bytes(3).data
+
+
+def test_a_frame_that_does_not_exist_is_refused_by_its_request(server: RunningServer, cookie: str) -> None:
+    with channel(server, cookie) as socket:
+        socket.send('{"type":"frame","index":77,"request":12}')
+        assert wanted(socket, "error")["request"] == 12
+
+
+def test_a_page_that_stops_reading_slows_nobody(server: RunningServer, cookie: str) -> None:
+    with channel(server, cookie, "/ws/stalled") as stalled, channel(server, cookie, "/ws/lively") as lively:
+        for request in range(300):
+            stalled.send(json.dumps({"type": "frame", "index": request % 5, "request": request}))
+            stalled.send('{"type":"hello"}')
+        for request in range(50):
+            lively.send(json.dumps({"type": "frame", "index": request % 5, "request": request}))
+            while not isinstance(lively.recv(timeout=20), bytes):
+                pass
+
+
+def test_without_a_calibration_its_download_says_what_is_missing(server: RunningServer, cookie: str) -> None:
+    for path in ("/api/calibration.json", "/api/export/tf2"):
+        answer = get(server, path, Cookie=cookie)
+        assert answer.status == 409
+        assert b"four placements" in answer.body
+
+
+def test_the_clicks_can_be_downloaded_at_any_time(server: RunningServer, cookie: str) -> None:
+    answer = get(server, "/api/clicks.json", Cookie=cookie)
+    assert json.loads(answer.body)["schema"] == "cocalib/clicks-1"
+    assert answer.headers["Content-Disposition"] == 'attachment; filename="clicks.json"'
+
+
+def test_after_closing_nobody_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    recording = PictureRecording(grey_pictures(1))
+    workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="one grey")
+    running = start(workspace, recording, ServerOptions(port=0, token="mine"))
+    assert running.url.endswith("?token=mine")
+    answer = get(running, "/?token=mine")
+    with channel(running, answer.headers["Set-Cookie"].partition(";")[0]) as socket:
+        running.close()
+        workspace.close()
+        with pytest.raises(ConnectionClosed):
+            wanted(socket, "never")
+    with pytest.raises(ConnectionRefusedError):
+        get(running, "/")
+    assert (tmp_path / "cocalib" / "cookie.key").stat().st_mode & 0o077 == 0
