@@ -1,0 +1,154 @@
+"""Written recordings: another reader finds in them exactly what was simulated."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from calib_core.errors import RecordingError
+from calib_core.measurements import TimeNs
+from calib_core.recordings.writing import RadarReturnMessage, RecordedMessage, write_ros1_bag
+from calib_core.synthetic import SimulatedRecording, SimulationOptions, simulate, write_recording
+
+OPTIONS = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0, seed=5)
+
+
+@pytest.fixture(scope="module")
+def recording() -> SimulatedRecording:
+    return simulate(OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def folder(recording: SimulatedRecording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    target = tmp_path_factory.mktemp("recording")
+    write_recording(recording, target, ("ros1", "mcap", "db3"))
+    return target
+
+
+def _messages(paths: list[Path], topic: str) -> Iterator[tuple[int, Any]]:
+    with AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        for connection, time, raw in reader.messages([c for c in reader.connections if c.topic == topic]):
+            yield time, reader.deserialize(raw, connection.msgtype)
+
+
+def _stamp(message: Any) -> int:
+    return int(message.header.stamp.sec) * 10**9 + int(message.header.stamp.nanosec)
+
+
+def _cloud(message: Any) -> np.ndarray:
+    return np.frombuffer(message.data.tobytes(), dtype="<f4").reshape(message.width, len(message.fields))
+
+
+def test_a_ros_1_radar_bag_has_one_message_per_return_and_point_ids_that_begin_anew_in_each_scan(
+    recording: SimulatedRecording, folder: Path
+) -> None:
+    messages = [message for _, message in _messages([folder / "radar.bag"], "/ti_mmwave/radar_scan")]
+    scans = [scan for scan in recording.scans() if len(scan)]
+    assert [m.point_id for m in messages] == [i for scan in scans for i in range(len(scan))]
+    assert [_stamp(m) for m in messages if m.point_id == 0] == [int(scan.time) for scan in scans]
+    points = np.array([[m.x, m.y, m.z] for m in messages])
+    assert np.array_equal(points, np.concatenate([scan.points_radar_m for scan in scans]))
+    assert np.array_equal([m.velocity for m in messages], np.concatenate([scan.doppler_mps for scan in scans]))
+    assert np.array_equal([m.intensity for m in messages], np.concatenate([scan.snr_db for scan in scans]))
+    assert [m.range for m in messages] == pytest.approx(np.linalg.norm(points, axis=1), rel=1e-6)
+    assert [m.bearing for m in messages] == pytest.approx(np.rad2deg(np.arctan2(points[:, 1], points[:, 0])), rel=1e-5)
+    assert {m.doppler_bin for m in messages if m.velocity == 0.0} == {16}
+
+
+@pytest.mark.parametrize("container", ["mcap", "db3"])
+def test_ros_2_bags_hold_the_same_scans_as_clouds_and_open_as_folder_and_as_file(
+    recording: SimulatedRecording, folder: Path, container: str
+) -> None:
+    inside = folder / f"recording_{container}"
+    scans = list(recording.scans())
+    for path in (inside, inside / f"recording_{container}.{container}"):
+        clouds = [message for _, message in _messages([path], "/ti_mmwave/radar_scan_pcl")]
+        assert [_stamp(cloud) for cloud in clouds] == [int(scan.time) for scan in scans]
+        for cloud, scan in zip(clouds, scans, strict=True):
+            values = _cloud(cloud)
+            assert [f.name for f in cloud.fields] == ["x", "y", "z", "intensity", "velocity"]
+            assert np.array_equal(values[:, :3].astype(float), scan.points_radar_m)
+            assert np.array_equal(values[:, 4].astype(float), scan.doppler_mps)
+    assert (inside / "metadata.yaml").is_file()
+
+
+@pytest.mark.parametrize("name", ["camera.bag", "recording_mcap", "recording_db3"])
+def test_every_container_holds_the_rendered_frames_with_both_stamps(
+    recording: SimulatedRecording, folder: Path, name: str
+) -> None:
+    frames = list(recording.frames())
+    images = list(_messages([folder / name], "/camera/image_raw/compressed"))
+    assert [time for time, _ in images] == [int(frame.receive_time) for frame in frames]
+    for (_, message), frame in zip(images, frames, strict=True):
+        data = message.data.tobytes()
+        assert _stamp(message) == int(frame.time)
+        assert data == frame.jpeg(OPTIONS.jpeg_quality)
+        decoded = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
+        assert decoded.shape == (80, 128, 3)
+        assert np.abs(decoded.astype(float) - frame.pixels).mean() < 6.0
+
+
+def test_camera_info_carries_the_intrinsics(recording: SimulatedRecording, folder: Path) -> None:
+    infos = [message for _, message in _messages([folder / "camera.bag"], "/camera/camera_info")]
+    assert len(infos) == len(list(_messages([folder / "camera.bag"], "/camera/image_raw/compressed")))
+    assert np.array_equal(infos[0].K.reshape(3, 3), recording.camera.matrix_px)
+    assert np.array_equal(infos[0].D, recording.camera.distortion)
+    assert (infos[0].distortion_model, infos[0].width, infos[0].height) == ("plumb_bob", 128, 80)
+
+
+def test_raw_images_hold_the_very_pixels(tmp_path: Path) -> None:
+    recording = simulate(replace(OPTIONS, placements=1, raw_images=True, camera_rate_hz=1.0))
+    write_recording(recording, tmp_path)
+    images = [message for _, message in _messages([tmp_path / "camera.bag"], "/camera/image_raw")]
+    for message, frame in zip(images, recording.frames(), strict=True):
+        assert message.encoding == "bgr8"
+        assert np.array_equal(message.data.reshape(message.height, message.width, 3), frame.pixels)
+
+
+def test_the_stock_driver_leaves_four_fields_at_zero(tmp_path: Path) -> None:
+    recording = simulate(replace(OPTIONS, placements=1, radar_message="stock", camera_rate_hz=1.0))
+    write_recording(recording, tmp_path)
+    messages = [message for _, message in _messages([tmp_path / "radar.bag"], "/ti_mmwave/radar_scan")]
+    assert {(m.range, m.doppler_bin, m.bearing, m.intensity) for m in messages} == {(0.0, 0, 0.0, 0.0)}
+    assert {m.x for m in messages} != {0.0}
+
+
+def test_an_imaging_radar_writes_clouds_to_ros_1_too(tmp_path: Path) -> None:
+    recording = simulate(replace(OPTIONS, placements=1, radar="imaging", camera_rate_hz=1.0))
+    write_recording(recording, tmp_path)
+    clouds = [message for _, message in _messages([tmp_path / "radar.bag"], "/ti_mmwave/radar_scan_pcl")]
+    assert len(clouds) == len(list(recording.scans()))
+
+
+def test_truth_and_clicks_say_what_the_simulation_knows(recording: SimulatedRecording, folder: Path) -> None:
+    truth = json.loads((folder / "truth.json").read_text())
+    clicks = json.loads((folder / "clicks.json").read_text())
+    assert truth["schema"] == "cocalib/truth-1"
+    assert np.array_equal(truth["camera_from_radar"]["rotation"], recording.camera_from_radar.rotation)
+    assert np.array_equal(truth["camera_from_radar"]["translation_m"], recording.camera_from_radar.translation_m)
+    for entry, placement in zip(truth["placements"], recording.placements, strict=True):
+        assert entry["start"]["sec"] * 10**9 + entry["start"]["nanosec"] == placement.start
+        assert np.array_equal(entry["pixel_px"], placement.pixel_px)
+    assert clicks["schema"] == "cocalib/clicks-1"
+    assert [entry["image_time"] for entry in clicks["clicks"]] == [e["best_image_time"] for e in truth["placements"]]
+
+
+def test_a_recording_is_never_overwritten(recording: SimulatedRecording, folder: Path) -> None:
+    with pytest.raises(RecordingError, match=r"radar\.bag exists already"):
+        write_recording(recording, folder)
+
+
+@pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
+def test_a_bag_reads_back_whatever_its_compression(tmp_path: Path, compression: Any) -> None:
+    body = RadarReturnMessage(TimeNs(7), "radar", 0, 1.0, -2.0, 0.5, 2.25, -0.5, 12, -63.5, 21.0)
+    path = write_ros1_bag(tmp_path / "one.bag", [RecordedMessage("/radar", TimeNs(9), body)], compression=compression)
+    [(time, message)] = _messages([path], "/radar")
+    assert time == 9
+    assert (message.x, message.y, message.z, message.velocity, message.doppler_bin) == (1.0, -2.0, 0.5, -0.5, 12)

@@ -1,0 +1,170 @@
+"""Simulated radar sessions: bins, static and moving returns, stamps, and the truth beside them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib_core.errors import OptionError
+from calib_core.measurements import NS_PER_S
+from calib_core.radar import direction_cosines
+from calib_core.synthetic import RADAR_PROFILES, SimulatedScans, SimulationOptions, simulate_scans
+from calib_core.synthetic.options import SceneName
+
+SHORT = SimulationOptions(placements=4, dwell_s=5.0, seed=3)
+
+
+@pytest.fixture(scope="module")
+def session() -> SimulatedScans:
+    return simulate_scans(SHORT)
+
+
+def test_the_same_seed_gives_the_same_scans_and_another_seed_others(session: SimulatedScans) -> None:
+    again, other = simulate_scans(SHORT), simulate_scans(replace(SHORT, seed=4))
+    assert np.array_equal(session.scans.points_radar_m, again.scans.points_radar_m)
+    assert np.array_equal(session.scans.times_ns, again.scans.times_ns)
+    assert session.clicks == again.clicks
+    assert session.clicks != other.clicks
+
+
+def test_ranges_azimuths_and_speeds_lie_on_the_radars_bins(session: SimulatedScans) -> None:
+    profile = RADAR_PROFILES["awr1843"]
+    r, u, _ = direction_cosines(session.scans.points_radar_m).T
+    speed_bins = session.scans.doppler_mps / profile.doppler_bin_mps
+    assert np.abs(r / profile.range_bin_m - np.round(r / profile.range_bin_m)).max() < 1e-4
+    assert np.abs(32.0 * u - np.round(32.0 * u)).max() < 1e-4
+    assert np.abs(speed_bins - np.round(speed_bins)).max() < 1e-4
+    assert np.abs(speed_bins).max() <= 16.001
+
+
+def test_interpolated_azimuths_leave_the_lattice() -> None:
+    session = simulate_scans(replace(SHORT, angle_bins=False))
+    u = direction_cosines(session.scans.points_radar_m)[:, 1]
+    assert np.median(np.abs(32.0 * u - np.round(32.0 * u))) > 0.15
+
+
+def test_the_reflector_shows_in_nearly_every_scan_of_its_dwell_with_doppler_exactly_zero(
+    session: SimulatedScans,
+) -> None:
+    for placement in session.placements:
+        window = session.scans.between(placement.start, placement.end)
+        error = direction_cosines(window.points_radar_m) - direction_cosines(placement.position_radar_m[None])
+        near = (np.abs(error) < [0.1, 0.05, 0.08]).all(axis=1) & (window.doppler_mps == 0.0)
+        seen = len(set(window.scan_of_return()[near].tolist())) / len(window)
+        assert seen > 0.8, placement.id
+
+
+def test_without_clutter_and_person_hardly_anything_but_the_reflector_returns() -> None:
+    session = simulate_scans(replace(SHORT, clutter="none", person=False))
+    assert len(session.scans.points_radar_m) < 2.2 * len(session.scans)
+    window = session.scans.between(session.placements[1].end, session.placements[2].start)
+    assert len(window.points_radar_m) < 0.5 * len(window)
+
+
+def test_clutter_stays_and_a_walking_person_moves(session: SimulatedScans) -> None:
+    bare = simulate_scans(replace(SHORT, person=False))
+    assert np.mean(bare.scans.doppler_mps == 0.0) > 0.9
+    gap = session.scans.between(session.placements[0].end, session.placements[1].start)
+    assert np.abs(gap.doppler_mps).max() > 0.5
+
+
+def test_elevation_is_measured_far_worse_than_range_and_azimuth() -> None:
+    session = simulate_scans(replace(SHORT, placements=20, clutter="none", person=False, angle_bins=False))
+    errors = []
+    for placement in session.placements:
+        window = session.scans.between(placement.start, placement.end)
+        error = direction_cosines(window.points_radar_m) - direction_cosines(placement.position_radar_m[None])
+        errors.append(np.median(error[np.abs(error[:, 0]) < 0.1], axis=0))
+    range_m, azimuth, elevation = np.array(errors).std(axis=0)
+    assert range_m < 0.03
+    assert elevation > 2.0 * azimuth
+
+
+def test_an_imaging_radar_is_finer() -> None:
+    session = simulate_scans(replace(SHORT, radar="imaging", clutter="none", person=False))
+    placement = session.placements[0]
+    window = session.scans.between(placement.start, placement.end)
+    error = direction_cosines(window.points_radar_m) - direction_cosines(placement.position_radar_m[None])
+    near = np.abs(error[:, 0]) < 0.1
+    assert np.abs(np.median(error[near], axis=0)).max() < 0.02
+
+
+def test_a_click_lies_on_its_truth_pixel_within_its_noise(session: SimulatedScans) -> None:
+    frames = set(session.stage.frame_times.header_ns.tolist())
+    for click, placement in zip(session.clicks, session.placements, strict=True):
+        assert placement.start < click.image_time < placement.end
+        assert int(click.image_time) in frames
+        assert np.hypot(*([click.u_px, click.v_px] - placement.pixel_px)) < 4.0 * SHORT.click_sigma_px + 0.01
+
+
+def test_a_truth_pixel_is_the_projection_of_the_true_position(session: SimulatedScans) -> None:
+    projected = session.camera.project(session.camera_from_radar @ session.points_radar_m)
+    assert np.abs(projected - session.pixels_px).max() < 1e-9
+    assert session.camera.sees(session.camera_from_radar @ session.points_radar_m).all()
+
+
+def test_stamps_rise_and_the_two_sensors_are_not_synchronised(session: SimulatedScans) -> None:
+    frames, scans = session.stage.frame_times, session.stage.scan_times
+    for times in (frames, scans):
+        assert (np.diff(times.header_ns) > 0).all()
+        assert (np.diff(times.receive_ns) > 0).all()
+        assert (times.receive_ns > times.header_ns).all()
+    assert not set(frames.header_ns.tolist()) & set(scans.header_ns.tolist())
+
+
+def test_a_clock_offset_moves_the_radars_stamps_by_just_that() -> None:
+    plain, ahead = simulate_scans(SHORT), simulate_scans(replace(SHORT, clock_offset_s=0.25))
+    assert set((ahead.scans.times_ns - plain.scans.times_ns).tolist()) <= {
+        NS_PER_S // 4 - 1,
+        NS_PER_S // 4,
+        NS_PER_S // 4 + 1,
+    }
+    assert np.array_equal(plain.stage.frame_times.header_ns, ahead.stage.frame_times.header_ns)
+    assert np.array_equal(plain.scans.points_radar_m, ahead.scans.points_radar_m)
+
+
+def test_frames_and_scans_are_dropped_at_the_share_that_was_asked_for() -> None:
+    whole, holed = simulate_scans(replace(SHORT, dropped_share=0.0)), simulate_scans(replace(SHORT, dropped_share=0.3))
+    assert len(holed.scans) / len(whole.scans) == pytest.approx(0.7, abs=0.08)
+
+
+@pytest.mark.parametrize("scene", ["rooftop", "field", "aisle", "checkerboard"])
+def test_every_scene_has_room_for_twenty_placements(scene: SceneName) -> None:
+    session = simulate_scans(
+        SimulationOptions(scene=scene, clutter="none", person=False, dwell_s=4.0, radar_rate_hz=2.0)
+    )
+    ranges = np.linalg.norm(session.points_radar_m, axis=1)
+    assert len(session.placements) == 20
+    assert ranges.max() - ranges.min() > 5.0
+    heights = (session.stage.rig.radar_from_world.inverse() @ session.points_radar_m)[:, 2]
+    assert heights == pytest.approx(np.full(20, 0.2), abs=0.06)
+
+
+def test_on_a_tripod_the_heights_vary() -> None:
+    session = simulate_scans(
+        SimulationOptions(heights=True, clutter="none", person=False, dwell_s=4.0, radar_rate_hz=2.0)
+    )
+    heights = (session.stage.rig.radar_from_world.inverse() @ session.points_radar_m)[:, 2]
+    assert heights.min() > 0.1
+    assert heights.max() - heights.min() > 0.8
+
+
+def test_in_heavy_clutter_something_returns_louder_than_the_reflector() -> None:
+    session = simulate_scans(replace(SHORT, clutter="heavy", person=False, placements=8))
+    placement = session.placements[-1]
+    window = session.scans.between(placement.start, placement.end)
+    error = np.linalg.norm(window.points_radar_m - placement.position_radar_m, axis=1)
+    assert window.snr_db[error > 1.5].max() > window.snr_db[error < 1.0].max()
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"placements": 0}, "placements is 0"),
+        ({"dwell_s": 1.0}, "dwell_s is 1.0"),
+        ({"jpeg_quality": 0}, "jpeg_quality is 0"),
+    ],
+)
+def test_an_option_out_of_range_is_refused_by_name(changes: dict[str, float], text: str) -> None:
+    with pytest.raises(OptionError, match=text):
+        replace(SHORT, **changes)  # type: ignore[arg-type]
