@@ -143,7 +143,7 @@ def test_the_lens_model_follows_from_name_and_number_of_coefficients(model, coef
         (ROS + "binning_x: 2\n", "binning or a region of interest is set"),
         (KALIBR.replace("pinhole", "omni"), "cam0.camera_model: 'omni' is not supported"),
         (KALIBR.replace("501.5, ", ""), "cam0.intrinsics: expected 4 numbers, found 3"),
-        (json.dumps({**OURS, "distorsion": []}), "distorsion: unknown key; did you mean distortion?"),
+        (json.dumps({**OURS, "distortions": []}), "distortions: unknown key; did you mean distortion?"),
         ("<robot/>", "XML with <robot>; expected OpenCV's <opencv_storage>"),
         ('<!DOCTYPE x [<!ENTITY a "b">]><opencv_storage/>', "declares a document type"),
         ("<opencv_storage>", "not XML"),

@@ -93,7 +93,7 @@ def test_a_fault_in_a_pair_is_named_with_its_place_and_what_to_do(change, words)
             pairs_text(camera={**CAMERA, "model": "pinhle"}),
             "camera.model: unknown value 'pinhle'; did you mean pinhole?",
         ),
-        (pairs_text(camera={**CAMERA, "distorsion": []}), "camera.distorsion: unknown key; did you mean distortion?"),
+        (pairs_text(camera={**CAMERA, "distortions": []}), "camera.distortions: unknown key; did you mean distortion?"),
         (pairs_text(camera={**CAMERA, "distortion": [1, 2]}), "camera: pinhole takes 0 distortion coefficients, got 2"),
         (pairs_text(radar={"sigma_range": 1}), "radar.sigma_range: unknown key; did you mean sigma_range_m?"),
         (pairs_text(zebra=1), "zebra: unknown key; the keys here are schema, camera, pairs, radar,"),

@@ -1,0 +1,52 @@
+"""The published schemas and the page about formats say what the code does."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from calib_core.interchange import FORMATS, export, read_calibration, read_camera, read_clicks, read_pairs
+from calib_core.interchange.schemas import schema_texts
+
+
+@pytest.mark.parametrize("name", ["clicks-1.schema.json", "pairs-1.schema.json", "calibration-1.schema.json"])
+def test_the_published_schema_is_the_one_the_types_give(project_root: Path, name):
+    published = (project_root / "docs/schemas" / name).read_text(encoding="utf-8")
+
+    assert published == schema_texts()[name], "run: python -m calib_core.interchange.schemas docs/schemas"
+
+
+def test_the_page_lists_every_format_with_its_file_name(project_root: Path):
+    page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
+
+    rows = dict(re.findall(r"^\| `([\w-]+)` \| [^|]* \| `([^`]+)` \|", page, flags=re.MULTILINE))
+
+    assert rows == {known.name: known.file_name for known in FORMATS}
+
+
+def test_the_examples_on_the_page_are_read(project_root: Path):
+    page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
+    examples = re.findall(r"```(json|yaml)\n(.*?)```", page, flags=re.DOTALL)
+    readers = {"cocalib/clicks-1": read_clicks, "cocalib/pairs-1": read_pairs}
+
+    read = []
+    for language, text in examples:
+        schema = re.search(r'"schema": "([\w/-]+)"', text)
+        if schema:
+            read.append(readers[schema[1]](text))
+        else:
+            read.append(read_camera(text, language))
+
+    assert len(read) == 3
+
+
+def test_formats_are_named_once_and_each_says_what_it_lacks(project_root: Path):
+    names = [known.name for known in FORMATS]
+    assert len(set(names)) == len(names)
+    assert len({known.file_name for known in FORMATS}) == len(names)
+
+    file = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+    for known in FORMATS:
+        notes = export(file, known.name).notes
+        assert known.carries_camera or any("carries the pose only" in note for note in notes)
+        assert known.comment != "none" or any("calibration.json" in note for note in notes)
