@@ -1,7 +1,7 @@
 """The whole of it: clicks and radar returns go in, camera_from_radar comes out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -51,7 +51,8 @@ def calibrate(
         return calibrate_as_printed(clicks, scans, camera, options)
     pairing = pair_clicks(clicks, scans, options)
     excluded = frozenset(click.id for click in clicks if click.excluded)
-    return _solved(pairing.pairs, pairing.unpaired, excluded, camera, options)
+    outcome = _solved(pairing.pairs, pairing.unpaired, excluded, camera, options)
+    return replace(outcome, unpaired=pairing.unpaired) if isinstance(outcome, Unsolvable) else outcome
 
 
 def calibrate_pairs(

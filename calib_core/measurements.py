@@ -270,8 +270,10 @@ class Unsolvable:
         code: one word for programs, such as "too-few-pairs".
         reason: what is missing, with figures.
         hint: what to do about it.
+        unpaired: clicks that found no radar position; often they are why.
     """
 
     code: str
     reason: str
     hint: str
+    unpaired: tuple[Unpaired, ...] = ()

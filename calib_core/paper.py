@@ -5,7 +5,7 @@ What the paper leaves open is in PaperOptions.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -223,13 +223,15 @@ def calibrate_as_printed(
     ordered = clicks_by_time(clicks)
     static = static_returns_as_printed(scans, options.paper)
     found = [pair_as_printed(click, static, options) for click in ordered]
-    return _solved(
+    unpaired = tuple(pair for pair in found if isinstance(pair, Unpaired))
+    outcome = _solved(
         [pair for pair in found if isinstance(pair, Pair)],
         camera,
         options,
         excluded=frozenset(click.id for click in ordered if click.excluded),
-        unpaired=tuple(pair for pair in found if isinstance(pair, Unpaired)),
+        unpaired=unpaired,
     )
+    return replace(outcome, unpaired=unpaired) if isinstance(outcome, Unsolvable) else outcome
 
 
 def solve_pairs_as_printed(

@@ -5,7 +5,7 @@ from app.view.drawn import CautionRow, Stage, View
 from app.view.figures import metric_figures, pose_figures, residual_limit_px
 from app.view.rows import click_rows
 from app.view.wording import sentence
-from calib_core.measurements import Unsolvable
+from calib_core.measurements import Unpaired, Unsolvable
 from calib_core.results import Calibration
 
 __all__ = ["MIN_PLACEMENTS", "view"]
@@ -57,8 +57,16 @@ def _stage(session: Session) -> Stage:
 
 
 def _missing(session: Session) -> int:
-    """How many placements are missing before a solve can be tried."""
-    return max(0, MIN_PLACEMENTS - sum(not click.excluded for click in session.clicks))
+    """How many placements are missing before a solve can be tried; those that the radar did not see do not count."""
+    unseen = {row.id for row in _unpaired(session)}
+    usable = sum(not click.excluded and click.id not in unseen for click in session.clicks)
+    return max(0, MIN_PLACEMENTS - usable)
+
+
+def _unpaired(session: Session) -> tuple[Unpaired, ...]:
+    """Clicks of now that found no radar position, as far as the newest answer knows."""
+    here = {click.id for click in session.clicks}
+    return tuple(row for row in session.outcome.unpaired if row.id in here) if session.outcome else ()
 
 
 def _waits_for_clicks(session: Session) -> bool:
@@ -71,7 +79,7 @@ def _words(session: Session, stage: Stage) -> tuple[str, str]:
     """Return the status line and the next thing to do."""
     missing, outcome = _missing(session), session.outcome
     if _waits_for_clicks(session):
-        return f"{missing} more placement{'s' if missing > 1 else ''} needed", _NEXT_CLICK
+        return f"{missing} more placement{'s' if missing > 1 else ''} needed", _next_click(session)
     if stage == "solving":
         return "solving…", ""
     if isinstance(outcome, Unsolvable):
@@ -81,7 +89,12 @@ def _words(session: Session, stage: Stage) -> tuple[str, str]:
     return "", ""
 
 
-_NEXT_CLICK = "Step to a frame in which the reflector stands still, and click its centre."
+def _next_click(session: Session) -> str:
+    unpaired = _unpaired(session)
+    if not unpaired:
+        return "Step to a frame in which the reflector stands still, and click its centre."
+    count = "The click" if len(session.clicks) == 1 else f"{len(unpaired)} of {len(session.clicks)} clicks"
+    return f"{count} found no radar position: {unpaired[0].reason}. {sentence(unpaired[0].hint)}"
 
 
 def _agreement(calibration: Calibration) -> str:

@@ -22,7 +22,7 @@ def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
     """Return one row per click, in order of image time."""
     calibration = session.outcome if isinstance(session.outcome, Calibration) else None
     pairs = {pair.id: pair for pair in calibration.pairs} if calibration else {}
-    unpaired = {row.id: row for row in calibration.unpaired} if calibration else {}
+    unpaired = {row.id: row for row in session.outcome.unpaired} if session.outcome else {}
     return tuple(_row(click, facts, pairs, unpaired) for click in session.clicks)
 
 

@@ -301,3 +301,14 @@ def test_after_close_nothing_is_answered() -> None:
     worker.request(3, [CLICK], CalibrationOptions(), answers)
     assert len(answers.all) == count
     assert all(solved.revision == 1 for solved in answers.all)
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_clicks_outside_the_radar_recording_are_named_in_the_answer(
+    recording: Recording, clicks: tuple[ReflectorClick, ...], method: str
+) -> None:
+    away = [replace(click, image_time=TimeNs(click.image_time + 10**12)) for click in clicks[:5]]
+    options = CalibrationOptions(method=method)  # type: ignore[arg-type]
+    outcome = solve_clicks(recording, away, recording.camera(), options)
+    assert isinstance(outcome, Unsolvable)
+    assert [row.id for row in outcome.unpaired] == [click.id for click in away]

@@ -114,6 +114,20 @@ def test_too_few_pairs_is_no_failure_while_clicks_are_collected() -> None:
     assert (seen.stage, seen.status) == ("collecting", "2 more placements needed")
 
 
+def test_clicks_that_the_radar_did_not_see_do_not_count_and_say_why() -> None:
+    unseen = tuple(
+        Unpaired(name, "no-scan", "the nearest radar scan is 9.00 s away", "check that both clocks agree")
+        for name in ("c1", "c3")
+    )
+    seen = shown(5, Unsolvable("too-few-pairs", "3 of at least 4 pairs", "click more", unseen))
+    assert (seen.stage, seen.status) == ("collecting", "1 more placement needed")
+    assert seen.hint == (
+        "2 of 5 clicks found no radar position: the nearest radar scan is 9.00 s away. Check that both clocks agree."
+    )
+    assert [row.state for row in seen.clicks] == ["unpaired", "pending", "unpaired", "pending", "pending"]
+    assert "9.00 s away" in seen.clicks[0].note
+
+
 def test_figures_stay_while_a_newer_answer_is_worked_out() -> None:
     seen = shown(5, calibration(*FIVE), ClickMoved("c1", 11.0, 20.0))
     assert (seen.stage, seen.status, seen.solving) == ("solving", "solving…", True)
