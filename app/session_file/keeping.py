@@ -120,13 +120,20 @@ def set_aside(folder: Path) -> Path | None:
 
     Returns:
         where it is now; None when there was none.
+
+    Raises:
+        SessionFileError: another process has it open, or it cannot be moved.
     """
     if not folder.exists():
         return None
+    FolderLock(folder).close()
     number = 1
     while (kept := folder.with_name(f"{folder.name}.{number}")).exists():
         number += 1
-    folder.rename(kept)
+    try:
+        folder.rename(kept)
+    except OSError as error:
+        raise SessionFileError(f"{folder}: cannot be moved to {kept.name}: {error.strerror}") from error
     return kept
 
 

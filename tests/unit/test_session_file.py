@@ -328,6 +328,14 @@ def test_a_session_set_aside_is_kept_beside_under_the_next_free_number(tmp_path:
     assert not folder.exists()
 
 
+def test_a_session_that_is_open_is_not_set_aside(tmp_path: Path) -> None:
+    session_file = open_session_file(tmp_path / "s", FACTS)
+    with pytest.raises(SessionFileError, match="is open already"):
+        set_aside(tmp_path / "s")
+    session_file.close()
+    assert (tmp_path / "s" / "journal.jsonl").exists()
+
+
 def test_the_session_lies_beside_its_recording(tmp_path: Path) -> None:
     assert (
         recording_session_folder([tmp_path / "drive.bag", tmp_path / "b.bag"]) == tmp_path / "drive.bag.cocalib-session"
