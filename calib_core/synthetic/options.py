@@ -36,6 +36,8 @@ class SimulationOptions:
     """Whether a person carries the reflector; without, it is simply there."""
     camera_model: CameraModel = "plumb_bob"
     """Lens model."""
+    field_of_view_deg: float | None = None
+    """Horizontal field of view before distortion [deg]; without it 75, for equidistant 110."""
     width_px: int = 1280
     """Columns of the image."""
     height_px: int = 720

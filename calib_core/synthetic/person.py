@@ -134,8 +134,11 @@ def capsules(state: PersonState) -> tuple[Capsule, ...]:
     chest = hips + 0.39 * spine
     head = shoulders + 0.23 * (np.cos(0.5 * lean) * up + np.sin(0.5 * lean) * forward) + 0.03 * forward
     torso = [
-        Capsule(hips - 0.06 * left, hips + 0.06 * left, 0.125, 0.125, "trousers", -9.0),
-        *(Capsule(hips + s * 0.05 * left, chest + s * 0.075 * left, 0.112, 0.118, "vest", rcs) for s, rcs in _TORSO),
+        Capsule(hips - 0.055 * left, hips + 0.055 * left, 0.120, 0.120, "trousers", -9.0),
+        *(
+            Capsule(hips + 0.12 * spine + s * 0.05 * left, chest + s * 0.075 * left, 0.112, 0.118, "vest", rcs)
+            for s, rcs in _TORSO
+        ),
         Capsule(shoulders - 0.14 * left - 0.03 * up, shoulders + 0.14 * left - 0.03 * up, 0.078, 0.078, "yoke"),
         Capsule(shoulders, shoulders + 0.12 * spine, 0.055, 0.052, "skin"),
         Capsule(head - 0.045 * up, head + 0.03 * up, 0.080, 0.092, "skin", -14.0),

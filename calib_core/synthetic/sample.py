@@ -18,12 +18,13 @@ SAMPLE_OPTIONS = SimulationOptions(
     radar="awr1843",
     placements=20,
     dwell_s=4.6,
+    field_of_view_deg=62.0,
     width_px=960,
     height_px=600,
     camera_rate_hz=1.5,
     radar_rate_hz=10.0,
-    jpeg_quality=70,
-    seed=2,
+    jpeg_quality=68,
+    seed=19,
     rig=RigOptions(camera_offset_m=(-0.02, 0.03, 0.11)),
 )
 

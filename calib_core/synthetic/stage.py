@@ -18,6 +18,8 @@ __all__ = ["Stage", "child_rng", "set_stage"]
 
 _GHOST_SHARE = 0.25
 _TRIPOD_M = 1.4
+_RIM_SHARE = 0.03
+"""Share of the image's width at its rim where no reflector is put: all of it is to show."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +64,12 @@ def child_rng(options: SimulationOptions, number: int) -> np.random.Generator:
 def set_stage(options: SimulationOptions) -> Stage:
     """Decide where everything is and when, from the options alone."""
     scene = scene_named(options.scene)
-    camera = typical_camera(options.camera_model, width_px=options.width_px, height_px=options.height_px)
+    camera = typical_camera(
+        options.camera_model,
+        width_px=options.width_px,
+        height_px=options.height_px,
+        field_of_view_deg=options.field_of_view_deg,
+    )
     rig = random_rig(child_rng(options, 0), camera=camera, options=options.rig)
     positions = _positions(child_rng(options, 1), scene, rig, options)
     story = tell_story(child_rng(options, 2), positions_m=positions, dwell_s=options.dwell_s, narrow=scene.narrow)
@@ -106,7 +113,10 @@ def _positions(rng: np.random.Generator, scene: Scene, rig: Rig, options: Simula
     found: list[np.ndarray] = []
     for _ in range(400):
         batch = world_from_radar @ draw_positions(rng, count=min(options.placements, 8), rig=rig, layout=layout)
-        for position in batch:
+        whole = rig.camera.in_image(
+            rig.camera.project(rig.camera_from_world @ batch), margin_px=-_RIM_SHARE * options.width_px
+        )
+        for position in batch[whole]:
             apart = all(np.linalg.norm(position[:2] - other[:2]) >= layout.separation_m for other in found)
             if apart and scene.free(position[:2], 0.7) and len(found) < options.placements:
                 found.append(position)

@@ -30,7 +30,7 @@ def _sky(directions: np.ndarray, footprint_rad: float) -> np.ndarray:
     level = 420.0 / (height + 0.12)  # clouds lie on a level sheet, seen ever flatter towards the horizon
     u, v = directions[:, 0] * level, directions[:, 1] * level
     footprint = (footprint_rad * level / (height + 0.12)).astype(np.float32)
-    billow = fractal_noise(u, v, size_m=620.0, octaves=4, footprint_m=footprint, seed=17, fall=0.5)
+    billow = fractal_noise(u, v, size_m=620.0, octaves=3, footprint_m=footprint, seed=17, fall=0.5)
     cover = np.clip((billow - 0.12) / 0.75, 0.0, 1.0) * np.clip(height / 0.05, 0.0, 1.0)
     cover = cover * cover * (3.0 - 2.0 * cover) * 0.85
     white = np.array([0.93, 0.94, 0.96], dtype=np.float32)

@@ -125,7 +125,7 @@ def _limb_colour(limb: Capsule, normal: np.ndarray, share: np.ndarray, scene: Sc
     light = lit(scene, flat, sun) * (0.80 + 0.20 * flat[:, 2:3])
     albedo = np.broadcast_to(np.array(_ALBEDO[limb.surface], dtype=np.float32), flat.shape)
     if limb.surface == "vest":
-        band = (np.abs(share.ravel() - 0.25) < 0.075) | (np.abs(share.ravel() - 0.72) < 0.075)
+        band = (np.abs(share.ravel() - 0.12) < 0.10) | (np.abs(share.ravel() - 0.72) < 0.10)
         albedo = np.where(band[:, None], np.array(_ALBEDO["stripe"], dtype=np.float32), albedo)
     return (albedo * light).reshape(normal.shape)
 

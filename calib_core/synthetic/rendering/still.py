@@ -17,7 +17,8 @@ __all__ = ["Still", "pixel_rays", "trace_still"]
 _GRID_PX = 4
 _SAMPLES = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))
 _SUN_RADIUS = 0.012
-_LENS_BLUR_PX = 0.6
+_LENS_BLUR_PX = 0.5
+"""Standard deviation of the lens blur of what is far away."""
 _FAR_M = {"tiles": 22.3, "grass": 400.0, "floor": 22.0, "asphalt": 12.0}
 
 
@@ -42,8 +43,6 @@ class Still:
 
 def pixel_rays(rig: Rig, du_px: float = 0.0, dv_px: float = 0.0) -> np.ndarray:
     """Return what each pixel looks at: (h, w, 3) unit directions in the world, exact on a grid of 4 px and smooth between."""
-    import cv2
-
     camera = rig.camera
     columns, rows = camera.width_px // _GRID_PX + 3, camera.height_px // _GRID_PX + 3
     u, v = np.meshgrid(np.arange(columns) * _GRID_PX + du_px, np.arange(rows) * _GRID_PX + dv_px)
@@ -55,12 +54,13 @@ def pixel_rays(rig: Rig, du_px: float = 0.0, dv_px: float = 0.0) -> np.ndarray:
     rays = (grid[j, i] * (1 - s) + grid[j, i + 1] * s) * (1 - t) + (
         grid[j + 1, i] * (1 - s) + grid[j + 1, i + 1] * s
     ) * t
-    rays = cv2.patchNaNs(rays.reshape(-1, 3), 0.0) if np.isnan(rays).any() else rays.reshape(-1, 3)
+    rays = np.nan_to_num(rays.reshape(-1, 3))  # a lens may see nothing at all in its corners
     return (rays / np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-6)).reshape(*x.shape, 3)
 
 
 def trace_still(scene: Scene, rig: Rig) -> Still:
     """Trace a scene's backdrop, four samples a pixel, each with the sun at another spot of its disc."""
+    import cv2
 
     eye = rig.camera_position_world_m
     solids = [block(item) for item in scene.solids]
@@ -78,7 +78,8 @@ def trace_still(scene: Scene, rig: Rig) -> Still:
     rays = pixel_rays(rig)
     hits = trace(solids, eye, rays.reshape(-1, 3), rig, far_m=_FAR_M[scene.ground], ceiling_m=scene.ceiling_m)
     shape = rays.shape[:2]
-    return Still(total / len(_SAMPLES), hits.depth_m.reshape(shape), (hits.solid == -1).reshape(shape), rays, eye)
+    levels = cv2.GaussianBlur(total / np.float32(len(_SAMPLES)), (0, 0), _LENS_BLUR_PX)
+    return Still(levels, hits.depth_m.reshape(shape), (hits.solid == -1).reshape(shape), rays, eye)
 
 
 def _shade(
