@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
+from app.option_changes import checked_options
 from app.resources import version
 from app.session import Outcome, Solved
 from calib_core.arrays import TimesNs
@@ -103,8 +104,10 @@ def solve_clicks(
         options: what steers the solve.
 
     Raises:
+        OptionError: an option is out of range.
         CalibrationError: the recording cannot be read where the clicks lie.
     """
+    checked_options(options)
     if camera is None:
         return Unsolvable(
             "no-camera",
@@ -135,9 +138,10 @@ def solve_pairs(text: str, source: str, options: CalibrationOptions) -> Outcome:
 
     Raises:
         InputError: the text is not a file of pairs.
+        OptionError: an option, or what the file says about noise, is out of range.
     """
-    pairs_file = read_pairs(text, source, noise=options.noise)
-    return calibrate_pairs(pairs_file.pairs, pairs_file.camera, pairs_file.options(options))
+    pairs_file = read_pairs(text, source, noise=checked_options(options).noise)
+    return calibrate_pairs(pairs_file.pairs, pairs_file.camera, checked_options(pairs_file.options(options)))
 
 
 def camera_for(recording: RecordingSource, camera_file: Path | None) -> Camera | None:

@@ -103,10 +103,14 @@ class Journal:
         self.steps += 1
 
     def close(self) -> None:
-        """Let go of the file."""
-        os.close(self._descriptor)
+        """Let go of the file; nothing can be appended any more."""
+        descriptor, self._descriptor = self._descriptor, -1  # a number that is never a file: others reuse the old one
+        if descriptor >= 0:
+            os.close(descriptor)
 
     def _write(self, line: bytes) -> None:
+        if self._descriptor < 0:
+            raise SessionFileError(f"{self._path}: the session is closed, so the change was not made; start again")
         rest = memoryview(line + b"\n")
         try:
             if os.fstat(self._descriptor).st_nlink == 0:
@@ -115,12 +119,19 @@ class Journal:
                 rest = rest[os.write(self._descriptor, rest) :]
             os.fsync(self._descriptor)
         except OSError as error:
-            self._cut()
+            self._take_back()
             raise SessionFileError(
                 f"{self._path}: the change could not be kept, so it was not made: {error.strerror}; "
                 "make room or restore the folder, then do it again"
             ) from error
         self._length += len(line) + 1
+
+    def _take_back(self) -> None:
+        """Drop what a failed write left; where even that fails, write nothing more behind it."""
+        try:
+            self._cut()
+        except OSError:
+            self.close()
 
     def _cut(self) -> None:
         """Drop what follows the last whole line."""

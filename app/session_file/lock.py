@@ -40,7 +40,9 @@ class FolderLock:
 
     def close(self) -> None:
         """Let go; the file stays, since deleting it would race with the next holder."""
-        os.close(self._descriptor)
+        descriptor, self._descriptor = self._descriptor, -1  # never closed twice: others reuse the number
+        if descriptor >= 0:
+            os.close(descriptor)
 
 
 if sys.platform == "win32":

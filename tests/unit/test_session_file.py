@@ -303,6 +303,32 @@ def test_a_full_disk_refuses_the_step_and_leaves_the_journal_as_it_was(
     again.close()
 
 
+def test_a_disk_that_cannot_even_take_back_stops_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session_file = open_session_file(tmp_path, FACTS)
+    history = keep(session_file, STEPS[0])
+
+    def broken(*_: object) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", broken)
+        patch.setattr(os, "ftruncate", broken)
+        with pytest.raises(SessionFileError, match="Input/output error"):
+            session_file.append(STEPS[1], history)
+    with pytest.raises(SessionFileError, match="the session is closed"):
+        session_file.append(STEPS[1], history)
+    session_file.close()
+
+
+def test_a_closed_session_writes_into_no_other_file(tmp_path: Path) -> None:
+    session_file = open_session_file(tmp_path / "s", FACTS)
+    session_file.close()
+    with (tmp_path / "other").open("w+b") as other:
+        with pytest.raises(SessionFileError, match="the session is closed"):
+            keep(session_file, STEPS[0])
+        assert other.read() == b""
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows does not delete open files")
 def test_a_folder_deleted_under_an_open_session_is_noticed(tmp_path: Path) -> None:
     session_file = open_session_file(tmp_path, FACTS)

@@ -24,7 +24,7 @@ from app.solving import (
 )
 from app.workspace import open_workspace
 from calib_core.camera import Camera
-from calib_core.errors import InputError, RecordingError
+from calib_core.errors import InputError, OptionError, RecordingError
 from calib_core.interchange import camera_info_text, read_calibration, read_clicks
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, LocatingOptions
@@ -75,6 +75,14 @@ def test_without_intrinsics_the_answer_says_that_they_are_missing() -> None:
     assert isinstance(outcome, Unsolvable)
     assert outcome.code == "no-camera"
     assert "--camera" in outcome.hint
+
+
+def test_options_out_of_range_are_refused_here_too() -> None:
+    wrong = CalibrationOptions(locating=LocatingOptions(window_s=-1.0))
+    with pytest.raises(OptionError, match=r"locating\.window_s: -1 is out of range"):
+        solve_clicks(Radar(), [CLICK], CAMERA, wrong)
+    with pytest.raises(OptionError, match=r"locating\.window_s"):
+        solve_pairs("{}", "pairs.json", wrong)
 
 
 def test_scans_are_read_around_every_click_once_excluded_ones_too() -> None:
