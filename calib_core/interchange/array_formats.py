@@ -23,6 +23,7 @@ MATLAB_NOTES = (
 )
 _MAT_TEXT_BYTES = 116
 _ONE_BASED = 1.0
+_LARGEST = 1e9
 
 
 def write_matrix(file: CalibrationFile) -> str:
@@ -43,7 +44,7 @@ def read_matrix(text: str, source: str) -> ImportedCalibration:
         numbers = np.array(words, dtype=np.float64)
     except ValueError as error:
         raise InputError(f"{source}: not a matrix ({error}); give 3 or 4 rows of 4 numbers") from None
-    if len(numbers) not in (12, 16) or not np.isfinite(numbers).all():
+    if len(numbers) not in (12, 16) or not (np.abs(numbers) <= _LARGEST).all():
         raise InputError(f"{source}: expected 12 or 16 finite numbers, found {len(numbers)}; give 3 or 4 rows of 4")
     if len(numbers) == 16 and np.abs(numbers[12:] - [0, 0, 0, 1]).max() > 0:
         raise InputError(f"{source}: the last row must be 0 0 0 1; is the matrix transposed?")

@@ -34,6 +34,7 @@ _MATRIX_KEYS = {  # the camera matrix's key -> the distortion's
     "K": ("D",),
     "k": ("d",),
 }
+_LARGEST = 1e9
 _WIDTH_KEYS = ("image_width", "image_Width", "width", "width_px")
 _HEIGHT_KEYS = ("image_height", "image_Height", "height", "height_px")
 
@@ -225,6 +226,6 @@ def _number(value: Any, *, source: str, place: str) -> float:
         number = float("nan") if isinstance(value, bool) else float(value)
     except (TypeError, ValueError):
         number = float("nan")
-    if not np.isfinite(number):
+    if not abs(number) <= _LARGEST:
         raise InputError(f"{source}: {place}: {str(value)[:60]!r} is not a number to calculate with; correct it")
     return number

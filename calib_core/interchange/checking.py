@@ -134,7 +134,7 @@ def _miss(candidate: RigidTransform, stated: StatedCheckPoint, camera: Camera | 
         return float(np.linalg.norm(point_camera_m[0] - stated.camera_m) / (_CLOSE * np.linalg.norm(stated.camera_m)))
     if stated.pixel_px is None or camera is None:
         return float("inf")
-    apart = float(np.linalg.norm(camera.project(point_camera_m)[0] - stated.pixel_px)) / _CLOSE_PX
+    apart = float(np.hypot(*(camera.project(point_camera_m)[0] - stated.pixel_px))) / _CLOSE_PX
     return apart if np.isfinite(apart) else float("inf")
 
 

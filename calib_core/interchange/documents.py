@@ -32,12 +32,15 @@ CLICKS_SCHEMA: Final = "cocalib/clicks-1"
 PAIRS_SCHEMA: Final = "cocalib/pairs-1"
 CALIBRATION_SCHEMA: Final = "cocalib/calibration-1"
 
+Measured = Annotated[float, Meta(ge=-1e9, le=1e9)]
+"""No position, pixel or coefficient comes near the bound; it keeps what is computed from them finite."""
+Pixel = tuple[Measured, Measured]
+Position = tuple[Measured, Measured, Measured]
 Vector2 = tuple[float, float]
-Vector3 = tuple[float, float, float]
 Vector4 = tuple[float, float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 Matrix22 = tuple[Vector2, Vector2]
-Matrix33 = tuple[Vector3, Vector3, Vector3]
+Matrix33 = tuple[Position, Position, Position]
 Matrix66 = tuple[Vector6, Vector6, Vector6, Vector6, Vector6, Vector6]
 Name = Annotated[str, Meta(min_length=1, max_length=200)]
 Positive = Annotated[float, Meta(gt=0)]
@@ -56,7 +59,7 @@ class ClickDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
 
     id: Name
     image_time: TimeDocument
-    pixel_px: Vector2
+    pixel_px: Pixel
     sigma_px: Positive | None = None
     excluded: bool = False
 
@@ -75,7 +78,7 @@ class CameraDocument(Struct, frozen=True, forbid_unknown_fields=True):
     width_px: Annotated[int, Meta(ge=1)]
     height_px: Annotated[int, Meta(ge=1)]
     matrix_px: Matrix33
-    distortion: list[float] = []
+    distortion: list[Measured] = []
 
 
 class RadarDocument(Struct, frozen=True, forbid_unknown_fields=True):
@@ -89,7 +92,7 @@ class RadarDocument(Struct, frozen=True, forbid_unknown_fields=True):
 class PositionDocument(Struct, frozen=True, forbid_unknown_fields=True):
     """A tape-measured camera centre in the radar frame: forward, left, up."""
 
-    position_m: Vector3
+    position_m: Position
     sigma_m: Positive = 0.01
 
 
@@ -97,9 +100,9 @@ class PairDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_default
     """One reflector position seen by both sensors."""
 
     id: Name
-    radar_m: Vector3
-    pixel_px: Vector2
-    alternatives_radar_m: list[Vector3] = []
+    radar_m: Position
+    pixel_px: Pixel
+    alternatives_radar_m: list[Position] = []
     sigma_px: Positive | None = None
 
 
@@ -117,7 +120,7 @@ class TransformDocument(Struct, frozen=True):
     """p_target = rotation p_source + translation_m; the quaternion is the same rotation."""
 
     rotation: Matrix33
-    translation_m: Vector3
+    translation_m: Position
     quaternion_wxyz: Vector4 | None = None
 
 
@@ -142,8 +145,8 @@ class SigmaDocument(Struct, frozen=True):
 class CheckPointDocument(Struct, frozen=True):
     """A radar point and the pixel it must come out at."""
 
-    radar_m: Vector3
-    pixel_px: Vector2
+    radar_m: Position
+    pixel_px: Pixel
 
 
 class MetricsDocument(Struct, frozen=True):
@@ -163,8 +166,8 @@ class SolvedPairDocument(Struct, frozen=True):
     """One pair under the solved pose; residual_px is projected_px minus pixel_px, distance_px its length."""
 
     id: Name
-    radar_m: Vector3
-    pixel_px: Vector2
+    radar_m: Position
+    pixel_px: Pixel
     inlier: bool
     image_time: TimeDocument | None = None
     excluded: bool = False

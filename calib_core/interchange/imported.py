@@ -29,8 +29,14 @@ Direction = Literal["camera_from_radar", "radar_from_camera"]
 Axes = Literal["optical", "link"]
 
 _FEW_DIGITS = 2e-3
+_LARGEST = 1e12
 _RADAR_NAME = re.compile(r"radar|rdr|mmwave|umrr|ars\d|srr|mrr|lrr", re.IGNORECASE)
 _CAMERA_NAME = re.compile(r"cam|optical|image|rgb", re.IGNORECASE)
+
+
+def _refuse_endless(*arrays: np.ndarray) -> None:
+    if not all((np.abs(array) <= _LARGEST).all() for array in arrays):
+        raise ValueError("a number is not finite, or larger than any position or pixel")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +61,7 @@ class WrittenPose:
         shape = {"matrix": (3, 3), "rpy": (3,)}.get(self.form, (4,))
         object.__setattr__(self, "rotation", frozen_array(self.rotation, shape))
         object.__setattr__(self, "translation_m", frozen_array(self.translation_m, (3,)))
+        _refuse_endless(self.rotation, self.translation_m)
 
     def rotation_matrix(self) -> np.ndarray:
         """Return the rotation as written, as a matrix.
@@ -110,6 +117,7 @@ class StatedCheckPoint:
             object.__setattr__(self, "camera_m", frozen_array(self.camera_m, (3,)))
         if self.pixel_px is not None:
             object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+        _refuse_endless(*(part for part in (self.radar_m, self.camera_m, self.pixel_px) if part is not None))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -91,7 +91,7 @@ def refusal(read: Callable[..., object], *given: object) -> str:
 
 
 @pytest.mark.parametrize("name", [known.name for known in FORMATS])
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(pose=poses(), camera=cameras(), frames=frame_names())
 def test_a_pose_comes_back_from_every_format_bit_for_bit_or_nearly(name, pose, camera, frames):
     file = file_of(pose, camera, frames)
@@ -164,8 +164,7 @@ def test_clicks_come_back(clicks):
 @given(pose=poses(), camera=cameras(), values=st.lists(st.floats(allow_subnormal=False), min_size=9, max_size=9))
 def test_whatever_a_calibration_holds_the_file_is_json_and_reads_back_the_same(pose, camera, values):
     a, b, c, d, e, f, g, h, i = values
-    finite = [x if math.isfinite(x) else 1.0 for x in (a, b, c)]
-    assume(all(abs(x) < 1e150 for x in finite))
+    finite = [x if abs(x) < 1e9 else 1.0 for x in (a, b, c)]
     pairs = (
         PairResult(
             "p",
@@ -230,7 +229,7 @@ JSON_VALUES = st.recursive(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     content=JSON_VALUES, schema=st.sampled_from(["cocalib/pairs-1", "cocalib/clicks-1", "cocalib/calibration-1", None])
 )
@@ -244,7 +243,7 @@ def test_any_json_is_read_or_refused_in_one_line(content, schema):
         assert "\n" not in refused
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     data=st.binary(max_size=60) | st.text(max_size=60).map(str.encode),
     start=st.sampled_from([b"", b"PK\x03\x04", b"MATLAB 5.0 ", b"<launch>", b"%YAML:1.0\n", b"{", b"K: ", b"cam0:\n "]),
@@ -273,7 +272,7 @@ def test_a_damaged_file_is_read_or_refused(name, place, junk, cut):
     assert not refused or refused.startswith("file: ")
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(pose=poses(), edit=st.sampled_from(["direction", "axes", "translation", "rotation"]))
 def test_a_slip_is_never_passed_over(pose, edit):
     file = file_of(pose, Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])))
@@ -298,6 +297,7 @@ def test_a_slip_is_never_passed_over(pose, edit):
     assert all(finding.code not in ("check-point-missed", "disagrees") for finding in explained)
 
 
+@settings(max_examples=40, deadline=None)
 @given(
     value=st.recursive(
         st.none() | st.integers(-(2**53), 2**53) | st.floats() | st.text(),

@@ -227,13 +227,13 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
     calibration = file.calibration
     expected = compare(imported(file), read_any(text_of(file, "tf2"))).pixels
     squares = []
-    for _ in range(200):
+    for _ in range(120):
         error = rng.multivariate_normal(np.zeros(6), calibration.covariance)
         pose = dataclasses.replace(calibration, camera_from_radar=calibration.camera_from_radar.perturbed(error))
         other = compare(imported(file), imported(dataclasses.replace(file, calibration=pose)))
         squares.append([at.rms_px**2 for at in other.pixels])
 
-    np.testing.assert_allclose(np.sqrt(np.mean(squares, axis=0)), [at.sigma_px for at in expected], rtol=0.12)
+    np.testing.assert_allclose(np.sqrt(np.mean(squares, axis=0)), [at.sigma_px for at in expected], rtol=0.15)
 
 
 @pytest.mark.parametrize(
