@@ -1,11 +1,15 @@
 """Placements from the radar alone."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
+from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs, time_from_parts
 from calib_core.options import GatingOptions
 from calib_core.placements import Placement, find_placements
+from calib_core.recordings import open_recording
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.scans import SimulatedPlacement, simulate_scans
 
@@ -39,10 +43,13 @@ def found_in(*dwells: tuple[float, float, tuple[float, float, float], float]) ->
 
 
 def is_of(placement: Placement, truth: SimulatedPlacement) -> bool:
-    overlap = min(placement.end, truth.end) - max(placement.start, truth.start)
-    range_m = float(np.linalg.norm(truth.position_radar_m))
-    apart_m = float(np.linalg.norm(placement.position_radar_m - truth.position_radar_m))
-    return overlap > 0.5 * (truth.end - truth.start) and apart_m < 0.06 + 0.06 * range_m
+    return rests_at(placement, truth.start, truth.end, truth.position_radar_m)
+
+
+def rests_at(placement: Placement, start: TimeNs, end: TimeNs, position_radar_m: np.ndarray) -> bool:
+    overlap = min(placement.end, end) - max(placement.start, start)
+    apart_m = float(np.linalg.norm(placement.position_radar_m - position_radar_m))
+    return overlap > 0.5 * (end - start) and apart_m < 0.06 + 0.06 * float(np.linalg.norm(position_radar_m))
 
 
 @pytest.mark.parametrize(
@@ -63,6 +70,17 @@ def test_nearly_all_simulated_placements_are_found_and_nearly_nothing_else(optio
     assert len(found) - hits <= 1
     assert list(found) == sorted(found, key=lambda placement: placement.start)
     assert all(0.0 < placement.score <= 1.0 for placement in found)
+
+
+def test_all_placements_of_the_sample_recording_are_found_and_nothing_else(project_root: Path) -> None:
+    folder = project_root / "sample_data" / "rooftop"
+    with open_recording([folder / "camera.bag", folder / "radar.bag"]) as recording:
+        found = find_placements(recording.radar_scans(), GatingOptions())
+    truth = json.loads((folder / "truth.json").read_text(encoding="utf-8"))["placements"]
+    assert len(found) == len(truth)
+    for placement, true in zip(found, truth, strict=True):
+        start, end = (time_from_parts(**true[key]) for key in ("start", "end"))
+        assert rests_at(placement, start, end, np.array(true["position_radar_m"]))
 
 
 def test_a_dwell_is_found_with_its_times_and_its_place() -> None:
