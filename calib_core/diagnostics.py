@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Flags
-from calib_core.consensus import Consensus, associate, find_consensus, log_odds_of
+from calib_core.consensus import Consensus, associate, find_consensus, log_odds_of, mixture_cost
 from calib_core.evidence import Evidence
 from calib_core.geometry import RigidTransform
 from calib_core.initial_pose import starting_poses
 from calib_core.locating import CLUSTER_SCALE
 from calib_core.radar import cartesian_from_polar, direction_cosines
-from calib_core.refining import Refined
+from calib_core.refining import Refined, refine
 from calib_core.results import Caution
 from calib_core.uncertainty import LeftOut, PoseUncertainty
 
@@ -89,12 +89,17 @@ def handedness(evidence: Evidence, best: Consensus, *, estimate_scale: bool, see
     A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be told by its residuals:
     placements on the ground fit a camera mirrored below the ground just as well. Only what is known of the camera
     position, or placements at varied heights, tell the two apart. The 24 right-handed conventions need no test: they are
-    rotations, and the pose absorbs them.
+    rotations, and the pose absorbs them. Each hand is fitted with its own noise level.
     """
     mirrored = evidence.mirrored()
     starts = starting_poses(mirrored, most=_MIRROR_STARTS, rng=np.random.default_rng(seed))
     found = find_consensus(mirrored, starts, estimate_scale=estimate_scale)
-    return best.cost - found[0].cost if found else -np.inf
+    if not found:
+        return -np.inf
+    plain, other = (
+        refine(pairs, start, estimate_scale=estimate_scale) for pairs, start in ((evidence, best), (mirrored, found[0]))
+    )
+    return mixture_cost(plain.evidence, plain.camera_from_radar) - mixture_cost(other.evidence, other.camera_from_radar)
 
 
 def _mirrored_axes(f: Findings) -> list[Caution]:

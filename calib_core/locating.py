@@ -80,16 +80,18 @@ def clusters_of(window: RadarScans, *, most: int) -> tuple[Cluster, ...]:
     amplitude = _amplitudes(window.snr_db)
     free = np.ones(len(steps), dtype=bool)
     cells, mass = _cells(steps, amplitude)
+    neighbours = ((cells[:, None] - cells[None]) ** 2).sum(axis=2) <= _SAME_PLACE**2
     clusters: list[Cluster] = []
     while len(clusters) < most and mass.any():
-        centre = _mean_shifted(_densest(cells, mass), steps, np.where(free, amplitude, 0.0))
+        densest = int(np.argmax(np.where(mass > 0, neighbours @ mass, 0.0)))
+        around = neighbours[densest] * mass
+        centre = _mean_shifted(around @ cells / around.sum(), steps, np.where(free, amplitude, 0.0))
         members = free & _near(steps, centre, _REACH)
         mass = np.where(_near(cells, centre, _REACH), 0.0, mass)
-        if not members.any():
-            mass[np.argmax(mass)] = 0.0
-            continue
-        free &= ~members
-        clusters.append(_cluster(window, steps, amplitude, members))
+        mass[densest] = 0.0
+        if members.any():
+            free &= ~members
+            clusters.append(_cluster(window, steps, amplitude, members))
     return tuple(clusters)
 
 
@@ -111,17 +113,9 @@ def _cells(steps: Points3, amplitude: Values) -> tuple[Points3, Values]:
     return means[heaviest], mass[heaviest]
 
 
-def _densest(cells: Points3, mass: Values) -> Vector3:
-    """Return the mean of the neighbourhood with the most mass."""
-    alive = np.flatnonzero(mass)
-    squared = ((cells[alive, None] - cells[None, alive]) ** 2).sum(axis=2)
-    neighbours = (squared <= _SAME_PLACE**2) * mass[alive]
-    best = neighbours[int(np.argmax(neighbours.sum(axis=1)))]
-    return np.asarray(best @ cells[alive] / best.sum())
-
-
 def _near(steps: Points3, centre: Vector3, reach: float) -> Flags:
-    return np.asarray(((steps - centre) ** 2).sum(axis=1) <= reach**2)
+    away = steps - centre
+    return np.asarray(np.einsum("ij,ij->i", away, away) <= reach**2)
 
 
 def _mean_shifted(centre: Vector3, steps: Points3, weight: Values) -> Vector3:
