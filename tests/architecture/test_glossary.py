@@ -1,0 +1,27 @@
+"""The glossary can be looked things up in."""
+
+import re
+from pathlib import Path
+
+_ENTRY = re.compile(r"^\*\*(.+?)\*\*", re.MULTILINE)
+
+
+def test_every_term_says_what_to_avoid_and_stands_in_its_place(project_root: Path) -> None:
+    entries = [
+        block
+        for block in (project_root / "GLOSSARY.md").read_text(encoding="utf-8").split("\n\n")
+        if _ENTRY.match(block)
+    ]
+    terms = [match[1] for block in entries if (match := _ENTRY.match(block))]
+    assert {"click", "scan", "return", "reflector", "placement", "pair", "candidate", "calibration"} <= set(terms)
+    assert [block for block in entries if "*Avoid:*" not in block] == []
+    assert terms == sorted(terms, key=str.casefold)
+
+
+def test_every_link_of_the_convention_pages_leads_to_a_file(project_root: Path) -> None:
+    for page in ("GLOSSARY.md", "docs/conventions.md", "docs/paper.md"):
+        text = (project_root / page).read_text(encoding="utf-8")
+        targets = [target for target in re.findall(r"\]\(([^)#:]+)\)", text) if target != "accuracy.md"]
+        assert [target for target in targets if not (project_root / page).parent.joinpath(target).is_file()] == []
+        quoted = re.findall(r"`(tests/[\w/.]+)`", text)
+        assert [name for name in quoted if not (project_root / name).exists()] == []
