@@ -87,7 +87,7 @@ def test_an_id_that_was_undone_is_not_given_again() -> None:
         ClickPlaced(frame_time(1), 1.0, 1.0),
         Undo(),
         ClickPlaced(frame_time(2), 1.0, 1.0),
-        ClickPlaced(frame_time(3), 1, 1),
+        ClickPlaced(frame_time(3), 1.0, 1.0),
     )
     assert [click.id for click in history.present.clicks] == ["c2", "c3"]
 

@@ -246,7 +246,15 @@ def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings(
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(12.4321, "12.4"), (0.0314159, "0.0314"), (1234.6, "1235"), (99.96, "100"), (0, "0"), (-5.5, "-5.50"), (NAN, "–")],
+    [
+        (12.4321, "12.4"),
+        (0.0314159, "0.0314"),
+        (1234.6, "1235"),
+        (99.96, "100"),
+        (0.0, "0"),
+        (-5.5, "-5.50"),
+        (NAN, "–"),
+    ],
 )
 def test_a_plain_number_has_three_digits_that_count(value: float, text: str) -> None:
     assert plain(value) == text
