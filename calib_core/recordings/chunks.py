@@ -6,25 +6,21 @@ chunks stored as they are, only the bytes asked for are read.
 
 import threading
 from collections import OrderedDict
-from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.compression import unpack
+from calib_core.recordings.compression import unpack, unpack_what_is_there
 from calib_core.recordings.files import FileBytes
+from calib_core.recordings.gathering import gather_heads
 from calib_core.recordings.sources import Channel, Heads, MessageIndex
 from calib_core.results import Caution
 
-__all__ = ["CACHE_BYTES", "Chunk", "ChunkedSource", "MessageIndex"]
+__all__ = ["CACHE_BYTES", "Chunk", "ChunkedSource"]
 
 CACHE_BYTES = 64 * 2**20
-_COALESCE_BYTES = 4096
-_THREADS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +58,8 @@ class ChunkedSource:
         self.channels: tuple[Channel, ...] = ()
         self.cautions: tuple[Caution, ...] = ()
         self.indexes: dict[int, MessageIndex] = {}
+        self.recovered = False
+        """The file was not closed; its chunks may be cut off."""
         self._cache: OrderedDict[int, bytes] = OrderedDict()
         self._cache_bytes = 0
         self._lock = threading.Lock()
@@ -154,75 +152,19 @@ class ChunkedSource:
     def _unpack(self, chunk: int) -> bytes:
         where = self.chunks[chunk]
         data = self.file.at(where.position, where.stored_bytes)
+        if self.recovered:
+            return unpack_what_is_there(data, where.compression, where.size_bytes)
         place = f"{self.path}: chunk {chunk} at byte {where.position}"
         return unpack(data, where.compression, where.size_bytes, where=place)
 
+    def in_memory(self, chunk: int) -> bytes | None:
+        """Return a packed chunk unpacked, without passing it through the cache; None for one stored as it is."""
+        if not self.chunks[chunk].packed:
+            return None
+        with self._lock:
+            cached = self._cache.get(chunk)
+        return cached if cached is not None else self._unpack(chunk)
+
     def heads(self, index: MessageIndex, size: int) -> Heads:
-        """Read the first bytes of many messages.
-
-        Of chunks stored as they are only the records' heads are read, neighbours in one go; packed chunks are each
-        unpacked once, in several threads, without passing through the cache.
-        """
-        rows = np.zeros((len(index), size), dtype=np.uint8)
-        lengths = np.zeros(len(index), dtype=np.int64)
-        groups = list(_groups(index.chunk))
-        with ThreadPoolExecutor(_THREADS) as pool:
-            jobs = [
-                pool.submit(self._fill, int(index.chunk[group[0]]), index, group, rows, lengths) for group in groups
-            ]
-            for job in jobs:
-                job.result()
-        return Heads(rows, lengths)
-
-    def _fill(self, chunk: int, index: MessageIndex, group: np.ndarray, rows: np.ndarray, lengths: np.ndarray) -> None:
-        """Fill the rows of the messages that lie in one chunk."""
-        order = group[np.argsort(index.offset[group], kind="stable")]
-        offsets = index.offset[order]
-        span = self.lead_bytes + rows.shape[1]
-        if self.chunks[chunk].packed:
-            whole = self._cache.get(chunk) or self._unpack(chunk)
-            runs: Iterable[tuple[int, int, bytes]] = [(0, len(order), whole)]
-            bases = np.zeros(len(order), dtype=np.int64)
-        else:
-            cuts = np.flatnonzero(np.diff(offsets) > span + _COALESCE_BYTES) + 1
-            edges = [0, *cuts.tolist(), len(order)]
-            bases = np.repeat(offsets[edges[:-1]], np.diff(edges))
-            runs = (
-                (a, b, self.piece(chunk, int(offsets[a]), int(offsets[b - 1] - offsets[a]) + span))
-                for a, b in pairwise(edges)
-            )
-        for first, last, data in runs:
-            self._fill_run(chunk, order[first:last], offsets[first:last], data, int(bases[first]), rows, lengths)
-
-    def _fill_run(
-        self,
-        chunk: int,
-        order: np.ndarray,
-        offsets: np.ndarray,
-        data: bytes,
-        base: int,
-        rows: np.ndarray,
-        lengths: np.ndarray,
-    ) -> None:
-        size = rows.shape[1]
-        buffer = np.frombuffer(data, dtype=np.uint8)
-        if not len(buffer):
-            raise RecordingError(f"{self.path}: chunk {chunk} is shorter than its index says; the file is damaged")
-        reach = (offsets - base)[:, None] + np.arange(self.lead_bytes + size)
-        gathered = buffer[np.minimum(reach, len(buffer) - 1)]
-        usual, found = self.usual(gathered[:, : self.lead_bytes])
-        rows[order] = gathered[:, self.lead_bytes :]
-        lengths[order] = found
-        for place in np.flatnonzero(~usual):
-            start, length = self.locate(chunk, int(offsets[place]))
-            head = self.piece(chunk, start, min(size, length))
-            rows[order[place], : len(head)] = np.frombuffer(head, dtype=np.uint8)
-            lengths[order[place]] = length
-
-
-def _groups(chunk: np.ndarray) -> Iterable[np.ndarray]:
-    """Return, chunk by chunk, the rows of the index that lie in it."""
-    if not len(chunk):
-        return []
-    order = np.argsort(chunk, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(chunk[order])) + 1)
+        """Read the first bytes of many messages, in the order of the index."""
+        return gather_heads(self, index, size)

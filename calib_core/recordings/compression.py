@@ -6,10 +6,13 @@ from typing import Protocol
 
 from calib_core.errors import RecordingError
 
-__all__ = ["MAX_CHUNK_BYTES", "unpack", "unpack_message"]
+__all__ = ["MAX_CHUNK_BYTES", "unpack", "unpack_message", "unpack_what_is_there"]
 
 MAX_CHUNK_BYTES = 1 << 30
 """Recorders write chunks of about 1 MB; one that declares more than 1 GiB is damaged or made to harm."""
+
+
+_PIECE_BYTES = 1 << 12
 
 
 class _Unpacker(Protocol):
@@ -54,6 +57,32 @@ def unpack(data: bytes, kind: str, size: int, *, where: str) -> bytes:
             f"{where}: a {kind} chunk holds {size - left} bytes, but declares {size}; the file is damaged: copy it again"
         )
     return parts[0] if len(parts) == 1 else b"".join(parts)
+
+
+def unpack_what_is_there(data: bytes, kind: str, size: int) -> bytes:
+    """Decompress a chunk that may be cut off or damaged; return the bytes before the damage.
+
+    Args:
+        data: the compressed bytes there are.
+        kind: as for unpack; of an unknown kind nothing can be had.
+        size: how many bytes it declares to hold.
+    """
+    if kind in ("", "none"):
+        return data
+    if kind not in ("bz2", "lz4", "zstd"):
+        return b""
+    unpacker = _unpacker(kind, "")
+    parts: list[bytes] = []
+    left = size
+    try:
+        for place in range(0, len(data), _PIECE_BYTES):
+            if unpacker.eof or left <= 0:
+                break
+            parts.append(unpacker.decompress(data[place : place + _PIECE_BYTES], max_length=left))
+            left -= len(parts[-1])
+    except (OSError, RuntimeError, ValueError, EOFError, _zstd_error()):
+        pass  # what came out before is all there is
+    return b"".join(parts)
 
 
 def unpack_message(data: bytes, *, where: str) -> bytes:

@@ -138,7 +138,9 @@ class McapSource(ChunkedSource):
             return
         for kind, _, record in self._records(self.file.at(start + length, index_bytes), start + length):
             if kind == _MESSAGE_INDEX:
-                channel, size = struct.unpack_from("<HI", record)
+                channel, size = struct.unpack_from("<HI", record.ljust(6, b"\xff"))
+                if len(record) < 6 + size:
+                    raise self._damaged(start + length)
                 entries = np.frombuffer(record, dtype=_INDEX_ENTRY, count=size // _INDEX_ENTRY.itemsize, offset=6)
                 self._note(channel, number, entries["time"].astype(np.int64), entries["offset"].astype(np.int64))
 
@@ -225,7 +227,7 @@ class McapSource(ChunkedSource):
         """Return where the message itself begins, and its length."""
         head = self.piece(chunk, offset, _RECORD.size)
         kind, size = _RECORD.unpack(head) if len(head) == _RECORD.size else (0, 0)
-        if kind != _MESSAGE or size < _MESSAGE_HEAD.size:
+        if kind != _MESSAGE or not _MESSAGE_HEAD.size <= size <= _MAX_RECORD_BYTES:
             raise RecordingError(
                 f"{self.path}: no message where the index says (chunk {chunk}, byte {offset}); the file is damaged: "
                 f"mcap recover {self.path.name}"
@@ -235,7 +237,7 @@ class McapSource(ChunkedSource):
     def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Recognise message records; all of them are alike."""
         sizes = np.ascontiguousarray(rows[:, 1:9]).view("<i8")[:, 0] - _MESSAGE_HEAD.size
-        return (rows[:, 0] == _MESSAGE) & (sizes >= 0), sizes
+        return (rows[:, 0] == _MESSAGE) & (sizes >= 0) & (sizes <= _MAX_RECORD_BYTES), sizes
 
 
 def _string(data: bytes, place: int) -> tuple[str, int]:

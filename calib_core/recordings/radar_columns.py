@@ -147,6 +147,11 @@ def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Retur
         plan: which columns to use.
         column: gives a column by the driver's name.
     """
+    with np.errstate(invalid="ignore"):  # damaged bytes may hold signalling NaN
+        return _returns(plan, column)
+
+
+def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     parts = [np.asarray(column(name), dtype=np.float64) for name in plan.position]
     if len(parts) == 2:
         parts.append(np.zeros_like(parts[0]))

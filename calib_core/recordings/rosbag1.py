@@ -9,7 +9,9 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.chunks import Chunk, ChunkedSource
+from calib_core.recordings.rosbag1_recovery import fields_of, scan_bag
 from calib_core.recordings.sources import Channel, MessageIndex
+from calib_core.results import Caution
 
 if TYPE_CHECKING:
     from calib_core.recordings.files import FileBytes
@@ -37,17 +39,45 @@ class Rosbag1Source(ChunkedSource):
         if not magic or magic.groups() != (b"2", b"0"):
             version = ".".join(part.decode() for part in magic.groups()) if magic else "?"
             raise RecordingError(f"{file.path}: a ROS 1 bag of version {version}; only 2.0 can be read: rosbag migrate")
-        header, _ = self._record(magic.end(), _BAG_HEADER)
+        header, after = self._record(magic.end(), _BAG_HEADER)
         if header.get("encryptor"):
             raise RecordingError(f"{file.path}: the bag is encrypted; decrypt it first: rosbag decrypt")
         index_position = _number(header.get("index_pos", b""), 8)
-        if not 0 < index_position <= file.size_bytes:
-            raise RecordingError(
-                f"{file.path}: the bag was not closed properly and has no index (recorder killed, or copy cut short); "
-                f"repair it first: rosbag reindex {file.path.name}"
-            )
-        infos = self._read_tail(index_position)
-        self._read_indexes(sorted(infos), index_position)
+        try:
+            if not 0 < index_position <= file.size_bytes:
+                raise RecordingError(
+                    f"{file.path}: the bag was not closed properly and has no index (recorder killed, or copy cut short); "
+                    f"repair it first: rosbag reindex {file.path.name}"
+                )
+            infos = self._read_tail(index_position)
+            self._read_indexes(sorted(infos), index_position)
+        except RecordingError as fault:
+            self._recover(after[0] + after[1], fault)
+
+    def _recover(self, start: int, fault: RecordingError) -> None:
+        """Index a bag that has no index, or a damaged one, by walking over all of it."""
+        found = scan_bag(self.file, start)
+        if not found.messages:
+            raise fault
+        self.recovered = True
+        self.chunks = found.chunks
+        channels = [self._channel(fields, data, 0) for fields, data in found.connections.values()]
+        self.channels = tuple(channels)
+        self.indexes = {}
+        for connection, entries in found.messages.items():
+            columns = np.array(entries, dtype=np.int64)
+            self.note_index(connection, MessageIndex.sorted_from(columns[:, 0], columns[:, 1], columns[:, 2]))
+        count = sum(map(len, found.messages.values()))
+        lost = self.size_bytes - found.kept_bytes
+        self.cautions = (
+            Caution(
+                "not-closed",
+                f"{self.path.name} has no usable index (it was not closed properly, or cut short): {count} whole messages "
+                f"were found by reading all of it"
+                + (f"; the last {lost} bytes could not be understood" if lost else ""),
+                f"check that what you need is there; rosbag reindex {self.path.name} makes opening fast again",
+            ),
+        )
 
     # -- opening
 
@@ -57,7 +87,7 @@ class Rosbag1Source(ChunkedSource):
         if length > _MAX_HEADER_BYTES:
             raise self._damaged(position)
         raw = self.file.at(position + 4, length + 4)
-        fields = _fields(raw[:length])
+        fields = fields_of(raw[:length])
         if fields is None or (expected is not None and _number(fields.get("op", b""), 1) != expected):
             raise self._damaged(position)
         return fields, (position + 8 + length, _U32.unpack_from(raw, length)[0])
@@ -85,7 +115,7 @@ class Rosbag1Source(ChunkedSource):
         return infos
 
     def _channel(self, header: dict[str, bytes], data: bytes, position: int) -> Channel:
-        fields = _fields(data)
+        fields = fields_of(data)
         if fields is None or "conn" not in header:
             raise self._damaged(position)
         return Channel(
@@ -144,7 +174,7 @@ class Rosbag1Source(ChunkedSource):
                 head = self.piece(chunk, offset, length + 8)
             if length + 8 > len(head):
                 break
-            fields = _fields(head[4 : 4 + length])
+            fields = fields_of(head[4 : 4 + length])
             size = _U32.unpack_from(head, 4 + length)[0]
             kind = _number(fields.get("op", b""), 1) if fields else 0
             if kind == _MESSAGE:
@@ -166,20 +196,6 @@ class Rosbag1Source(ChunkedSource):
             return np.zeros(len(rows), dtype=bool), words[:, 1].astype(np.int64)
         usual &= (rows[:, mark : mark + 4] == np.frombuffer(b"op=\x02", dtype=np.uint8)).all(axis=1)
         return usual, words[:, 1].astype(np.int64)
-
-
-def _fields(raw: bytes) -> dict[str, bytes] | None:
-    """Split a record header into its name=value fields; None where it is not one."""
-    fields: dict[str, bytes] = {}
-    place = 0
-    while place + 4 <= len(raw):
-        length = _U32.unpack_from(raw, place)[0]
-        name, equals, value = raw[place + 4 : place + 4 + length].partition(b"=")
-        if not equals or place + 4 + length > len(raw):
-            return None
-        fields[name.decode("ascii", "replace")] = value
-        place += 4 + length
-    return fields if place == len(raw) else None
 
 
 def _number(value: bytes, size: int) -> int:

@@ -69,11 +69,13 @@ class Heads:
 
     Attributes:
         rows: (n, size) uint8; bytes past a message's end mean nothing.
-        lengths: (n,) how long each message is.
+        lengths: (n,) how long each message is; -1 for one that cannot be read.
+        fault: why the first of those cannot be read; "" without any.
     """
 
     rows: np.ndarray
     lengths: TimesNs
+    fault: str = ""
 
 
 class Source(Protocol):

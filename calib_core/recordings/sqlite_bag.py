@@ -116,11 +116,16 @@ class SqliteSource:
         lengths = np.zeros(len(index), dtype=np.int64)
         small = not self._packed and self._mean_bytes(index) < _SMALL_BYTES
         found = self._short_heads(index, size) if small else {}
+        fault = ""
         for place, number in enumerate(index.chunk.tolist()):
-            head, length = found[number] if number in found else self._head(number, size)
+            try:
+                head, length = found[number] if number in found else self._head(number, size)
+            except RecordingError as error:
+                lengths[place], fault = -1, fault or str(error)
+                continue
             rows[place, : len(head)] = np.frombuffer(head, dtype=np.uint8)
             lengths[place] = length
-        return Heads(rows, lengths)
+        return Heads(rows, lengths, fault)
 
     def _mean_bytes(self, index: MessageIndex) -> float:
         if not len(index):

@@ -12,7 +12,7 @@ from calib_core.errors import MessageError
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.recordings.images import EncodedImage, ImageLayout
 from calib_core.recordings.radar_columns import Returns, no_returns
-from calib_core.recordings.radar_layouts import ScanLayout
+from calib_core.recordings.radar_layouts import RadarLayout, ScanLayout
 from calib_core.recordings.radar_lists import PointLayout, first_of_scans
 from calib_core.recordings.topics import Topic
 
@@ -32,14 +32,16 @@ class RadarStream:
     """
 
     def __init__(self, topic: Topic, layouts: Sequence[ScanLayout] | Sequence[PointLayout], stamps_ns: TimesNs) -> None:
-        self._topic = topic
+        self.topic = topic
+        self.layout: RadarLayout = layouts[0]
+        """Of the first part; all parts of a driver that sends one return per message share it."""
         self._layouts = layouts
         self._blocks: OrderedDict[int, RadarScans] = OrderedDict()
         self._lock = threading.Lock()
         self.unreadable: Mapping[int, str] = {}
         first = np.arange(len(topic))
-        if isinstance(layouts[0], PointLayout):
-            first = self._group(layouts[0], stamps_ns)
+        if isinstance(self.layout, PointLayout):
+            first = self._group(self.layout, stamps_ns)
         order = np.argsort(stamps_ns[first], kind="stable")
         last = np.append(first[1:], len(topic))
         self._first, self._last = first[order], last[order]
@@ -50,7 +52,7 @@ class RadarStream:
         numbers: list[np.ndarray | None] = [None, None]
         if any(names):
             reach = max(layout.offset_after(name) for name in names if name)
-            rows = self._topic.heads(np.arange(len(self._topic)), reach).rows
+            rows = self.topic.heads(np.arange(len(self.topic)), reach).rows
             numbers = [layout.column(rows, name) if name else None for name in names]
         return first_of_scans(stamps_ns, *numbers)
 
@@ -85,7 +87,7 @@ class RadarStream:
                 self._blocks.move_to_end(number)
                 return self._blocks[number]
         rows = slice(number * _BLOCK_SCANS, min((number + 1) * _BLOCK_SCANS, len(self.times_ns)))
-        layout = self._layouts[0]
+        layout = self.layout
         block = self._decode_points(layout, rows) if isinstance(layout, PointLayout) else self._decode_scans(rows)
         with self._lock:
             self._blocks[number] = block
@@ -99,10 +101,10 @@ class RadarStream:
 
     def _returns(self, message: int) -> Returns:
         """Decode one message; one that cannot be read is an empty scan, and is told."""
-        layout = self._layouts[int(self._topic.part[message])]
+        layout = self._layouts[int(self.topic.part[message])]
         assert not isinstance(layout, PointLayout)
         try:
-            return layout.returns(self._topic.payload(message))
+            return layout.returns(self.topic.payload(message))
         except MessageError as error:
             self.unreadable = {**self.unreadable, message: str(error)}
             return no_returns()
@@ -112,7 +114,7 @@ class RadarStream:
         if not len(counts):
             return RadarScans()
         messages = np.concatenate([np.arange(a, b) for a, b in zip(self._first[rows], self._last[rows], strict=True)])
-        heads = self._topic.heads(messages, layout.dtype.itemsize)
+        heads = self.topic.heads(messages, layout.dtype.itemsize)
         short = heads.lengths < layout.dtype.itemsize
         returns = layout.returns_of_rows(heads.rows)
         if short.any():

@@ -1,6 +1,6 @@
 """Topics: the same name joined over all files, and what each can be used for."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -9,13 +9,14 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.camera_info import is_camera_info
+from calib_core.recordings.decoding import Message, decode
 from calib_core.recordings.definitions import Definition, definition_of
 from calib_core.recordings.images import ImageLayout, is_compressed_image, is_raw_image
 from calib_core.recordings.radar_layouts import RadarLayout, recognise
 from calib_core.recordings.sources import Channel, Heads, MessageIndex, Source
 from calib_core.results import Caution
 
-__all__ = ["Rhythm", "Topic", "TopicKind", "TopicSummary", "Usage", "join_topics", "usage_of"]
+__all__ = ["Rhythm", "StampedTopic", "Topic", "TopicKind", "TopicSummary", "Usage", "join_topics", "usage_of"]
 
 TopicKind = Literal["radar", "image", "camera-info", "other"]
 
@@ -126,35 +127,76 @@ class Topic:
         source = self.parts[int(self.part[row])][0]
         return source.read(int(self.chunk[row]), int(self.offset[row]))
 
+    def message(self, row: int) -> Message:
+        """Read and decode one message."""
+        return decode(self.definition(int(self.part[row])), self.payload(row))
+
     def heads(self, rows: np.ndarray, size: int) -> Heads:
         """Read the first bytes of many messages, in the order of rows."""
         out = np.zeros((len(rows), size), dtype=np.uint8)
         lengths = np.zeros(len(rows), dtype=np.int64)
         parts = self.part[rows]
+        fault = ""
         for number, (source, _) in enumerate(self.parts):
             mine = np.flatnonzero(parts == number)
             if len(mine):
                 at = rows[mine]
                 heads = source.heads(MessageIndex(self.receive_ns[at], self.chunk[at], self.offset[at]), size)
                 out[mine], lengths[mine] = heads.rows, heads.lengths
-        return Heads(out, lengths)
+                fault = fault or heads.fault
+        return Heads(out, lengths, fault)
 
-    def header_stamps(self) -> TimesNs | None:
-        """Read the stamp each message begins with; None where its type begins with none."""
+    def take(self, rows: np.ndarray) -> "Topic":
+        """Keep the given messages."""
+        return replace(
+            self,
+            part=self.part[rows],
+            receive_ns=self.receive_ns[rows],
+            chunk=self.chunk[rows],
+            offset=self.offset[rows],
+        )
+
+    def stamped(self) -> "StampedTopic":
+        """Read the stamp each message begins with; messages that cannot be read are left out, and why is told."""
+        if not len(self):
+            return StampedTopic(self, None)
+        heads = self.heads(np.arange(len(self)), 12)
+        readable = heads.lengths >= 0
+        topic = self if readable.all() else self.take(np.flatnonzero(readable))
+        stamps = topic._stamps(heads.rows[readable])
+        return StampedTopic(topic, stamps, int(np.count_nonzero(~readable)), heads.fault)
+
+    def _stamps(self, heads: np.ndarray) -> TimesNs | None:
         offsets = [self.definition(number).stamp_offset for number in range(len(self.parts))]
-        if any(offset is None for offset in offsets) or not len(self):
+        if any(offset is None for offset in offsets):
             return None
-        heads = self.heads(np.arange(len(self)), 12).rows
         starts = np.array(offsets, dtype=np.int64)[self.part]
         words = np.take_along_axis(heads, starts[:, None] + np.arange(8), axis=1)
         big = self._big_endian(heads)
         words[big] = words[big][:, [3, 2, 1, 0, 7, 6, 5, 4]]
         pairs = np.ascontiguousarray(words).view("<u4").astype(np.int64)
-        return pairs[:, 0] * 1_000_000_000 + pairs[:, 1]
+        return pairs[:, 0] * NS_PER_S + pairs[:, 1]
 
     def _big_endian(self, heads: np.ndarray) -> np.ndarray:
         cdr = np.array([channel.encoding == "cdr" for _, channel in self.parts])[self.part]
         return np.asarray(cdr & (heads[:, 1] == 0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StampedTopic:
+    """The messages of a topic that can be read, with their stamps.
+
+    Attributes:
+        topic: without the messages that cannot be read.
+        header_ns: (n,) None where the type begins with no stamp.
+        lost: how many messages cannot be read.
+        fault: why the first of them cannot.
+    """
+
+    topic: Topic
+    header_ns: TimesNs | None
+    lost: int = 0
+    fault: str = ""
 
 
 def join_topics(sources: tuple[Source, ...]) -> tuple[tuple[Topic, ...], tuple[Caution, ...]]:
@@ -214,24 +256,34 @@ class Usage:
 
 
 def usage_of(topic: Topic) -> Usage:
-    """Find out what a topic can be used for, by its definition and its first message."""
-    kind: TopicKind = "other"
+    """Find out what a topic can be used for, by its definition and its first message that can be read."""
     try:
         definition = topic.definition()
-        if is_camera_info(definition):
-            return Usage("camera-info")
-        if is_raw_image(definition) or is_compressed_image(definition):
-            kind = "image"
-            layout = ImageLayout(definition, topic.name)
-            if len(topic):
-                layout.check(topic.payload(0))
-            return Usage("image", image=layout, problem=None if len(topic) else "no messages")
-        if len(topic):
-            kind = "radar" if "radar" in topic.name.lower() else "other"
-            radar = recognise(definition, topic.payload(0))
-            return Usage("radar", radar=radar) if radar is not None else Usage("other")
     except MessageError as error:
-        return Usage(kind, problem=str(error))
-    except RecordingError as error:
-        return Usage(kind, problem=f"its first message cannot be read: {error}")
-    return Usage("other", problem="no messages")
+        return Usage("other", problem=str(error))
+    if is_camera_info(definition):
+        return Usage("camera-info")
+    pictures = is_raw_image(definition) or is_compressed_image(definition)
+    usage = Usage("image" if pictures else "other", problem="no messages")
+    for row in sorted({0, len(topic) // 2, len(topic) - 1}) if len(topic) else ():
+        try:
+            payload = topic.payload(row)
+            return _image_usage(topic, definition, payload) if pictures else _radar_usage(definition, payload)
+        except MessageError as error:
+            usage = usage if usage.problem != "no messages" else replace(usage, problem=str(error))
+        except RecordingError as error:
+            usage = replace(usage, problem=f"its messages cannot be read: {error}")
+    if usage.problem != "no messages" and "radar" in topic.name.lower() and not pictures:
+        return replace(usage, kind="radar")
+    return usage
+
+
+def _image_usage(topic: Topic, definition: Definition, payload: bytes) -> Usage:
+    layout = ImageLayout(definition, topic.name)
+    layout.check(payload)
+    return Usage("image", image=layout)
+
+
+def _radar_usage(definition: Definition, payload: bytes) -> Usage:
+    radar = recognise(definition, payload)
+    return Usage("other") if radar is None else Usage("radar", radar=radar)

@@ -1,0 +1,112 @@
+"""What is odd about a recording, in words: overlap, lost messages, radars that are none or flat, repeated stamps."""
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.errors import MessageError, RecordingError
+from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.recordings.calendar import utc
+from calib_core.recordings.streams import ImageStream, RadarStream
+from calib_core.recordings.topics import StampedTopic
+from calib_core.results import Caution
+
+__all__ = ["about_images", "about_lost", "about_radar", "check_overlap"]
+
+_SAMPLED_SCANS = 12
+
+
+def about_lost(name: str, count: int, stamped: StampedTopic) -> list[Caution]:
+    """Say how many messages of a topic are lost.
+
+    Raises:
+        MessageError: all of them.
+    """
+    if not stamped.lost:
+        return []
+    if not len(stamped.topic):
+        raise MessageError(f"topic {name}: none of its {count} messages can be read: {stamped.fault}")
+    return [
+        Caution(
+            "unreadable-messages",
+            f"{stamped.lost} of {count} messages of {name} cannot be read and are left out: {stamped.fault}",
+            "if they are many, copy the file again from its source",
+        )
+    ]
+
+
+def check_overlap(name: str, radar: RadarStream | None, images: ImageStream | None, *, required: bool) -> list[Caution]:
+    """Compare the intervals of both sensors.
+
+    Args:
+        name: of the recording.
+        radar: None where there is none.
+        images: likewise.
+        required: no overlap is an error.
+
+    Raises:
+        RecordingError: they have no time in common, and that is required.
+    """
+    if radar is None or images is None:
+        return []
+    a, b = radar.times_ns, images.times_ns
+    if a[0] <= b[-1] and b[0] <= a[-1]:
+        return []
+    gap_s = max(int(a[0] - b[-1]), int(b[0] - a[-1])) / NS_PER_S
+    what = (
+        f"{radar.topic.name} ({_interval(a)}) and {images.topic.name} ({_interval(b)}) have no time in common: "
+        f"{gap_s:.1f} s apart"
+    )
+    hint = "give recordings made together; if only the clocks differ, try --clock receive or --clock header"
+    if required:
+        raise RecordingError(f"{name}: {what}; {hint}")
+    return [Caution("no-overlap", what, hint)]
+
+
+def _interval(times_ns: TimesNs) -> str:
+    return f"{utc(TimeNs(int(times_ns[0])))} to {utc(TimeNs(int(times_ns[-1])))}"
+
+
+def about_radar(radar: RadarStream | None) -> list[Caution]:
+    """Say what is odd about the radar, from a dozen of its scans."""
+    if radar is None:
+        return []
+    name, layout = radar.topic.name, radar.layout
+    cautions = []
+    if layout.lidar_like:
+        cautions.append(
+            Caution(
+                "looks-like-lidar",
+                f"{name} looks like a lidar: {layout.description}",
+                "choose the radar with --radar-topic, or give the file that has it",
+            )
+        )
+    heights = [radar.scans(time, time).points_radar_m[:, 2] for time in _sample(radar.times_ns)]
+    height = np.concatenate([*heights, np.zeros(0)])
+    height = height[np.isfinite(height)]
+    if len(height) > 1 and np.all(height == height[0]):
+        cautions.append(
+            Caution(
+                "flat-radar",
+                f"{name} gives every return the same height ({height[0]:g} m): it measures no elevation",
+                "put the reflector's centre at the radar's height at every placement, and measure the camera position",
+            )
+        )
+    return cautions
+
+
+def _sample(times_ns: TimesNs) -> list[TimeNs]:
+    count = min(_SAMPLED_SCANS, len(times_ns))
+    return [TimeNs(int(times_ns[place])) for place in np.linspace(0, len(times_ns) - 1, count).astype(int)]
+
+
+def about_images(images: ImageStream | None) -> list[Caution]:
+    """Say how many images were left out because of their stamps."""
+    if images is None or not images.repeated:
+        return []
+    return [
+        Caution(
+            "repeated-stamps",
+            f"{images.repeated} images of {images.topic.name} have the stamp of another; the first of each is shown",
+            "nothing to do, unless they are many: then the camera driver stamps wrongly; try --clock receive",
+        )
+    ]

@@ -1,0 +1,111 @@
+"""The first bytes of many messages at once: for stamps, and for drivers that send every return by itself."""
+
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+
+from calib_core.errors import RecordingError
+from calib_core.recordings.sources import Heads, MessageIndex
+
+__all__ = ["ChunkAccess", "gather_heads"]
+
+_NEAR_BYTES = 4096
+_RUN_MESSAGES = 4096
+_THREADS = 4
+
+
+class ChunkAccess(Protocol):
+    """What gathering needs of a chunked file."""
+
+    lead_bytes: int
+
+    def in_memory(self, chunk: int) -> bytes | None:
+        """Return a packed chunk unpacked, None for one that is stored as it is."""
+        ...
+
+    def piece(self, chunk: int, offset: int, size: int) -> bytes:
+        """Return at most size bytes from offset of the unpacked chunk."""
+        ...
+
+    def locate(self, chunk: int, offset: int) -> tuple[int, int]:
+        """Return where in the chunk a message itself begins, and its length."""
+        ...
+
+    def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tell which records (n, lead_bytes) have their message at lead_bytes, and how long the messages are."""
+        ...
+
+
+def gather_heads(source: ChunkAccess, index: MessageIndex, size: int) -> Heads:
+    """Read the first bytes of many messages.
+
+    Of chunks stored as they are only the records' heads are read, neighbours in one go; packed chunks are each unpacked
+    once, in several threads. Messages of a chunk that cannot be read get the length -1.
+    """
+    gather = _Gather(source, index, size)
+    with ThreadPoolExecutor(_THREADS) as pool:
+        faults = [fault for fault in pool.map(gather.chunk, _groups(index.chunk)) if fault]
+    return Heads(gather.rows, gather.lengths, faults[0] if faults else "")
+
+
+def _groups(chunk: np.ndarray) -> Iterable[np.ndarray]:
+    """Return, chunk by chunk, the rows of the index that lie in it."""
+    if not len(chunk):
+        return []
+    order = np.argsort(chunk, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(chunk[order])) + 1)
+
+
+class _Gather:
+    """The table that the threads fill; each fills rows of its own."""
+
+    def __init__(self, source: ChunkAccess, index: MessageIndex, size: int) -> None:
+        self.source = source
+        self.index = index
+        self.size = size
+        self.rows = np.zeros((len(index), size), dtype=np.uint8)
+        self.lengths = np.zeros(len(index), dtype=np.int64)
+
+    def chunk(self, group: np.ndarray) -> str:
+        """Fill the rows of the messages that lie in one chunk; return what went wrong."""
+        chunk = int(self.index.chunk[group[0]])
+        order = group[np.argsort(self.index.offset[group], kind="stable")]
+        try:
+            whole = self.source.in_memory(chunk)
+            for first, last in pairwise(self._edges(order)):
+                self._run(chunk, order[first:last], whole)
+        except RecordingError as error:
+            self.lengths[group] = -1
+            return str(error)
+        return ""
+
+    def _edges(self, order: np.ndarray) -> list[int]:
+        """Cut messages into runs of neighbours that are read in one go."""
+        far = np.diff(self.index.offset[order]) > self.source.lead_bytes + self.size + _NEAR_BYTES
+        cuts = {*(np.flatnonzero(far) + 1).tolist(), *range(_RUN_MESSAGES, len(order), _RUN_MESSAGES)}
+        return [0, *sorted(cuts), len(order)]
+
+    def _run(self, chunk: int, order: np.ndarray, whole: bytes | None) -> None:
+        lead = self.source.lead_bytes
+        offsets = self.index.offset[order]
+        base, end = int(offsets[0]), int(offsets[-1]) + lead + self.size
+        data = self.source.piece(chunk, base, end - base) if whole is None else whole[base:end]
+        buffer = np.frombuffer(data, dtype=np.uint8)
+        if not len(buffer):
+            raise RecordingError(f"chunk {chunk} is shorter than its index says; the file is damaged: copy it again")
+        reach = (offsets - base)[:, None] + np.arange(lead + self.size)
+        gathered = buffer[np.minimum(reach, len(buffer) - 1)]
+        usual, self.lengths[order] = self.source.usual(gathered[:, :lead])
+        self.rows[order] = gathered[:, lead:]
+        for place in np.flatnonzero(~usual).tolist():
+            self._single(chunk, int(offsets[place]), int(order[place]))
+
+    def _single(self, chunk: int, offset: int, row: int) -> None:
+        """Read the head of a message whose record is laid out in another way."""
+        start, length = self.source.locate(chunk, offset)
+        head = self.source.piece(chunk, start, min(self.size, length))
+        self.rows[row, : len(head)] = np.frombuffer(head, dtype=np.uint8)
+        self.lengths[row] = length
