@@ -28,12 +28,12 @@ def load_yaml(text: str, *, source: str) -> Any:
         """The safe constructor, and OpenCV's matrix tag."""
 
     Constructor.add_constructor(_OPENCV_TAG, lambda self, node: self.construct_mapping(node, deep=True))
-    yaml = YAML(typ="safe", pure=True)
-    yaml.Constructor = Constructor
+    loader = YAML(typ="safe", pure=True)
+    loader.Constructor = Constructor
     # OpenCV before 5 writes "%YAML:1.0", which is no YAML directive, and may leave out the "---" after it.
     plain = re.sub(r"\A\ufeff?%YAML[: ][\d.]+[^\n]*\n(---[^\n]*\n)?", "", text)
     try:
-        return yaml.load(plain)
+        return loader.load(plain)
     except (YAMLError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1 + text.count(chr(10)) - plain.count(chr(10))}: " if mark else ""

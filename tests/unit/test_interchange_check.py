@@ -2,7 +2,9 @@
 
 import dataclasses
 import json
+import os
 import re
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange import (
     FORMATS,
     CalibrationFile,
+    FrameNames,
     check,
     compare,
     export,
@@ -363,3 +366,18 @@ def test_what_scipy_writes_for_matlab_is_read(tmp_path, compressed):
     assert read["whole"].tolist() == [[0, 1, 2], [3, 4, 5]]
     assert read["frames"] == {"radar": "rädar", "camera": "cam"}
     assert read_any_file(tmp_path / "a.mat").camera_from_radar.rotation.tolist() == matrix[:3, :3].tolist()
+
+
+def test_the_shell_gets_a_strange_frame_name_as_one_word(file, tmp_path):
+    strange = FrameNames("radar; touch was_run #", "camera *|=(x) optical")
+    (tmp_path / "static_transform.sh").write_bytes(export(dataclasses.replace(file, frames=strange), "tf2").data)
+    (tmp_path / "ros2").write_text("#!/bin/sh\nprintf '%s\\n' \"$@\" > words\n", encoding="utf-8")
+    (tmp_path / "ros2").chmod(0o755)
+
+    path = f"{tmp_path}:{os.environ['PATH']}"
+    subprocess.run(["sh", "static_transform.sh"], cwd=tmp_path, env={**os.environ, "PATH": path}, check=True)
+
+    words = (tmp_path / "words").read_text(encoding="utf-8").splitlines()
+    assert words[words.index("--frame-id") + 1] == strange.radar
+    assert words[words.index("--child-frame-id") + 1] == strange.camera
+    assert not (tmp_path / "was_run").exists()
