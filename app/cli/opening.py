@@ -64,7 +64,7 @@ class Open:
     camera: Path | None = None
     """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     clicks: Path | None = None
-    """Clicks that join the session (cocalib/clicks-1 JSON)."""
+    """Clicks that a new session begins with (cocalib/clicks-1 JSON)."""
     session: Path | None = None
     """Folder of the session; without it, beside the recording where that can be written, else in your user folder."""
     fresh: bool = False
@@ -126,7 +126,9 @@ def _serve(
         stack.callback(workspace.close)
         if options is not None and options != CalibrationOptions():
             workspace.dispatch(OptionsChanged(options))
-        if clicks_file is not None:
+        if clicks_file is not None and workspace.restored.steps == 0:
             workspace.import_clicks(read_text(clicks_file), source=str(clicks_file))
+        elif clicks_file is not None:
+            print(f"The session goes on as it was; {clicks_file} was not taken in again (--fresh begins anew)")
         serve(workspace, recording, ServerOptions(**dataclasses.asdict(serving)))
     return 0

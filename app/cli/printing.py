@@ -29,8 +29,10 @@ def refuse(reason: str) -> int:
 
 
 def explain_unsolvable(outcome: Unsolvable) -> int:
-    """Say on stderr why the data cannot give a calibration and what would help; return exit code 1."""
+    """Say on stderr why the data cannot give a calibration, what would help, and which clicks found no radar; return 1."""
     print(f"cocalib: no calibration: {outcome.reason} {outcome.hint}", file=sys.stderr)
+    for click in outcome.unpaired:
+        print(f"  click {click.id}: {click.reason} {click.hint}", file=sys.stderr)
     return 1
 
 
