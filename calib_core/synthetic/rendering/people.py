@@ -69,13 +69,14 @@ def _nearest(
     axis = (limb.end_m - limb.start_m).astype(np.float32)
     to_start = limb.start_m.astype(np.float32) - origins
     ray_axis = rays @ axis
-    ray_start = (rays * to_start).sum(axis=-1)
+    ray_start = rays[..., 0] * to_start[..., 0] + rays[..., 1] * to_start[..., 1] + rays[..., 2] * to_start[..., 2]
     length2 = float(axis @ axis)
     flat = np.maximum(length2 - ray_axis**2, 1e-9)
     share = np.clip((ray_axis * ray_start - to_start @ axis) / flat, 0.0, 1.0)
     along = np.maximum(ray_start + share * ray_axis, 0.0)
     gap = along[..., None] * rays - to_start - share[..., None] * axis
-    return gap, np.linalg.norm(gap, axis=-1), along, share
+    distance = np.sqrt(gap[..., 0] ** 2 + gap[..., 1] ** 2 + gap[..., 2] ** 2)
+    return gap, distance, along, share
 
 
 def draw_limbs(
@@ -130,6 +131,21 @@ def _limb_colour(limb: Capsule, normal: np.ndarray, share: np.ndarray, scene: Sc
     return (albedo * light).reshape(normal.shape)
 
 
+def _feet(ends: np.ndarray, towards: Vector3) -> np.ndarray:
+    """Throw points (n, 3) onto the ground along the light."""
+    feet = ends - (np.maximum(ends[:, 2:3], 0.0) / towards[2]) * towards
+    feet[:, 2] = 0.0
+    return feet
+
+
+def _near_shadow(points: np.ndarray, limb: Capsule, towards: Vector3) -> np.ndarray:
+    """Return the rows of ground points that a limb's shadow, its soft edge included, can reach."""
+    feet = _feet(_outline(limb, 0.22), towards)
+    low, high = feet.min(axis=0), feet.max(axis=0)
+    x, y = points[:, 0], points[:, 1]
+    return np.flatnonzero((x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]))
+
+
 def shade_ground(
     levels: np.ndarray,
     limbs: tuple[Capsule, ...],
@@ -144,9 +160,7 @@ def shade_ground(
     if not limbs:
         return
     ends = np.concatenate([_outline(limb, 0.05) for limb in limbs])
-    feet = ends - (np.maximum(ends[:, 2:3], 0.0) / towards[2]) * towards
-    feet[:, 2] = 0.0
-    window = Window.around(camera.project(camera_from_world @ feet), camera, 6.0)
+    window = Window.around(camera.project(camera_from_world @ _feet(ends, towards)), camera, 6.0)
     if window is None:
         return
     ground = still.ground[window.rows, window.columns]
@@ -157,10 +171,11 @@ def shade_ground(
     sun = np.broadcast_to(towards.astype(np.float32), points.shape)
     free = np.ones(len(rows), dtype=np.float32)
     for limb in limbs:
-        _, distance, along, share = _nearest(points, sun, limb)
+        near = _near_shadow(points, limb, towards)
+        _, distance, along, share = _nearest(points[near], sun[near], limb)
         radius = limb.start_radius_m + share * (limb.end_radius_m - limb.start_radius_m)
         soft = 0.012 + _PENUMBRA * along
-        free = np.minimum(free, np.clip((distance - radius) / (2.0 * soft) + 0.5, 0.0, 1.0))
+        free[near] = np.minimum(free[near], np.clip((distance - radius) / (2.0 * soft) + 0.5, 0.0, 1.0))
     dark = np.zeros(ground.size, dtype=np.float32)
     dark[rows] = 1.0 - free
     factor = 1.0 - strength * dark.reshape(ground.shape)

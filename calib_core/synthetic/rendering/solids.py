@@ -53,9 +53,11 @@ class Solid:
         if self.round:
             middle = 0.5 * (self.low_m[:2] + self.high_m[:2])
             radius = 0.5 * (self.high_m[0] - self.low_m[0])
-            return np.maximum(np.linalg.norm(places_m - middle, axis=1) - radius, 0.0)
-        outside = np.maximum(np.maximum(self.low_m[:2] - places_m, places_m - self.high_m[:2]), 0.0)
-        return np.hypot(outside[:, 0], outside[:, 1])
+            return np.maximum(np.hypot(places_m[:, 0] - middle[0], places_m[:, 1] - middle[1]) - radius, 0.0)
+        x, y = (
+            np.maximum(np.maximum(self.low_m[i] - places_m[:, i], places_m[:, i] - self.high_m[i]), 0.0) for i in (0, 1)
+        )
+        return np.hypot(x, y)
 
     def crossing(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return distances (n,) at which rays enter (infinite if they miss), and the axis of the face they enter by.
@@ -72,17 +74,19 @@ class Solid:
             enter, leave = np.fmax(near[:, 2], side_in), np.fmin(far[:, 2], side_out)
             axis[side_in >= near[:, 2]] = 3
         else:
-            enter, leave = near.max(axis=1), far.min(axis=1)
-            axis = near.argmax(axis=1)
+            enter = np.maximum(np.maximum(near[:, 0], near[:, 1]), near[:, 2])
+            leave = np.minimum(np.minimum(far[:, 0], far[:, 1]), far[:, 2])
+            axis = np.where(near[:, 0] == enter, 0, np.where(near[:, 1] == enter, 1, 2))
         return np.where((enter <= leave) & (enter > 1e-3), enter, _FAR), axis
 
     def _side(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         middle = 0.5 * (self.low_m[:2] + self.high_m[:2])
         radius = 0.5 * (self.high_m[0] - self.low_m[0])
         offset = origins[..., :2] - middle
-        a = np.maximum((directions[:, :2] ** 2).sum(axis=1), 1e-12)
-        b = (offset * directions[:, :2]).sum(axis=-1)
-        c = (offset**2).sum(axis=-1) - radius**2
+        dx, dy = directions[:, 0], directions[:, 1]
+        a = np.maximum(dx * dx + dy * dy, 1e-12)
+        b = offset[..., 0] * dx + offset[..., 1] * dy
+        c = offset[..., 0] ** 2 + offset[..., 1] ** 2 - radius**2
         root = b * b - a * c
         hit = root > 0.0
         reach = np.sqrt(np.where(hit, root, 0.0))
@@ -190,7 +194,8 @@ def shadowed(
         rise = (solid.high_m[2] - start[:, 2]) / direction[2]
         low = np.minimum(solid.low_m[:2], solid.low_m[:2] - direction[:2] * max(float(rise.max()), 0.0))
         high = np.maximum(solid.high_m[:2], solid.high_m[:2] - direction[:2] * max(float(rise.max()), 0.0))
-        near = np.flatnonzero((rise > 0.0) & (start[:, :2] > low).all(axis=1) & (start[:, :2] < high).all(axis=1))
+        x, y = start[:, 0], start[:, 1]
+        near = np.flatnonzero((rise > 0.0) & (x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]))
         if len(near):
             reach, _ = solid.crossing(start[near], np.broadcast_to(direction, (len(near), 3)))
             dark[near[np.isfinite(reach)]] = 1.0
