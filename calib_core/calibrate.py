@@ -231,6 +231,7 @@ def _used_results(used: Sequence[Pair], refined: Refined, left_out: LeftOut) -> 
             influence=float(left_out.influence[i]),
             candidate=chosen,
             expected_covariance_px2=_residual_covariance(refined.model.whitening[i]),
+            image_time=pair.image_time,
         )
         for i, pair in enumerate(used)
         for chosen in (int(refined.rows[i] - evidence.first[i]),)
@@ -267,5 +268,6 @@ def _excluded_results(
             excluded=True,
             candidate=chosen,
             expected_covariance_px2=_residual_covariance(model.whitening[i]),
+            image_time=pair.image_time,
         )
     return results

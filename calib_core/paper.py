@@ -306,6 +306,7 @@ def _result(
         point_radar_m=point_radar_m,
         inlier=inlier,
         excluded=pair.id in excluded,
+        image_time=pair.image_time,
     )
 
 

@@ -1,0 +1,63 @@
+"""What the solvers return goes through the file unharmed: pairs in, a file out that passes its own check."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib_core.calibrate import calibrate_pairs
+from calib_core.interchange import (
+    calibration_text,
+    check,
+    export,
+    read_any,
+    read_calibration,
+    read_pairs,
+    write_calibration,
+)
+from calib_core.measurements import time_from_parts
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
+
+
+@pytest.fixture
+def truth(project_root: Path) -> Calibration:
+    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8")).calibration
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_solved_pairs_become_a_file_that_passes_its_check(truth, method):
+    rng = np.random.default_rng(3)
+    points = np.column_stack([rng.uniform(4, 15, 14), rng.uniform(-0.35, 0.35, 14), rng.uniform(-0.2, 0.1, 14)])
+    points[:, 1:] *= points[:, :1]
+    pixels = truth.reproject(points) + rng.normal(0, 1, (14, 2))
+    rows = [
+        {"id": f"p{i}", "radar_m": point.tolist(), "pixel_px": pixel.tolist()}
+        for i, (point, pixel) in enumerate(zip(points, pixels, strict=True))
+    ]
+    camera = {
+        "model": "plumb_bob",
+        "width_px": 640,
+        "height_px": 480,
+        "matrix_px": truth.camera.matrix_px.tolist(),
+        "distortion": truth.camera.distortion.tolist(),
+    }
+    pairs_file = read_pairs(json.dumps({"schema": "cocalib/pairs-1", "camera": camera, "pairs": rows}))
+    pairs = [dataclasses.replace(p, image_time=time_from_parts(100 + i, 7)) for i, p in enumerate(pairs_file.pairs)]
+    options = dataclasses.replace(pairs_file.options(CalibrationOptions()), method=method)
+
+    outcome = calibrate_pairs(pairs, pairs_file.camera, options, frozenset({"p3"}))
+    assert isinstance(outcome, Calibration)
+    text = calibration_text(outcome)
+
+    report = check(read_any(text))
+    assert report.ok, report.lines()
+    assert write_calibration(read_calibration(text)) == text
+    content = json.loads(text)
+    assert content["options"]["method"] == method
+    assert [pair["image_time"] for pair in content["pairs"]] == [{"sec": 100 + i, "nanosec": 7} for i in range(14)]
+    assert [pair["id"] for pair in content["pairs"] if pair["excluded"]] == ["p3"]
+    assert content["check_point"]["radar_m"] == [round(value, 3) for value in content["check_point"]["radar_m"]]
+    assert check(read_any(export(read_calibration(text), "tf2").data)).ok
