@@ -16,6 +16,7 @@ _FRAME_NUMBERS = ("radar_frame_idx", "frame_idx", "frame_number", "frame_id_numb
 _POINT_NUMBERS = ("point_id", "detection_id", "target_id", "index")
 _DEGREE_PACKAGES = ("ainstein_radar_msgs",)
 _TENTH_OF_DB = 0.1
+_SHORTEST_CYCLE_NS = 5e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -184,15 +185,19 @@ def first_of_scans(
 
 
 def _between_scans_ns(pauses_ns: np.ndarray) -> float:
-    """Return a pause that lies between those within a scan and those between scans: the widest gap of their logarithms."""
+    """Return a pause that lies between those within a scan and those between scans.
+
+    It is the middle of the widest gap between their logarithms; where they are all alike, no radar cycle is shorter
+    than 5 ms, and no driver takes that long from one return to the next.
+    """
     positive = np.sort(pauses_ns[pauses_ns > 0]).astype(np.float64)
-    if len(positive) < 2:
-        return float(positive[0]) / 2 if len(positive) else np.inf
+    if not len(positive):
+        return np.inf
     logs = np.log(positive)
     if np.any(pauses_ns <= 0):
         logs = np.concatenate([[logs[0] - 1.0], logs])
     steps = np.diff(logs)
+    if not len(steps) or steps.max() < np.log(2.0):
+        return max(float(positive[0]) / 2, _SHORTEST_CYCLE_NS)
     cut = int(np.argmax(steps))
-    if steps[cut] < np.log(2.0):
-        return float(positive[0]) / 2  # every message is a scan of its own
     return float(np.exp((logs[cut] + logs[cut + 1]) / 2))
