@@ -106,7 +106,7 @@ def _by_check_point(pose: WrittenPose, stated: StatedCheckPoint, camera: Camera 
             "caution",
             "check-point-unused",
             f"the check point {shown} states a pixel, and there is no camera to compute it with",
-            "give the intrinsics with --camera",
+            "check it with --against calibration.json, which has the camera",
         )
 
     def miss(candidate: RigidTransform) -> float:

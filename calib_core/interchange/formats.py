@@ -96,7 +96,7 @@ class ExportBytes:
 
 _POSE_ONLY = ("carries the pose only: keep your camera_info, or export the camera with --to opencv",)
 _KIT = (
-    "poses are in sensor_kit_base_link; without --parent-from-radar the radar sits at the kit's origin",
+    "poses are in sensor_kit_base_link; the radar is put at the kit's origin (in Python, parent_from_radar= places it)",
     *_POSE_ONLY,
 )
 _KALIBR = ("T_cam_radar is our key: Kalibr itself has none for radars",)
