@@ -11,8 +11,8 @@ const picture = /** @type {HTMLCanvasElement} */ (document.getElementById("pictu
 export const marks = /** @type {HTMLCanvasElement} */ (document.getElementById("marks"));
 const paper = /** @type {CanvasRenderingContext2D} */ (picture.getContext("2d", { alpha: false }));
 const ink = /** @type {CanvasRenderingContext2D} */ (marks.getContext("2d"));
-/** Above this many screen px per image px, pixels are shown as squares. */
-const SQUARES_ABOVE = 2.5;
+/** From this many device px per image px on, pixels are shown as squares: their edges snap to device px, so not before. */
+const SQUARES_FROM = 8;
 let drawPicture = false;
 let drawInk = false;
 
@@ -87,7 +87,7 @@ function paintPicture() {
   paper.fillRect(0, 0, picture.width, picture.height);
   const shown = state.shown;
   if (!shown) return;
-  paper.imageSmoothingEnabled = viewport.scale < SQUARES_ABOVE * shown.scale;
+  paper.imageSmoothingEnabled = viewport.scale < SQUARES_FROM * shown.scale;
   paper.imageSmoothingQuality = state.playing ? "low" : "high";
   const [x, y] = geometry.toDevice(-0.5, -0.5);
   paper.drawImage(shown.bitmap, x, y, shown.width * viewport.scale, shown.height * viewport.scale);

@@ -106,6 +106,11 @@ class FrameStore:
                 task.add_done_callback(_retrieve)
                 self._coming[key] = task
 
+    def close(self) -> None:
+        """Drop what is on its way. Called on the event loop."""
+        for task in self._coming.values():
+            task.cancel()
+
     async def _make(self, key: tuple[int, Size]) -> Frame:
         index, size = key
         try:

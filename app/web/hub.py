@@ -82,7 +82,6 @@ class Hub:
         self.tabs: set[Tab] = set()
         self.steps = ThreadPoolExecutor(max_workers=1, thread_name_prefix="steps")
         self._view = workspace.view
-        self._news: asyncio.AbstractEventLoop | None = None
         self._searching: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
@@ -93,10 +92,12 @@ class Hub:
         )
         self._searching = loop.create_task(self._search())
 
-    def close(self) -> None:
-        """Stop listening. Called from any thread, before the event loop stops."""
+    async def end(self) -> None:
+        """Stop listening, and drop what is on its way."""
         self._end_subscription()
-        self.steps.shutdown(wait=True, cancel_futures=True)
+        if self._searching is not None:
+            self._searching.cancel()
+        self.frames.close()
 
     @property
     def view(self) -> View:

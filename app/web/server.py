@@ -101,7 +101,8 @@ class RunningServer:
 
     def close(self) -> None:
         """Stop serving; the workspace and the recording stay open."""
-        self._hub.close()
+        asyncio.run_coroutine_threadsafe(self._hub.end(), self._viser.get_event_loop()).result()
+        self._hub.steps.shutdown(wait=True, cancel_futures=True)
         with contextlib.redirect_stdout(io.StringIO()):  # viser says that it stopped
             self._viser.stop()
         self._executor.shutdown(wait=True, cancel_futures=True)

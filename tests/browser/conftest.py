@@ -1,0 +1,107 @@
+"""A real browser, the sample recording served in this process, and a fresh page for every test."""
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Playwright, sync_playwright
+
+from app.web.server import RunningServer, ServerOptions, start
+from app.workspace import Workspace, open_workspace
+from calib_core.recordings import Recording, open_recording
+from tests.browser.driving import FLAGS, Driver
+from tests.find_browser import find_browser
+
+
+@pytest.fixture(scope="module")
+def playwright_driver() -> Iterator[Playwright]:
+    """Start Playwright; it keeps an event loop running in this thread, so other modules must not find it here."""
+    with sync_playwright() as driver:
+        yield driver
+
+
+@pytest.fixture(scope="module")
+def launch(playwright_driver: Playwright) -> Iterator[Callable[..., Browser]]:
+    """Start browsers with further flags; all are closed at the end."""
+    path, running = find_browser(), []
+
+    def start_browser(*flags: str) -> Browser:
+        browser = playwright_driver.chromium.launch(executable_path=str(path), args=[*FLAGS, *flags])
+        running.append(browser)
+        return browser
+
+    yield start_browser
+    for browser in running:
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def chromium(launch: Callable[..., Browser]) -> Browser:
+    return launch()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_state_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep the cookie's key out of the user's own folder."""
+    patch = pytest.MonkeyPatch()
+    patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+    yield
+    patch.undo()
+
+
+@pytest.fixture(scope="session")
+def truth(project_root: Path) -> Any:
+    return json.loads((project_root / "sample_data" / "rooftop" / "truth.json").read_text())
+
+
+@pytest.fixture(scope="session")
+def sample(project_root: Path) -> Iterator[Recording]:
+    folder = project_root / "sample_data" / "rooftop"
+    with open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording:
+        yield recording
+
+
+@pytest.fixture
+def workspace(sample: Recording, tmp_path: Path) -> Iterator[Workspace]:
+    opened = open_workspace(sample, camera=sample.camera(), session_folder=tmp_path / "session", name="sample")
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def server(workspace: Workspace, sample: Recording) -> Iterator[RunningServer]:
+    running = start(workspace, sample, ServerOptions(port=0, token="test"))
+    yield running
+    running.close()
+
+
+@pytest.fixture
+def open_page(chromium: Browser) -> Iterator[Callable[..., Driver]]:
+    """Open pages; at the end none of them has complained, and none has asked anybody but this machine."""
+    drivers: list[Driver] = []
+    contexts = []
+
+    def open_one(url: str, browser: Browser | None = None, **context_options: Any) -> Driver:
+        context = (browser or chromium).new_context(**{"viewport": {"width": 1280, "height": 720}, **context_options})
+        contexts.append(context)
+        drivers.append(Driver(context.new_page(), url))
+        return drivers[-1]
+
+    yield open_one
+    for driver in drivers:
+        assert driver.complaints == []
+        strangers = [
+            url
+            for url in driver.addresses
+            if not url.startswith(("http://127.0.0.1", "ws://127.0.0.1", "blob:", "data:"))
+        ]
+        assert strangers == []
+    for context in contexts:
+        context.close()
+
+
+@pytest.fixture
+def page(open_page: Callable[..., Driver], server: RunningServer) -> Driver:
+    return open_page(server.url)

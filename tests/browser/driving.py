@@ -1,0 +1,134 @@
+"""Words for driving the page: wait for a condition, click an image point, read the state."""
+
+import math
+import time
+from typing import Any
+
+from playwright.sync_api import Page
+
+__all__ = ["FLAGS", "Driver"]
+
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+    "--disable-background-timer-throttling",
+    "--disable-renderer-backgrounding",
+]
+
+
+class Driver:
+    """One open page and what a person does with it."""
+
+    def __init__(self, page: Page, url: str) -> None:
+        self.page = page
+        self.complaints: list[str] = []
+        self.addresses: set[str] = set()
+        page.on("console", self._console)
+        page.on("pageerror", lambda error: self.complaints.append(f"error: {error}"))
+        page.on("request", lambda request: self.addresses.add(request.url))
+        page.on("websocket", lambda socket: self.addresses.add(socket.url))
+        page.goto(url)
+        self.until("__cocalib.state.shown")
+
+    def _console(self, message: Any) -> None:
+        if message.type == "error":
+            self.complaints.append(message.text)
+
+    def until(self, condition: str, seconds: float = 40) -> None:
+        """Wait until a JavaScript condition holds. The page's policy forbids eval, so the condition goes in as a function."""
+        self.page.evaluate(
+            f"""() => new Promise((resolve, reject) => {{
+                const end = performance.now() + {seconds * 1000};
+                const look = () => {{
+                    let holds = false;
+                    try {{ holds = Boolean({condition}); }} catch {{ holds = false; }}
+                    if (holds) resolve(true);
+                    else if (performance.now() > end) reject(new Error({condition!r} + " never came"));
+                    else setTimeout(look, 15);
+                }};
+                look();
+            }})"""
+        )
+
+    def value(self, expression: str) -> Any:
+        """Evaluate in the page."""
+        return self.page.evaluate(f"() => ({expression})")
+
+    @property
+    def view(self) -> Any:
+        """The last view of the server."""
+        return self.value("__cocalib.state.view")
+
+    def frame_at(self, stamp: dict[str, int]) -> int:
+        """Return the index of the frame with this stamp."""
+        return int(
+            self.value(
+                "__cocalib.state.recording.frame_times.sec.findIndex((sec, index) => "
+                f"sec === {stamp['sec']} && __cocalib.state.recording.frame_times.nanosec[index] === {stamp['nanosec']})"
+            )
+        )
+
+    def go_to(self, index: int) -> None:
+        """Step to a frame and wait until it is on the screen."""
+        self.value(f"__cocalib.goTo({index})")
+        self.until(f"__cocalib.state.shown.index === {index} && __cocalib.state.shown.scale === 1")
+
+    def place_of(self, u: float, v: float) -> tuple[float, float]:
+        """Return where an image point lies on the page [CSS px]."""
+        x, y = self.value(
+            "(() => { const box = document.getElementById('marks').getBoundingClientRect();"
+            f"const [x, y] = __cocalib.toCss({u}, {v}); return [box.left + x, box.top + y]; }})()"
+        )
+        return float(x), float(y)
+
+    def click(self, u: float, v: float) -> None:
+        """Click an image point and wait until the server has confirmed it."""
+        self.page.mouse.click(*self.place_of(u, v))
+        self.settle()
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Drag from one image point to another."""
+        (x, y), (to_x, to_y) = self.place_of(*start), self.place_of(*end)
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        self.page.mouse.move((x + to_x) / 2, (y + to_y) / 2)
+        self.page.mouse.move(to_x, to_y)
+        self.page.mouse.up()
+        self.settle()
+
+    def press(self, *keys: str) -> None:
+        """Press keys one after the other and wait for what they do."""
+        for key in keys:
+            self.page.keyboard.press(key)
+        self.settle()
+
+    def settle(self) -> None:
+        """Wait until nothing is on its way: no unconfirmed event, no mark of the hand, no solve."""
+        self.until("__cocalib.unconfirmed() === 0 && __cocalib.state.local.size === 0 && !__cocalib.state.view.solving")
+
+    def click_sample(self, truth: dict[str, Any], count: int | None = None) -> None:
+        """Click the reflector in every placement of the sample, where it was rendered."""
+        for placement in truth["placements"][:count]:
+            self.go_to(self.frame_at(placement["best_image_time"]))
+            self.page.mouse.click(*self.place_of(*placement["pixel_px"]))
+            self.until("__cocalib.unconfirmed() === 0")
+        self.settle()
+
+    def text(self, selector: str) -> str:
+        """Return what an element says."""
+        return self.page.inner_text(selector)
+
+    def zoom_to(self, u: float, v: float, factor: float) -> None:
+        """Turn the wheel over an image point until there are this many screen pixels per image pixel."""
+        deadline = time.monotonic() + 20
+        self.page.mouse.move(*self.place_of(u, v))
+        while abs(self.value("__cocalib.zoom()") / factor - 1) > 0.02:
+            assert time.monotonic() < deadline, "the wheel does not zoom"
+            ratio = factor / self.value("__cocalib.zoom()")
+            step = max(-400.0, min(400.0, -625.0 * math.log(ratio)))
+            before = self.value("__cocalib.zoom()")
+            self.page.mouse.wheel(0, step)
+            self.until(f"__cocalib.zoom() !== {before!r}")

@@ -1,0 +1,181 @@
+"""A person calibrates the sample in a real browser."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.web.server import RunningServer
+from tests.browser.driving import Driver
+
+pytestmark = pytest.mark.browser
+
+
+def test_clicking_every_placement_gives_a_calibration_near_the_truth(page: Driver, truth: Any, tmp_path: Path) -> None:
+    page.until("__cocalib.state.placements.length >= 15")
+    page.click_sample(truth, 3)
+    assert "1 more placement" in page.text("#status-text")
+    assert not page.view["has_calibration"]
+    page.click_sample(truth)
+    view = page.view
+    assert len(view["clicks"]) == len(truth["placements"])
+    assert page.text('[data-key="aed"] dd').startswith(
+        next(row["value"] for row in view["metrics"] if row["key"] == "aed")
+    )
+    page.until("__cocalib.state.overlay.returns !== null && __cocalib.state.overlay.guesses.length > 0")
+    page.page.click("#export")
+    with page.page.expect_download() as download:
+        page.page.click('[data-export="api/calibration.json"]')
+    saved = tmp_path / "calibration.json"
+    download.value.save_as(saved)
+    calibration, true = json.loads(saved.read_text()), truth["camera_from_radar"]
+    rotation = np.array(calibration["camera_from_radar"]["rotation"]) @ np.array(true["rotation"]).T
+    angle_deg = np.rad2deg(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)))
+    offset_m = np.subtract(calibration["camera_from_radar"]["translation_m"], true["translation_m"])
+    sigma_m = np.array([calibration["sigma"][f"{axis}_m"] for axis in "xyz"])
+    assert angle_deg < 1.0
+    assert np.all(np.abs(offset_m) < 4 * sigma_m)
+    assert np.all(sigma_m < 0.5)
+
+
+def test_undo_and_redo_go_through_everything(page: Driver, truth: Any) -> None:
+    page.click_sample(truth, 5)
+    solved = page.view
+    assert solved["has_calibration"]
+    page.press("x")
+    assert page.view["clicks"][4]["state"] == "excluded"
+    page.press("Control+z")
+    assert page.view["clicks"][4]["state"] == solved["clicks"][4]["state"]
+    page.press("Control+z")
+    assert len(page.view["clicks"]) == 4
+    page.press("Control+Shift+z")
+    assert page.view["clicks"] == solved["clicks"]
+    page.page.click("#undo")
+    page.settle()
+    assert len(page.view["clicks"]) == 4
+    page.page.click("#redo")
+    page.settle()
+    assert page.view["clicks"] == solved["clicks"]
+
+
+def test_excluding_a_pair_solves_again_and_greys_its_row(page: Driver, truth: Any) -> None:
+    page.click_sample(truth, 7)
+    before = page.view
+    page.press("j")
+    worst = max(before["clicks"], key=lambda row: row["residual_px"] or 0)
+    assert page.value("__cocalib.state.selected") == worst["id"]
+    page.press("x")
+    after = page.view
+    assert after["metrics"] != before["metrics"]
+    assert page.page.get_attribute(f'.pairs [data-id="{worst["id"]}"]', "class") == "row excluded"
+    page.page.click(f'.pairs [data-id="{worst["id"]}"] [data-act]')
+    page.settle()
+    assert page.view["metrics"] == before["metrics"]
+
+
+def test_a_mark_can_be_dragged_nudged_placed_anew_and_removed(page: Driver, truth: Any) -> None:
+    page.click_sample(truth, 1)
+    [placed] = page.view["clicks"]
+    u, v = placed["u_px"], placed["v_px"]
+    page.zoom_to(u, v, 4)
+    page.drag((u, v), (u + 6, v - 3))
+    [dragged] = page.view["clicks"]
+    assert (dragged["u_px"], dragged["v_px"]) == pytest.approx((u + 6, v - 3), abs=0.1)
+    page.press("Alt+ArrowRight", "Alt+ArrowRight", "Alt+ArrowUp")
+    page.until("__cocalib.state.view.revision === 3")
+    [nudged] = page.view["clicks"]
+    assert (nudged["u_px"], nudged["v_px"]) == pytest.approx((dragged["u_px"] + 0.2, dragged["v_px"] - 0.1), abs=1e-6)
+    page.press("Control+z")
+    assert page.view["clicks"][0]["u_px"] == pytest.approx(dragged["u_px"], abs=1e-9), "one step back for one movement"
+    page.click(u + 20, v + 10)
+    [again] = page.view["clicks"]
+    assert again["id"] == placed["id"]
+    assert (again["u_px"], again["v_px"]) == pytest.approx((u + 20, v + 10), abs=0.1)
+    page.press("Delete")
+    assert page.view["clicks"] == []
+
+
+def test_dragging_beside_a_mark_pans_and_places_nothing(page: Driver) -> None:
+    page.zoom_to(400, 300, 3)
+    before = page.place_of(400, 300)
+    page.drag((400, 300), (430, 310))
+    after = page.place_of(400, 300)
+    assert (after[0] - before[0], after[1] - before[1]) == pytest.approx((90, 30), abs=1.5)
+    assert page.view["clicks"] == []
+    page.press("f")
+    assert page.value("__cocalib.viewport.fitted")
+
+
+def test_keys_walk_frames_placements_and_overlays(page: Driver) -> None:
+    page.until("__cocalib.state.placements.length > 2")
+    frames = page.value("__cocalib.state.placements.map((placement) => placement.frame)")
+    for key, expected in (("ArrowRight", 1), ("Shift+ArrowRight", 11), ("ArrowLeft", 10), ("Home", 0), ("n", frames[0]),
+                          ("n", frames[1]), ("p", frames[0]), ("p", frames[-1])):  # fmt: skip
+        page.press(key)
+        page.until(f"__cocalib.state.shown.index === {expected}")
+    assert page.page.get_attribute('[data-layer="returns"]', "aria-pressed") == "true"
+    page.press("1")
+    assert page.page.get_attribute('[data-layer="returns"]', "aria-pressed") == "false"
+    page.press("?")
+    assert page.page.is_visible("#help-dialog")
+    page.press("?")
+    assert not page.page.is_visible("#help-dialog")
+
+
+def test_playing_shows_frame_after_frame_and_space_stops_it(page: Driver) -> None:
+    page.press(" ")
+    page.until("__cocalib.state.shown.index >= 3")
+    page.press(" ")
+    assert not page.value("__cocalib.state.playing")
+    page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
+
+
+def test_keys_work_while_the_hand_is_in_the_3d_view(page: Driver) -> None:
+    space = page.page.frame_locator("#space-view").locator("canvas").last
+    space.wait_for(state="attached")
+    space.click(position={"x": 60, "y": 120})
+    assert page.value("document.activeElement.id") == "space-view"
+    page.press("ArrowRight", "ArrowRight")
+    page.until("__cocalib.state.shown.index === 2")
+
+
+def test_the_method_and_its_options_can_be_changed_and_taken_back(page: Driver, truth: Any) -> None:
+    page.click_sample(truth, 8)
+    robust = page.view["metrics"]
+    page.page.click("#tab-options")
+    page.page.click('[data-method="paper"]')
+    page.settle()
+    assert page.view["method"] == "paper"
+    assert page.view["metrics"] != robust
+    page.page.click('[data-method="default"]')
+    page.settle()
+    assert page.view["metrics"] == robust
+    page.page.fill('[data-path="noise.sigma_px"] input', "5000")
+    page.page.press('[data-path="noise.sigma_px"] input', "Enter")
+    page.until("document.querySelector('.toast')")
+    assert "out of range" in page.text(".toast")
+    page.until("document.querySelector('[data-path=\"noise.sigma_px\"] input').value === '2'")
+
+
+def test_two_tabs_see_the_same(
+    page: Driver, open_page: Callable[..., Driver], server: RunningServer, truth: Any
+) -> None:
+    other = open_page(server.url)
+    page.click_sample(truth, 2)
+    other.until("__cocalib.state.view.clicks.length === 2")
+    other.go_to(page.value("__cocalib.state.cursor"))
+    other.press("Delete")
+    page.until("__cocalib.state.view.clicks.length === 1")
+    assert page.view == other.view
+
+
+def test_a_page_that_is_loaded_again_is_where_it_was(page: Driver, truth: Any) -> None:
+    page.click_sample(truth, 4)
+    before, frame = page.view, page.value("__cocalib.state.cursor")
+    page.page.reload()
+    page.until("__cocalib.state.shown && __cocalib.state.view")
+    assert page.view == before
+    assert page.value("__cocalib.state.shown.index") == frame

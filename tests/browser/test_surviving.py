@@ -1,0 +1,133 @@
+"""Nothing is lost: not by killing the server, not by clicking while it is gone, not by what a recording calls itself."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.web.server import ServerOptions, start
+from app.workspace import open_workspace
+from tests.browser.driving import Driver
+from tests.picture_recording import PictureRecording, grey_pictures
+
+pytestmark = pytest.mark.browser
+
+
+class Process:
+    """The program as a person starts it: `cocalib demo`."""
+
+    def __init__(self, folder: Path, port: int) -> None:
+        command = [
+            sys.executable,
+            "-m",
+            "app",
+            "demo",
+            "--no-browser",
+            "--port",
+            str(port),
+            "--session",
+            str(folder / "session"),
+        ]
+        environment = {**os.environ, "XDG_STATE_HOME": str(folder)}
+        self.running = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
+        assert self.running.stdout is not None
+        found = next((found for line in self.running.stdout if (found := re.search(r"http://\S+", line))), None)
+        self.url = found.group() if found else ""
+
+    def kill(self) -> None:
+        if self.running.poll() is None:
+            self.running.send_signal(signal.SIGKILL)
+            self.running.wait()
+        assert self.running.stdout is not None
+        self.running.stdout.close()
+
+
+@pytest.fixture
+def starter(tmp_path: Path) -> Iterator[Callable[[], Process]]:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    started: list[Process] = []
+
+    def start_it() -> Process:
+        started.append(Process(tmp_path, port))
+        assert f":{port}/" in started[-1].url, "the port is taken"
+        return started[-1]
+
+    yield start_it
+    for process in started:
+        process.kill()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="kill -9 is a matter of POSIX")
+def test_killing_the_server_loses_no_click_and_the_page_comes_back_by_itself(
+    starter: Callable[[], Process], open_page: Callable[..., Driver], truth: Any
+) -> None:
+    process = starter()
+    page = open_page(process.url)
+    page.click_sample(truth, 5)
+    before = page.view
+    process.kill()
+    page.until("!__cocalib.state.connected")
+    assert "does not answer" in page.text("#banner")
+    u, v = truth["placements"][4]["pixel_px"]
+    page.page.mouse.click(*page.place_of(u + 30, v + 20))
+    page.until("__cocalib.unconfirmed() === 1")
+    starter()
+    page.until("__cocalib.state.connected")
+    page.settle()
+    after = page.view
+    assert [row["id"] for row in after["clicks"]] == [row["id"] for row in before["clicks"]]
+    places = [[(row["u_px"], row["v_px"]) for row in view["clicks"][:4]] for view in (before, after)]
+    assert places[0] == places[1]
+    moved = after["clicks"][4]
+    assert (moved["u_px"], moved["v_px"]) == pytest.approx((u + 30, v + 20), abs=1.0), (
+        "the click of the dead time arrived"
+    )
+    assert not page.page.is_visible("#banner")
+    page.page.frame_locator("#space-view").locator("canvas").last.wait_for(state="attached")
+    page.complaints[:] = [text for text in page.complaints if "WebSocket connection" not in text]
+
+
+def test_what_a_recording_calls_itself_is_text_and_never_runs(open_page: Callable[..., Driver], tmp_path: Path) -> None:
+    hostile = '<img src=x onerror="window.hit=1"><script>window.hit=1</script>'
+    recording = PictureRecording(grey_pictures(3), image_topic=hostile, radar_topic=f"radar{hostile}")
+    workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name=f"name{hostile}")
+    running = start(workspace, recording, ServerOptions(port=0, token="test"))
+    try:
+        page = open_page(running.url)
+        page.click(100, 100)
+        page.press("?")
+        page.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        assert page.value("window.hit === undefined")
+        assert page.text("#recording-name") == f"name{hostile}"
+        assert hostile in page.text("#recording-topics")
+        assert page.page.locator("img").count() == 0
+    finally:
+        running.close()
+        workspace.close()
+
+
+def test_large_frames_play_at_half_size_and_stand_at_full_size(
+    open_page: Callable[..., Driver], tmp_path: Path
+) -> None:
+    recording = PictureRecording(grey_pictures(30, 2400, 1200))
+    workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="large")
+    running = start(workspace, recording, ServerOptions(port=0, token="test"))
+    try:
+        page = open_page(running.url)
+        assert page.value("__cocalib.state.shown.scale") == 1
+        page.press(" ")
+        page.until("__cocalib.state.shown.index > 1 && __cocalib.state.shown.scale === 0.5")
+        page.press(" ")
+        page.until("!__cocalib.state.playing && __cocalib.state.shown.scale === 1")
+    finally:
+        running.close()
+        workspace.close()
