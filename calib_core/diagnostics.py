@@ -4,7 +4,7 @@ A check says nothing when all is well. The texts are for people; the codes are f
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from calib_core.locating import CLUSTER_SCALE
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.refining import Refined, refine
 from calib_core.results import Caution
-from calib_core.uncertainty import LeftOut, PoseUncertainty
+from calib_core.uncertainty import LeftOut, PoseUncertainty, pose_uncertainty
 
 __all__ = ["Findings", "cautions_of", "handedness"]
 
@@ -36,6 +36,7 @@ _MIRROR_STARTS = 2
 _AMBIGUOUS_MARGIN = 4.0
 _FAR_CAMERA = 3.0
 _CONTRADICTION_SIGMAS = 4.0
+_SUSPICIOUS_NOISE = 1.6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,28 +143,43 @@ def _two_poses(f: Findings) -> list[Caution]:
 
 
 def _camera_position(f: Findings) -> list[Caution]:
+    if f.evidence.belief.measured:
+        return _contradicted_position(f)
     belief = f.evidence.belief
-    centre_m = _camera_centre(f.refined.camera_from_radar)
-    away_m = centre_m - belief.position_m
-    if belief.measured:
-        sigmas = float(np.linalg.norm(away_m)) / belief.sigma_m
-        if sigmas <= _CONTRADICTION_SIGMAS:
-            return []
-        return [
-            Caution(
-                "camera-position-contradicted",
-                f"the pairs want the camera {100 * np.linalg.norm(away_m):.1f} cm from where it was measured "
-                f"({sigmas:.1f} times the stated {100 * belief.sigma_m:.1f} cm)",
-                "measure again from the radar's antennas to the lens: forward, left, up; or state a larger uncertainty",
-            )
-        ]
-    if np.linalg.norm(away_m) <= _FAR_CAMERA * belief.sigma_m:
+    away_m = float(np.linalg.norm(_camera_centre(f.refined.camera_from_radar) - belief.position_m))
+    if away_m <= _FAR_CAMERA * belief.sigma_m:
         return []
     return [
         Caution(
             "camera-far-away",
-            f"the camera comes out {np.linalg.norm(away_m):.1f} m from the radar; {belief.sigma_m:g} m was expected",
+            f"the camera comes out {away_m:.1f} m from the radar; about {belief.sigma_m:g} m was expected",
             "if the sensors are really that far apart, say so (nominal distance); otherwise suspect axes or intrinsics",
+        )
+    ]
+
+
+def _contradicted_position(f: Findings) -> list[Caution]:
+    """Compare the measured camera position with the one the pairs find on their own.
+
+    A position stated with a small sigma wins over the pairs and only makes the residuals large; so it is set free.
+    """
+    belief = f.evidence.belief
+    if f.chi2_per_degree < _SUSPICIOUS_NOISE:
+        return []
+    start = Consensus(f.refined.camera_from_radar, 0.0, float(f.refined.noise_scale.max()))
+    alone = refine(replace(f.evidence, belief=belief.freed()), start, estimate_scale=True)
+    away_m = _camera_centre(alone.camera_from_radar) - belief.position_m
+    centre_jacobian = belief.rows(alone.camera_from_radar)[1] * belief.sigma_m
+    doubt = centre_jacobian @ pose_uncertainty(alone).covariance @ centre_jacobian.T + belief.sigma_m**2 * np.eye(3)
+    sigmas = float(np.sqrt(away_m @ np.linalg.solve(doubt, away_m)))
+    if sigmas < _CONTRADICTION_SIGMAS:
+        return []
+    return [
+        Caution(
+            "camera-position-contradicted",
+            f"on their own the pairs put the camera {100 * np.linalg.norm(away_m):.0f} cm from where it was measured, "
+            f"{sigmas:.1f} standard deviations",
+            "measure again from the radar's antennas to the lens: forward, left, up; or state a larger uncertainty",
         )
     ]
 

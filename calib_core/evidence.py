@@ -58,6 +58,10 @@ class CameraBelief:
         jacobian = np.concatenate([-rotation.T, -rotation.T @ skew(translation_m)], axis=1)
         return away_m / sigma_m, jacobian / sigma_m
 
+    def freed(self) -> "CameraBelief":
+        """Return the same position as a guess only, a metre or more wide."""
+        return replace(self, sigma_m=max(self.sigma_m, 1.0), measured=False)
+
     def cost(self, camera_from_radar: RigidTransform) -> float:
         """Return twice the negative log-probability of a pose's camera centre, up to a constant."""
         away_m = self.position_m + camera_from_radar.rotation.T @ camera_from_radar.translation_m

@@ -1,0 +1,85 @@
+"""Pairs that other people measured, with the poses they published (lidar instead of radar; sources lie beside the data)."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib_core.calibrate import calibrate_pairs
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform, rotation_angle_rad
+from calib_core.locating import candidate_at
+from calib_core.measurements import Pair
+from calib_core.options import CalibrationOptions, NoiseOptions
+from calib_core.results import Calibration
+
+pytestmark = pytest.mark.real
+
+
+def load(folder: Path, name: str, size_px: tuple[int, int]) -> tuple[list[dict], Camera, RigidTransform]:
+    document = json.loads((folder / "real_pairs" / f"{name}.json").read_text(encoding="utf-8"))
+    camera = Camera("plumb_bob", *size_px, np.array(document["camera"]["K"]), np.array(document["camera"]["D"]))
+    published = document["published_T_camera_from_sensor"]
+    u, _, vt = np.linalg.svd(np.array(published["R"]))
+    return document["pairs"], camera, RigidTransform(u @ vt, np.array(published["t"]))
+
+
+def solve(rows: list[dict], camera: Camera, noise: NoiseOptions) -> Calibration:
+    pairs = [Pair(row["id"], np.array(row["uv"]), (candidate_at(np.array(row["xyz"]), noise),)) for row in rows]
+    outcome = calibrate_pairs(pairs, camera, CalibrationOptions(noise=noise))
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+def test_forty_board_centres_give_the_published_pose_and_name_the_outlier(shared_data: Path) -> None:
+    rows, camera, published = load(shared_data, "acfr_lidar_chessboard_40", (1920, 1208))
+    calibration = solve(rows, camera, NoiseOptions(1.0, 0.015, 0.3, 0.3))
+    pose = calibration.camera_from_radar
+    assert rotation_angle_rad(pose.rotation @ published.rotation.T) < np.deg2rad(0.5)
+    assert np.linalg.norm(pose.translation_m - published.translation_m) < 0.07
+    (outlier,) = (pair for pair in calibration.pairs if not pair.inlier)
+    assert outlier.distance_px == max(pair.distance_px for pair in calibration.pairs)
+    assert outlier.distance_px == pytest.approx(53.0, abs=5.0)
+    assert outlier.outlier_probability > 0.999
+    assert calibration.metrics.aed_px < 2.5
+
+
+def test_forty_board_centres_solve_with_radar_noise_assumed_as_well(shared_data: Path) -> None:
+    """Told three to ten times the real noise, the estimator finds the real level and the same pose."""
+    rows, camera, published = load(shared_data, "acfr_lidar_chessboard_40", (1920, 1208))
+    calibration = solve(rows, camera, NoiseOptions())
+    pose = calibration.camera_from_radar
+    assert rotation_angle_rad(pose.rotation @ published.rotation.T) < np.deg2rad(0.6)
+    assert max(calibration.noise_scale[2:]) < 0.5
+    assert [pair.id for pair in calibration.pairs if not pair.inlier] == [
+        max(calibration.pairs, key=lambda pair: pair.distance_px).id
+    ]
+
+
+def test_sixteen_hasty_clicks_are_no_more_certain_than_they_are(shared_data: Path) -> None:
+    """The published pose lies 5 deg from every fit to these clicks; with the noise of hasty clicks it is not excluded."""
+    rows, camera, published = load(shared_data, "heethesh_lidar_clicks_16", (964, 724))
+    hasty = NoiseOptions(6.0, 0.03, 1.15, 1.15, estimate_scale=False)
+    calibration = solve(rows, camera, hasty)
+    error = published.error_from(calibration.camera_from_radar)
+    assert error @ np.linalg.solve(calibration.covariance, error) < calibration.covariance_quantile
+    assert np.linalg.norm(error[3:]) > np.deg2rad(3.0)
+
+
+def test_another_robust_fit_to_the_hasty_clicks_lies_inside_the_uncertainty(shared_data: Path) -> None:
+    rows, camera, _ = load(shared_data, "heethesh_lidar_clicks_16", (964, 724))
+    document = json.loads((shared_data / "real_pairs" / "heethesh_lidar_clicks_16.json").read_text(encoding="utf-8"))
+    u, _, vt = np.linalg.svd(np.array(document["my_robust_fit"]["R"]))
+    other = RigidTransform(u @ vt, np.array(document["my_robust_fit"]["t"]))
+    calibration = solve(rows, camera, NoiseOptions())
+    error = other.error_from(calibration.camera_from_radar)
+    assert error @ np.linalg.solve(calibration.covariance, error) < calibration.covariance_quantile
+
+
+def test_the_order_of_real_pairs_does_not_change_a_bit(shared_data: Path) -> None:
+    rows, camera, _ = load(shared_data, "acfr_lidar_chessboard_40", (1920, 1208))
+    noise = replace(NoiseOptions(), sigma_px=1.0)
+    forward, backward = (solve(order, camera, noise) for order in (rows, rows[::-1]))
+    assert forward.camera_from_radar.as_matrix().tobytes() == backward.camera_from_radar.as_matrix().tobytes()
