@@ -15,14 +15,12 @@ __all__ = ["Backdrop", "Box", "Cylinder", "Ground", "Material", "Scatterer", "Sc
 
 Material = Literal[
     "render",
-    "concrete",
     "metal",
     "louvre",
     "white",
     "dark",
     "wood",
     "cartons",
-    "rack",
     "brick",
     "plaster",
     "checkerboard",

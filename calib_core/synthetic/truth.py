@@ -4,6 +4,7 @@ import json
 from typing import Any
 
 from calib_core.camera import Camera
+from calib_core.interchange import write_clicks
 from calib_core.measurements import TimeNs, time_parts
 from calib_core.synthetic.recording import SimulatedRecording
 
@@ -36,11 +37,7 @@ def truth_text(recording: SimulatedRecording) -> str:
 
 def clicks_text(recording: SimulatedRecording) -> str:
     """Write the example clicks (schema cocalib/clicks-1)."""
-    clicks = [
-        {"id": click.id, "image_time": _time(click.image_time), "pixel_px": [click.u_px, click.v_px]}
-        for click in recording.clicks
-    ]
-    return _text({"schema": "cocalib/clicks-1", "clicks": clicks})
+    return write_clicks(recording.clicks)
 
 
 def _time(time: TimeNs) -> dict[str, int]:

@@ -150,8 +150,7 @@ def shadow_limbs(apex_m: Vector3, facing_rad: float) -> tuple[Capsule, ...]:
     """Return rounded stand-ins for sheets and block that throw about the same shadow."""
     edges = EDGE_M * apex_edges(facing_rad, np.deg2rad(9.0))
     tips = apex_m + edges
-    low = np.array([0.0, 0.0, 0.0])
     centre = np.array([apex_m[0] + 0.055 * np.cos(facing_rad), apex_m[1] + 0.055 * np.sin(facing_rad), 0.0])
     bottom = centre + np.array([0.0, 0.0, max(0.05, float(tips[:, 2].min()) - 0.09)])
-    limbs = [Capsule(apex_m, tip + low, 0.045, 0.02, "shoe") for tip in tips]
+    limbs = [Capsule(apex_m, tip, 0.045, 0.02, "shoe") for tip in tips]
     return (*limbs, Capsule(bottom, bottom + np.array([0.0, 0.0, 0.03]), 0.085, 0.085, "shoe"))

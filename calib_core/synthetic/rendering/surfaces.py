@@ -196,14 +196,12 @@ def _door(p: Patch) -> np.ndarray:
 
 _MATERIALS: dict[Material, Callable[[Patch], np.ndarray]] = {
     "render": _render,
-    "concrete": _render,
     "metal": _metal,
     "louvre": _louvre,
     "white": lambda p: p.plain(0.72, 0.72, 0.70),
     "dark": lambda p: p.plain(0.09, 0.09, 0.09),
     "wood": _wood,
     "cartons": _cartons,
-    "rack": lambda p: p.plain(0.05, 0.12, 0.35),
     "brick": _brick,
     "plaster": _plaster,
     "checkerboard": _checkerboard,
