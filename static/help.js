@@ -35,8 +35,11 @@ function build() {
   const keys = make("dl", "", KEYS.flatMap(({ keys: names, does }) => [make("dt", "", names.map(key)), make("dd", "", does)]));
   const mouse = make("dl", "", MOUSE.flatMap(([hand, does]) => [make("dt", "", [key(hand)]), make("dd", "", does)]));
   const legend = make("div", "legend", MARKS.map(([path, words]) => make("div", "", [drawing(path), words])));
+  const title = make("h2", "", "Keys, mouse and marks");
+  title.tabIndex = -1;
+  title.autofocus = true;
   dialog.replaceChildren(
-    make("h2", "", "Keys, mouse and marks"),
+    title,
     close,
     make("div", "columns", [keys, make("div", "", [mouse, note()])]),
     legend,

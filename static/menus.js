@@ -35,6 +35,7 @@ function open() {
     link("api/clicks.json", "Clicks", "clicks.json: to go on with elsewhere, or for cocalib solve", true),
     importer(),
   ];
+  items.find((item) => item instanceof HTMLAnchorElement)?.classList.add("first");
   menu.replaceChildren(...items);
   menu.hidden = false;
   button.setAttribute("aria-expanded", "true");

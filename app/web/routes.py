@@ -52,7 +52,7 @@ _VISER_STYLE = b"""<style>
 }
 html, body, #root, #root div { background-color: transparent !important; }
 html { background: #0d1014 !important; }
-html[data-theme="light"] { background: #e9ecf0 !important; }
+html[data-theme="light"] { background: #202830 !important; }
 </style>
 </head>"""
 
