@@ -190,10 +190,11 @@ def _parse_idl(name: str, text: str) -> dict[str, tuple[Field, ...]]:
     try:
         for section in _SEPARATOR.split(text):
             body = re.sub(r"^\s*IDL:.*$", "", section, flags=re.MULTILINE)
-            for owner, (_, fields) in get_types_from_idl(body).items():
+            for owner, (_, fields) in get_types_from_idl(body).items() if body.strip() else ():
                 types[short_type(owner)] = tuple(_field_from_rosbags(*field) for field in fields)
     except TypesysError as error:
-        raise MessageError(f"the definition of {name} is not valid IDL ({error})") from error
+        why = " ".join(str(error).split())
+        raise MessageError(f"the definition of {name} is not valid IDL ({why})") from error
     if name not in types:
         raise MessageError(f"the IDL text does not define {name}")
     return types

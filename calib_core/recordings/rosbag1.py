@@ -50,6 +50,8 @@ class Rosbag1Source(ChunkedSource):
                     f"repair it first: rosbag reindex {file.path.name}"
                 )
             infos = self._read_tail(index_position)
+            if len(infos) != _number(header.get("chunk_count", b""), 4):
+                raise self._damaged(index_position)
             self._read_indexes(sorted(infos), index_position)
         except RecordingError as fault:
             self._recover(after[0] + after[1], fault)
@@ -111,6 +113,8 @@ class Rosbag1Source(ChunkedSource):
             elif kind == _CHUNK_INFO:
                 infos.append(_number(header.get("chunk_pos", b""), 8))
             position = data + size
+        if position > self.size_bytes:
+            raise self._damaged(position - size)
         self.channels = tuple(channels.values())
         return infos
 

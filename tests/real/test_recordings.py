@@ -1,0 +1,122 @@
+"""Real recordings: every container of the road recording, a lidar cloud with holes, camera formats, raw radar packets."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib_core.errors import RecordingError
+from calib_core.measurements import NS_PER_S
+from calib_core.recordings import RecordingOptions, describe, inspect_recording, open_recording
+
+pytestmark = pytest.mark.real
+
+ROAD = (
+    "pjlab_radar_camera.bag",
+    "pjlab_radar_camera_mcap",
+    "pjlab_radar_camera_mcap/pjlab_radar_camera_mcap.mcap",
+    "pjlab_radar_camera_db3",
+    "pjlab_radar_camera_db3/pjlab_radar_camera_db3.db3",
+)
+
+
+@pytest.fixture
+def road(shared_data: Path) -> Path:
+    return shared_data / "real_radar_camera_road"
+
+
+@pytest.mark.parametrize("name", ROAD)
+def test_the_road_recording_opens_in_every_container(road, name):
+    with open_recording(road / name) as recording:
+        scans = recording.radar_scans()
+        assert (len(scans), len(recording.image_times)) == (7, 7)
+        np.testing.assert_array_equal(recording.radar_times, recording.image_times)
+        assert int(recording.radar_times[0]) == 1_604_546_789_558_788_096
+        counts = np.diff(scans.first_return)
+        assert (counts.min(), counts.max(), counts.sum()) == (81, 83, 575)
+        np.testing.assert_allclose(scans.points_radar_m[:2], [[206.6, 0.8, 0.0], [46.6, -4.6, 0.0]], rtol=1e-6)
+        assert np.isfinite(scans.doppler_mps).all()
+        frame = recording.image_bytes(3)
+        assert (frame.format, frame.width_px, frame.height_px) == ("jpeg", 1920, 1200)
+        assert recording.image(3).shape == (1200, 1920, 3)
+        camera = recording.camera()
+        assert camera is not None
+        assert camera.model == "plumb_bob"
+        np.testing.assert_allclose(camera.matrix_px, [[2117.87, 0, 950.144], [0, 2121.65, 588.036], [0, 0, 1]])
+        assert [caution.code for caution in recording.cautions] == ["flat-radar"]
+
+
+@pytest.mark.parametrize("name", ROAD)
+def test_the_readers_agree_with_rosbags_message_by_message(road, name):
+    from rosbags.highlevel import AnyReader
+
+    path = road / name
+    with (
+        open_recording(path) as recording,
+        AnyReader([path if path.suffix == ".bag" else path.parent / path.name]) as reader,
+    ):
+        images = [c for c in reader.connections if c.topic == recording.image_topic]
+        for index, (connection, _, raw) in enumerate(reader.messages(images)):
+            message = reader.deserialize(raw, connection.msgtype)
+            assert recording.image_bytes(index).data == message.data.tobytes()
+        clouds = [c for c in reader.connections if c.topic == recording.radar_topic]
+        scans = recording.radar_scans()
+        for index, (connection, _, raw) in enumerate(reader.messages(clouds)):
+            message = reader.deserialize(raw, connection.msgtype)
+            stamp = message.header.stamp.sec * NS_PER_S + message.header.stamp.nanosec
+            assert stamp == scans.times_ns[index]
+            table = message.data.reshape(message.width, message.point_step)[:, :12].copy().view("<f4")
+            np.testing.assert_array_equal(scans.scan(index).points_radar_m, table)
+
+
+def test_the_folder_of_all_three_copies_is_one_recording_and_says_so(road):
+    with open_recording(road) as recording:
+        assert len(recording.radar_times) == len(recording.image_times) == 7
+        assert "repeated-messages" in [caution.code for caution in recording.cautions]
+
+
+def test_a_lidar_cloud_with_holes_and_mixed_types_is_read(shared_data):
+    with inspect_recording(shared_data / "real_pointcloud2" / "test.bag") as recording:
+        scans = recording.radar_scans()
+        assert len(scans.points_radar_m) == 180_822
+        assert np.isfinite(scans.points_radar_m).all()
+        assert np.abs(scans.points_radar_m).max() < 300
+        assert recording.radar_frame == "luminar_lidar"
+        # stamps of March 2020 in a bag received in November: the stamps hold
+        assert int(scans.times_ns[0]) == 1_583_971_570_015_299_642
+        assert [caution.code for caution in recording.cautions] == ["looks-like-lidar"]
+        assert "looks like a lidar" in describe(recording)
+
+
+def test_raw_camera_images_go_by_their_stamps_of_another_year(shared_data):
+    with open_recording(shared_data / "real_camera_formats" / "raw.bag", require=("image",)) as recording:
+        assert int(recording.image_times[0]) == 1_648_052_479_616_566_426
+        assert recording.image(0).shape == (480, 640, 3)
+        frame = recording.image_bytes(0)
+        assert (frame.format, frame.width_px, frame.height_px) == ("jpeg", 640, 480)
+        assert recording.cautions == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "topic", "words"),
+    [
+        ("compressed.bag", "/spot/camera/hand_color/image/qoi", "the encoding 'qoi' cannot be read"),
+        ("compressedDepth.bag", "/spot/depth/frontleft/image/compressedDepth", "is a depth image, not a picture"),
+    ],
+)
+def test_what_no_decoder_reads_is_refused_in_words(shared_data, name, topic, words):
+    path = shared_data / "real_camera_formats" / name
+    with pytest.raises(RecordingError, match=words) as caught:
+        open_recording(path, RecordingOptions(image_topic=topic), require=("image",))
+    assert topic in str(caught.value)
+    with pytest.raises(RecordingError, match="no camera image topic that can be read"):
+        open_recording(path, require=("image",))
+
+
+@pytest.mark.parametrize("name", ["ars548/1708578204", "srr520/1708578209"])
+def test_raw_packets_of_a_radar_are_listed_with_the_reason_they_are_not_read(shared_data, name):
+    inside = "src/nebula_continental/nebula_continental/test_resources/decoder_ground_truth"
+    with inspect_recording(shared_data / "real_radar_packets" / inside / name) as recording:
+        (topic,) = recording.topics
+        assert topic.type == "nebula_msgs/msg/NebulaPackets"
+        assert "the recording has no definition of nebula_msgs/msg/NebulaPackets" in str(topic.problem)

@@ -1,0 +1,76 @@
+"""What `cocalib info` says."""
+
+import json
+
+import msgspec
+import pytest
+
+from calib_core.measurements import NS_PER_S
+from calib_core.recordings import RecordingSummary, describe, inspect_recording, recording_summary
+
+START_NS = 1_700_000_000 * NS_PER_S
+
+
+def test_the_text_names_files_times_topics_radar_camera_and_cautions(ros1, write, plain, jpeg, cloud_points):
+    rows = plain(ros1, jpeg)
+    points = cloud_points(4)
+    points["z"] = 0
+    rows = [(t, at, ros1.cloud(at, points) if "radar" in t else message) for t, at, message in rows]
+    path = write(ros1, [*rows, ("/odd", START_NS, ros1.new("std_msgs/msg/String", data="hello"))], "bag-lz4")
+    with inspect_recording(path) as recording:
+        text = describe(recording)
+    size = f"{path.stat().st_size / 1000:.1f} kB"
+    assert (
+        text
+        == f"""\
+files     recording.bag  {size}  ROS 1 bag, lz4
+time      2023-11-14 22:13:20.030 UTC to 2023-11-14 22:13:21.950 UTC, 1.9 s
+          radar and camera share 1.9 s
+
+used as     topic                     type                         messages     rate  longest gap  jitter  stamps
+intrinsics  /camera/camera_info       sensor_msgs/CameraInfo             20  10.0 Hz      0.100 s  0.0 ms  received
+camera      /camera/image/compressed  sensor_msgs/CompressedImage        20  10.0 Hz      0.100 s  0.0 ms  measured
+            /odd                      std_msgs/String                     1                                received
+radar       /radar/points             sensor_msgs/PointCloud2            20  10.0 Hz      0.100 s  0.0 ms  measured
+
+radar     /radar/points, frame 'radar': 20 scans at 10.0 Hz, longest gap 0.100 s
+          returns per scan: 4 (4 to 4)
+          position from x, y, z; speed from velocity; amplitude from snr
+camera    /camera/image/compressed, frame 'camera': 20 images at 10.0 Hz, longest gap 0.100 s
+          64 x 48 px, jpeg
+          plumb_bob from /camera/camera_info: fx 500.00 fy 510.00 cx 319.50 cy 239.50 px; \
+distortion -0.1, 0.02, 0.001, -0.002, 0.003
+
+caution   /radar/points gives every return the same height (0 m): it measures no elevation.
+          put the reflector's centre at the radar's height at every placement, and measure the camera position. [flat-radar]"""
+    )
+
+
+@pytest.mark.parametrize("part", ["radar", "camera", "nothing"])
+def test_a_recording_that_lacks_something_is_described_all_the_same(part, ros, write, plain, jpeg):
+    rows = [row for row in plain(ros, jpeg) if part in row[0]]
+    with inspect_recording(write(ros, rows)) as recording:
+        text = describe(recording)
+        summary = recording_summary(recording)
+    assert ("radar     none that can be read" in text) == (part != "radar")
+    assert ("camera    none that can be read" in text) == (part != "camera")
+    assert (summary.radar is None, summary.camera is None) == (part != "radar", part != "camera")
+    assert summary.overlap_s is None
+    assert ("no messages" in text) == (part == "nothing")
+
+
+def test_the_summary_survives_json(ros, write, plain, jpeg):
+    with inspect_recording(write(ros, plain(ros, jpeg))) as recording:
+        summary = recording_summary(recording)
+    data = msgspec.json.encode(summary)
+    assert msgspec.json.decode(data, type=RecordingSummary) == summary
+    plain_values = json.loads(data)
+    assert plain_values["start"] == {"sec": 1_700_000_000, "nanosec": 0}
+    assert plain_values["radar"]["returns_per_scan"] == [3, 4.0, 5]
+    assert plain_values["camera"]["matrix_px"][0][0] == 500.0
+
+
+def test_what_cannot_be_read_is_explained(ros1, write):
+    message = ros1.compressed(START_NS, b"qoif" + bytes(30), "qoi")
+    with inspect_recording(write(ros1, [("/camera/qoi", START_NS, message)])) as recording:
+        assert "topic /camera/qoi: the encoding 'qoi' cannot be read" in describe(recording)
