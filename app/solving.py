@@ -83,6 +83,10 @@ class RecordingSource(RadarSource, Protocol):
     @property
     def camera_info_topic(self) -> str | None: ...  # noqa: D102
     @property
+    def radar_clock(self) -> str | None: ...  # noqa: D102
+    @property
+    def image_clock(self) -> str | None: ...  # noqa: D102
+    @property
     def radar_frame(self) -> str: ...  # noqa: D102
     @property
     def camera_frame(self) -> str: ...  # noqa: D102
@@ -169,6 +173,8 @@ def calibration_text(calibration: Calibration, recording: RecordingSource) -> st
         radar_topic=recording.radar_topic,
         image_topic=recording.image_topic,
         camera_info_topic=recording.camera_info_topic,
+        radar_clock=recording.radar_clock,
+        image_clock=recording.image_clock,
         version=version(),
     )
     return interchange_text(calibration, _frame_names(recording), provenance)

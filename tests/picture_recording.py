@@ -31,6 +31,8 @@ class PictureRecording:
     radar_topic: str = "/radar"
     image_topic: str = "/camera"
     camera_info_topic: str | None = None
+    radar_clock: str | None = "header"
+    image_clock: str | None = "header"
     radar_frame: str = "radar"
     camera_frame: str = "camera_optical"
     cautions: tuple[Any, ...] = ()

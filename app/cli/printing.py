@@ -1,6 +1,8 @@
 """What commands share: reading and writing files, refusing in one line, and what a recording must bring."""
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from app import whole_file
@@ -12,6 +14,7 @@ from calib_core.recordings import Recording
 
 __all__ = [
     "explain_unsolvable",
+    "progress_bar",
     "read_text",
     "refuse",
     "required_camera",
@@ -84,6 +87,25 @@ def required_camera(recording: Recording, camera_file: Path | None) -> Camera:
             "give them with --camera FILE (ROS camera_info YAML, OpenCV YAML or XML, Kalibr camchain, JSON)"
         )
     return camera
+
+
+@contextmanager
+def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar on stderr while something long goes on; nothing where stderr is not a terminal.
+
+    Args:
+        label: what is going on.
+
+    Yields:
+        the function to tell how much is done, and of how much.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(label, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def seconds_text(time: TimeNs) -> str:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import tyro
 
+from app.cli.printing import progress_bar
 from calib_core.errors import InputError
 from calib_core.synthetic import Container, SimulationOptions
 
@@ -28,6 +29,7 @@ class Simulate:
 
         if self.out.exists() and (not self.out.is_dir() or any(self.out.iterdir())):
             raise InputError(f"{self.out}: not an empty folder; nothing was written")
-        paths = write_recording(simulate(self.options), self.out, containers=self.containers)
+        with progress_bar("rendering frames") as progress:
+            paths = write_recording(simulate(self.options), self.out, containers=self.containers, progress=progress)
         print("\n".join(str(path) for path in paths))
         return 0

@@ -10,7 +10,7 @@
     }
   };
   const solved = () => state.view && !state.view.solving && state.view.solved_revision === state.view.revision;
-  const canvas = () => document.querySelector("canvas");
+  const canvas = () => document.getElementById("marks");
   const press = (type, x, y) =>
     canvas().dispatchEvent(
       new PointerEvent(type, { clientX: x, clientY: y, button: 0, buttons: type === "pointerup" ? 0 : 1, pointerId: 1, isPrimary: true, bubbles: true, cancelable: true }),
@@ -29,11 +29,10 @@
       await until(() => state.shown.index === click.frame && solved());
       await new Promise((done) => setTimeout(done, 100));
       const box = canvas().getBoundingClientRect();
-      const place = toCss(click.u_px + (number % 2 ? 12 : -12), click.v_px);
-      const [x, y] = [box.left + place.x, box.top + place.y];
+      const [x, y] = toCss(click.u_px + (number % 2 ? 30 : -30), click.v_px);
       const revision = state.view.revision;
-      press("pointerdown", x, y);
-      press("pointerup", x, y);
+      press("pointerdown", box.left + x, box.top + y);
+      press("pointerup", box.left + x, box.top + y);
       const start = performance.now();
       await until(() => Math.abs(clickIn(click.frame).u_px - click.u_px) > 0.01);
       await painted();

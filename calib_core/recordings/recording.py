@@ -91,6 +91,19 @@ class Recording:
         return " + ".join(path.name for path in self.paths)
 
     @property
+    def radar_clock(self) -> str | None:
+        """The clock that radar_times are by: "header" or "receive"; None without radar."""
+        return self._clock_of(self.radar_topic)
+
+    @property
+    def image_clock(self) -> str | None:
+        """The clock that image_times are by: "header" or "receive"; None without images."""
+        return self._clock_of(self.image_topic)
+
+    def _clock_of(self, name: str | None) -> str | None:
+        return next((topic.clock for topic in self.topics if topic.name == name), None)
+
+    @property
     def cautions(self) -> tuple[Caution, ...]:
         """What a person must know; messages found unreadable so far are counted in."""
         radar = self._assembly.radar

@@ -1,19 +1,27 @@
 """Write a simulated recording to a folder, in the containers people use."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 from calib_core.recordings.writing import write_ros1_bag, write_ros2
 from calib_core.synthetic.messages import all_messages, camera_messages, radar_messages
 from calib_core.synthetic.options import Container
-from calib_core.synthetic.recording import SimulatedRecording
+from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
 from calib_core.synthetic.truth import clicks_text, truth_text
 
-__all__ = ["write_recording"]
+__all__ = ["Progress", "write_recording"]
+
+Progress: TypeAlias = Callable[[int, int], None]
+"""Called with how much is done, and of how much."""
 
 
 def write_recording(
-    recording: SimulatedRecording, folder: Path, containers: Sequence[Container] = ("ros1",)
+    recording: SimulatedRecording,
+    folder: Path,
+    containers: Sequence[Container] = ("ros1",),
+    *,
+    progress: Progress = lambda done, total: None,
 ) -> tuple[Path, ...]:
     """Write recording, truth.json and clicks.json, and return the data files.
 
@@ -22,20 +30,29 @@ def write_recording(
         folder: made if it does not exist; files of the same name in it are not overwritten.
         containers: "ros1" writes radar.bag and camera.bag; "mcap" and "db3" write a ROS 2 bag each, a folder with
             metadata.yaml whose data file can also be opened alone.
+        progress: told after each frame how many are written, of how many in all containers.
 
     Raises:
         RecordingError: a file exists already.
     """
     folder.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
-    for container in containers:
+    frame_count = len(recording.stage.frame_times.header_ns)
+    for number, container in enumerate(containers):
+        frames = _counted(recording, progress, before=number * frame_count, total=len(containers) * frame_count)
         if container == "ros1":
             written.append(write_ros1_bag(folder / "radar.bag", radar_messages(recording, 1)))
-            written.append(write_ros1_bag(folder / "camera.bag", camera_messages(recording)))
+            written.append(write_ros1_bag(folder / "camera.bag", camera_messages(recording, frames)))
         else:
             name = folder / f"recording_{container}"
-            messages = all_messages(recording, 2)
+            messages = all_messages(recording, 2, frames)
             written.append(write_ros2(name, messages, container="mcap" if container == "mcap" else "sqlite3"))
     (folder / "truth.json").write_text(truth_text(recording), encoding="utf-8")
     (folder / "clicks.json").write_text(clicks_text(recording), encoding="utf-8")
     return tuple(written)
+
+
+def _counted(recording: SimulatedRecording, progress: Progress, *, before: int, total: int) -> Iterator[SimulatedFrame]:
+    for done, frame in enumerate(recording.frames(), start=before + 1):
+        yield frame
+        progress(done, total)

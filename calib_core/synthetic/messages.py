@@ -81,10 +81,20 @@ def radar_messages(recording: SimulatedRecording, generation: Literal[1, 2]) -> 
             yield from _returns(recording, scan, int(receive))
 
 
-def all_messages(recording: SimulatedRecording, generation: Literal[1, 2]) -> Iterator[RecordedMessage]:
-    """Merge both sensors' messages as one recorder would get them."""
+def all_messages(
+    recording: SimulatedRecording, generation: Literal[1, 2], frames: Iterable[SimulatedFrame] | None = None
+) -> Iterator[RecordedMessage]:
+    """Merge both sensors' messages as one recorder would get them.
+
+    Args:
+        recording: whose sensors.
+        generation: of ROS.
+        frames: other than all of the recording's.
+    """
     return heapq.merge(
-        camera_messages(recording), radar_messages(recording, generation), key=lambda message: message.receive_time
+        camera_messages(recording, frames),
+        radar_messages(recording, generation),
+        key=lambda message: message.receive_time,
     )
 
 
