@@ -16,7 +16,8 @@ export function drawMarks(pen) {
   const index = state.shown?.index ?? -1;
   const overlay = state.overlay?.index === index ? state.overlay : null;
   if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
-  if (state.layers.predictions && overlay) for (const [u, v] of overlay.guesses) drawGuess(pen, u, v);
+  const clicked = clicks().some((click) => click.frame === index);
+  if (state.layers.predictions && overlay && !clicked) for (const [u, v] of overlay.guesses) drawGuess(pen, u, v);
   const here = clicks();
   if (state.layers.others) for (const click of here) if (click.frame !== index) drawOther(pen, click);
   for (const click of here) if (click.frame === index) drawClick(pen, click);

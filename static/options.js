@@ -9,6 +9,12 @@ import { on, state } from "./state.js";
 const page = /** @type {HTMLElement} */ (document.getElementById("page-options"));
 /** The options that most people come for. */
 const FIRST = ["locating.window_s", "noise.sigma_px", "gating.max_range_m", "solving.camera_position"];
+/** Names that say more than the option's own. @type {Record<string, string>} */
+const LABELS = {
+  "locating.window_s": "Radar window around a click",
+  "noise.sigma_px": "Uncertainty of a click",
+  "gating.max_range_m": "Farthest return",
+};
 /** @type {Record<string, string>} */
 const METHODS = { default: "Robust", paper: "Paper" };
 /** @type {Record<string, string>} */
@@ -108,6 +114,7 @@ function cameraPosition(field) {
     input.dataset.hint = `Camera's distance ${names[index]} of the radar [m]`;
   });
   const sure = number(0.0001, 10, "standard deviation of the position");
+  const numbers = make("span", "control triple", [...inputs, make("span", "", "±"), sure, make("span", "unit", "m")]);
   const told = () => {
     if (!on_.checked) return change(field.path, null);
     change(field.path, { position_m: inputs.map((input) => Number(input.value) || 0), sigma_m: Number(sure.value) || 0.01 });
@@ -117,10 +124,9 @@ function cameraPosition(field) {
     on_.checked = value !== null;
     inputs.forEach((input, index) => write(input, value?.position_m[index] ?? ""));
     write(sure, value?.sigma_m ?? "");
-    for (const input of [...inputs, sure]) input.disabled = value === null;
+    numbers.hidden = value === null;
   });
   const head = row(field, make("span", "control", [on_]), "Camera position by tape");
-  const numbers = make("span", "control triple", [...inputs, make("span", "", "±"), sure, make("span", "unit", "m")]);
   return make("div", "", [head, numbers]);
 }
 
@@ -141,7 +147,7 @@ function write(input, value) {
 }
 
 /** @param {Field} field @param {HTMLElement} content @param {string} [label] */
-function row(field, content, label = sentence(field.label)) {
+function row(field, content, label = LABELS[field.path] ?? sentence(field.label)) {
   const line = make("div", "field", [make("span", "", label), content]);
   line.dataset.hint = field.hint;
   line.dataset.path = field.path;

@@ -33,13 +33,17 @@ export function sorted() {
   return [...clicks()].sort((a, b) => sign * ((a[sorting.key] ?? -1) - (b[sorting.key] ?? -1)) || a.frame - b.frame);
 }
 
-/** Go to the click of the next smaller residual; from the smallest to the largest. */
+/** The click that the walk has come to. @type {string|null} */
+let walkedTo = null;
+
+/** Go to the largest residual; then, as long as one walks on, to the next smaller one. */
 export function nextWorst() {
   const ranked = clicks().filter((click) => click.residual_px !== null && click.state !== "excluded");
   ranked.sort((a, b) => Number(b.residual_px) - Number(a.residual_px));
   if (!ranked.length) return;
-  const at = ranked.findIndex((click) => click.id === state.selected);
+  const at = walkedTo === state.selected ? ranked.findIndex((click) => click.id === walkedTo) : -1;
   const next = ranked[(at + 1) % ranked.length];
+  walkedTo = next.id;
   pause();
   goTo(next.frame);
   select(next.id);
@@ -100,7 +104,7 @@ function line(click) {
 }
 
 /** Three digits. @param {number} value */
-const digits = (value) => (value < 10 ? value.toFixed(2) : value < 100 ? value.toFixed(1) : value.toFixed(0));
+const digits = (value) => (value < 0.995 ? value.toFixed(2) : value < 999.5 ? value.toPrecision(3) : value.toFixed(0));
 
 /** @param {Click} click */
 const word = (click) => (click.state === "unpaired" ? "no return" : click.state === "pending" ? "…" : "–");

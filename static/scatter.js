@@ -6,7 +6,8 @@ import { make } from "./notices.js";
 import { goTo, pause } from "./player.js";
 import { clicks, on, select, state } from "./state.js";
 
-const SIDE = 168;
+/** CSS px of the plot's side: smaller in a narrow panel. */
+let side = 180;
 const canvas = make("canvas", "", []);
 const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
 
@@ -34,31 +35,32 @@ const offset = (click) => (click.projected_px ? [click.projected_px[0] - click.u
 /** Place of a click in the plot; those beyond lie on its edge. @param {import("./messages.js").ClickRow} click @param {number} most @returns {[number, number]} */
 function place(click, most) {
   const [du, dv] = offset(click).map((value) => Math.min(1.06, Math.max(-1.06, value / most)));
-  const half = SIDE / 2;
+  const half = side / 2;
   return [half + du * (half - 14), half + dv * (half - 14)];
 }
 
 function draw() {
+  side = (document.getElementById("panel")?.clientWidth ?? 0) > 440 ? 180 : 140;
   const ratio = window.devicePixelRatio || 1;
-  canvas.width = canvas.height = Math.round(SIDE * ratio);
-  canvas.style.width = canvas.style.height = `${SIDE}px`;
+  canvas.width = canvas.height = Math.round(side * ratio);
+  canvas.style.width = canvas.style.height = `${side}px`;
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
-  pen.clearRect(0, 0, SIDE, SIDE);
+  pen.clearRect(0, 0, side, side);
   const most = reach();
-  const half = SIDE / 2;
+  const half = side / 2;
   pen.strokeStyle = themeColour("line");
   pen.lineWidth = 1;
   for (const share of [0.5, 1]) ring(half, half, share * (half - 14));
   pen.beginPath();
   pen.moveTo(half, 6);
-  pen.lineTo(half, SIDE - 6);
+  pen.lineTo(half, side - 6);
   pen.moveTo(6, half);
-  pen.lineTo(SIDE - 6, half);
+  pen.lineTo(side - 6, half);
   pen.stroke();
   pen.fillStyle = themeColour("faint");
   pen.font = `10px ${themeColour("mono")}`;
   pen.textAlign = "right";
-  pen.fillText(`${most} px`, SIDE - 5, half - 4);
+  pen.fillText(`${most} px`, side - 5, half - 4);
   for (const click of clicks()) if (click.projected_px) mark(click, most);
 }
 

@@ -30,15 +30,17 @@ from calib_core.results import Calibration, PairResult
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["LOOK_AT", "STAND_AT", "Sight", "TabScene"]
+__all__ = ["FIELD_OF_VIEW_RAD", "LOOK_AT", "STAND_AT", "Sight", "TabScene"]
 
-STAND_AT, LOOK_AT = (-2.4, 0.0, 2.2), (6.0, 0.0, -1.0)
+STAND_AT, LOOK_AT = (-5.0, 0.0, 3.6), (6.0, 0.0, -0.4)
 """Where the 3D view's camera begins: behind and above the radar, looking forward."""
+
+FIELD_OF_VIEW_RAD = 0.75
 
 _VIEWPOINTS = {
     "behind": (STAND_AT, LOOK_AT),
-    "above": ((6.0, 0.0, 19.0), (6.01, 0.0, 0.0)),
-    "side": ((6.0, -13.0, 3.5), (6.0, 0.0, 0.5)),
+    "above": ((7.0, 0.0, 26.0), (7.01, 0.0, 0.0)),
+    "side": ((7.0, -20.0, 4.0), (7.0, 0.0, 0.0)),
 }
 _RINGS_EVERY_M, _RINGS_UP_TO_M = 5.0, 30.0
 _LIT, _DIM, _ORANGE, _RINGS = (87, 182, 242), (112, 124, 136), (255, 180, 84), (84, 99, 115)

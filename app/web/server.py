@@ -27,7 +27,7 @@ from app.web.channel import Channel
 from app.web.hook import ProcessRequest, SocketHandler, start_viser
 from app.web.hub import Hub, PageRecording
 from app.web.routes import Reply, Routes, refusal
-from app.web.scene import LOOK_AT, STAND_AT, TabScene
+from app.web.scene import FIELD_OF_VIEW_RAD, LOOK_AT, STAND_AT, TabScene
 from app.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -78,6 +78,7 @@ class RunningServer:
         )
         self._viser.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         self._viser.initial_camera.position, self._viser.initial_camera.look_at = STAND_AT, LOOK_AT
+        self._viser.initial_camera.fov = FIELD_OF_VIEW_RAD
         self._viser.on_client_connect(self._space_came)
         self._viser.on_client_disconnect(self._space_went)
         asyncio.run_coroutine_threadsafe(self._hub.start(), self._viser.get_event_loop()).result()

@@ -1,0 +1,92 @@
+"""Take the pictures of the documentation: `make picture` writes docs/pictures/*.png from the sample recording."""
+
+import json
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import Browser, sync_playwright
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from app.web.server import RunningServer, ServerOptions, start  # noqa: E402
+from app.workspace import open_workspace  # noqa: E402
+from calib_core.recordings import open_recording  # noqa: E402
+from tests.browser.driving import FLAGS, Driver  # noqa: E402
+from tests.find_browser import find_browser  # noqa: E402
+
+PICTURES = ROOT / "docs" / "pictures"
+SIZE = {"width": 1440, "height": 900}
+
+
+def opened(browser: Browser, server: RunningServer, theme: str) -> Driver:
+    """Open the page in a theme, 3D view included."""
+    page = browser.new_page(viewport=SIZE)  # type: ignore[arg-type]
+    page.add_init_script(f"if (top === window) localStorage.setItem('cocalib-layout', '{{\"theme\": \"{theme}\"}}')")
+    driver = Driver(page, server.url)
+    driver.until("__cocalib.state.placementsKnown")
+    page.frame_locator("#space-view").locator("canvas").last.wait_for(state="attached")
+    return driver
+
+
+def shoot(driver: Driver, name: str) -> None:
+    """Wait until the 3D view has drawn what it was told, then take the picture."""
+    driver.settle()
+    driver.page.wait_for_timeout(3000)
+    driver.page.screenshot(path=PICTURES / f"{name}.png")
+    print(PICTURES / f"{name}.png")
+
+
+def placed(driver: Driver, clicks: list[dict[str, Any]]) -> None:
+    """Click what the sample's example clicks say."""
+    for click in clicks:
+        driver.go_to(driver.frame_at(click["image_time"]))
+        driver.page.mouse.click(*driver.place_of(*click["pixel_px"]))
+        driver.until("__cocalib.unconfirmed() === 0")
+    driver.settle()
+
+
+def take_all(browser: Browser, server: RunningServer, clicks: list[dict[str, Any]]) -> None:
+    """Walk through one calibration: first look, a click under the loupe, the result, a pair in doubt, the light theme."""
+    driver = opened(browser, server, "dark")
+    driver.press("n")
+    shoot(driver, "first_look")
+    placed(driver, clicks)
+    u, v = clicks[3]["pixel_px"]
+    driver.go_to(driver.frame_at(clicks[3]["image_time"]))
+    driver.zoom_to(u, v, 1.6)
+    driver.page.mouse.move(*driver.place_of(u + 5, v + 3))
+    shoot(driver, "page")
+    driver.page.mouse.move(700, 860)
+    driver.press("f", "j")
+    driver.page.click("#tab-pose")
+    shoot(driver, "pose")
+    driver.page.close()
+    shoot(opened(browser, server, "light"), "light")
+
+
+def main() -> None:
+    """Serve the sample with a session of its own and take the pictures."""
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    folder = ROOT / "sample_data" / "rooftop"
+    clicks = json.loads((folder / "clicks.json").read_text(encoding="utf-8"))["clicks"]
+    with (
+        tempfile.TemporaryDirectory() as session,
+        open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording,
+    ):
+        workspace = open_workspace(
+            recording, camera=recording.camera(), session_folder=Path(session) / "s", name="the sample recording"
+        )
+        server = start(workspace, recording, ServerOptions(port=0, token="pictures"))
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(executable_path=str(find_browser()), args=FLAGS)
+            take_all(browser, server, clicks)
+            browser.close()
+        server.close()
+        workspace.close()
+
+
+if __name__ == "__main__":
+    main()
