@@ -8,8 +8,9 @@ import numpy as np
 from calib_core.arrays import Flags, Values
 from calib_core.camera import Camera
 from calib_core.consensus import Consensus, associate, find_consensus
-from calib_core.diagnostics import Findings, cautions_of, handedness
+from calib_core.diagnostics import MIRRORED_GAIN, Findings, cautions_of
 from calib_core.evidence import Evidence, evidence_of
+from calib_core.handedness import mirror_gain
 from calib_core.initial_pose import starting_poses
 from calib_core.measurements import Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.metrics import distances, metrics_of
@@ -28,6 +29,7 @@ MIN_PAIRS = 4
 _INLIER_PROBABILITY = 0.5
 _STARTS_MEASURED = 3
 _STARTS_FREE = 6
+_OPEN_ROTATION_RAD = 0.5  # a rotation less certain than that is not known
 _AGREEING_SHARE = 0.9
 _PLAUSIBLE_SCALE = 1.8
 _NEAR_PRIOR = 4.0  # standard deviations
@@ -90,6 +92,9 @@ def _solved(
         return fit
     refined = fit.refined
     uncertainty = pose_uncertainty(refined)
+    open_rad = float(np.sqrt(uncertainty.covariance[3:, 3:].diagonal().max()))
+    if not open_rad < _OPEN_ROTATION_RAD:
+        return _no_shape(len(used))
     left_out = leave_one_out(refined, uncertainty.information)
     metrics = _metrics(evidence, refined, left_out)
     findings = Findings(
@@ -154,16 +159,16 @@ def _best_fit(evidence: Evidence, options: CalibrationOptions) -> _Fit | Unsolva
     starts = starting_poses(few, most=most, rng=np.random.default_rng(seed))
     found = find_consensus(few, starts, estimate_scale=estimate_scale)
     if not found:
-        return _no_pose("no two placements lie in different directions")
+        return _no_shape(len(evidence))
     refined = refine(evidence, found[0], estimate_scale=estimate_scale)
-    mirror_gain = -np.inf
+    gain = -np.inf
     if not _beyond_doubt(evidence, refined):
-        mirror_gain = handedness(few, found[0], estimate_scale=estimate_scale, seed=seed)
+        gain = mirror_gain(few, found[0], estimate_scale=estimate_scale, seed=seed)
     inliers = int(_inliers(refined).sum())
     if inliers < MIN_PAIRS:
         reason = f"only {inliers} of {len(evidence)} pairs agree on any pose"
-        return _mirrored(reason) if mirror_gain > 0 else _no_pose(reason)
-    return _Fit(refined, found, mirror_gain)
+        return _mirrored(reason) if gain > MIRRORED_GAIN else _no_pose(reason)
+    return _Fit(refined, found, gain)
 
 
 def _inliers(refined: Refined) -> Flags:
@@ -189,6 +194,14 @@ def _some_pairs(evidence: Evidence) -> Evidence:
     if len(evidence) <= _PAIRS_TO_START:
         return evidence
     return evidence.some(np.linspace(0, len(evidence) - 1, _PAIRS_TO_START).round().astype(np.int64))
+
+
+def _no_shape(count: int) -> Unsolvable:
+    return Unsolvable(
+        "degenerate-placements",
+        f"the {count} placements do not fix the pose: they lie at one place or along one line",
+        "spread the placements: near and far, left and right",
+    )
 
 
 def _no_pose(reason: str) -> Unsolvable:

@@ -9,19 +9,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Flags
-from calib_core.consensus import Consensus, associate, find_consensus, log_odds_of, mixture_cost
+from calib_core.consensus import Consensus, associate, log_odds_of
 from calib_core.evidence import Evidence
 from calib_core.geometry import RigidTransform
-from calib_core.initial_pose import starting_poses
 from calib_core.locating import CLUSTER_SCALE
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.refining import Refined, refine
 from calib_core.results import Caution
 from calib_core.uncertainty import LeftOut, PoseUncertainty, pose_uncertainty
 
-__all__ = ["Findings", "cautions_of", "handedness"]
+__all__ = ["MIRRORED_GAIN", "Findings", "cautions_of"]
 
-_MIRRORED = 6.0  # differences of twice the log-likelihood
+MIRRORED_GAIN = 6.0
+"""From how large a gain in twice the log-likelihood on mirrored axes are the likelier ones."""
+
 _NOT_MIRRORED = -3.0
 _ALMOST_AS_LIKELY = 6.0
 _OTHER_POSE_RAD = np.deg2rad(5.0)
@@ -32,7 +33,6 @@ _WEAK_POSITION_M = 0.15
 _NOISE_EXCESS = 2.5
 _FEW_INLIERS = 8
 _DECISIVE_INFLUENCE = 3.0
-_MIRROR_STARTS = 2
 _AMBIGUOUS_MARGIN = 4.0
 _FAR_CAMERA = 3.0
 _CONTRADICTION_SIGMAS = 4.0
@@ -84,27 +84,8 @@ def cautions_of(findings: Findings) -> tuple[Caution, ...]:
     return tuple(caution for check in checks for caution in check(findings))
 
 
-def handedness(evidence: Evidence, best: Consensus, *, estimate_scale: bool, seed: int) -> float:
-    """Return by how much twice the log-likelihood rises when the radar's y axis is mirrored.
-
-    A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be told by its residuals:
-    placements on the ground fit a camera mirrored below the ground just as well. Only what is known of the camera
-    position, or placements at varied heights, tell the two apart. The 24 right-handed conventions need no test: they are
-    rotations, and the pose absorbs them. Each hand is fitted with its own noise level.
-    """
-    mirrored = evidence.mirrored()
-    starts = starting_poses(mirrored, most=_MIRROR_STARTS, rng=np.random.default_rng(seed))
-    found = find_consensus(mirrored, starts, estimate_scale=estimate_scale)
-    if not found:
-        return -np.inf
-    plain, other = (
-        refine(pairs, start, estimate_scale=estimate_scale) for pairs, start in ((evidence, best), (mirrored, found[0]))
-    )
-    return mixture_cost(plain.evidence, plain.camera_from_radar) - mixture_cost(other.evidence, other.camera_from_radar)
-
-
 def _mirrored_axes(f: Findings) -> list[Caution]:
-    if f.mirror_gain > _MIRRORED:
+    if f.mirror_gain > MIRRORED_GAIN:
         return [
             Caution(
                 "mirrored-axes",

@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib_core.calibrate import MIN_PAIRS, calibrate_pairs
+from calib_core.calibrate import MIN_PAIRS, calibrate, calibrate_pairs
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.scans import simulate_scans
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 
@@ -98,3 +100,60 @@ def test_figures_are_over_the_inliers_and_held_out_is_larger() -> None:
     assert calibration.metrics.n == len(inliers)
     assert calibration.metrics.aed_px == pytest.approx(np.mean([pair.distance_px for pair in inliers]))
     assert calibration.metrics.held_out_aed_px > calibration.metrics.aed_px
+
+
+def test_one_place_clicked_over_and_over_is_unsolvable() -> None:
+    simulated = simulate_pairs(4, rng=np.random.default_rng(9))
+    repeated = [replace(simulated.pairs[0], id=f"again-{k}") for k in range(6)]
+    outcome = calibrate_pairs(repeated, simulated.camera, CalibrationOptions())
+    assert isinstance(outcome, Unsolvable)
+    assert outcome.code == "degenerate-placements"
+
+
+def test_placements_along_one_line_are_unsolvable_without_a_camera_position() -> None:
+    simulated = simulate_pairs(4, rng=np.random.default_rng(9))
+    line = np.array([[4.0 + k, 1.0, -0.8] for k in range(6)])
+    pixels = simulated.camera.project(simulated.camera_from_radar @ line)
+    example = simulated.pairs[0].candidates[0]
+    pairs = [
+        replace(
+            simulated.pairs[0], id=f"l{k}", pixel_px=pixels[k], candidates=(replace(example, position_radar_m=line[k]),)
+        )
+        for k in range(6)
+    ]
+    outcome = calibrate_pairs(pairs, simulated.camera, CalibrationOptions())
+    assert isinstance(outcome, Unsolvable)
+    assert outcome.code == "degenerate-placements"
+
+
+def test_clicks_that_have_nothing_to_do_with_the_radar_are_unsolvable() -> None:
+    rng = np.random.default_rng(10)
+    simulated = simulate_pairs(8, rng=rng)
+    random = [replace(pair, pixel_px=rng.uniform(0.0, 1000.0, 2)) for pair in simulated.pairs]
+    outcome = calibrate_pairs(random, simulated.camera, MEASURED)
+    assert isinstance(outcome, Unsolvable)
+    assert outcome.hint
+
+
+def test_a_whole_simulated_session_comes_out_within_its_uncertainty() -> None:
+    session = simulate_scans(SimulationOptions(placements=12, seed=4))
+    options = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.015)))
+    outcome = calibrate(session.clicks, session.scans, session.camera, options)
+    assert isinstance(outcome, Calibration)
+    truth = session.stage.rig.camera_from_radar
+    error = truth.error_from(outcome.camera_from_radar)
+    assert error @ np.linalg.solve(outcome.covariance, error) < 1.5 * outcome.covariance_quantile
+    at = {click.id: place.position_radar_m for click, place in zip(session.clicks, session.placements, strict=True)}
+    for pair in outcome.pairs:
+        assert not pair.inlier or np.linalg.norm(pair.point_radar_m - at[pair.id]) < 1.0
+
+
+def test_clicks_in_any_order_give_the_same_bits() -> None:
+    session = simulate_scans(SimulationOptions(placements=6, seed=5, person=False))
+    clicks = [*session.clicks[:-1], replace(session.clicks[-1], excluded=True)]
+    forward, backward = (calibrate(order, session.scans, session.camera, MEASURED) for order in (clicks, clicks[::-1]))
+    assert isinstance(forward, Calibration)
+    assert isinstance(backward, Calibration)
+    assert forward.camera_from_radar.as_matrix().tobytes() == backward.camera_from_radar.as_matrix().tobytes()
+    assert [pair.id for pair in forward.pairs] == [pair.id for pair in backward.pairs]
+    assert [pair.excluded for pair in forward.pairs].count(True) == 1

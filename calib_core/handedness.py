@@ -1,0 +1,31 @@
+"""Is one radar axis mirrored? Residuals alone cannot tell; residuals and what is known of the camera can."""
+
+import numpy as np
+
+from calib_core.consensus import Consensus, find_consensus, mixture_cost
+from calib_core.evidence import Evidence
+from calib_core.initial_pose import starting_poses
+from calib_core.refining import refine
+
+__all__ = ["mirror_gain"]
+
+_STARTS = 2
+
+
+def mirror_gain(evidence: Evidence, best: Consensus, *, estimate_scale: bool, seed: int) -> float:
+    """Return by how much twice the log-likelihood rises when the radar's y axis is mirrored.
+
+    A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be told by its residuals:
+    placements on the ground fit a camera mirrored below the ground just as well. Only what is known of the camera
+    position, or placements at varied heights, tell the two apart. The 24 right-handed conventions need no test: they are
+    rotations, and the pose absorbs them. Each hand is fitted with its own noise level.
+    """
+    mirrored = evidence.mirrored()
+    starts = starting_poses(mirrored, most=_STARTS, rng=np.random.default_rng(seed))
+    found = find_consensus(mirrored, starts, estimate_scale=estimate_scale)
+    if not found:
+        return -np.inf
+    plain, other = (
+        refine(pairs, start, estimate_scale=estimate_scale) for pairs, start in ((evidence, best), (mirrored, found[0]))
+    )
+    return mixture_cost(plain.evidence, plain.camera_from_radar) - mixture_cost(other.evidence, other.camera_from_radar)
