@@ -72,7 +72,7 @@ class RunningServer:
         self._routes = Routes(static_folder(), workspace, recording, self._hub)
         self._channels: dict[str, Channel] = {}
         self._scenes: dict[str, tuple[int, TabScene]] = {}
-        self.on_admission: Callable[[], None] = lambda: None
+        self.on_new_link: Callable[[], None] = lambda: None
         self._viser = start_viser(
             options.host, options.port, wrap_request=self._wrap_request, wrap_handler=self._wrap_handler
         )
@@ -113,11 +113,13 @@ class RunningServer:
 
         async def process(_connection: ServerConnection, request: Request) -> Response | None:
             asked = doors.Request(request.path, _all_headers(request.headers))
+            link = self._guard.token
             verdict = self._guard.check(asked)
             if isinstance(verdict, doors.Refused):
                 return _response(refusal(verdict.status, verdict.reason))
             if isinstance(verdict, doors.Admitted):
-                self.on_admission()
+                if self._guard.token != link:
+                    self.on_new_link()
                 return _redirect(verdict)
             path = request.path.partition("?")[0]
             if asked.is_websocket:
@@ -181,9 +183,9 @@ def serve(workspace: Workspace, recording: ServedRecording, options: ServerOptio
             print(
                 f"Warning: bound to {options.host}: whoever has the link and reaches this machine sees the recording."
             )
-        _print_link(server, "Open")
+        print(f"Open {server.url}", flush=True)
         if options.token is None:
-            server.on_admission = lambda: _print_link(server, "For another browser, open")
+            server.on_new_link = lambda: print(f"For another browser, open {server.url}", flush=True)
         if not options.no_browser:
             threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
         stop.wait()
@@ -191,10 +193,6 @@ def serve(workspace: Workspace, recording: ServedRecording, options: ServerOptio
         print("\nStopped; every click is kept.")
     finally:
         server.close()
-
-
-def _print_link(server: RunningServer, words: str) -> None:
-    print(f"{words} {server.url}", flush=True)
 
 
 def _all_headers(headers: Headers) -> dict[str, list[str]]:
