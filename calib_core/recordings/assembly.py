@@ -9,19 +9,21 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
-from calib_core.errors import MessageError, RecordingError
+from calib_core.errors import RecordingError
 from calib_core.measurements import TimeNs
 from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap
 from calib_core.recordings.clocks import ClockChoice, Stamps, choose_clock, choose_clocks
 from calib_core.recordings.decoding import Message
 from calib_core.recordings.images import ImageLayout
-from calib_core.recordings.radar_layouts import RadarLayout, recognise
+from calib_core.recordings.radar_layouts import layouts_of_parts
 from calib_core.recordings.radar_lists import PointLayout
 from calib_core.recordings.recorded_camera import recorded_camera
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.sources import Source
+from calib_core.recordings.stamping import StampedTopic, read_stamps
 from calib_core.recordings.streams import ImageStream, RadarStream
-from calib_core.recordings.topics import Rhythm, Topic, TopicSummary, join_topics, usage_of
+from calib_core.recordings.topics import Rhythm, Topic, TopicSummary, join_topics
+from calib_core.recordings.usages import Usage, usage_of
 from calib_core.results import Caution
 
 __all__ = ["Assembly", "assemble"]
@@ -64,10 +66,11 @@ def assemble(
         raise RecordingError(f"{name}: holds no messages; was the recorder told which topics to record?")
     inventory = Inventory(name, topics, {topic.name: usage_of(topic) for topic in topics})
     selection = select(inventory, options, require)
-    selection, headers, lost = _stamped(selection)
-    clocks, stamps, about_clocks = _clocks(selection, headers, options)
+    selection, stamped, lost = _stamped(selection, inventory)
+    clocks, stamps, about_clocks = _clocks(stamped, options)
     cautions.extend([*lost, *about_clocks])
-    radar = _radar_stream(selection.radar, inventory, stamps)
+    heads = {name: both.heads for name, both in stamped.items()}
+    radar = _radar_stream(selection.radar, inventory, stamps, heads)
     images = _image_stream(selection.image, inventory, stamps)
     cautions.extend(check_overlap(name, radar, images, required=len(require) == 2))
     camera, about_camera = recorded_camera(selection.camera_info, images)
@@ -86,26 +89,26 @@ def assemble(
     )
 
 
-def _stamped(selection: Selection) -> tuple[Selection, Mapping[str, TimesNs | None], list[Caution]]:
+def _stamped(selection: Selection, inventory: Inventory) -> tuple[Selection, Mapping[str, StampedTopic], list[Caution]]:
     """Read the stamps of the topics in use; leave out messages that cannot be read, and say so."""
-    headers: dict[str, TimesNs | None] = {}
-    cautions: list[Caution] = []
-    kept: list[Topic | None] = []
-    for topic in (selection.radar, selection.image):
-        stamped = topic.stamped() if topic is not None else None
-        kept.append(stamped.topic if stamped is not None else None)
-        if topic is not None and stamped is not None:
-            headers[topic.name] = stamped.header_ns
-            cautions.extend(about_lost(topic.name, len(topic), stamped))
-    return replace(selection, radar=kept[0], image=kept[1]), headers, cautions
+    used = [topic for topic in (selection.radar, selection.image) if topic is not None]
+    stamped = read_stamps([(topic, _head_bytes(inventory.usages[topic.name])) for topic in used])
+    by_name = {topic.name: both for topic, both in zip(used, stamped, strict=True)}
+    lost = [caution for topic in used for caution in about_lost(topic.name, len(topic), by_name[topic.name])]
+    radar = by_name[selection.radar.name].topic if selection.radar else None
+    image = by_name[selection.image.name].topic if selection.image else None
+    return replace(selection, radar=radar, image=image), by_name, lost
+
+
+def _head_bytes(usage: Usage) -> int:
+    return usage.radar.group_bytes if isinstance(usage.radar, PointLayout) else 12
 
 
 def _clocks(
-    selection: Selection, headers: Mapping[str, TimesNs | None], options: RecordingOptions
+    stamped: Mapping[str, StampedTopic], options: RecordingOptions
 ) -> tuple[Mapping[str, Literal["header", "receive"]], Mapping[str, TimesNs], tuple[Caution, ...]]:
-    """Choose the clock of the topics in use; return clock and times by topic."""
-    used = [topic for topic in (selection.radar, selection.image) if topic is not None]
-    read = [Stamps(topic.name, topic.receive_ns, headers[topic.name]) for topic in used]
+    """Choose the clock of the topics in use, the radar first; return clock and times by topic."""
+    read = [Stamps(name, both.topic.receive_ns, both.header_ns) for name, both in stamped.items()]
     if options.clock == "header":
         for both in read:
             if both.header_ns is None:
@@ -114,7 +117,7 @@ def _clocks(
         choice = choose_clocks(read[0], read[1], options.clock)
     else:
         choice = choose_clock(read[0], options.clock) if read else ClockChoice((), ())
-    clocks = dict(zip([topic.name for topic in used], choice.clocks, strict=True))
+    clocks = dict(zip(stamped, choice.clocks, strict=True))
     stamps = {both.topic: _times(both, clock) for both, clock in zip(read, choice.clocks, strict=True)}
     return clocks, stamps, choice.cautions
 
@@ -130,18 +133,14 @@ def _times(both: Stamps, clock: str) -> TimesNs:
     return np.where(missing, both.receive_ns - delay, both.header_ns)
 
 
-def _radar_stream(topic: Topic | None, inventory: Inventory, stamps: Mapping[str, TimesNs]) -> RadarStream | None:
-    if topic is None:
+def _radar_stream(
+    topic: Topic | None, inventory: Inventory, stamps: Mapping[str, TimesNs], heads: Mapping[str, np.ndarray]
+) -> RadarStream | None:
+    first = inventory.usages[topic.name].radar if topic is not None else None
+    if topic is None or first is None:
         return None
-    layouts: list[RadarLayout] = []
-    for number in range(len(topic.parts)):
-        rows = np.flatnonzero(topic.part == number)
-        layout = recognise(topic.definition(number), topic.payload(int(rows[0]))) if number and len(rows) else None
-        layouts.append(layout or inventory.usages[topic.name].radar)  # type: ignore[arg-type]
-    kinds = {isinstance(layout, PointLayout) for layout in layouts}
-    if len(kinds) > 1 or (len(layouts) > 1 and kinds == {True} and len({str(layout.dtype) for layout in layouts}) > 1):  # type: ignore[union-attr]
-        raise MessageError(f"topic {topic.name}: its files hold different message layouts; open them one at a time")
-    return RadarStream(topic, layouts, stamps[topic.name])  # type: ignore[arg-type]
+    layouts = layouts_of_parts(first, [topic.definition(number) for number in range(len(topic.parts))])
+    return RadarStream(topic, layouts, stamps[topic.name], heads[topic.name])
 
 
 def _image_stream(topic: Topic | None, inventory: Inventory, stamps: Mapping[str, TimesNs]) -> ImageStream | None:

@@ -6,8 +6,8 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.calendar import utc
+from calib_core.recordings.stamping import StampedTopic
 from calib_core.recordings.streams import ImageStream, RadarStream
-from calib_core.recordings.topics import StampedTopic
 from calib_core.results import Caution
 
 __all__ = ["about_images", "about_lost", "about_radar", "check_overlap"]
@@ -80,8 +80,7 @@ def about_radar(radar: RadarStream | None) -> list[Caution]:
                 "choose the radar with --radar-topic, or give the file that has it",
             )
         )
-    heights = [radar.scans(time, time).points_radar_m[:, 2] for time in _sample(radar.times_ns)]
-    height = np.concatenate([*heights, np.zeros(0)])
+    height = radar.sample(_SAMPLED_SCANS).points_radar_m[:, 2]
     height = height[np.isfinite(height)]
     if len(height) > 1 and np.all(height == height[0]):
         cautions.append(
@@ -92,11 +91,6 @@ def about_radar(radar: RadarStream | None) -> list[Caution]:
             )
         )
     return cautions
-
-
-def _sample(times_ns: TimesNs) -> list[TimeNs]:
-    count = min(_SAMPLED_SCANS, len(times_ns))
-    return [TimeNs(int(times_ns[place])) for place in np.linspace(0, len(times_ns) - 1, count).astype(int)]
 
 
 def about_images(images: ImageStream | None) -> list[Caution]:

@@ -157,10 +157,12 @@ class ChunkedSource:
         place = f"{self.path}: chunk {chunk} at byte {where.position}"
         return unpack(data, where.compression, where.size_bytes, where=place)
 
-    def in_memory(self, chunk: int) -> bytes | None:
-        """Return a packed chunk unpacked, without passing it through the cache; None for one stored as it is."""
+    def in_memory(self, chunk: int, *, keep: bool) -> bytes | None:
+        """Return a packed chunk unpacked, and keep it in the cache if asked to; None for one stored as it is."""
         if not self.chunks[chunk].packed:
             return None
+        if keep:
+            return self.unpacked(chunk)
         with self._lock:
             cached = self._cache.get(chunk)
         return cached if cached is not None else self._unpack(chunk)

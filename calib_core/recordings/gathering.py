@@ -15,6 +15,7 @@ __all__ = ["ChunkAccess", "gather_heads"]
 _NEAR_BYTES = 4096
 _RUN_MESSAGES = 4096
 _THREADS = 4
+_FEW_CHUNKS = 32
 
 
 class ChunkAccess(Protocol):
@@ -22,8 +23,8 @@ class ChunkAccess(Protocol):
 
     lead_bytes: int
 
-    def in_memory(self, chunk: int) -> bytes | None:
-        """Return a packed chunk unpacked, None for one that is stored as it is."""
+    def in_memory(self, chunk: int, *, keep: bool) -> bytes | None:
+        """Return a packed chunk unpacked, and keep it in the cache if asked to; None for one that is stored as it is."""
         ...
 
     def piece(self, chunk: int, offset: int, size: int) -> bytes:
@@ -43,38 +44,49 @@ def gather_heads(source: ChunkAccess, index: MessageIndex, size: int) -> Heads:
     """Read the first bytes of many messages.
 
     Of chunks stored as they are only the records' heads are read, neighbours in one go; packed chunks are each unpacked
-    once, in several threads. Messages of a chunk that cannot be read get the length -1.
+    once. Many chunks are shared out to a few threads, which wait for the disk or unpack at the same time.
+    Messages of a chunk that cannot be read get the length -1.
     """
-    gather = _Gather(source, index, size)
+    groups = _groups(index.chunk)
+    gather = _Gather(source, index, size, keep=len(groups) <= _FEW_CHUNKS)
+    if len(groups) <= _FEW_CHUNKS:
+        return Heads(gather.rows, gather.lengths, gather.chunks(groups))
+    batches = [groups[first : first + _FEW_CHUNKS] for first in range(0, len(groups), _FEW_CHUNKS)]
     with ThreadPoolExecutor(_THREADS) as pool:
-        faults = [fault for fault in pool.map(gather.chunk, _groups(index.chunk)) if fault]
+        faults = [fault for fault in pool.map(gather.chunks, batches) if fault]
     return Heads(gather.rows, gather.lengths, faults[0] if faults else "")
 
 
-def _groups(chunk: np.ndarray) -> Iterable[np.ndarray]:
+def _groups(chunk: np.ndarray) -> list[np.ndarray]:
     """Return, chunk by chunk, the rows of the index that lie in it."""
     if not len(chunk):
         return []
     order = np.argsort(chunk, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(chunk[order])) + 1)
+    edges = [0, *(np.flatnonzero(np.diff(chunk[order])) + 1).tolist(), len(chunk)]
+    return [order[first:last] for first, last in pairwise(edges)]
 
 
 class _Gather:
     """The table that the threads fill; each fills rows of its own."""
 
-    def __init__(self, source: ChunkAccess, index: MessageIndex, size: int) -> None:
+    def __init__(self, source: ChunkAccess, index: MessageIndex, size: int, *, keep: bool) -> None:
+        self.keep = keep
         self.source = source
         self.index = index
         self.size = size
         self.rows = np.zeros((len(index), size), dtype=np.uint8)
         self.lengths = np.zeros(len(index), dtype=np.int64)
 
+    def chunks(self, groups: Iterable[np.ndarray]) -> str:
+        """Fill the rows of several chunks; return what first went wrong."""
+        return next(iter([fault for group in groups if (fault := self.chunk(group))]), "")
+
     def chunk(self, group: np.ndarray) -> str:
         """Fill the rows of the messages that lie in one chunk; return what went wrong."""
         chunk = int(self.index.chunk[group[0]])
         order = group[np.argsort(self.index.offset[group], kind="stable")]
         try:
-            whole = self.source.in_memory(chunk)
+            whole = self.source.in_memory(chunk, keep=self.keep)
             for first, last in pairwise(self._edges(order)):
                 self._run(chunk, order[first:last], whole)
         except RecordingError as error:
@@ -84,6 +96,8 @@ class _Gather:
 
     def _edges(self, order: np.ndarray) -> list[int]:
         """Cut messages into runs of neighbours that are read in one go."""
+        if len(order) == 1:
+            return [0, 1]
         far = np.diff(self.index.offset[order]) > self.source.lead_bytes + self.size + _NEAR_BYTES
         cuts = {*(np.flatnonzero(far) + 1).tolist(), *range(_RUN_MESSAGES, len(order), _RUN_MESSAGES)}
         return [0, *sorted(cuts), len(order)]

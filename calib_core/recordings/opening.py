@@ -1,5 +1,6 @@
 """From paths to open files: folders expanded, contents told by their first bytes."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,6 +15,7 @@ __all__ = ["open_sources"]
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _METADATA = "metadata.yaml"
 _KINDS = "ROS 1 .bag, ROS 2 .mcap and .db3 files and their folders can be opened"
+_PACKED_MESSAGES = re.compile(r"^\s*compression_mode:\s*['\"]?message", re.IGNORECASE | re.MULTILINE)
 _PACKED = {
     b"\x28\xb5\x2f\xfd": ("Zstandard", "zstd -d"),
     b"\x1f\x8b": ("gzip", "gunzip"),
@@ -92,7 +94,7 @@ def _from_metadata(folder: Path) -> list[tuple[Path, bool]]:
 def _packed_messages(metadata: Path, path: Path) -> bool:
     if path.suffix != ".db3" or not metadata.is_file():
         return False
-    return str(_metadata(metadata).get("compression_mode", "")).upper() == "MESSAGE"
+    return bool(_PACKED_MESSAGES.search(metadata.read_text(encoding="utf-8", errors="replace")))
 
 
 def _open(path: Path, packed: bool) -> Source:

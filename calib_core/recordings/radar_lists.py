@@ -134,13 +134,18 @@ class PointLayout:
         """View raw rows (n, dtype.itemsize) as records."""
         return np.ascontiguousarray(rows).view(self.dtype)[:, 0]
 
-    def offset_after(self, name: str) -> int:
-        """Return where a field ends in a message."""
-        code, offset = self._place(name)
-        return offset + code.itemsize
+    @property
+    def group_bytes(self) -> int:
+        """How many bytes of a message hold the stamp and the numbers that tell scans apart."""
+        places = [self._place(name) for name in (self.frame_number, self.point_number) if name]
+        return max([12, *(offset + code.itemsize for code, offset in places)])
 
-    def column(self, rows: np.ndarray, name: str) -> np.ndarray:
-        """Read one field from rows that reach at least to its end: (n,)."""
+    def numbers(self, rows: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Read frame and point numbers from rows of at least group_bytes: (n,) each, None for one there is not."""
+        frame = self._column(rows, self.frame_number) if self.frame_number else None
+        return frame, self._column(rows, self.point_number) if self.point_number else None
+
+    def _column(self, rows: np.ndarray, name: str) -> np.ndarray:
         code, offset = self._place(name)
         return np.ascontiguousarray(rows[:, offset : offset + code.itemsize]).view(code)[:, 0]
 

@@ -7,7 +7,8 @@ from typing import Literal
 from calib_core.errors import MessageError, RecordingError
 from calib_core.recordings.clocks import Clock
 from calib_core.recordings.radar_lists import PointLayout
-from calib_core.recordings.topics import Topic, TopicKind, Usage
+from calib_core.recordings.topics import Topic, TopicKind
+from calib_core.recordings.usages import Usage
 
 __all__ = ["Inventory", "Need", "RecordingOptions", "Selection", "select"]
 

@@ -12,7 +12,7 @@ from calib_core.errors import MessageError
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.recordings.images import EncodedImage, ImageLayout
 from calib_core.recordings.radar_columns import Returns, no_returns
-from calib_core.recordings.radar_layouts import RadarLayout, ScanLayout
+from calib_core.recordings.radar_layouts import RadarLayout
 from calib_core.recordings.radar_lists import PointLayout, first_of_scans
 from calib_core.recordings.topics import Topic
 
@@ -29,9 +29,10 @@ class RadarStream:
         topic: the radar topic.
         layouts: one per part of the topic.
         stamps_ns: (n,) one time per message, by the chosen clock.
+        heads: (n, size) the first bytes of the messages, at least as many as PointLayout.group_bytes.
     """
 
-    def __init__(self, topic: Topic, layouts: Sequence[ScanLayout] | Sequence[PointLayout], stamps_ns: TimesNs) -> None:
+    def __init__(self, topic: Topic, layouts: Sequence[RadarLayout], stamps_ns: TimesNs, heads: np.ndarray) -> None:
         self.topic = topic
         self.layout: RadarLayout = layouts[0]
         """Of the first part; all parts of a driver that sends one return per message share it."""
@@ -41,20 +42,11 @@ class RadarStream:
         self.unreadable: Mapping[int, str] = {}
         first = np.arange(len(topic))
         if isinstance(self.layout, PointLayout):
-            first = self._group(self.layout, stamps_ns)
+            first = first_of_scans(stamps_ns, *self.layout.numbers(heads))
         order = np.argsort(stamps_ns[first], kind="stable")
         last = np.append(first[1:], len(topic))
         self._first, self._last = first[order], last[order]
         self.times_ns: TimesNs = frozen_array(stamps_ns[first][order], (None,), dtype=np.int64)
-
-    def _group(self, layout: PointLayout, stamps_ns: TimesNs) -> np.ndarray:
-        names = (layout.frame_number, layout.point_number)
-        numbers: list[np.ndarray | None] = [None, None]
-        if any(names):
-            reach = max(layout.offset_after(name) for name in names if name)
-            rows = self.topic.heads(np.arange(len(self.topic)), reach).rows
-            numbers = [layout.column(rows, name) if name else None for name in names]
-        return first_of_scans(stamps_ns, *numbers)
 
     def scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
         """Decode the scans with start <= stamp <= end."""
@@ -86,18 +78,24 @@ class RadarStream:
             if number in self._blocks:
                 self._blocks.move_to_end(number)
                 return self._blocks[number]
-        rows = slice(number * _BLOCK_SCANS, min((number + 1) * _BLOCK_SCANS, len(self.times_ns)))
-        layout = self.layout
-        block = self._decode_points(layout, rows) if isinstance(layout, PointLayout) else self._decode_scans(rows)
+        block = self._decoded(np.arange(number * _BLOCK_SCANS, min((number + 1) * _BLOCK_SCANS, len(self.times_ns))))
         with self._lock:
             self._blocks[number] = block
             while len(self._blocks) > 2 and sum(len(b.points_radar_m) for b in self._blocks.values()) > _CACHED_RETURNS:
                 self._blocks.popitem(last=False)
         return block
 
-    def _decode_scans(self, rows: slice) -> RadarScans:
-        scans = [self._returns(int(message)) for message in self._first[rows]]
-        return _stacked(self.times_ns[rows], [len(scan) for scan in scans], _joined(scans))
+    def sample(self, count: int) -> RadarScans:
+        """Decode at most count scans spread evenly over the recording."""
+        places = np.linspace(0, len(self.times_ns) - 1, min(count, len(self.times_ns)))
+        return self._decoded(np.unique(places.astype(np.int64)))
+
+    def _decoded(self, scans: np.ndarray) -> RadarScans:
+        """Decode the given scans, ascending."""
+        if isinstance(self.layout, PointLayout):
+            return self._decoded_points(self.layout, scans)
+        returns = [self._returns(int(message)) for message in self._first[scans]]
+        return _stacked(self.times_ns[scans], [len(scan) for scan in returns], _joined(returns))
 
     def _returns(self, message: int) -> Returns:
         """Decode one message; one that cannot be read is an empty scan, and is told."""
@@ -109,18 +107,18 @@ class RadarStream:
             self.unreadable = {**self.unreadable, message: str(error)}
             return no_returns()
 
-    def _decode_points(self, layout: PointLayout, rows: slice) -> RadarScans:
-        counts = self._last[rows] - self._first[rows]
+    def _decoded_points(self, layout: PointLayout, scans: np.ndarray) -> RadarScans:
+        counts = self._last[scans] - self._first[scans]
         if not len(counts):
             return RadarScans()
-        messages = np.concatenate([np.arange(a, b) for a, b in zip(self._first[rows], self._last[rows], strict=True)])
+        messages = np.concatenate([np.arange(a, b) for a, b in zip(self._first[scans], self._last[scans], strict=True)])
         heads = self.topic.heads(messages, layout.dtype.itemsize)
         short = heads.lengths < layout.dtype.itemsize
         returns = layout.returns_of_rows(heads.rows)
         if short.any():
             returns.points_radar_m[short] = np.nan
             self.unreadable = {**self.unreadable, **dict.fromkeys(messages[short].tolist(), "the message is cut short")}
-        return _stacked(self.times_ns[rows], counts.tolist(), returns)
+        return _stacked(self.times_ns[scans], counts.tolist(), returns)
 
 
 def _joined(scans: Sequence[Returns]) -> Returns:

@@ -1,22 +1,19 @@
 """Topics: the same name joined over all files, and what each can be used for."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from calib_core.arrays import TimesNs
-from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
-from calib_core.recordings.camera_info import is_camera_info
 from calib_core.recordings.decoding import Message, decode
 from calib_core.recordings.definitions import Definition, definition_of
-from calib_core.recordings.images import ImageLayout, is_compressed_image, is_raw_image
-from calib_core.recordings.radar_layouts import RadarLayout, recognise
 from calib_core.recordings.sources import Channel, Heads, MessageIndex, Source
 from calib_core.results import Caution
 
-__all__ = ["Rhythm", "StampedTopic", "Topic", "TopicKind", "TopicSummary", "Usage", "join_topics", "usage_of"]
+__all__ = ["Rhythm", "Topic", "TopicKind", "TopicSummary", "join_topics", "read_heads"]
 
 TopicKind = Literal["radar", "image", "camera-info", "other"]
 
@@ -133,18 +130,7 @@ class Topic:
 
     def heads(self, rows: np.ndarray, size: int) -> Heads:
         """Read the first bytes of many messages, in the order of rows."""
-        out = np.zeros((len(rows), size), dtype=np.uint8)
-        lengths = np.zeros(len(rows), dtype=np.int64)
-        parts = self.part[rows]
-        fault = ""
-        for number, (source, _) in enumerate(self.parts):
-            mine = np.flatnonzero(parts == number)
-            if len(mine):
-                at = rows[mine]
-                heads = source.heads(MessageIndex(self.receive_ns[at], self.chunk[at], self.offset[at]), size)
-                out[mine], lengths[mine] = heads.rows, heads.lengths
-                fault = fault or heads.fault
-        return Heads(out, lengths, fault)
+        return read_heads([(self, rows)], size)[0]
 
     def take(self, rows: np.ndarray) -> "Topic":
         """Keep the given messages."""
@@ -156,17 +142,8 @@ class Topic:
             offset=self.offset[rows],
         )
 
-    def stamped(self) -> "StampedTopic":
-        """Read the stamp each message begins with; messages that cannot be read are left out, and why is told."""
-        if not len(self):
-            return StampedTopic(self, None)
-        heads = self.heads(np.arange(len(self)), 12)
-        readable = heads.lengths >= 0
-        topic = self if readable.all() else self.take(np.flatnonzero(readable))
-        stamps = topic._stamps(heads.rows[readable])
-        return StampedTopic(topic, stamps, int(np.count_nonzero(~readable)), heads.fault)
-
-    def _stamps(self, heads: np.ndarray) -> TimesNs | None:
+    def stamps_in(self, heads: np.ndarray) -> TimesNs | None:
+        """Take the stamps out of the first 12 bytes of all messages; None where the type begins with none."""
         offsets = [self.definition(number).stamp_offset for number in range(len(self.parts))]
         if any(offset is None for offset in offsets):
             return None
@@ -182,21 +159,32 @@ class Topic:
         return np.asarray(cdr & (heads[:, 1] == 0))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class StampedTopic:
-    """The messages of a topic that can be read, with their stamps.
-
-    Attributes:
-        topic: without the messages that cannot be read.
-        header_ns: (n,) None where the type begins with no stamp.
-        lost: how many messages cannot be read.
-        fault: why the first of them cannot.
-    """
-
-    topic: Topic
-    header_ns: TimesNs | None
-    lost: int = 0
-    fault: str = ""
+def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int) -> list[Heads]:
+    """Read the first bytes of messages of several topics, file by file."""
+    found = [
+        Heads(np.zeros((len(rows), size), dtype=np.uint8), np.zeros(len(rows), dtype=np.int64)) for _, rows in wanted
+    ]
+    places: dict[int, list[tuple[int, np.ndarray]]] = {}
+    sources: dict[int, Source] = {}
+    for number, (topic, rows) in enumerate(wanted):
+        parts = topic.part[rows]
+        for part, (source, _) in enumerate(topic.parts):
+            mine = np.flatnonzero(parts == part)
+            if len(mine):
+                sources[id(source)] = source
+                places.setdefault(id(source), []).append((number, mine))
+    for key, shares in places.items():
+        picked = [wanted[number][0].take(wanted[number][1][mine]) for number, mine in shares]
+        index = MessageIndex(
+            *(np.concatenate([getattr(t, n) for t in picked]) for n in ("receive_ns", "chunk", "offset"))
+        )
+        heads = sources[key].heads(index, size)
+        edges = np.cumsum([0, *map(len, picked)])
+        for (number, mine), first, last in zip(shares, edges[:-1], edges[1:], strict=True):
+            found[number].rows[mine] = heads.rows[first:last]
+            found[number].lengths[mine] = heads.lengths[first:last]
+            found[number] = replace(found[number], fault=found[number].fault or heads.fault)
+    return found
 
 
 def join_topics(sources: tuple[Source, ...]) -> tuple[tuple[Topic, ...], tuple[Caution, ...]]:
@@ -236,54 +224,3 @@ def _join(name: str, parts: tuple[tuple[Source, Channel], ...]) -> Topic:
     part, receive_ns, chunk, offset = np.concatenate(columns, axis=1).astype(np.int64)
     order = np.lexsort((part, receive_ns))  # stable: messages of one instant stay in the order of their file
     return Topic(name, parts, part[order], receive_ns[order], chunk[order], offset[order], repeated)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Usage:
-    """What a topic can be used for.
-
-    Attributes:
-        kind: see TopicSummary.
-        problem: see TopicSummary.
-        radar: its layout where it is a radar.
-        image: its layout where it holds images.
-    """
-
-    kind: TopicKind
-    problem: str | None = None
-    radar: RadarLayout | None = None
-    image: ImageLayout | None = None
-
-
-def usage_of(topic: Topic) -> Usage:
-    """Find out what a topic can be used for, by its definition and its first message that can be read."""
-    try:
-        definition = topic.definition()
-    except MessageError as error:
-        return Usage("other", problem=str(error))
-    if is_camera_info(definition):
-        return Usage("camera-info")
-    pictures = is_raw_image(definition) or is_compressed_image(definition)
-    usage = Usage("image" if pictures else "other", problem="no messages")
-    for row in sorted({0, len(topic) // 2, len(topic) - 1}) if len(topic) else ():
-        try:
-            payload = topic.payload(row)
-            return _image_usage(topic, definition, payload) if pictures else _radar_usage(definition, payload)
-        except MessageError as error:
-            usage = usage if usage.problem != "no messages" else replace(usage, problem=str(error))
-        except RecordingError as error:
-            usage = replace(usage, problem=f"its messages cannot be read: {error}")
-    if usage.problem != "no messages" and "radar" in topic.name.lower() and not pictures:
-        return replace(usage, kind="radar")
-    return usage
-
-
-def _image_usage(topic: Topic, definition: Definition, payload: bytes) -> Usage:
-    layout = ImageLayout(definition, topic.name)
-    layout.check(payload)
-    return Usage("image", image=layout)
-
-
-def _radar_usage(definition: Definition, payload: bytes) -> Usage:
-    radar = recognise(definition, payload)
-    return Usage("other") if radar is None else Usage("radar", radar=radar)

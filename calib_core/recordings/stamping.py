@@ -1,0 +1,51 @@
+"""The stamps of the topics in use, read in one pass over the files."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.recordings.topics import Topic, read_heads
+
+__all__ = ["StampedTopic", "read_stamps"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StampedTopic:
+    """The messages of a topic that can be read, with their stamps.
+
+    Attributes:
+        topic: without the messages that cannot be read.
+        header_ns: (n,) None where the type begins with no stamp.
+        heads: (n, size) uint8, the first bytes of the messages.
+        lost: how many messages cannot be read.
+        fault: why the first of them cannot.
+    """
+
+    topic: Topic
+    header_ns: TimesNs | None
+    heads: np.ndarray
+    lost: int = 0
+    fault: str = ""
+
+
+def read_stamps(topics: Sequence[tuple[Topic, int]]) -> tuple[StampedTopic, ...]:
+    """Read the stamps of several topics; messages that cannot be read are left out, and why is told.
+
+    All topics are read in one pass, so that a packed chunk with messages of all of them is unpacked once.
+
+    Args:
+        topics: each with how many bytes of its messages to keep; 12 hold the stamp.
+    """
+    size = max((wanted for _, wanted in topics), default=0)
+    found = read_heads([(topic, np.arange(len(topic))) for topic, _ in topics], size)
+    stamped = []
+    for (topic, wanted), heads in zip(topics, found, strict=True):
+        readable = heads.lengths >= 0
+        kept = topic if readable.all() else topic.take(np.flatnonzero(readable))
+        rows = heads.rows[readable]
+        lost = int(np.count_nonzero(~readable))
+        stamps = kept.stamps_in(rows[:, :12]) if len(kept) else None
+        stamped.append(StampedTopic(kept, stamps, rows[:, :wanted], lost, heads.fault))
+    return tuple(stamped)

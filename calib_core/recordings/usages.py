@@ -1,0 +1,63 @@
+"""What each topic can be used for, by its definition and its messages."""
+
+from dataclasses import dataclass, replace
+
+from calib_core.errors import MessageError, RecordingError
+from calib_core.recordings.camera_info import is_camera_info
+from calib_core.recordings.definitions import Definition
+from calib_core.recordings.images import ImageLayout, is_compressed_image, is_raw_image
+from calib_core.recordings.radar_layouts import RadarLayout, recognise
+from calib_core.recordings.topics import Topic, TopicKind
+
+__all__ = ["Usage", "usage_of"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Usage:
+    """What a topic can be used for.
+
+    Attributes:
+        kind: see TopicSummary.
+        problem: see TopicSummary.
+        radar: its layout where it is a radar.
+        image: its layout where it holds images.
+    """
+
+    kind: TopicKind
+    problem: str | None = None
+    radar: RadarLayout | None = None
+    image: ImageLayout | None = None
+
+
+def usage_of(topic: Topic) -> Usage:
+    """Find out what a topic can be used for, by its definition and its first message that can be read."""
+    try:
+        definition = topic.definition()
+    except MessageError as error:
+        return Usage("other", problem=str(error))
+    if is_camera_info(definition):
+        return Usage("camera-info")
+    pictures = is_raw_image(definition) or is_compressed_image(definition)
+    usage = Usage("image" if pictures else "other", problem="no messages")
+    for row in sorted({0, len(topic) // 2, len(topic) - 1}) if len(topic) else ():
+        try:
+            payload = topic.payload(row)
+            return _image_usage(topic, definition, payload) if pictures else _radar_usage(definition, payload)
+        except MessageError as error:
+            usage = usage if usage.problem != "no messages" else replace(usage, problem=str(error))
+        except RecordingError as error:
+            usage = replace(usage, problem=f"its messages cannot be read: {error}")
+    if usage.problem != "no messages" and "radar" in topic.name.lower() and not pictures:
+        return replace(usage, kind="radar")
+    return usage
+
+
+def _image_usage(topic: Topic, definition: Definition, payload: bytes) -> Usage:
+    layout = ImageLayout(definition, topic.name)
+    layout.check(payload)
+    return Usage("image", image=layout)
+
+
+def _radar_usage(definition: Definition, payload: bytes) -> Usage:
+    radar = recognise(definition, payload)
+    return Usage("other") if radar is None else Usage("radar", radar=radar)
