@@ -81,19 +81,19 @@ def test_a_mark_can_be_dragged_nudged_placed_anew_and_removed(page: Driver, trut
     [placed] = page.view["clicks"]
     u, v = placed["u_px"], placed["v_px"]
     page.zoom_to(u, v, 4)
-    page.drag((u, v), (u + 6, v - 3))
+    page.drag((u, v), (u - 6, v - 3))
     [dragged] = page.view["clicks"]
-    assert (dragged["u_px"], dragged["v_px"]) == pytest.approx((u + 6, v - 3), abs=0.1)
+    assert (dragged["u_px"], dragged["v_px"]) == pytest.approx((u - 6, v - 3), abs=0.1)
     page.press("Alt+ArrowRight", "Alt+ArrowRight", "Alt+ArrowUp")
     page.until("__cocalib.state.view.revision === 3")
     [nudged] = page.view["clicks"]
     assert (nudged["u_px"], nudged["v_px"]) == pytest.approx((dragged["u_px"] + 0.2, dragged["v_px"] - 0.1), abs=1e-6)
     page.press("Control+z")
     assert page.view["clicks"][0]["u_px"] == pytest.approx(dragged["u_px"], abs=1e-9), "one step back for one movement"
-    page.click(u + 20, v + 10)
+    page.click(u - 20, v - 10)
     [again] = page.view["clicks"]
     assert again["id"] == placed["id"]
-    assert (again["u_px"], again["v_px"]) == pytest.approx((u + 20, v + 10), abs=0.1)
+    assert (again["u_px"], again["v_px"]) == pytest.approx((u - 20, v - 10), abs=0.1)
     page.press("Delete")
     assert page.view["clicks"] == []
 
