@@ -2,6 +2,7 @@
 
 import sqlite3
 import threading
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -21,6 +22,7 @@ __all__ = ["MAGIC", "SqliteSource"]
 MAGIC = b"SQLite format 3\0"
 _FORMATS = {"ros2msg": "msg", "ros2idl": "idl"}
 _SMALL_BYTES = 4096
+_QUERY_ROWS = 20_000
 
 
 class SqliteSource:
@@ -93,7 +95,7 @@ class SqliteSource:
         """Tell where the messages of a channel lie: SQLite walks over all rows' heads once."""
         rows = self._rows("SELECT timestamp, id FROM messages WHERE topic_id = ?", channel_id)
         try:
-            columns = np.array(rows, dtype=np.int64).reshape(-1, 2)
+            columns = np.fromiter(chain.from_iterable(rows), dtype=np.int64, count=2 * len(rows)).reshape(-1, 2)
         except (TypeError, ValueError, OverflowError) as error:
             raise self._damaged(f"a row without a time: {error}") from error
         return MessageIndex.sorted_from(columns[:, 0], columns[:, 1], np.zeros(len(columns), dtype=np.int64))
@@ -111,44 +113,45 @@ class SqliteSource:
         return unpack_message(data, where=f"{self.path}: row {row}") if self._packed else data
 
     def heads(self, index: MessageIndex, size: int) -> Heads:
-        """Read the first bytes of many messages."""
+        """Read the first bytes of many messages: short ones by query, long ones without their overflow pages."""
         rows = np.zeros((len(index), size), dtype=np.uint8)
-        lengths = np.zeros(len(index), dtype=np.int64)
-        small = not self._packed and self._mean_bytes(index) < _SMALL_BYTES
-        found = self._short_heads(index, size) if small else {}
+        lengths = np.full(len(index), -1, dtype=np.int64)
+        if not self._packed and len(index) > 1:
+            self._fill_by_query(index, rows, lengths)
         fault = ""
-        for place, number in enumerate(index.chunk.tolist()):
+        for place in np.flatnonzero(lengths < 0).tolist():
             try:
-                head, length = found[number] if number in found else self._head(number, size)
+                head, length = self._head(int(index.chunk[place]), size)
             except RecordingError as error:
-                lengths[place], fault = -1, fault or str(error)
+                fault = fault or str(error)
                 continue
             rows[place, : len(head)] = np.frombuffer(head, dtype=np.uint8)
             lengths[place] = length
         return Heads(rows, lengths, fault)
 
-    def _mean_bytes(self, index: MessageIndex) -> float:
-        if not len(index):
-            return 0.0
-        some = index.chunk[:: max(1, len(index) // 20)].tolist()
-        query = "SELECT length(data) FROM messages WHERE id = ?"
-        return float(np.mean([row[0] or 0 for number in some for row in self._rows(query, number)] or [0]))
-
-    def _short_heads(self, index: MessageIndex, size: int) -> dict[int, tuple[bytes, int]]:
-        """Read the heads of short messages in one query per 100,000 rows."""
-        found: dict[int, tuple[bytes, int]] = {}
-        wanted = set(index.chunk.tolist())
-        low, high = int(index.chunk.min()), int(index.chunk.max())
+    def _fill_by_query(self, index: MessageIndex, rows: np.ndarray, lengths: np.ndarray) -> None:
+        """Read the heads of short messages, a stretch of rows per query; what is not found keeps the length -1."""
+        size = rows.shape[1]
+        order = np.argsort(index.chunk)
+        numbers = index.chunk[order]
         query = (
-            "SELECT id, substr(data, 1, ?), length(data) FROM messages WHERE id BETWEEN ? AND ? AND topic_id IN "
-            "(SELECT topic_id FROM messages WHERE id = ?)"
+            f"SELECT id, CASE WHEN length(data) <= {_SMALL_BYTES} THEN substr(data, 1, ?) END, length(data) "
+            "FROM messages WHERE id BETWEEN ? AND ? ORDER BY id"
         )
-        for first in range(low, high + 1, 100_000):
-            last = min(first + 99_999, high)
-            for number, head, length in self._rows(query, size, first, last, low):
-                if number in wanted:
-                    found[number] = (head, length)
-        return found
+        for first in range(0, len(numbers), _QUERY_ROWS):
+            stretch = numbers[first : first + _QUERY_ROWS]
+            if int(stretch[-1] - stretch[0]) > 4 * _QUERY_ROWS:
+                continue  # many rows of other topics lie between: one by one is cheaper
+            found = [row for row in self._rows(query, size, int(stretch[0]), int(stretch[-1])) if type(row[1]) is bytes]
+            ids = np.fromiter((row[0] for row in found), dtype=np.int64, count=len(found))
+            heads = np.frombuffer(b"".join(row[1].ljust(size, b"\0") for row in found), dtype=np.uint8).reshape(
+                -1, size
+            )
+            sizes = np.fromiter((row[2] for row in found), dtype=np.int64, count=len(found))
+            places = np.searchsorted(ids, stretch)
+            there = np.flatnonzero(np.isin(stretch, ids))
+            into = order[first : first + _QUERY_ROWS][there]
+            rows[into], lengths[into] = heads[places[there]], sizes[places[there]]
 
     def _head(self, row: int, size: int) -> tuple[bytes, int]:
         """Read one message's first bytes without its overflow pages."""
