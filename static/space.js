@@ -4,7 +4,7 @@
 import { listen } from "./keys.js";
 import { make } from "./notices.js";
 import { tab, tell } from "./socket.js";
-import { on } from "./state.js";
+import { on, state } from "./state.js";
 
 const frame = /** @type {HTMLIFrameElement} */ (document.getElementById("space-view"));
 const group = /** @type {HTMLElement} */ (document.getElementById("viewpoints"));
@@ -16,7 +16,17 @@ const VIEWPOINTS = [
   ["camera", "Camera", "Look from where the camera is."],
 ];
 
+/** How long the 3D view waits after a hand was on the picture, so that mark and overlay are painted first. ms */
+const HOLD = 250;
+
+/** What static/pace.js reads in the 3D view's frame. */
+const pace = { playing: false, holdUntil: 0 };
+
 export function startSpace() {
+  Object.assign(window, { cocalibPace: pace });
+  on(["playing"], () => (pace.playing = state.playing));
+  for (const type of ["pointerdown", "pointerup", "keydown", "wheel"])
+    addEventListener(type, () => (pace.holdUntil = performance.now() + HOLD), { capture: true, passive: true });
   for (const [viewpoint, label, hint] of VIEWPOINTS) {
     const chip = make("button", "chip", label);
     chip.dataset.hint = hint;

@@ -170,11 +170,12 @@ def _formats() -> Reply:
 
 @cache
 def _viser_page() -> Reply:
-    """Return viser's own client, its panels hidden: our page has them."""
+    """Return viser's own client, its panels hidden, for our page has them, and its drawing paced (static/pace.js)."""
     import viser
 
     page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
-    body = gzip.compress(page.replace(b"</head>", _VISER_STYLE, 1), mtime=0)
+    page = page.replace(b"<head>", b'<head><script src="../../pace.js"></script>', 1).replace(b"</head>", _VISER_STYLE, 1)
+    body = gzip.compress(page, mtime=0)
     return _reply(body, _TYPES[".html"], policy=_VISER_POLICY, more=(("Content-Encoding", "gzip"),))
 
 

@@ -181,7 +181,8 @@ def serve(workspace: Workspace, recording: ServedRecording, options: ServerOptio
     try:
         if not doors.is_loopback(options.host):
             print(
-                f"Warning: bound to {options.host}: whoever has the link and reaches this machine sees the recording."
+                f"Warning: bound to {options.host}: whoever has the link and reaches this machine sees the recording. "
+                "From another machine, put this machine's address into the link."
             )
         print(f"Open {server.url}", flush=True)
         if options.token is None:

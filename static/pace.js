@@ -1,0 +1,61 @@
+// @ts-check
+/**
+ * Runs in the 3D view's frame, before viser's own script. Viser draws as often as it can, and shares its thread with our page:
+ * without a graphics card every drawing holds the picture up. So the 3D view draws at full rate only while a hand is on it, and
+ * the picture goes first.
+ */
+{
+  /** Least time between two drawings. ms */
+  const QUIET = 125;
+  const PLAYING = 500;
+  /** How long after the last touch the view counts as being moved. ms */
+  const TOUCH = 1200;
+
+  const frame = window.requestAnimationFrame.bind(window);
+  /** @type {Map<number, FrameRequestCallback>} */
+  const waiting = new Map();
+  let number = 0;
+  let drawn = 0;
+  let touched = -TOUCH;
+  let coming = false;
+
+  /** When the next drawing may happen. @param {number} now */
+  function next(now) {
+    const page = /** @type {{playing?: boolean, holdUntil?: number}} */ (/** @type {any} */ (window.parent).cocalibPace ?? {});
+    if (now - touched < TOUCH) return now;
+    return Math.max(drawn + (page.playing ? PLAYING : QUIET), page.holdUntil ?? 0);
+  }
+
+  /** Draw when it is time, all callbacks in one frame. */
+  function schedule() {
+    if (coming) return;
+    coming = true;
+    const now = performance.now();
+    const wait = next(now) - now;
+    if (wait <= 0) frame(draw);
+    else setTimeout(() => frame(draw), wait);
+  }
+
+  /** @param {number} time */
+  function draw(time) {
+    coming = false;
+    if (next(performance.now()) > performance.now()) return schedule();
+    drawn = performance.now();
+    const callbacks = [...waiting.values()];
+    waiting.clear();
+    for (const callback of callbacks) callback(time);
+  }
+
+  window.requestAnimationFrame = (callback) => {
+    number += 1;
+    waiting.set(number, callback);
+    schedule();
+    return number;
+  };
+  window.cancelAnimationFrame = (handle) => {
+    waiting.delete(handle);
+  };
+  for (const type of ["pointerdown", "wheel", "touchstart", "keydown"])
+    window.addEventListener(type, () => (touched = performance.now()), { capture: true, passive: true });
+  window.addEventListener("pointermove", (event) => event.buttons && (touched = performance.now()), { capture: true, passive: true });
+}
