@@ -29,6 +29,8 @@ _SIGMAS = (
     ("azimuthstd", "azimuthanglestd", "sigmaazimuth", "azimuthsigma"),
     ("elevationstd", "elevationanglestd", "sigmaelevation", "elevationsigma"),
 )
+_INVALID_POSITION = ("invaliddistance", "invalidrange", "invalidazimuth", "invalidelevation")
+_INVALID_DOPPLER = ("invalidrangerate", "invaliddoppler", "invalidvelocity")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +64,8 @@ class ColumnPlan:
         amplitude: a figure in dB, or None.
         amplitude_scale: its unit in dB.
         sigma: standard deviations of range, azimuth and elevation; None each where there is none.
+        spoils_position: flags that say the position is not valid.
+        spoils_doppler: flags that say the speed is not valid.
     """
 
     position: tuple[str, ...]
@@ -72,6 +76,8 @@ class ColumnPlan:
     amplitude: str | None = None
     amplitude_scale: float = 1.0
     sigma: tuple[str | None, str | None, str | None] = (None, None, None)
+    spoils_position: tuple[str, ...] = ()
+    spoils_doppler: tuple[str, ...] = ()
 
     @property
     def looks_like_radar(self) -> bool:
@@ -128,6 +134,8 @@ def plan_columns(names: Iterable[str], *, degrees: bool = False) -> ColumnPlan |
         velocity=() if doppler else velocity,
         amplitude=first(_AMPLITUDES),
         sigma=(sigma[0], sigma[1], sigma[2]),
+        spoils_position=tuple(by_plain[name] for name in _INVALID_POSITION if name in by_plain),
+        spoils_doppler=tuple(by_plain[name] for name in _INVALID_DOPPLER if name in by_plain),
     )
 
 
@@ -166,7 +174,12 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
         if name:
             sigma[:, axis] = np.radians(column(name)) if plan.degrees and axis else column(name)
     amplitude = column(plan.amplitude) if plan.amplitude else np.full(n, np.nan)
-    return Returns(position, _doppler(plan, column, position), amplitude * plan.amplitude_scale, sigma)
+    doppler = _doppler(plan, column, position)
+    for flag in plan.spoils_doppler:
+        doppler = np.where(np.asarray(column(flag)) != 0, np.nan, doppler)
+    for flag in plan.spoils_position:
+        position[np.asarray(column(flag)) != 0] = np.nan
+    return Returns(position, doppler, amplitude * plan.amplitude_scale, sigma)
 
 
 def _doppler(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Points3) -> Values:

@@ -104,8 +104,12 @@ class RadarStream:
         try:
             return layout.returns(self.topic.payload(message))
         except MessageError as error:
-            self.unreadable = {**self.unreadable, message: str(error)}
+            self._note_unreadable({message: str(error)})
             return no_returns()
+
+    def _note_unreadable(self, found: Mapping[int, str]) -> None:
+        with self._lock:
+            self.unreadable = {**self.unreadable, **found}
 
     def _decoded_points(self, layout: PointLayout, scans: np.ndarray) -> RadarScans:
         counts = self._last[scans] - self._first[scans]
@@ -117,7 +121,7 @@ class RadarStream:
         returns = layout.returns_of_rows(heads.rows)
         if short.any():
             returns.points_radar_m[short] = np.nan
-            self.unreadable = {**self.unreadable, **dict.fromkeys(messages[short].tolist(), "the message is cut short")}
+            self._note_unreadable(dict.fromkeys(messages[short].tolist(), "the message is cut short"))
         return _stacked(self.times_ns[scans], counts.tolist(), returns)
 
 

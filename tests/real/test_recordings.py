@@ -7,6 +7,7 @@ import pytest
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
+from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import RecordingOptions, describe, inspect_recording, open_recording
 
 pytestmark = pytest.mark.real
@@ -120,3 +121,54 @@ def test_raw_packets_of_a_radar_are_listed_with_the_reason_they_are_not_read(sha
         (topic,) = recording.topics
         assert topic.type == "nebula_msgs/msg/NebulaPackets"
         assert "the recording has no definition of nebula_msgs/msg/NebulaPackets" in str(topic.problem)
+
+
+@pytest.mark.parametrize(
+    ("kind", "folder", "file"),
+    [
+        ("ContinentalArs548Detection", "ars548", "1708578204_202447652_detection.yaml"),
+        ("ContinentalSrr520Detection", "srr520", "1708578209_76111685_hrr_detection.yaml"),
+        ("ContinentalSrr520Detection", "srr520", "1708578209_45566935_near_detection.yaml"),
+    ],
+)
+def test_real_detection_lists_of_two_radars_become_scans(shared_data, tmp_path, kind, folder, file):
+    """Detections decoded by the driver's authors, with the driver's own message definitions, written to a bag."""
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    from ruamel.yaml import YAML
+
+    home = shared_data / "real_radar_packets" / "src" / "nebula_continental"
+    values = YAML(typ="safe", pure=True).load(
+        home / "nebula_continental" / "test_resources" / "decoder_ground_truth" / folder / file
+    )
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name in (kind, f"{kind}List"):
+        text = (home / "continental_msgs" / "msg" / f"{name}.msg").read_text()
+        store.register(get_types_from_msg(text, f"continental_msgs/msg/{name}"))
+    detection = store.types[f"continental_msgs/msg/{kind}"]
+    rows = values["detections"]
+    stamp = store.types["builtin_interfaces/msg/Time"](**values["header"]["stamp"])
+    fields = {**values, "detections": [detection(**row) for row in rows]}
+    fields["header"] = store.types["std_msgs/msg/Header"](stamp=stamp, frame_id="radar")
+    if "origin_pos" in fields:
+        fields["origin_pos"] = store.types["geometry_msgs/msg/Point"](**fields["origin_pos"])
+    list_type = f"continental_msgs/msg/{kind}List"
+    message = store.types[list_type](**fields)
+    with Writer(tmp_path / "bag", version=9) as writer:
+        connection = writer.add_connection("/radar/detections", list_type, typestore=store)
+        writer.write(connection, 1_708_578_209 * NS_PER_S, store.serialize_cdr(message, list_type))
+    with open_recording(tmp_path / "bag", require=("radar",)) as recording:
+        scan = recording.radar_scans().scan(0)
+    assert len(scan) == len(rows) > 30
+
+    def column(name: str) -> np.ndarray:
+        return np.array([row.get(name, 0.0) for row in rows], dtype=np.float32).astype(np.float64)
+
+    polar = np.stack([column("range"), column("azimuth_angle"), column("elevation_angle")], axis=1)
+    valid = ~np.array([row.get("invalid_azimuth", False) or row.get("invalid_elevation", False) for row in rows])
+    np.testing.assert_allclose(scan.points_radar_m[valid], cartesian_from_polar(polar)[valid])
+    np.testing.assert_array_equal(scan.doppler_mps, column("range_rate"))
+    np.testing.assert_array_equal(scan.snr_db, column("snr" if "snr" in rows[0] else "rcs"))
+    if "range_std" in rows[0]:
+        sigma = [column("range_std"), column("azimuth_angle_std"), column("elevation_angle_std")]
+        np.testing.assert_array_equal(scan.sigma_polar, np.stack(sigma, axis=1))

@@ -374,3 +374,40 @@ def test_without_numbers_scans_are_told_apart_by_pauses(counts, same_stamp):
 def test_grouping_nothing_gives_nothing():
     assert first_of_scans(np.zeros(0, dtype=np.int64)).tolist() == []
     assert first_of_scans(np.array([5])).tolist() == [0]
+
+
+def test_returns_flagged_as_invalid_keep_their_row_without_a_value(ros, write):
+    kind = ros.define(
+        "continental_msgs/msg/Detection",
+        "float32 azimuth_angle\nbool invalid_azimuth\nfloat32 range\nfloat32 range_rate\nbool invalid_range_rate\n",
+    )
+    ros.define("continental_msgs/msg/DetectionList", "Header header\ncontinental_msgs/Detection[] detections\n")
+    flags = [(False, False), (True, False), (False, True)]
+    detections = [
+        ros.new(kind, azimuth_angle=0.0, invalid_azimuth=a, range=2.0, range_rate=0.5, invalid_range_rate=r)
+        for a, r in flags
+    ]
+    message = ros.new("continental_msgs/msg/DetectionList", header=ros.header(START_NS), detections=detections)
+    with opened(write, ros, [message]) as recording:
+        scan = recording.radar_scans().scan(0)
+    np.testing.assert_array_equal(scan.points_radar_m, [[2, 0, 0], [np.nan] * 3, [2, 0, 0]])
+    np.testing.assert_array_equal(scan.doppler_mps, [0.5, 0.5, np.nan])
+
+
+def test_big_endian_messages_are_read(ros2, write, cloud_points, monkeypatch, plain, jpeg):
+    """A machine of the other byte order wrote them; CDR says so in its first bytes."""
+    little = ros2.serialise
+    monkeypatch.setattr(
+        ros2, "serialise", lambda m: bytes(ros2.store.serialize_cdr(m, m.__msgtype__, little_endian=False))
+    )
+    messages = [ros2.cloud(START_NS + i * 10**8, cloud_points(3)) for i in range(3)]
+    ti, positions = ti_messages(ros2, TI_SCAN, [2, 3, 1])
+    rows = [("/radar/cloud", START_NS + i * 10**8, message) for i, message in enumerate(messages)] + ti
+    assert little(messages[0]) != ros2.serialise(messages[0])
+    path = write(ros2, rows)
+    with open_recording(path, RecordingOptions(radar_topic="/radar/cloud"), require=("radar",)) as recording:
+        np.testing.assert_array_equal(recording.radar_times, START_NS + 10**8 * np.arange(3))
+        np.testing.assert_array_equal(recording.radar_scans().scan(2).points_radar_m[:, 0], cloud_points(3)["x"])
+    with open_recording(path, RecordingOptions(radar_topic="/ti_mmwave/radar_scan"), require=("radar",)) as recording:
+        np.testing.assert_array_equal(recording.radar_scans().points_radar_m, positions)
+        assert np.diff(recording.radar_scans().first_return).tolist() == [2, 3, 1]
