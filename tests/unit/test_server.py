@@ -1,7 +1,9 @@
 """The port as a client meets it: the contract with viser's server, the attacks, and the words of the channel."""
 
+import gzip
 import http.client
 import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -96,6 +98,9 @@ def test_viser_still_starts_the_way_the_hook_takes(server: RunningServer, cookie
     import viser
 
     page = get(server, "/viser/tab1/", Cookie=cookie)
+    scripts = re.findall(rb"<script[^>]*>", gzip.decompress(page.body) if page.body[:2] == b"\x1f\x8b" else page.body)
+    assert scripts[0] == b'<script src="../../pace.js">', "the pace must be set before viser's script runs"
+    assert len(scripts) > 1
     assert page.status == 200
     assert page.headers["X-Frame-Options"] == "SAMEORIGIN"
     address = server.origin.replace("http", "ws") + "/viser/tab1"
