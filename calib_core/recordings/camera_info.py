@@ -43,9 +43,9 @@ def camera_from_info(message: Message, *, topic: str, rectified: bool = False) -
         rectified: the image topic is a rectified one, so P holds and nothing is distorted.
     """
     upper = "K" in message
-    matrix = message.array("K" if upper else "k").reshape(3, 3).astype(np.float64)
-    projection = message.array("P" if upper else "p").reshape(3, 4).astype(np.float64)
-    distortion = message.array("D" if upper else "d").astype(np.float64)
+    matrix = message.numbers("K" if upper else "k", 9).reshape(3, 3)
+    projection = message.numbers("P" if upper else "p", 12).reshape(3, 4)
+    distortion = message.numbers("D" if upper else "d", message.count("D" if upper else "d"))
     model_name = message.text("distortion_model").strip().lower()
     if rectified and projection[0, 0] > 0:
         matrix, distortion, model_name = projection[:, :3].copy(), np.zeros(0), ""

@@ -8,7 +8,7 @@ import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
 
@@ -37,46 +37,59 @@ class Message:
 
     def whole(self, name: str) -> int:
         """Return an integer field."""
-        value = self.values[name]
-        assert isinstance(value, int)
-        return value
+        value = self._field(name)
+        return value if isinstance(value, int) else self._refuse(name, "an integer")
 
     def text(self, name: str) -> str:
         """Return a string field."""
-        value = self.values[name]
-        assert isinstance(value, str)
-        return value
+        value = self._field(name)
+        return value if isinstance(value, str) else self._refuse(name, "a string")
 
     def message(self, name: str) -> "Message":
         """Return a nested message."""
-        value = self.values[name]
-        assert isinstance(value, Message)
-        return value
+        value = self._field(name)
+        return value if isinstance(value, Message) else self._refuse(name, "a message")
 
     def array(self, name: str) -> np.ndarray:
         """Return an array of numbers as recorded."""
-        value = self.values[name]
-        assert isinstance(value, np.ndarray)
-        return value
+        value = self._field(name)
+        return value if isinstance(value, np.ndarray) else self._refuse(name, "an array of numbers")
+
+    def octets(self, name: str) -> np.ndarray:
+        """Return an array of bytes."""
+        value = self.array(name)
+        return value.view(np.uint8) if value.dtype.itemsize == 1 or not len(value) else self._refuse(name, "bytes")
+
+    def numbers(self, name: str, count: int) -> Values:
+        """Return an array of so many numbers."""
+        value = self.array(name)
+        fits = len(value) == count and value.dtype.names is None
+        return value.astype(np.float64) if fits else self._refuse(name, f"{count} numbers")
 
     def messages(self, name: str) -> "list[Message]":
         """Return a list of messages that are not of fixed size; empty for an empty list of any."""
-        value = self.values[name]
-        assert isinstance(value, list)
-        return value
+        value = self._field(name)
+        fits = isinstance(value, list) and all(isinstance(element, Message) for element in value)
+        return value if isinstance(value, list) and fits else self._refuse(name, "a list of messages")
 
     def count(self, name: str) -> int:
         """Return how many elements an array holds."""
-        value = self.values[name]
-        assert isinstance(value, list | np.ndarray)
-        return len(value)
+        value = self._field(name)
+        return len(value) if isinstance(value, list | np.ndarray) else self._refuse(name, "an array")
+
+    def _field(self, name: str) -> Value:
+        return self.values[name] if name in self.values else self._refuse(name, "a field of it")
+
+    def _refuse(self, name: str, what: str) -> NoReturn:
+        raise MessageError(f"a {self.type} message has a layout of its own: {name} is not {what}; it cannot be used")
 
     def column(self, name: str, path: str) -> Values:
         """Return one number of each message in a list: (n,); path is dotted."""
-        value = self.values[name]
-        if isinstance(value, np.ndarray):
+        value = self._field(name)
+        if isinstance(value, np.ndarray) and path in (value.dtype.names or ()):
             return value[path].astype(np.float64)
-        assert isinstance(value, list)
+        if not isinstance(value, list):
+            self._refuse(name, f"a list with {path}")
         return np.array([_at(element, path.split(".")) for element in value], dtype=np.float64)
 
 

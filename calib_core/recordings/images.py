@@ -142,7 +142,7 @@ class ImageLayout:
 
     def _file(self, message: Message) -> EncodedImage:
         """Take out the recorded file; what it is, its first bytes say and not the field 'format'."""
-        data = message.array("data").tobytes()
+        data = message.octets("data").tobytes()
         said = message.text("format")
         if "compressedDepth" in said:
             raise self._refused(
@@ -191,7 +191,7 @@ class ImageLayout:
             raise self._refused(str(error)) from error
         row = width * _ENCODINGS[encoding][0]
         step = step or row
-        data = message.array("data")
+        data = message.octets("data")
         if step < row or len(data) < step * (height - 1) + row:
             raise self._refused(
                 f"an image of {width} x {height} {encoding} pixels with rows of {step} bytes has {len(data)} bytes of data; "

@@ -78,7 +78,7 @@ class CloudLayout:
             return fast
         message = decode(self.definition, payload)
         order = payload_byte_order(payload, self.definition)
-        data = message.array("data")
+        data = message.octets("data")
         height, width, step = message.whole("height"), message.whole("width"), message.whole("row_step")
         dtype = _point_dtype(message, order)
         plan = plan_columns(dtype.names or ())
@@ -207,7 +207,7 @@ def _channel_columns(message: Message) -> dict[str, np.ndarray]:
     columns = {axis: message.column("points", axis) for axis in "xyz"} if message.count("points") else {}
     columns = columns or {axis: np.zeros(0) for axis in "xyz"}
     for channel in message.messages("channels"):
-        values = channel.array("values").astype(np.float64)
+        values = channel.numbers("values", channel.count("values"))
         if len(values) == len(columns["x"]):
             columns.setdefault(channel.text("name"), values)
     return columns

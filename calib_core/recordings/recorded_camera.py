@@ -4,7 +4,7 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
-from calib_core.recordings.camera_info import camera_from_info
+from calib_core.recordings.camera_info import CameraReading, camera_from_info
 from calib_core.recordings.streams import ImageStream
 from calib_core.recordings.topics import Topic
 from calib_core.results import Caution
@@ -22,16 +22,13 @@ def recorded_camera(topic: Topic | None, images: ImageStream | None) -> tuple[Ca
     if topic is None or not len(topic):
         return None, []
     try:
-        first, last = (topic.message(row) for row in (0, len(topic) - 1))
+        reading, other = (_reading(topic, row, images) for row in (0, len(topic) - 1))
     except RecordingError as error:
         return None, [Caution("camera-unreadable", str(error), "give the intrinsics with --camera FILE")]
-    rectified = images is not None and "rect" in images.topic.name.rpartition("/image")[2]
-    reading = camera_from_info(first, topic=topic.name, rectified=rectified)
     cautions = list(reading.cautions)
     if reading.camera is None:
         return None, cautions
-    other = camera_from_info(last, topic=topic.name, rectified=rectified).camera
-    if other is None or not np.array_equal(other.matrix_px, reading.camera.matrix_px):
+    if other.camera is None or not np.array_equal(other.camera.matrix_px, reading.camera.matrix_px):
         cautions.append(
             Caution(
                 "camera-changes",
@@ -42,6 +39,11 @@ def recorded_camera(topic: Topic | None, images: ImageStream | None) -> tuple[Ca
     if images is None or not len(images.times_ns):
         return reading.camera, cautions
     return _fitted(reading.camera, images, topic.name, cautions)
+
+
+def _reading(topic: Topic, row: int, images: ImageStream | None) -> CameraReading:
+    rectified = images is not None and "rect" in images.topic.name.rpartition("/image")[2]
+    return camera_from_info(topic.message(row), topic=topic.name, rectified=rectified)
 
 
 def _fitted(
