@@ -52,7 +52,7 @@ def take_all(browser: Browser, server: RunningServer, clicks: list[dict[str, Any
     """Walk through one calibration: first look, a click under the loupe, the result, a pair in doubt, the light theme."""
     driver = opened(browser, server, "dark")
     driver.press("n")
-    shoot(driver, "first_look")
+    shoot(driver, "empty")
     placed(driver, clicks)
     u, v = clicks[3]["pixel_px"]
     driver.go_to(driver.frame_at(clicks[3]["image_time"]))

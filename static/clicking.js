@@ -42,6 +42,7 @@ function inBox(event) {
 /** @param {PointerEvent} event */
 function pressed(event) {
   if (event.button > 1 || !state.shown) return;
+  flushNudge();
   const [x, y] = inBox(event);
   const [u, v] = toImage(x, y);
   const mark = event.button === 0 ? markNear(x, y) : null;
