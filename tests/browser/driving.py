@@ -57,6 +57,10 @@ class Driver:
         """Evaluate in the page."""
         return self.page.evaluate(f"() => ({expression})")
 
+    def drawn(self) -> None:
+        """Wait until the browser has laid out and drawn twice: what was asked for before is on the screen."""
+        self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
     @property
     def view(self) -> Any:
         """The last view of the server."""

@@ -69,6 +69,7 @@ def test_nothing_is_cut_off_or_covered_at_any_common_size(page: Driver) -> None:
     for width, height in ((1280, 720), (1440, 900), (1920, 1080), (1024, 640)):
         page.page.set_viewport_size({"width": width, "height": height})
         page.until(f"innerWidth === {width} && innerHeight === {height}")
+        page.drawn()
         outside = page.value(
             "[...document.querySelectorAll('button, canvas:not([hidden]), .figure, #status-text')]"
             ".filter((part) => part.offsetParent !== null)"

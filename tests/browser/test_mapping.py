@@ -66,7 +66,7 @@ def test_a_click_on_what_is_drawn_comes_back_within_a_tenth_of_a_pixel(
         page.until("__cocalib.state.hover === null")
         if page.value("__cocalib.clickIn(__cocalib.state.shown.index) !== undefined"):
             page.press("Delete")
-        page.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        page.drawn()
         x, y = drawn_at(page, u, v, ratio)
         page.page.mouse.click(round(x), round(y))  # a mouse knows whole CSS pixels only
         page.settle()
@@ -97,6 +97,6 @@ def test_the_canvas_lies_on_device_pixels_whatever_the_window(
     for width, height in ((1280, 720), (1003, 611), (1441, 877)):
         page.page.set_viewport_size({"width": width, "height": height})
         page.until(f"innerWidth === {width}")
-        page.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        page.drawn()
         box: Any = page.value("document.getElementById('marks').getBoundingClientRect().toJSON()")
         assert [box[side] % 4 for side in ("left", "top", "width", "height")] == [0, 0, 0, 0]

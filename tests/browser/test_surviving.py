@@ -105,7 +105,7 @@ def test_what_a_recording_calls_itself_is_text_and_never_runs(open_page: Callabl
         page = open_page(running.url)
         page.click(100, 100)
         page.press("?")
-        page.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        page.drawn()
         assert page.value("window.hit === undefined")
         assert page.text("#recording-name") == f"name{hostile}"
         assert hostile in page.text("#recording-topics")
