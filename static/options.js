@@ -103,10 +103,10 @@ function yesNo(field) {
 
 /** Camera position by tape measure: off, or three numbers and how sure they are. @param {Field} field */
 function cameraPosition(field) {
-  const on_ = make("input", "", []);
-  on_.type = "checkbox";
-  on_.id = "camera-position";
-  on_.setAttribute("aria-label", "Camera position measured by tape");
+  const wanted = make("input", "", []);
+  wanted.type = "checkbox";
+  wanted.id = "camera-position";
+  wanted.setAttribute("aria-label", "Camera position measured by tape");
   const names = ["forward", "left", "up"];
   const inputs = names.map((name) => number(-100, 100, `camera ${name} of the radar`));
   inputs.forEach((input, index) => {
@@ -116,17 +116,25 @@ function cameraPosition(field) {
   const sure = number(0.0001, 10, "standard deviation of the position");
   const numbers = make("span", "control triple", [...inputs, make("span", "", "±"), sure, make("span", "unit", "m")]);
   const told = () => {
-    if (!on_.checked) return change(field.path, null);
-    change(field.path, { position_m: inputs.map((input) => Number(input.value) || 0), sigma_m: Number(sure.value) || 0.01 });
+    const entered = [...inputs, sure].every((input) => input.value !== "");
+    if (entered) change(field.path, { position_m: inputs.map((input) => Number(input.value)), sigma_m: Number(sure.value) });
   };
-  for (const input of [on_, ...inputs, sure]) input.onchange = told;
+  wanted.onchange = () => {
+    numbers.hidden = !wanted.checked;
+    if (!wanted.checked) return change(field.path, null);
+    if (sure.value === "") sure.value = "0.01";
+    inputs[0].focus();
+    told();
+  };
+  for (const input of [...inputs, sure]) input.onchange = told;
   writers.set(field.path, (value) => {
-    on_.checked = value !== null;
+    if (value === null && numbers.contains(document.activeElement)) return; // the tape is being read
+    wanted.checked = value !== null;
     inputs.forEach((input, index) => write(input, value?.position_m[index] ?? ""));
     write(sure, value?.sigma_m ?? "");
     numbers.hidden = value === null;
   });
-  const head = row(field, make("span", "control", [on_]), "Camera position by tape");
+  const head = row(field, make("span", "control", [wanted]), "Camera position by tape");
   return make("div", "", [head, numbers]);
 }
 
@@ -149,7 +157,7 @@ function write(input, value) {
 /** @param {Field} field @param {HTMLElement} content @param {string} [label] */
 function row(field, content, label = LABELS[field.path] ?? sentence(field.label)) {
   const line = make("div", "field", [make("span", "", label), content]);
-  line.dataset.hint = field.hint;
+  line.dataset.hint = `${label}\n${field.hint}`;
   line.dataset.path = field.path;
   return line;
 }

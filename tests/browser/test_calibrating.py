@@ -160,6 +160,27 @@ def test_the_method_and_its_options_can_be_changed_and_taken_back(page: Driver, 
     page.until("document.querySelector('[data-path=\"noise.sigma_px\"] input').value === '2'")
 
 
+def test_a_camera_position_counts_once_it_is_entered_and_not_before(page: Driver, truth: Any) -> None:
+    page.click_sample(truth, 6)
+    without = page.view
+    page.page.click("#tab-options")
+    page.page.click("#camera-position")
+    assert page.view["options"]["solving"]["camera_position"] is None
+    rotation, translation = (np.array(truth["camera_from_radar"][key]) for key in ("rotation", "translation_m"))
+    for name, value in zip(("forward", "left", "up"), -rotation.T @ translation, strict=True):
+        page.page.fill(f'[aria-label="camera {name} of the radar"]', f"{value:.3f}")
+    page.page.keyboard.press("Enter")
+    page.until("__cocalib.state.view.options.solving.camera_position !== null")
+    page.settle()
+    assert page.view["options"]["solving"]["camera_position"]["sigma_m"] == 0.01
+    assert page.view["pose"] != without["pose"]
+    page.page.click("#camera-position")
+    page.until("__cocalib.state.view.options.solving.camera_position === null")
+    page.settle()
+    assert page.view["pose"] == without["pose"]
+    assert page.page.is_hidden('[aria-label="camera up of the radar"]')
+
+
 def test_two_tabs_see_the_same(
     page: Driver, open_page: Callable[..., Driver], server: RunningServer, truth: Any
 ) -> None:
