@@ -3,6 +3,7 @@
 from app.view.drawing import view
 from app.view.drawn import CautionRow, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View
 from app.view.summary import summary_lines
+from app.view.wording import sentence
 
 __all__ = [
     "CautionRow",
@@ -13,6 +14,7 @@ __all__ = [
     "Level",
     "Stage",
     "View",
+    "sentence",
     "summary_lines",
     "view",
 ]

@@ -81,9 +81,9 @@ def _words(session: Session, stage: Stage) -> tuple[str, str]:
     if _waits_for_clicks(session):
         return f"{missing} more placement{'s' if missing > 1 else ''} needed", _next_click(session)
     if stage == "solving":
-        return "solving…", ""
+        return "Solving…", ""
     if isinstance(outcome, Unsolvable):
-        return outcome.reason, sentence(outcome.hint)
+        return sentence(outcome.reason), sentence(outcome.hint)
     if isinstance(outcome, Calibration):
         return _agreement(outcome), sentence(outcome.cautions[0].hint) if outcome.cautions else ""
     return "", ""
@@ -101,8 +101,8 @@ def _agreement(calibration: Calibration) -> str:
     used = [pair for pair in calibration.pairs if not pair.excluded]
     agreeing = sum(pair.inlier for pair in used)
     if agreeing == len(used):
-        return f"solved: all {len(used)} pairs agree"
-    return f"solved: {agreeing} of {len(used)} pairs agree"
+        return f"Solved: all {len(used)} pairs agree"
+    return f"Solved: {agreeing} of {len(used)} pairs agree"
 
 
 def _cautions(calibration: Calibration) -> tuple[CautionRow, ...]:

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from app.view import sentence
 from app.web.frames import Frame
 from app.web.hub import Hub
 from app.web.messages import (
@@ -104,7 +105,7 @@ class Channel:
                 incoming = parse(text)
                 await self._obey(incoming)
             except CalibrationError as error:
-                self.outbox.put(encode(Problem(str(error), request=request_of(text))))
+                self.outbox.put(encode(Problem(sentence(str(error)), request=request_of(text))))
 
     async def _obey(self, incoming: Incoming) -> None:
         """Do what the page wants.

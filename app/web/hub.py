@@ -10,7 +10,7 @@ from typing import Protocol
 
 from app.resources import version
 from app.session import Stamp
-from app.view import CautionRow, View
+from app.view import CautionRow, View, sentence
 from app.web.frames import EncodedPicture, FrameStore
 from app.web.messages import (
     Outgoing,
@@ -150,7 +150,9 @@ class Hub:
             frame_times=StampColumns.of(facts.image_times),
             start=Stamp.of(TimeNs(int(facts.image_times[0]))),
             radar=StampColumns.of(recording.radar_times),
-            cautions=tuple(CautionRow(row.code, row.message, row.hint) for row in recording.cautions),
+            cautions=tuple(
+                CautionRow(row.code, sentence(row.message), sentence(row.hint)) for row in recording.cautions
+            ),
             session=SessionNote(str(restored.folder), len(restored.history.present.clicks), restored.note),
             version=version(),
         )

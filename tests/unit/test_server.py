@@ -207,7 +207,7 @@ def test_a_click_reaches_the_other_tab_and_undo_takes_it_from_both(server: Runni
 @pytest.mark.parametrize(
     ("message", "words"),
     [
-        ({"type": "click_placed", "image_time": {"sec": 1, "nanosec": 2}, "pixel_px": [1, 1]}, "no frame"),
+        ({"type": "click_placed", "image_time": {"sec": 1, "nanosec": 2}, "pixel_px": [1, 1]}, "No frame"),
         ({"type": "click_placed", "image_time": stamp(0), "pixel_px": [5000, 1]}, "outside"),
         ({"type": "click_removed", "id": "c99"}, "c99"),
         ({"type": "options_changed", "options": {"noise": {"sigma_pix": 1}}}, "sigma_px"),

@@ -68,7 +68,7 @@ FIVE = tuple(pair(f"c{number}") for number in range(1, 6))
 
 @pytest.mark.parametrize(
     ("count", "status"),
-    [(0, "4 more placements needed"), (1, "3 more placements needed"), (3, "1 more placement needed"), (4, "solving…")],
+    [(0, "4 more placements needed"), (1, "3 more placements needed"), (3, "1 more placement needed"), (4, "Solving…")],
 )
 def test_the_status_counts_down_to_the_first_solve(count: int, status: str) -> None:
     assert view(clicked(count), FACTS).status == status
@@ -86,19 +86,19 @@ def test_before_the_first_click_the_hint_says_what_to_do() -> None:
 
 def test_a_solved_session_says_how_many_pairs_agree() -> None:
     four_agree = (*FIVE[:4], pair("c5", inlier=False))
-    assert shown(5, calibration(*FIVE)).status == "solved: all 5 pairs agree"
-    assert shown(5, calibration(*four_agree)).status == "solved: 4 of 5 pairs agree"
+    assert shown(5, calibration(*FIVE)).status == "Solved: all 5 pairs agree"
+    assert shown(5, calibration(*four_agree)).status == "Solved: 4 of 5 pairs agree"
 
 
 def test_an_excluded_pair_is_not_among_those_that_could_agree() -> None:
-    assert shown(5, calibration(*FIVE[:4], pair("c5", excluded=True))).status == "solved: all 4 pairs agree"
+    assert shown(5, calibration(*FIVE[:4], pair("c5", excluded=True))).status == "Solved: all 4 pairs agree"
 
 
 def test_an_unsolvable_session_shows_reason_and_hint() -> None:
     seen = shown(5, Unsolvable("no-pose", "only 3 of 5 pairs agree on any pose", "spread the placements"))
     assert (seen.stage, seen.status, seen.hint) == (
         "unsolvable",
-        "only 3 of 5 pairs agree on any pose",
+        "Only 3 of 5 pairs agree on any pose.",
         "Spread the placements.",
     )
     assert not seen.has_calibration
@@ -106,7 +106,7 @@ def test_an_unsolvable_session_shows_reason_and_hint() -> None:
 
 def test_what_more_clicks_cannot_mend_is_told_from_the_first_click_on() -> None:
     seen = shown(1, Unsolvable("no-camera", "the intrinsics are missing", "give --camera"))
-    assert (seen.stage, seen.status) == ("unsolvable", "the intrinsics are missing")
+    assert (seen.stage, seen.status) == ("unsolvable", "The intrinsics are missing.")
 
 
 def test_too_few_pairs_is_no_failure_while_clicks_are_collected() -> None:
@@ -130,7 +130,7 @@ def test_clicks_that_the_radar_did_not_see_do_not_count_and_say_why() -> None:
 
 def test_figures_stay_while_a_newer_answer_is_worked_out() -> None:
     seen = shown(5, calibration(*FIVE), ClickMoved("c1", 11.0, 20.0))
-    assert (seen.stage, seen.status, seen.solving) == ("solving", "solving…", True)
+    assert (seen.stage, seen.status, seen.solving) == ("solving", "Solving…", True)
     assert seen.has_calibration
     assert seen.solved_revision == seen.revision - 1
     assert seen.metrics
@@ -330,7 +330,15 @@ def test_the_sigmas_of_the_mounting_are_those_of_many_perturbed_poses() -> None:
 
 
 @pytest.mark.parametrize(
-    ("phrase", "text"), [("the end", "The end."), ("Really?", "Really?"), ("", ""), ("solving…", "Solving…")]
+    ("phrase", "text"),
+    [
+        ("the end", "The end."),
+        ("Really?", "Really?"),
+        ("", ""),
+        ("/radar is odd", "/radar is odd."),
+        ("c14 suits", "c14 suits."),
+        ("solving…", "Solving…"),
+    ],
 )
 def test_a_phrase_becomes_a_sentence(phrase: str, text: str) -> None:
     assert sentence(phrase) == text
