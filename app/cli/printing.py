@@ -7,6 +7,7 @@ from pathlib import Path
 
 from app import whole_file
 from app.solving import camera_for
+from app.view import sentence
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.measurements import TimeNs, Unsolvable, time_parts
@@ -33,9 +34,9 @@ def refuse(reason: str) -> int:
 
 def explain_unsolvable(outcome: Unsolvable) -> int:
     """Say on stderr why the data cannot give a calibration, what would help, and which clicks found no radar; return 1."""
-    print(f"cocalib: no calibration: {outcome.reason} {outcome.hint}", file=sys.stderr)
+    print(f"cocalib: no calibration: {sentence(outcome.reason)} {sentence(outcome.hint)}", file=sys.stderr)
     for click in outcome.unpaired:
-        print(f"  click {click.id}: {click.reason} {click.hint}", file=sys.stderr)
+        print(f"  click {click.id}: {sentence(click.reason)} {sentence(click.hint)}", file=sys.stderr)
     return 1
 
 

@@ -13,6 +13,7 @@ from typing import Protocol
 import msgspec
 
 from app.solving import RecordingSource, calibration_text
+from app.view import sentence
 from app.web.survey import Survey
 from app.workspace import Workspace
 from calib_core.errors import CalibrationError
@@ -174,7 +175,9 @@ def _viser_page() -> Reply:
     import viser
 
     page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
-    page = page.replace(b"<head>", b'<head><script src="../../pace.js"></script>', 1).replace(b"</head>", _VISER_STYLE, 1)
+    page = page.replace(b"<head>", b'<head><script src="../../pace.js"></script>', 1).replace(
+        b"</head>", _VISER_STYLE, 1
+    )
     body = gzip.compress(page, mtime=0)
     return _reply(body, _TYPES[".html"], policy=_VISER_POLICY, more=(("Content-Encoding", "gzip"),))
 
@@ -182,4 +185,4 @@ def _viser_page() -> Reply:
 def _why_none(outcome: Unsolvable | None) -> str:
     if outcome is None:
         return "There is no calibration yet: click the reflector in at least four placements."
-    return f"{outcome.reason} {outcome.hint}"
+    return f"{sentence(outcome.reason)} {sentence(outcome.hint)}"
