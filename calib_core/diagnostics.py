@@ -31,6 +31,7 @@ _NARROW_CONDITION = 5e5
 _WEAK_ROTATION_RAD = np.deg2rad(2.0)
 _WEAK_POSITION_M = 0.15
 _NOISE_EXCESS = 2.5
+_NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
 _DECISIVE_INFLUENCE = 3.0
 _AMBIGUOUS_MARGIN = 4.0
@@ -76,6 +77,7 @@ def cautions_of(findings: Findings) -> tuple[Caution, ...]:
         _many_outliers,
         _few_inliers,
         _noise_excess,
+        _smooth_angle_errors,
         _weak_geometry,
         _same_places,
         _ambiguous_candidates,
@@ -217,6 +219,19 @@ def _noise_excess(f: Findings) -> list[Caution]:
             f"residuals are {np.sqrt(f.chi2_per_degree):.1f} times what the assumed noise explains "
             f"(chi2 / degrees of freedom {f.chi2_per_degree:.1f})",
             "check that the intrinsics belong to this camera, lens and image size; then the assumed radar noise",
+        )
+    ]
+
+
+def _smooth_angle_errors(f: Findings) -> list[Caution]:
+    if f.uncertainty.growth < _NOTABLE_GROWTH:
+        return []
+    return [
+        Caution(
+            "smooth-angle-errors",
+            "neighbouring placements share their residuals: the radar's angles are off by an amount that changes slowly with "
+            f"direction; the stated rotation uncertainty is {f.uncertainty.growth:.1f} times wider for it",
+            "more placements will not average it away; calibrate the radar's angles, or trust the stated uncertainty",
         )
     ]
 

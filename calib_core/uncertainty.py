@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib_core.angle_errors import pose_spread
 from calib_core.arrays import Matrix66, Points2, Points3, Values
 from calib_core.camera import Camera
 from calib_core.consensus import normal_equations
@@ -25,19 +26,21 @@ class PoseUncertainty:
 
     Attributes:
         covariance: (6, 6) of (dt, dtheta) [m, rad].
-        information: (6, 6) its inverse.
+        information: (6, 6) Gauss-Newton Hessian of the fit, for moving it about.
         quantile: the factor on the covariance whose ellipsoid holds 95 %.
         condition: condition number of the information of the pairs alone, each unknown in its own scale.
+        growth: by how much smooth angle errors of the radar widen the rotation's standard deviation; 1 without.
     """
 
     covariance: Matrix66
     information: Matrix66
     quantile: float
     condition: float
+    growth: float
 
 
 def pose_uncertainty(refined: Refined) -> PoseUncertainty:
-    """Invert the observed information of the mixture at the optimum.
+    """Invert the observed information of the mixture at the optimum, and widen it by smooth angle errors.
 
     Pairs that may be outliers (0 < w < 1) carry less than w of their Gauss-Newton information: by Louis' identity
 
@@ -50,13 +53,16 @@ def pose_uncertainty(refined: Refined) -> PoseUncertainty:
     information = _floored(plain, lost)
     prior_jacobian = refined.evidence.belief.rows(refined.camera_from_radar)[1]
     pairs_only = plain - prior_jacobian.T @ prior_jacobian
-    covariance = _symmetric_inverse(information)
+    independent = _symmetric_inverse(information)
+    spread = pose_spread(refined, plain)
+    covariance = independent if spread is None else _widened(independent, plain, spread)
     from_pairs = 1.0 - float(np.trace(prior_jacobian @ covariance @ prior_jacobian.T)) / 6.0
     return PoseUncertainty(
         covariance=covariance,
-        information=information,
-        quantile=_quantile(refined.degrees_of_freedom, from_pairs),
+        information=plain,
+        quantile=_quantile(refined.degrees_of_freedom, max(from_pairs, 0.0)),
         condition=_scaled_condition(pairs_only),
+        growth=float(np.sqrt(np.trace(covariance[3:, 3:]) / np.trace(independent[3:, 3:]))),
     )
 
 
@@ -67,6 +73,15 @@ def _floored(plain: Matrix66, lost: Matrix66) -> Matrix66:
     values, vectors = np.linalg.eigh(np.eye(6) - inverse @ lost @ inverse.T)
     kept = (vectors * np.maximum(values, _LEAST_SHARE)) @ vectors.T
     return np.asarray(root @ kept @ root.T)
+
+
+def _widened(covariance: Matrix66, plain: Matrix66, spread: Matrix66) -> Matrix66:
+    """Add to a covariance what smooth angle errors add to the plain one, in no direction less than nothing."""
+    root = np.linalg.cholesky(plain)
+    values, vectors = np.linalg.eigh(root.T @ spread @ root - np.eye(6))
+    back = np.linalg.inv(root).T @ vectors
+    widened = covariance + (back * np.maximum(values, 0.0)) @ back.T
+    return np.asarray((widened + widened.T) / 2.0)
 
 
 def _symmetric_inverse(matrix: Matrix66) -> Matrix66:
