@@ -1,9 +1,12 @@
 """The wheel is built, installed into an empty environment and started there."""
 
 import json
+import os
+import re
 import subprocess
 import sys
 import sysconfig
+import urllib.request
 import zipfile
 from pathlib import Path
 
@@ -75,6 +78,28 @@ def test_the_installed_command_finds_its_own_page_and_sample(installed: Path, tm
     assert len(printed) == 2
     for line in printed:
         assert Path(line).is_relative_to(installed), "found in the checkout, not in the wheel"
+
+
+def test_the_installed_command_serves_its_page(installed: Path, tmp_path: Path) -> None:
+    server = subprocess.Popen(
+        [installed / "bin" / "cocalib", "demo", "--no-browser", "--port", "0", "--session", tmp_path / "session"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1", "XDG_STATE_HOME": str(tmp_path / "state")},
+    )
+    try:
+        assert server.stdout is not None
+        link = next(
+            found[0] for line in server.stdout if (found := re.search(r"http://127\.0\.0\.1:\d+/\?token=\S+", line))
+        )
+        browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+        page = browser.open(link, timeout=30).read().decode()
+        assert "cocalib" in page
+        assert browser.open(link.partition("?")[0] + "main.js", timeout=30).status == 200
+    finally:
+        server.terminate()
+        server.communicate()
 
 
 def test_the_installed_command_solves_its_sample(installed: Path, tmp_path: Path) -> None:
