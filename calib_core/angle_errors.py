@@ -26,6 +26,7 @@ _MOST_CENTRES = 40
 _LEAST_PAIRS = 7.0
 _RELUCTANCE = 4.5  # prior log-odds of purely independent errors against each single split
 _SURELY_NONE = 0.7
+_NEGLIGIBLE = 1e-10
 
 
 def pose_spread(refined: Refined, information: Matrix66) -> Matrix66 | None:
@@ -107,18 +108,20 @@ def _log_likelihoods(
 
     In the singular basis of B, V is diagonal: tau^2 + rho^2 s^2 along it, tau^2 everywhere else.
     """
-    basis, singular, _ = np.linalg.svd(shape, full_matrices=False)
-    along, along_pose = basis.T @ residual, basis.T @ jacobian
+    squared, vectors = np.linalg.eigh(shape.T @ shape)  # B's singular values, squared
+    kept = squared > _NEGLIGIBLE * squared.max(initial=0.0)
+    squared, to_basis = squared[kept], vectors[:, kept] / np.sqrt(squared[kept])
+    along, along_pose = to_basis.T @ (shape.T @ residual), to_basis.T @ (shape.T @ jacobian)
     rest = residual @ residual - along @ along
     rest_pose = jacobian.T @ jacobian - along_pose.T @ along_pose
     rest_mixed = jacobian.T @ residual - along_pose.T @ along
     prior_information, prior_mixed = prior[1].T @ prior[1], prior[1].T @ prior[0]
-    found = []
-    for independent, smooth in levels:
-        variance = independent + smooth * singular**2
-        information = rest_pose / independent + (along_pose.T / variance) @ along_pose + prior_information
-        mixed = rest_mixed / independent + (along_pose.T / variance) @ along + prior_mixed
-        squares = rest / independent + (along**2 / variance).sum() - mixed @ np.linalg.solve(information, mixed)
-        log_volume = (len(residual) - len(singular)) * np.log(independent) + np.log(variance).sum()
-        found.append(-0.5 * (squares + log_volume + np.linalg.slogdet(information)[1]))
-    return np.array(found)
+    independent, smooth = np.array(levels).T
+    precision = 1.0 / (independent[:, None] + smooth[:, None] * squared)  # (levels, k)
+    information = rest_pose / independent[:, None, None] + prior_information
+    information = information + (along_pose.T[None] * precision[:, None, :]) @ along_pose
+    mixed = rest_mixed / independent[:, None] + (precision * along) @ along_pose + prior_mixed
+    explained = (mixed * np.linalg.solve(information, mixed[:, :, None])[:, :, 0]).sum(axis=1)
+    squares = rest / independent + precision @ along**2 - explained
+    log_volume = (len(residual) - len(squared)) * np.log(independent) - np.log(precision).sum(axis=1)
+    return np.asarray(-0.5 * (squares + log_volume + np.linalg.slogdet(information)[1]))

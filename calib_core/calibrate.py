@@ -9,7 +9,7 @@ from calib_core.arrays import Flags, Values
 from calib_core.camera import Camera
 from calib_core.consensus import Consensus, associate, find_consensus
 from calib_core.diagnostics import MIRRORED_GAIN, Findings, cautions_of
-from calib_core.evidence import Evidence, evidence_of
+from calib_core.evidence import Evidence, Linearised, evidence_of
 from calib_core.handedness import mirror_gain
 from calib_core.initial_pose import starting_poses
 from calib_core.measurements import Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
@@ -232,7 +232,7 @@ def _used_results(used: Sequence[Pair], refined: Refined, left_out: LeftOut) -> 
     evidence = refined.evidence
     points = cartesian_from_polar(evidence.polar[refined.rows])
     projected = evidence.camera.project(refined.camera_from_radar @ points)
-    inliers = _inliers(refined)
+    inliers, expected = _inliers(refined), _residual_covariances(refined.model)
     return {
         pair.id: PairResult(
             id=pair.id,
@@ -243,7 +243,7 @@ def _used_results(used: Sequence[Pair], refined: Refined, left_out: LeftOut) -> 
             outlier_probability=float(1.0 - refined.weights[i]),
             influence=float(left_out.influence[i]),
             candidate=chosen,
-            expected_covariance_px2=_residual_covariance(refined.model.whitening[i]),
+            expected_covariance_px2=expected[i],
             image_time=pair.image_time,
         )
         for i, pair in enumerate(used)
@@ -251,12 +251,12 @@ def _used_results(used: Sequence[Pair], refined: Refined, left_out: LeftOut) -> 
     }
 
 
-def _residual_covariance(whitening: np.ndarray) -> np.ndarray:
-    """Recover S = W^-1 W^-T; NaN where the camera does not see the position."""
-    if not whitening.any():
-        return np.full((2, 2), np.nan)
-    inverse = np.linalg.inv(whitening)
-    return np.asarray(inverse @ inverse.T)
+def _residual_covariances(model: Linearised) -> np.ndarray:
+    """Recover S = W^-1 W^-T of each pair (n, 2, 2); NaN where the camera does not see the position."""
+    unseen = ~model.whitening.any(axis=(1, 2))
+    inverse = np.linalg.inv(np.where(unseen[:, None, None], np.eye(2), model.whitening))
+    inverse[unseen] = np.nan
+    return np.asarray(inverse @ np.swapaxes(inverse, 1, 2))
 
 
 def _excluded_results(
@@ -268,6 +268,7 @@ def _excluded_results(
         return {}
     evidence = evidence_of(aside, camera, options).scaled(refined.noise_scale)
     rows, model = associate(evidence, refined.camera_from_radar)
+    expected = _residual_covariances(model)
     results = {}
     for i, pair in enumerate(aside):
         chosen = int(rows[i] - evidence.first[i])
@@ -280,7 +281,7 @@ def _excluded_results(
             inlier=False,
             excluded=True,
             candidate=chosen,
-            expected_covariance_px2=_residual_covariance(model.whitening[i]),
+            expected_covariance_px2=expected[i],
             image_time=pair.image_time,
         )
     return results

@@ -10,6 +10,7 @@ from calib_core.refining import refine
 __all__ = ["mirror_gain"]
 
 _STARTS = 2
+_BEYOND_DOUBT = 30.0  # a difference that noise levels cannot turn
 
 
 def mirror_gain(evidence: Evidence, best: Consensus, *, estimate_scale: bool, seed: int) -> float:
@@ -25,6 +26,8 @@ def mirror_gain(evidence: Evidence, best: Consensus, *, estimate_scale: bool, se
     found = find_consensus(mirrored, starts, estimate_scale=estimate_scale)
     if not found:
         return -np.inf
+    if abs(best.cost - found[0].cost) > _BEYOND_DOUBT:
+        return best.cost - found[0].cost
     plain, other = (
         refine(pairs, start, estimate_scale=estimate_scale) for pairs, start in ((evidence, best), (mirrored, found[0]))
     )
