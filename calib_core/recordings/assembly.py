@@ -15,6 +15,8 @@ from calib_core.recordings.checks import about_images, about_lost, about_radar, 
 from calib_core.recordings.clocks import ClockChoice, Stamps, choose_clock, choose_clocks
 from calib_core.recordings.decoding import Message
 from calib_core.recordings.images import ImageLayout
+from calib_core.recordings.radar_axes import RadarAxes, parse_radar_axes
+from calib_core.recordings.radar_checks import about_claims
 from calib_core.recordings.radar_layouts import layouts_of_parts
 from calib_core.recordings.radar_lists import PointLayout
 from calib_core.recordings.recorded_camera import recorded_camera
@@ -70,11 +72,12 @@ def assemble(
     clocks, stamps, about_clocks = _clocks(stamped, options)
     cautions.extend([*lost, *about_clocks])
     heads = {name: both.heads for name, both in stamped.items()}
-    radar = _radar_stream(selection.radar, inventory, stamps, heads)
+    axes = parse_radar_axes(options.radar_axes) if options.radar_axes else None
+    radar = _radar_stream(selection.radar, inventory, stamps, heads, axes)
     images = _image_stream(selection.image, inventory, stamps)
     cautions.extend(check_overlap(name, radar, images, required=len(require) == 2))
     camera, about_camera = recorded_camera(selection.camera_info, images)
-    cautions.extend([*about_camera, *about_radar(radar), *about_images(images)])
+    cautions.extend([*about_camera, *about_radar(radar), *about_claims(radar), *about_images(images)])
     return Assembly(
         topics=tuple(_summary(topic, inventory, selection, clocks, stamps) for topic in topics),
         radar_topic=selection.radar.name if selection.radar else None,
@@ -134,12 +137,18 @@ def _times(both: Stamps, clock: str) -> TimesNs:
 
 
 def _radar_stream(
-    topic: Topic | None, inventory: Inventory, stamps: Mapping[str, TimesNs], heads: Mapping[str, np.ndarray]
+    topic: Topic | None,
+    inventory: Inventory,
+    stamps: Mapping[str, TimesNs],
+    heads: Mapping[str, np.ndarray],
+    axes: RadarAxes | None,
 ) -> RadarStream | None:
     first = inventory.usages[topic.name].radar if topic is not None else None
     if topic is None or first is None:
         return None
     layouts = layouts_of_parts(first, [topic.definition(number) for number in range(len(topic.parts))])
+    if axes is not None:
+        layouts = tuple(layout.with_plan(layout.plan.read_as(axes)) for layout in layouts)
     return RadarStream(topic, layouts, stamps[topic.name], heads[topic.name])
 
 

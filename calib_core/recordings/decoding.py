@@ -7,7 +7,6 @@ Python than a list of one.
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, NoReturn, TypeAlias
 
 import numpy as np
@@ -15,8 +14,9 @@ import numpy as np
 from calib_core.arrays import Values
 from calib_core.errors import MessageError
 from calib_core.recordings.definitions import PRIMITIVES, Definition, Field
+from calib_core.recordings.placing import Place, TypesKey, element_layout, structure, walk
 
-__all__ = ["Message", "Value", "decode", "fixed_part", "payload_byte_order"]
+__all__ = ["Message", "Pin", "Value", "decode", "fixed_part", "payload_byte_order"]
 
 Value: TypeAlias = "int | float | str | Message | np.ndarray | list[Any]"
 _STRINGS = ("string", "wstring")
@@ -83,8 +83,15 @@ class Message:
     def _refuse(self, name: str, what: str) -> NoReturn:
         raise MessageError(f"a {self.type} message has a layout of its own: {name} is not {what}; it cannot be used")
 
-    def column(self, name: str, path: str) -> Values:
-        """Return one number of each message in a list: (n,); path is dotted."""
+    def number(self, path: str) -> float:
+        """Return a single number; path is dotted."""
+        try:
+            return float(_at(self, path.split(".")))
+        except (KeyError, TypeError, ValueError):
+            return self._refuse(path, "a number")
+
+    def column(self, name: str, path: str) -> np.ndarray:
+        """Return one number, or one fixed array, of each message in a list: (n,) or (n, k); path is dotted."""
         value = self._field(name)
         if isinstance(value, np.ndarray) and path in (value.dtype.names or ()):
             return value[path].astype(np.float64)
@@ -93,10 +100,10 @@ class Message:
         return np.array([_at(element, path.split(".")) for element in value], dtype=np.float64)
 
 
-def _at(element: Any, parts: list[str]) -> float:
+def _at(element: Any, parts: list[str]) -> Any:
     for part in parts:
         element = element[part]
-    return float(element)
+    return element
 
 
 def payload_byte_order(payload: bytes, definition: Definition) -> str:
@@ -188,7 +195,9 @@ class _Reader:
             raise ValueError(f"{field.name} claims {count} elements in a message of {len(self.data)} bytes")
         if not count:
             return np.zeros(0) if field.type in PRIMITIVES else []
-        layout = _layout(field.type, (self.place - self.origin) % 8, self.order, self.aligned, _Types(self.definition))
+        layout = element_layout(
+            field.type, (self.place - self.origin) % 8, self.order, self.aligned, TypesKey(self.definition)
+        )
         if layout is None:
             single = Field(field.name, field.type)
             return [self.value(single) for _ in range(count)]
@@ -198,104 +207,36 @@ class _Reader:
         return values
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Layout:
-    """How equal elements follow one another: padding before the first, one element, distance of neighbours."""
+@dataclass(frozen=True, slots=True)
+class Pin:
+    """Where a string's length lies in a message, and what it is: with all of them equal, all numbers lie where they did."""
 
-    lead_bytes: int
-    element: np.dtype[Any]
-    stride_bytes: int
-
-
-class _Types:
-    """The types of a definition, hashed by identity so that layouts are computed once."""
-
-    __slots__ = ("types",)
-
-    def __init__(self, definition: Definition) -> None:
-        self.types = definition.types
-
-    def __hash__(self) -> int:
-        return id(self.types)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Types) and other.types is self.types
+    offset: int
+    length: bytes
 
 
-_Place: TypeAlias = tuple[str, str, int]
-"""Dotted name, NumPy format without byte order, byte offset of one number."""
+def fixed_part(definition: Definition, payload: bytes) -> tuple[np.dtype[Any], tuple[Pin, ...]]:
+    """Lay out the numbers after the header, up to the first array of varying length, as they lie in this message.
 
-
-@lru_cache(maxsize=512)
-def _layout(kind: str, phase: int, order: str, aligned: bool, types: _Types) -> _Layout | None:
-    """Lay out an array of a type whose first element may begin at phase (modulo 8); None where elements differ."""
-    single = (Field("", kind),) if kind in PRIMITIVES else types.types.get(kind)
-    if single is None:
-        return None
-    elements: list[list[_Place]] = []
-    end = phase
-    for _ in range(3):
-        places, after, whole = _walk(types.types, single, end, aligned)
-        if not whole or after == end:
-            return None
-        elements.append(places)
-        end = after
-    starts = [places[0][2] for places in elements]
-    shapes = [
-        [(name, code, at - start) for name, code, at in places] for places, start in zip(elements, starts, strict=True)
-    ]
-    stride = starts[1] - starts[0]
-    if shapes[0] != shapes[1] or shapes[1] != shapes[2] or starts[2] - starts[1] != stride:
-        return None
-    extent = end - starts[2]
-    element = np.dtype(order + PRIMITIVES[kind]) if kind in PRIMITIVES else _structure(shapes[0], order, extent)
-    return _Layout(starts[0] - phase, element, stride)
-
-
-def _walk(
-    types: Mapping[str, tuple[Field, ...]], fields: tuple[Field, ...], place: int, aligned: bool, prefix: str = ""
-) -> tuple[list[_Place], int, bool]:
-    """Note the place of every number until one varies; return the places, where they end, and whether that is all."""
-    places: list[_Place] = []
-    for field in fields:
-        name = f"{prefix}{field.name}"
-        if field.type in PRIMITIVES and field.count != 0:
-            code = PRIMITIVES[field.type]
-            place += -place % int(code[1]) if aligned else 0
-            places.append((name, code if field.count is None else f"({field.count},){code}", place))
-            place += int(code[1]) * (field.count or 1)
-        elif field.type in types and field.count is None:
-            inner, place, whole = _walk(types, types[field.type], place, aligned, f"{name}.")
-            places.extend(inner)
-            if not whole:
-                return places, place, False
-        else:
-            return places, place, False
-    return places, place, True
-
-
-def _structure(places: list[_Place], order: str, size: int) -> np.dtype[Any]:
-    """Build a structured dtype whose field names are dotted."""
-    formats = [code.replace(")", f"){order}") if ")" in code else order + code for _, code, _ in places]
-    return np.dtype(
-        {
-            "names": [name for name, _, _ in places],
-            "formats": formats,
-            "offsets": [at for _, _, at in places],
-            "itemsize": size,
-        }
-    )
-
-
-def fixed_part(definition: Definition, payload: bytes) -> np.dtype[Any]:
-    """Lay out what follows the header, up to the first field of varying size, as it lies in this message.
-
-    Messages whose frame_id is of the same length all have this layout.
+    Messages whose strings are as long as the pins say all have this layout.
     """
-    order = payload_byte_order(payload, definition)
-    reader = _Reader(payload, order, definition)
+    reader = _Reader(payload, payload_byte_order(payload, definition), definition)
     first, *rest = definition.fields
     reader.value(first)
-    places, end, _ = _walk(definition.types, tuple(rest), reader.place - reader.origin, reader.aligned)
-    shifted = [(name, code, at + reader.origin) for name, code, at in places]
-    return _structure(shifted, order, end + reader.origin)
+    places: list[Place] = []
+    pins = [Pin(12, payload[12:16])] if first.type == "std_msgs/Header" else []
+    end = reader.place
+    for field in rest:
+        if field.type == "string" and field.count is None:
+            reader.align(4)
+            pins.append(Pin(reader.place, payload[reader.place : reader.place + 4]))
+            reader.value(field)
+            continue
+        begin = reader.place - reader.origin
+        found, after, whole = walk(definition.types, (field,), begin, reader.aligned)
+        places.extend((name, code, at + reader.origin) for name, code, at in found)
+        reader.place = after + reader.origin
+        end = reader.place if found else end
+        if not whole:
+            break
+    return structure(places, reader.order, end), tuple(pin for pin in pins if pin.offset < end)

@@ -1,7 +1,7 @@
 """Radar returns in sensor_msgs/PointCloud2 (and the older PointCloud), whatever their layout in memory."""
 
 import struct
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,8 @@ import numpy as np
 from calib_core.errors import MessageError
 from calib_core.recordings.decoding import Message, decode, payload_byte_order
 from calib_core.recordings.definitions import Definition
-from calib_core.recordings.radar_columns import ColumnPlan, Returns, no_returns, plan_columns, returns_from
+from calib_core.recordings.radar_columns import ColumnPlan, Returns, no_returns, returns_from
+from calib_core.recordings.radar_decoders import plan_for, plan_like
 
 __all__ = ["ChannelCloudLayout", "CloudLayout", "is_channel_cloud", "is_cloud"]
 
@@ -56,7 +57,7 @@ class CloudLayout:
     def recognise(cls, definition: Definition, payload: bytes) -> "CloudLayout | None":
         """Look at a first message; None where it holds no positions."""
         message = decode(definition, payload)
-        plan = plan_columns(_point_dtype(message, payload_byte_order(payload, definition)).names or ())
+        plan = plan_for("cloud", _point_dtype(message, payload_byte_order(payload, definition)).names or ())
         if plan is None:
             return None
         points = message.whole("height") * message.whole("width")
@@ -81,7 +82,7 @@ class CloudLayout:
         data = message.octets("data")
         height, width, step = message.whole("height"), message.whole("width"), message.whole("row_step")
         dtype = _point_dtype(message, order)
-        plan = plan_columns(dtype.names or ())
+        plan = plan_like(self.plan, "cloud", dtype.names or ())
         if plan is None:
             raise MessageError(f"a cloud has only the fields {', '.join(dtype.names or ('(none)',))}: no position")
         points = _points(data, dtype, height, width, step)
@@ -89,6 +90,10 @@ class CloudLayout:
             start = _after_header(payload, self.definition) + 8
             self._remember(payload[start : len(payload) - len(data) - 9], _Shape(dtype, plan))
         return _returns(points, plan)
+
+    def with_plan(self, plan: ColumnPlan) -> "CloudLayout":
+        """Read by another plan."""
+        return replace(self, plan=plan, _known={})
 
     def _remember(self, block: bytes, shape: _Shape) -> None:
         if len(self._known) < 16:
@@ -178,7 +183,7 @@ class ChannelCloudLayout:
     def recognise(cls, definition: Definition, payload: bytes) -> "ChannelCloudLayout | None":
         """Look at a first message."""
         columns = _channel_columns(decode(definition, payload))
-        plan = plan_columns(columns)
+        plan = plan_for("channels", columns)
         if plan is None:
             return None
         return cls(definition, plan, len(columns["x"]) > _LIDAR_POINTS or not plan.looks_like_radar)
@@ -202,12 +207,16 @@ class ChannelCloudLayout:
         except KeyError as error:
             raise MessageError(f"a cloud lacks the channel {error}, which the first one has") from error
 
+    def with_plan(self, plan: ColumnPlan) -> "ChannelCloudLayout":
+        """Read by another plan."""
+        return replace(self, plan=plan)
+
 
 def _channel_columns(message: Message) -> dict[str, np.ndarray]:
     columns = {axis: message.column("points", axis) for axis in "xyz"} if message.count("points") else {}
     columns = columns or {axis: np.zeros(0) for axis in "xyz"}
-    for channel in message.messages("channels"):
+    for number, channel in enumerate(message.messages("channels")):
         values = channel.numbers("values", channel.count("values"))
         if len(values) == len(columns["x"]):
-            columns.setdefault(channel.text("name"), values)
+            columns.setdefault(channel.text("name") or f"channel{number}", values)
     return columns

@@ -2,19 +2,22 @@
 
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib_core.arrays import Points3, Values
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
+from calib_core.recordings.radar_axes import RadarAxes
+from calib_core.recordings.radar_noise import full_covariance, sigma_polar_from_covariance
 
 __all__ = ["ColumnPlan", "Returns", "no_returns", "plan_columns", "returns_from"]
 
-_POSITION_PREFIXES = ("", "position", "poseposition", "pos", "point")
+_POSITION_PREFIXES = ("", "position", "poseposition", "poseposeposition", "pos", "point")
 _RANGES = ("range", "r", "distance", "dist", "rangem", "targetrange")
 _AZIMUTHS = ("azimuth", "azimuthangle", "azimuthrad", "azimuthdeg", "az")
 _ELEVATIONS = ("elevation", "elevationangle", "elevationrad", "elevationdeg", "el")
+_CLAIMED_AZIMUTHS = (*_AZIMUTHS, "bearing")
 _DOPPLERS = (
     "dopplervelocity", "vdopplermps", "radialvelocity", "radialspeed", "rangerate", "dopplermps", "doppler", "vradial",
     "velocity", "vr", "v", "speed", "speedradial", "rrate",
@@ -22,7 +25,8 @@ _DOPPLERS = (
 _AMPLITUDES = ("snrdb", "snr", "intensity", "rcs", "power", "amplitude", "magnitude")
 _VELOCITIES = (
     ("vx", "vy", "vz"), ("velocityx", "velocityy", "velocityz"), ("relativevelocityx", "relativevelocityy", "relativevelocityz"),
-    ("twistlinearx", "twistlineary", "twistlinearz"), ("vrelx", "vrely", "vrelz"), ("vabsx", "vaby", "vabz"),
+    ("twistlinearx", "twistlineary", "twistlinearz"),
+    ("twisttwistlinearx", "twisttwistlineary", "twisttwistlinearz"), ("vrelx", "vrely", "vrelz"), ("vabsx", "vaby", "vabz"),
 )  # fmt: skip
 _SIGMAS = (
     ("rangestd", "sigmarange", "rangesigma", "distancestd"),
@@ -35,12 +39,17 @@ _INVALID_DOPPLER = ("invalidrangerate", "invaliddoppler", "invalidvelocity")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Returns:
-    """The returns of one scan as columns; the meaning is that of RadarScan."""
+    """The returns of one scan as columns; the meaning is that of RadarScan.
+
+    Attributes:
+        claimed_polar: range, azimuth and elevation as the message has them, NaN for what it has not; only where asked for.
+    """
 
     points_radar_m: Points3
     doppler_mps: Values
     snr_db: Values
     sigma_polar: Points3
+    claimed_polar: Points3 | None = None
 
     def __len__(self) -> int:
         return len(self.points_radar_m)
@@ -66,6 +75,15 @@ class ColumnPlan:
         sigma: standard deviations of range, azimuth and elevation; None each where there is none.
         spoils_position: flags that say the position is not valid.
         spoils_doppler: flags that say the speed is not valid.
+        needed: flags that are zero where there is no return.
+        azimuth_sign: 1 where azimuth is positive to the left, -1 to the right.
+        covariance: an array with the position's covariance [m^2], or None.
+        claimed: range, azimuth and elevation beside the position, or those it is made of; for finding contradictions.
+        axes: what a person says about axes and units; None for nothing.
+        decoder: the layout's name in the registry; "" for one read by its column names alone.
+        assumed: what the layout's documents leave open, as a sentence; "" for nothing.
+        shared_with_lidars: lidars have the same columns.
+        claiming: fill in Returns.claimed_polar.
     """
 
     position: tuple[str, ...]
@@ -78,10 +96,21 @@ class ColumnPlan:
     sigma: tuple[str | None, str | None, str | None] = (None, None, None)
     spoils_position: tuple[str, ...] = ()
     spoils_doppler: tuple[str, ...] = ()
+    needed: tuple[str, ...] = ()
+    azimuth_sign: float = 1.0
+    covariance: str | None = None
+    claimed: tuple[str | None, str | None, str | None] = (None, None, None)
+    axes: RadarAxes | None = None
+    decoder: str = ""
+    assumed: str = ""
+    shared_with_lidars: bool = False
+    claiming: bool = False
 
     @property
     def looks_like_radar(self) -> bool:
         """Tell whether more than a position and an intensity is there, as a lidar has them."""
+        if self.decoder:
+            return not self.shared_with_lidars
         amplitude = self.amplitude is not None and _plain(self.amplitude) != "intensity"
         return self.polar or self.doppler is not None or bool(self.velocity) or amplitude
 
@@ -89,25 +118,33 @@ class ColumnPlan:
         """Say in a few words what is read from where."""
         words = [f"position from {', '.join(self.position)}"]
         if self.polar:
-            words[0] += f" (azimuth positive to the left, {'degrees' if self.degrees else 'radians'})"
+            side = "left" if self.azimuth_sign > 0 else "right"
+            words[0] += f" (azimuth positive to the {side}, {'degrees' if self.degrees else 'radians'})"
         speed = self.doppler or ", ".join(self.velocity)
         words.append(f"speed from {speed}" if speed else "no speed")
         words.append(f"amplitude from {self.amplitude}" if self.amplitude else "no amplitude")
         if any(self.sigma):
             words.append(f"noise from {', '.join(name for name in self.sigma if name)}")
-        return "; ".join(words)
+        elif self.covariance:
+            words.append(f"noise from {self.covariance}")
+        if self.axes:
+            words.append(self.axes.describe())
+        return (f"{self.decoder}: " if self.decoder else "") + "; ".join(words)
+
+    def read_as(self, axes: RadarAxes) -> "ColumnPlan":
+        """Follow what a person says about axes and units."""
+        return replace(self, axes=axes, degrees=self.degrees if axes.degrees is None else axes.degrees)
 
 
 def _plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
-def plan_columns(names: Iterable[str], *, degrees: bool = False) -> ColumnPlan | None:
+def plan_columns(names: Iterable[str]) -> ColumnPlan | None:
     """Recognise the columns of a radar by their names; None where there is no position.
 
     Args:
         names: as the message spells them; nested ones dotted.
-        degrees: angles are in degrees, as some packages document outside the message.
     """
     by_plain = {_plain(name): name for name in reversed(list(names))}
 
@@ -116,12 +153,13 @@ def plan_columns(names: Iterable[str], *, degrees: bool = False) -> ColumnPlan |
 
     position = _cartesian(by_plain)
     polar = not position
+    degrees = False
     if polar:
         polar_names = (first(_RANGES), first(_AZIMUTHS), first(_ELEVATIONS))
         if polar_names[0] is None or polar_names[1] is None:
             return None
         position = tuple(name for name in polar_names if name is not None)
-        degrees = degrees or _plain(position[1]).endswith("deg")
+        degrees = _plain(position[1]).endswith("deg")
     sets = (tuple(by_plain[name] for name in names if name in by_plain) for names in _VELOCITIES)
     velocity = next((found for found in sets if len(found) >= 2), ())
     doppler = first(_DOPPLERS)
@@ -136,6 +174,7 @@ def plan_columns(names: Iterable[str], *, degrees: bool = False) -> ColumnPlan |
         sigma=(sigma[0], sigma[1], sigma[2]),
         spoils_position=tuple(by_plain[name] for name in _INVALID_POSITION if name in by_plain),
         spoils_doppler=tuple(by_plain[name] for name in _INVALID_DOPPLER if name in by_plain),
+        claimed=(first(_RANGES), first(_CLAIMED_AZIMUTHS), first(_ELEVATIONS)),
     )
 
 
@@ -160,26 +199,51 @@ def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Retur
 
 
 def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
-    parts = [np.asarray(column(name), dtype=np.float64) for name in plan.position]
-    if len(parts) == 2:
-        parts.append(np.zeros_like(parts[0]))
-    position = np.stack(parts, axis=1)
+    position = _position(plan, column)
     n = len(position)
-    if plan.polar:
-        if plan.degrees:
-            position[:, 1:] = np.radians(position[:, 1:])
-        position = cartesian_from_polar(position)
-    sigma = np.full((n, 3), np.nan)
-    for axis, name in enumerate(plan.sigma):
-        if name:
-            sigma[:, axis] = np.radians(column(name)) if plan.degrees and axis else column(name)
     amplitude = column(plan.amplitude) if plan.amplitude else np.full(n, np.nan)
     doppler = _doppler(plan, column, position)
     for flag in plan.spoils_doppler:
         doppler = np.where(np.asarray(column(flag)) != 0, np.nan, doppler)
     for flag in plan.spoils_position:
         position[np.asarray(column(flag)) != 0] = np.nan
-    return Returns(position, doppler, amplitude * plan.amplitude_scale, sigma)
+    for flag in plan.needed:
+        position[np.asarray(column(flag)) == 0] = np.nan
+    if plan.axes:
+        position = position @ plan.axes.matrix.T
+    claimed = _columns(plan.claimed, column, n) if plan.claiming else None
+    return Returns(position, doppler, amplitude * plan.amplitude_scale, _sigma(plan, column, position), claimed)
+
+
+def _position(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Points3:
+    """Return positions in the message's own axes; angles taken as positive to the left and upwards."""
+    parts = [np.asarray(column(name), dtype=np.float64) for name in plan.position]
+    if len(parts) == 2:
+        parts.append(np.zeros_like(parts[0]))
+    position = np.stack(parts, axis=1)
+    if not plan.polar:
+        return position
+    if plan.degrees:
+        position[:, 1:] = np.radians(position[:, 1:])
+    position[:, 1] *= plan.azimuth_sign
+    return cartesian_from_polar(position)
+
+
+def _sigma(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Points3) -> Points3:
+    turn = np.eye(3) if plan.axes is None else plan.axes.matrix
+    if plan.covariance is not None:
+        covariance = full_covariance(np.asarray(column(plan.covariance), dtype=np.float64))
+        return sigma_polar_from_covariance(position, turn @ covariance @ turn.T)
+    sigma = _columns(plan.sigma, column, len(position))
+    if plan.degrees:
+        sigma[:, 1:] = np.radians(sigma[:, 1:])
+    if not turn[2, 2]:
+        sigma[:, 1:] = np.nan  # what was azimuth is no longer about the upward axis
+    return sigma
+
+
+def _columns(names: Iterable[str | None], column: Callable[[str], np.ndarray], n: int) -> Points3:
+    return np.stack([np.full(n, np.nan) if name is None else column(name) for name in names], axis=1).astype(np.float64)
 
 
 def _doppler(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Points3) -> Values:

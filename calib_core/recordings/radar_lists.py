@@ -6,16 +6,15 @@ from typing import Any
 import numpy as np
 
 from calib_core.arrays import TimesNs
-from calib_core.recordings.decoding import decode, fixed_part
+from calib_core.recordings.decoding import Pin, decode, fixed_part
 from calib_core.recordings.definitions import PRIMITIVES, Definition
-from calib_core.recordings.radar_columns import ColumnPlan, Returns, no_returns, plan_columns, returns_from
+from calib_core.recordings.radar_columns import ColumnPlan, Returns, no_returns, returns_from
+from calib_core.recordings.radar_decoders import find_decoder, plan_for
 
 __all__ = ["ListLayout", "PointLayout", "first_of_scans"]
 
 _FRAME_NUMBERS = ("radar_frame_idx", "frame_idx", "frame_number", "frame_id_number", "frame_counter")
 _POINT_NUMBERS = ("point_id", "detection_id", "target_id", "index")
-_DEGREE_PACKAGES = ("ainstein_radar_msgs",)
-_TENTH_OF_DB = 0.1
 _SHORTEST_CYCLE_NS = 5e6
 
 
@@ -36,8 +35,7 @@ class ListLayout:
         for field in definition.fields:
             if field.count != 0 or field.type not in definition.types:
                 continue
-            degrees = definition.type.partition("/")[0] in _DEGREE_PACKAGES
-            plan = plan_columns(leaf_names(definition, field.type), degrees=degrees)
+            plan = plan_for("list", *leaf_names(definition, field.type))
             if plan is not None and plan.looks_like_radar:
                 return cls(definition, field.name, plan)
         return None
@@ -58,16 +56,25 @@ class ListLayout:
             return no_returns()
         return returns_from(self.plan, lambda name: message.column(self.list_name, name))
 
+    def with_plan(self, plan: ColumnPlan) -> "ListLayout":
+        """Read by another plan."""
+        return replace(self, plan=plan)
 
-def leaf_names(definition: Definition, kind: str, prefix: str = "") -> list[str]:
-    """Return the dotted names of all single numbers of a type."""
-    names: list[str] = []
+
+def leaf_names(definition: Definition, kind: str, prefix: str = "") -> tuple[list[str], list[str]]:
+    """Return the dotted names of all single numbers of a type, and of all fixed arrays and strings."""
+    numbers: list[str] = []
+    others: list[str] = []
     for field in definition.types[kind]:
-        if field.count is None and field.type in PRIMITIVES:
-            names.append(prefix + field.name)
-        elif field.count is None and field.type in definition.types:
-            names.extend(leaf_names(definition, field.type, f"{prefix}{field.name}."))
-    return names
+        if field.type in PRIMITIVES or field.type == "string":
+            single = field.count is None and field.type in PRIMITIVES
+            if single or field.count != 0:
+                (numbers if single else others).append(prefix + field.name)
+        elif field.count is None:
+            more = leaf_names(definition, field.type, f"{prefix}{field.name}.")
+            numbers.extend(more[0])
+            others.extend(more[1])
+    return numbers, others
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +84,7 @@ class PointLayout:
     Attributes:
         frame_number: the field that numbers scans, or None.
         point_number: the field that numbers returns within a scan, or None.
-        frame_length: the four bytes that give the length of frame_id.
+        pins: where the lengths of the strings in front of the last number lie, and what they are in the first message.
     """
 
     definition: Definition
@@ -85,7 +92,7 @@ class PointLayout:
     dtype: np.dtype[Any]
     frame_number: str | None
     point_number: str | None
-    frame_length: bytes
+    pins: tuple[Pin, ...]
 
     one_per_message = True
     lidar_like = False
@@ -93,20 +100,21 @@ class PointLayout:
     @classmethod
     def recognise(cls, definition: Definition, payload: bytes) -> "PointLayout | None":
         """Look at the fields of fixed size: a position and a speed make a radar return."""
-        dtype = fixed_part(definition, payload)
+        dtype, pins = fixed_part(definition, payload)
         names = dtype.names or ()
-        plan = plan_columns(names)
+        strings = [field.name for field in definition.fields if field.type == "string"]
+        plan = plan_for("point", names, strings)
         if plan is None or plan.doppler is None or any("." in name for name in plan.position):
             return None
-        if plan.amplitude == "intensity" and "noise" in names:
-            plan = replace(plan, amplitude_scale=_TENTH_OF_DB)  # these forks pass the chip's 0.1 dB on
+        decoder = find_decoder("point", (*names, *strings))
+        numbers = (decoder.point_number,) if decoder and decoder.point_number else _POINT_NUMBERS
         return cls(
             definition,
             plan,
             dtype,
             next((name for name in _FRAME_NUMBERS if name in names), None),
-            next((name for name in _POINT_NUMBERS if name in names), None),
-            payload[12:16],
+            next((name for name in numbers if name in names), None),
+            pins,
         )
 
     @property
@@ -118,17 +126,27 @@ class PointLayout:
     def returns_of_rows(self, rows: np.ndarray) -> Returns:
         """Read many returns from the first bytes (n, dtype.itemsize) of their messages."""
         points = self.view(rows)
-        found = returns_from(self.plan, lambda name: points[name].astype(np.float64))
-        # The stock driver never fills in the intensity: zero there means unknown.
-        snr_db = np.where(found.snr_db == 0.0, np.nan, found.snr_db)
-        moved = self.misfits(rows)
-        if moved.any():
-            found.points_radar_m[moved] = np.nan
-        return replace(found, snr_db=snr_db)
+        return _known_snr(returns_from(self.plan, lambda name: points[name].astype(np.float64)))
+
+    def returns(self, payload: bytes) -> Returns:
+        """Read the return of one whole message, whatever its strings.
+
+        Raises:
+            MessageError: the bytes do not fit the definition.
+        """
+        message = decode(self.definition, payload)
+        return _known_snr(returns_from(self.plan, lambda name: np.array([message.number(name)])))
 
     def misfits(self, rows: np.ndarray) -> np.ndarray:
-        """Tell which rows have a frame_id of another length than the first, so that their fields lie elsewhere."""
-        return np.asarray((rows[:, 12:16] != np.frombuffer(self.frame_length, dtype=np.uint8)).any(axis=1))
+        """Tell which rows have strings of another length than the first, so that their fields lie elsewhere."""
+        moved = np.zeros(len(rows), dtype=bool)
+        for pin in self.pins:
+            moved |= (rows[:, pin.offset : pin.offset + 4] != np.frombuffer(pin.length, dtype=np.uint8)).any(axis=1)
+        return moved
+
+    def with_plan(self, plan: ColumnPlan) -> "PointLayout":
+        """Read by another plan."""
+        return replace(self, plan=plan)
 
     def view(self, rows: np.ndarray) -> np.ndarray:
         """View raw rows (n, dtype.itemsize) as records."""
@@ -153,6 +171,11 @@ class PointLayout:
         assert self.dtype.fields is not None
         place = self.dtype.fields[name]
         return place[0], place[1]
+
+
+def _known_snr(found: Returns) -> Returns:
+    """Leave out intensities of zero: the stock driver never fills them in."""
+    return replace(found, snr_db=np.where(found.snr_db == 0.0, np.nan, found.snr_db))
 
 
 def first_of_scans(

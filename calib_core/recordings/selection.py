@@ -29,6 +29,8 @@ class RecordingOptions:
     """The camera's image topic; guessed when not given."""
     camera_info_topic: str | None = None
     """The topic with the camera's intrinsics; the one beside the images when not given."""
+    radar_axes: str | None = None
+    """Where the radar message's x, y and z point, such as forward,right,up; add degrees or radians for its angles."""
     clock: Clock = "auto"
     """Times to go by: stamps in the messages, receive times, or auto: stamps unless they cannot be right."""
 

@@ -1,13 +1,14 @@
 """The two streams of a recording: radar scans by window, images by frame."""
 
+import contextlib
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from calib_core.arrays import TimesNs, frozen_array
+from calib_core.arrays import Points3, TimesNs, frozen_array
 from calib_core.errors import MessageError
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.recordings.images import EncodedImage, ImageLayout
@@ -90,6 +91,22 @@ class RadarStream:
         places = np.linspace(0, len(self.times_ns) - 1, min(count, len(self.times_ns)))
         return self._decoded(np.unique(places.astype(np.int64)))
 
+    def claims(self, count: int) -> Returns:
+        """Decode at most count messages' own ranges and angles beside the positions, in the message's own axes."""
+        layout = self.layout.with_plan(replace(self.layout.plan, claiming=True, axes=None))
+        mine = np.flatnonzero(self.topic.part == self.topic.part[0]) if len(self.topic) else np.zeros(0, np.int64)
+        if isinstance(layout, PointLayout):
+            rows = mine[np.unique(np.linspace(0, len(mine) - 1, min(16 * count, len(mine))).astype(np.int64))]
+            heads = self.topic.heads(rows, layout.dtype.itemsize)
+            whole = (heads.lengths >= layout.dtype.itemsize) & ~layout.misfits(heads.rows)
+            return layout.returns_of_rows(heads.rows[whole])
+        rows = mine[np.unique(np.linspace(0, len(mine) - 1, min(count, len(mine))).astype(np.int64))]
+        found = []
+        for row in rows.tolist():
+            with contextlib.suppress(MessageError):  # told when the scan itself is read
+                found.append(layout.returns(self.topic.payload(row)))
+        return _joined(found)
+
     def _decoded(self, scans: np.ndarray) -> RadarScans:
         """Decode the given scans, ascending."""
         if isinstance(self.layout, PointLayout):
@@ -122,7 +139,20 @@ class RadarStream:
         if short.any():
             returns.points_radar_m[short] = np.nan
             self._note_unreadable(dict.fromkeys(messages[short].tolist(), "the message is cut short"))
+        for row in np.flatnonzero(layout.misfits(heads.rows) & ~short).tolist():
+            self._reread(layout, int(messages[row]), row, returns)
         return _stacked(self.times_ns[scans], counts.tolist(), returns)
+
+    def _reread(self, layout: PointLayout, message: int, row: int, returns: Returns) -> None:
+        """Read a return whose fields lie elsewhere than in the first message, and put it into its row."""
+        try:
+            single = layout.returns(self.topic.payload(message))
+        except MessageError as error:
+            returns.points_radar_m[row] = np.nan
+            self._note_unreadable({message: str(error)})
+            return
+        for name in ("points_radar_m", "doppler_mps", "snr_db", "sigma_polar"):
+            getattr(returns, name)[row] = getattr(single, name)[0]
 
 
 def _joined(scans: Sequence[Returns]) -> Returns:
@@ -133,7 +163,13 @@ def _joined(scans: Sequence[Returns]) -> Returns:
         np.concatenate([scan.doppler_mps for scan in scans]),
         np.concatenate([scan.snr_db for scan in scans]),
         np.concatenate([scan.sigma_polar for scan in scans]),
+        _joined_claims(scans),
     )
+
+
+def _joined_claims(scans: Sequence[Returns]) -> Points3 | None:
+    claims = [scan.claimed_polar for scan in scans if scan.claimed_polar is not None]
+    return np.concatenate(claims) if claims else None
 
 
 def _stacked(times_ns: TimesNs, counts: Sequence[int], returns: Returns) -> RadarScans:

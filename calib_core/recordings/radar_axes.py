@@ -1,0 +1,83 @@
+"""Where the axes of a radar's messages point, where a person says so: the words of --radar-axes."""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Matrix33
+from calib_core.errors import OptionError
+
+__all__ = ["RadarAxes", "parse_radar_axes"]
+
+_DIRECTIONS = {
+    "forward": (0, 1), "backward": (0, -1),
+    "left": (1, 1), "right": (1, -1),
+    "up": (2, 1), "down": (2, -1),
+}  # fmt: skip
+_UNITS = ("degrees", "radians")
+_EXAMPLE = "for example --radar-axes forward,right,up or --radar-axes forward,left,up,degrees"
+
+
+@dataclass(frozen=True, slots=True)
+class RadarAxes:
+    """What a person says about a radar's messages.
+
+    Polar messages are first turned into x, y, z as if their azimuth were positive to the left and their elevation
+    upwards; so "forward,right,up" is also how to say that azimuth is positive to the right.
+
+    Attributes:
+        directions: where the message's x, y and z point.
+        degrees: its angles are in degrees (True), radians (False), or as its layout says (None).
+    """
+
+    directions: tuple[str, str, str] = ("forward", "left", "up")
+    degrees: bool | None = None
+
+    @property
+    def matrix(self) -> Matrix33:
+        """The signed permutation from the message's axes to x forward, y left, z up."""
+        matrix = np.zeros((3, 3))
+        for column, word in enumerate(self.directions):
+            axis, sign = _DIRECTIONS[word]
+            matrix[axis, column] = sign
+        return matrix
+
+    def describe(self) -> str:
+        """Say it in words."""
+        words = ", ".join(f"{axis} {word}" for axis, word in zip("xyz", self.directions, strict=True))
+        unit = "" if self.degrees is None else f", angles in {'degrees' if self.degrees else 'radians'}"
+        return f"axes as told: {words}{unit}"
+
+
+def parse_radar_axes(text: str) -> RadarAxes:
+    """Read the words of --radar-axes: three directions, a unit of angles, or both.
+
+    Args:
+        text: such as "forward,right,up", "degrees" or "forward,left,up,degrees".
+
+    Raises:
+        OptionError: a word is unknown, one is missing, or two directions lie on one axis.
+    """
+    words = [word for word in re.split(r"[,\s]+", text.strip().lower()) if word]
+    unknown = next((word for word in words if word not in _DIRECTIONS and word not in _UNITS), None)
+    if unknown is not None:
+        raise OptionError(
+            f"--radar-axes {text}: '{unknown}' is no direction; forward, backward, left, right, up, down are, "
+            f"and degrees or radians for the angles; {_EXAMPLE}"
+        )
+    units = [word for word in words if word in _UNITS]
+    directions = [word for word in words if word in _DIRECTIONS]
+    if len(units) > 1 or len(directions) not in (0, 3) or not words:
+        raise OptionError(
+            f"--radar-axes {text}: say where the message's x, y and z point, in this order, and at most one unit; {_EXAMPLE}"
+        )
+    degrees = units[0] == "degrees" if units else None
+    if not directions:
+        return RadarAxes(degrees=degrees)
+    if len({_DIRECTIONS[word][0] for word in directions}) < 3:
+        raise OptionError(
+            f"--radar-axes {text}: two of the directions lie on one line; x, y and z must differ; {_EXAMPLE}"
+        )
+    x, y, z = directions
+    return RadarAxes((x, y, z), degrees)
