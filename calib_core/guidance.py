@@ -58,10 +58,10 @@ def next_placement(calibration: Calibration, *, limits: PlacementLimits | None =
         calibration: of the default method, with its covariance.
         limits: where the reflector can go.
     """
-    if not np.isfinite(calibration.covariance).all():
+    used = np.array([pair.point_radar_m for pair in calibration.pairs if pair.inlier]).reshape(-1, 3)
+    if not len(used) or not np.isfinite(calibration.covariance).all():
         return None
     limits = limits or PlacementLimits()
-    used = np.array([pair.point_radar_m for pair in calibration.pairs if pair.inlier]).reshape(-1, 3)
     places = _free_places(calibration, used, limits)
     if not len(places):
         return None

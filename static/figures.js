@@ -19,10 +19,11 @@ const EMPTY = [
 /** Cautions that the person has opened stay open. @type {Set<string>} */
 const openCodes = new Set();
 export const poseTable = make("table", "", []);
+const adviceLine = make("p", "advice", "");
 let cautionText = "";
 
 export function startFigures() {
-  const pose = make("div", "pose", [poseTable]);
+  const pose = make("div", "pose", [poseTable, adviceLine]);
   posePage.append(pose);
   on(["view", "recording"], draw);
 }
@@ -34,6 +35,7 @@ function draw() {
   const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Appears with the first calibration.", level: "none" }));
   figures.replaceChildren(...shown.map(cell));
   poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Appears with the first calibration.")])]));
+  adviceLine.textContent = view.advice?.words ?? "";
   drawCautions([...(state.recording?.cautions ?? []), ...view.cautions]);
 }
 

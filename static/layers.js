@@ -10,7 +10,7 @@ const LAYERS = [
   ["returns", "Returns", "Radar returns of the nearest scan, carried into the picture: dots stand still, triangles move. (1)"],
   ["others", "All clicks", "The clicks of all other frames, coloured by residual. (2)"],
   ["ellipses", "95 %", "Where 95 % of the clicks of good pairs lie around their reprojection. (3)"],
-  ["predictions", "Predicted", "Where radar and calibration expect the reflector of this placement. (4)"],
+  ["predictions", "Predicted", "Where radar and calibration expect the reflector of this placement (circle), and where the next placement pays most (diamond). (4)"],
 ];
 const group = /** @type {HTMLElement} */ (document.getElementById("layers"));
 

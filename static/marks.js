@@ -18,6 +18,7 @@ export function drawMarks(pen) {
   if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
   const clicked = clicks().some((click) => click.frame === index);
   if (state.layers.predictions && overlay && !clicked) for (const [u, v] of overlay.guesses) drawGuess(pen, u, v);
+  if (state.layers.predictions && state.view?.advice) drawAdvice(pen, state.view.advice);
   const here = clicks();
   if (state.layers.others) for (const click of here) if (click.frame !== index) drawOther(pen, click);
   for (const click of here) if (click.frame === index) drawClick(pen, click);
@@ -54,6 +55,29 @@ function drawGuess(pen, u, v) {
   const [x, y] = toDevice(u, v);
   const dashes = [4 * viewport.ratio, 3.5 * viewport.ratio];
   outlined(pen, ink.guess, 1.4, () => pen.arc(x, y, 15 * viewport.ratio, 0, 2 * Math.PI), dashes);
+}
+
+/** Where the next placement pays most: a dashed diamond, for it lies on the ground. @param {Ink} pen @param {import("./messages.js").Advice} advice */
+function drawAdvice(pen, advice) {
+  if (advice.may_stop) return;
+  const [x, y] = toDevice(advice.u_px, advice.v_px);
+  const [wide, high] = [18 * viewport.ratio, 9 * viewport.ratio];
+  outlined(pen, ink.guess, 1.4, () => {
+    pen.moveTo(x - wide, y);
+    pen.lineTo(x, y - high);
+    pen.lineTo(x + wide, y);
+    pen.lineTo(x, y + high);
+    pen.closePath();
+  }, [4 * viewport.ratio, 3.5 * viewport.ratio]);
+  pen.font = `${11 * viewport.ratio}px ${getComputedStyle(document.body).fontFamily}`;
+  pen.textAlign = "center";
+  pen.lineWidth = 3 * viewport.ratio;
+  pen.strokeStyle = ink.edge;
+  const words = `next ${advice.range_m.toFixed(1)} m`;
+  const below = y + high + 13 * viewport.ratio;
+  pen.strokeText(words, x, below);
+  pen.fillStyle = ink.guess;
+  pen.fillText(words, x, below);
 }
 
 /** A click of another frame: where it was, small and quiet. @param {Ink} pen @param {Click} click */

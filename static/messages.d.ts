@@ -109,6 +109,17 @@ export interface CalibrationOptions {
   paper: PaperOptions;
 }
 
+/** Where to put the reflector next. */
+export interface Advice {
+  u_px: number;
+  v_px: number;
+  range_m: number;
+  gain: number;
+  may_stop: boolean;
+  position_radar_m: number[];
+  words: string;
+}
+
 /** Everything a client draws about the session. */
 export interface View {
   type: "view";
@@ -128,6 +139,7 @@ export interface View {
   cautions: CautionRow[];
   options: CalibrationOptions;
   residual_limit_px: number | null;
+  advice: Advice | null;
 }
 
 /** Many stamps, as two columns. */

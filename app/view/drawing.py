@@ -1,6 +1,7 @@
 """From the session to the View, in one pure call."""
 
 from app.session import History, RecordingFacts, Session
+from app.view.advice import advice_for
 from app.view.drawn import CautionRow, Stage, View
 from app.view.figures import metric_figures, pose_figures, residual_limit_px
 from app.view.rows import click_rows
@@ -43,6 +44,7 @@ def view(history: History, facts: RecordingFacts) -> View:
         cautions=_cautions(calibration) if calibration else (),
         options=session.options,
         residual_limit_px=residual_limit_px(calibration) if calibration else None,
+        advice=advice_for(calibration) if calibration else None,
     )
 
 
@@ -85,8 +87,16 @@ def _words(session: Session, stage: Stage) -> tuple[str, str]:
     if isinstance(outcome, Unsolvable):
         return sentence(outcome.reason), sentence(outcome.hint)
     if isinstance(outcome, Calibration):
-        return _agreement(outcome), sentence(outcome.cautions[0].hint) if outcome.cautions else ""
+        return _agreement(outcome), _next_step(outcome)
     return "", ""
+
+
+def _next_step(calibration: Calibration) -> str:
+    """Return what the first caution asks for; without cautions, the best next place."""
+    if calibration.cautions:
+        return sentence(calibration.cautions[0].hint)
+    advice = advice_for(calibration)
+    return advice.words if advice else ""
 
 
 def _next_click(session: Session) -> str:

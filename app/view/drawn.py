@@ -6,7 +6,7 @@ from typing import Literal, TypeAlias
 from app.session import Stamp
 from calib_core.options import CalibrationOptions, Method
 
-__all__ = ["CautionRow", "ClickRow", "ClickState", "Ellipse", "Figure", "Level", "Stage", "View"]
+__all__ = ["Advice", "CautionRow", "ClickRow", "ClickState", "Ellipse", "Figure", "Level", "Stage", "View"]
 
 ClickState: TypeAlias = Literal["pending", "inlier", "outlier", "excluded", "unpaired"]
 Level: TypeAlias = Literal["plain", "good", "caution"]
@@ -104,6 +104,29 @@ class CautionRow:
 
 
 @dataclass(frozen=True, slots=True)
+class Advice:
+    """Where to put the reflector next.
+
+    Attributes:
+        u_px: column where it would appear.
+        v_px: row.
+        range_m: how far from the radar.
+        gain: present uncertainty over the one expected afterwards, at least 1.
+        may_stop: no place is worth the walk.
+        position_radar_m: the place.
+        words: the same as one or two sentences.
+    """
+
+    u_px: float
+    v_px: float
+    range_m: float
+    gain: float
+    may_stop: bool
+    position_radar_m: tuple[float, ...]
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
 class View:
     """Everything a client draws about the session.
 
@@ -124,6 +147,7 @@ class View:
         cautions: the newest answer's.
         options: as they are now; changes are sent as a part of this tree.
         residual_limit_px: residuals beyond this deserve a look; None without a calibration.
+        advice: where to put the reflector next; None without a calibration.
     """
 
     revision: int
@@ -142,3 +166,4 @@ class View:
     cautions: tuple[CautionRow, ...]
     options: CalibrationOptions
     residual_limit_px: float | None
+    advice: Advice | None = None

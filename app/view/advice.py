@@ -1,0 +1,34 @@
+"""Where to put the reflector next, in words and as a place in the frame."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from app.view.drawn import Advice
+from calib_core.guidance import next_placement
+from calib_core.results import Calibration
+
+__all__ = ["advice_for"]
+
+_WORTH_SAYING = 0.05
+
+
+@lru_cache(maxsize=4)
+def advice_for(calibration: Calibration) -> Advice | None:
+    """Say where the next placement pays most; None where calib_core.guidance knows no place, as in the paper's method.
+
+    Worked out once per calibration: a View is asked for more often than there is a new answer.
+    """
+    best = next_placement(calibration)
+    if best is None:
+        return None
+    u_px, v_px = (round(float(value), 1) for value in best.pixel_px)
+    range_m = float(np.linalg.norm(best.position_radar_m))
+    if best.may_stop:
+        words = "You may stop: no further placement would make the pose much surer."
+    else:
+        x, y, _ = best.position_radar_m
+        side = "straight ahead" if abs(y) < 0.1 * abs(x) else f"{abs(y):.1f} m to the {'left' if y > 0 else 'right'}"
+        gain = f"{100 * (1 - 1 / best.gain):.0f} %" if best.gain > 1 + _WORTH_SAYING else "a little"
+        words = f"Best next place: {x:.1f} m ahead, {side}. It makes the pose {gain} surer."
+    return Advice(u_px, v_px, range_m, best.gain, best.may_stop, tuple(best.position_radar_m.tolist()), words)
