@@ -8,9 +8,10 @@ import numpy as np
 from calib_core.arrays import Flags, Values
 from calib_core.camera import Camera
 from calib_core.consensus import Consensus, associate, find_consensus
-from calib_core.diagnostics import MIRRORED_GAIN, Findings, cautions_of
+from calib_core.diagnostics import cautions_of
 from calib_core.evidence import Evidence, Linearised, evidence_of
-from calib_core.handedness import mirror_gain
+from calib_core.findings import Findings
+from calib_core.handedness import MIRRORED_GAIN, mirror_gain
 from calib_core.initial_pose import starting_poses
 from calib_core.measurements import Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.metrics import distances, metrics_of
@@ -253,7 +254,7 @@ def _used_results(used: Sequence[Pair], refined: Refined, left_out: LeftOut) -> 
 
 def _residual_covariances(model: Linearised) -> np.ndarray:
     """Recover S = W^-1 W^-T of each pair (n, 2, 2); NaN where the camera does not see the position."""
-    unseen = ~model.whitening.any(axis=(1, 2))
+    unseen = np.asarray(~model.whitening.any(axis=(1, 2)))
     inverse = np.linalg.inv(np.where(unseen[:, None, None], np.eye(2), model.whitening))
     inverse[unseen] = np.nan
     return np.asarray(inverse @ np.swapaxes(inverse, 1, 2))

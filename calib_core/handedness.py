@@ -7,7 +7,10 @@ from calib_core.evidence import Evidence
 from calib_core.initial_pose import starting_poses
 from calib_core.refining import refine
 
-__all__ = ["mirror_gain"]
+__all__ = ["MIRRORED_GAIN", "mirror_gain"]
+
+MIRRORED_GAIN = 6.0
+"""From how large a gain in twice the log-likelihood on mirrored axes are the likelier ones."""
 
 _STARTS = 2
 _BEYOND_DOUBT = 30.0  # a difference that noise levels cannot turn

@@ -1,0 +1,111 @@
+"""Is it this pose at all? Mirrored axes, a second pose as likely, and a camera where it cannot be."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from calib_core.consensus import Consensus
+from calib_core.findings import Findings
+from calib_core.geometry import RigidTransform
+from calib_core.handedness import MIRRORED_GAIN
+from calib_core.refining import refine
+from calib_core.results import Caution
+from calib_core.uncertainty import pose_uncertainty
+
+__all__ = ["camera_position", "mirrored_axes", "two_poses"]
+
+_NOT_MIRRORED = -3.0  # differences of twice the log-likelihood
+_ALMOST_AS_LIKELY = 6.0
+_OTHER_POSE_RAD = np.deg2rad(5.0)
+_OTHER_POSE_SIGMAS = 6.0
+_FAR_CAMERA = 3.0
+_CONTRADICTION_SIGMAS = 4.0
+_SUSPICIOUS_NOISE = 1.6
+
+
+def mirrored_axes(f: Findings) -> list[Caution]:
+    """Doubt the radar's axes: mirrored ones are likelier, or as likely."""
+    if f.mirror_gain > MIRRORED_GAIN:
+        return [
+            Caution(
+                "mirrored-axes",
+                "pairs and expected camera position agree better when one radar axis is mirrored "
+                f"(log-likelihood ratio {f.mirror_gain / 2:.1f}): the radar's axes look left-handed",
+                "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) where the "
+                "positions come from; do not use this pose",
+            )
+        ]
+    if f.mirror_gain > _NOT_MIRRORED:
+        return [
+            Caution(
+                "handedness-open",
+                "a mirrored radar axis would explain the pairs about as well: all placements lie near one plane",
+                "measure the camera position with a tape, or add placements at other heights (a tripod)",
+            )
+        ]
+    return []
+
+
+def two_poses(f: Findings) -> list[Caution]:
+    """Doubt the choice between two poses that explain the pairs about alike (a plane seen from afar has two)."""
+    best = f.alternatives[0]
+    for other in f.alternatives[1:]:
+        error = other.camera_from_radar.error_from(f.refined.camera_from_radar)
+        apart_rad = float(np.linalg.norm(error[3:]))
+        sigmas = float(np.sqrt(error @ f.uncertainty.information @ error))
+        if other.cost - best.cost < _ALMOST_AS_LIKELY and apart_rad > _OTHER_POSE_RAD and sigmas > _OTHER_POSE_SIGMAS:
+            return [
+                Caution(
+                    "two-poses",
+                    f"another pose, {np.rad2deg(apart_rad):.0f} deg away, explains the pairs almost as well",
+                    "measure the camera position with a tape, or add placements nearer and farther than the present ones",
+                )
+            ]
+    return []
+
+
+def camera_position(f: Findings) -> list[Caution]:
+    """Doubt a camera position that contradicts the tape measure, or is much farther away than expected."""
+    if f.evidence.belief.measured:
+        return _contradicted_position(f)
+    belief = f.evidence.belief
+    away_m = float(np.linalg.norm(_camera_centre(f.refined.camera_from_radar) - belief.position_m))
+    if away_m <= _FAR_CAMERA * belief.sigma_m:
+        return []
+    return [
+        Caution(
+            "camera-far-away",
+            f"the camera comes out {away_m:.1f} m from the radar; about {belief.sigma_m:g} m was expected",
+            "if the sensors are really that far apart, say so (nominal distance); otherwise suspect axes or intrinsics",
+        )
+    ]
+
+
+def _contradicted_position(f: Findings) -> list[Caution]:
+    """Compare the measured camera position with the one the pairs find on their own.
+
+    A position stated with a small sigma wins over the pairs and only makes the residuals large; so it is set free.
+    """
+    belief = f.evidence.belief
+    if f.chi2_per_degree < _SUSPICIOUS_NOISE:
+        return []
+    start = Consensus(f.refined.camera_from_radar, 0.0, float(f.refined.noise_scale.max()))
+    alone = refine(replace(f.evidence, belief=belief.freed()), start, estimate_scale=True)
+    away_m = _camera_centre(alone.camera_from_radar) - belief.position_m
+    centre_jacobian = belief.rows(alone.camera_from_radar)[1] * belief.sigma_m
+    doubt = centre_jacobian @ pose_uncertainty(alone).covariance @ centre_jacobian.T + belief.sigma_m**2 * np.eye(3)
+    sigmas = float(np.sqrt(away_m @ np.linalg.solve(doubt, away_m)))
+    if sigmas < _CONTRADICTION_SIGMAS:
+        return []
+    return [
+        Caution(
+            "camera-position-contradicted",
+            f"on their own the pairs put the camera {100 * np.linalg.norm(away_m):.0f} cm from where it was measured, "
+            f"{sigmas:.1f} standard deviations",
+            "measure again from the radar's antennas to the lens: forward, left, up; or state a larger uncertainty",
+        )
+    ]
+
+
+def _camera_centre(camera_from_radar: RigidTransform) -> np.ndarray:
+    return camera_from_radar.inverse().translation_m
