@@ -15,7 +15,7 @@ from calib_core.recordings.checks import about_images, about_lost, about_radar, 
 from calib_core.recordings.clocks import ClockChoice, Stamps, choose_clock, choose_clocks
 from calib_core.recordings.decoding import Message
 from calib_core.recordings.images import ImageLayout
-from calib_core.recordings.radar_axes import RadarAxes, parse_radar_axes
+from calib_core.recordings.radar_axes import parse_radar_axes
 from calib_core.recordings.radar_checks import about_claims
 from calib_core.recordings.radar_layouts import layouts_of_parts
 from calib_core.recordings.radar_lists import PointLayout
@@ -66,14 +66,14 @@ def assemble(
     cautions = [caution for source in sources for caution in source.cautions] + list(repeated)
     if not any(len(topic) for topic in topics) and require:
         raise RecordingError(f"{name}: holds no messages; was the recorder told which topics to record?")
-    inventory = Inventory(name, topics, {topic.name: usage_of(topic) for topic in topics})
+    axes = None if options.radar_axes is None else parse_radar_axes(options.radar_axes)
+    inventory = Inventory(name, topics, {topic.name: usage_of(topic).read_as(axes) for topic in topics})
     selection = select(inventory, options, require)
     selection, stamped, lost = _stamped(selection, inventory)
     clocks, stamps, about_clocks = _clocks(stamped, options)
     cautions.extend([*lost, *about_clocks])
     heads = {name: both.heads for name, both in stamped.items()}
-    axes = parse_radar_axes(options.radar_axes) if options.radar_axes else None
-    radar = _radar_stream(selection.radar, inventory, stamps, heads, axes)
+    radar = _radar_stream(selection.radar, inventory, stamps, heads)
     images = _image_stream(selection.image, inventory, stamps)
     cautions.extend(check_overlap(name, radar, images, required=len(require) == 2))
     camera, about_camera = recorded_camera(selection.camera_info, images)
@@ -137,18 +137,12 @@ def _times(both: Stamps, clock: str) -> TimesNs:
 
 
 def _radar_stream(
-    topic: Topic | None,
-    inventory: Inventory,
-    stamps: Mapping[str, TimesNs],
-    heads: Mapping[str, np.ndarray],
-    axes: RadarAxes | None,
+    topic: Topic | None, inventory: Inventory, stamps: Mapping[str, TimesNs], heads: Mapping[str, np.ndarray]
 ) -> RadarStream | None:
     first = inventory.usages[topic.name].radar if topic is not None else None
     if topic is None or first is None:
         return None
     layouts = layouts_of_parts(first, [topic.definition(number) for number in range(len(topic.parts))])
-    if axes is not None:
-        layouts = tuple(layout.with_plan(layout.plan.read_as(axes)) for layout in layouts)
     return RadarStream(topic, layouts, stamps[topic.name], heads[topic.name])
 
 

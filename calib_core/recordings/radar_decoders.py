@@ -211,7 +211,8 @@ _POINTS = (
     ),
     Decoder(
         "Delphi ESR tracks", "AutonomouStuff delphi_esr_msgs/EsrTrack", "point",
-        _f("canmsg id lat_rate status angle range range_accel range_rate"), polar=_f("range angle"), degrees=True,
+        _f("canmsg id lat_rate status angle range range_accel range_rate"), polar=_f("range angle"), doppler="range_rate",
+        degrees=True,
         azimuth_sign=-1, angles="deg, azimuth positive to the right (assumed); no elevation", amplitude=_NONE,
         needed=("status",), point_number="id", note="tracks of status 0 are left out",
         assumed=f"the definition states neither the unit of angle nor which way it counts; degrees are taken, and {_CLOCKWISE}",

@@ -56,4 +56,4 @@ def _same_layout(first: RadarLayout, definition: Definition) -> RadarLayout:
             f"the files hold {first.definition.type} and {definition.type} messages of different layout under one topic; "
             "open them one at a time"
         )
-    return found
+    return found.with_plan(found.plan.read_as(first.plan.axes)) if first.plan.axes else found

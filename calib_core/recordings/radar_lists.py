@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from calib_core.arrays import TimesNs
-from calib_core.recordings.decoding import Pin, decode, fixed_part
+from calib_core.recordings.decoding import Message, Pin, decode, fixed_part
 from calib_core.recordings.definitions import PRIMITIVES, Definition
 from calib_core.recordings.radar_columns import ColumnPlan, Returns, no_returns, returns_from
 from calib_core.recordings.radar_decoders import find_decoder, plan_for
@@ -134,13 +134,21 @@ class PointLayout:
         Raises:
             MessageError: the bytes do not fit the definition.
         """
-        message = decode(self.definition, payload)
+        message = self.message(payload)
         return _known_snr(returns_from(self.plan, lambda name: np.array([message.number(name)])))
+
+    def message(self, payload: bytes) -> Message:
+        """Decode one whole message.
+
+        Raises:
+            MessageError: the bytes do not fit the definition.
+        """
+        return decode(self.definition, payload)
 
     def misfits(self, rows: np.ndarray) -> np.ndarray:
         """Tell which rows have strings of another length than the first, so that their fields lie elsewhere."""
         moved = np.zeros(len(rows), dtype=bool)
-        for pin in self.pins:
+        for pin in (pin for pin in self.pins if pin.offset + 4 <= rows.shape[1]):
             moved |= (rows[:, pin.offset : pin.offset + 4] != np.frombuffer(pin.length, dtype=np.uint8)).any(axis=1)
         return moved
 
@@ -160,8 +168,8 @@ class PointLayout:
 
     def numbers(self, rows: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Read frame and point numbers from rows of at least group_bytes: (n,) each, None for one there is not."""
-        frame = self._column(rows, self.frame_number) if self.frame_number else None
-        return frame, self._column(rows, self.point_number) if self.point_number else None
+        frame = self._column(rows, self.frame_number).copy() if self.frame_number else None
+        return frame, self._column(rows, self.point_number).copy() if self.point_number else None
 
     def _column(self, rows: np.ndarray, name: str) -> np.ndarray:
         code, offset = self._place(name)

@@ -43,11 +43,22 @@ class RadarStream:
         self.unreadable: Mapping[int, str] = {}
         first = np.arange(len(topic))
         if isinstance(self.layout, PointLayout):
-            first = first_of_scans(stamps_ns, *self.layout.numbers(heads))
+            first = first_of_scans(stamps_ns, *self._numbers(self.layout, heads))
         order = np.argsort(stamps_ns[first], kind="stable")
         last = np.append(first[1:], len(topic))
         self._first, self._last = first[order], last[order]
         self.times_ns: TimesNs = frozen_array(stamps_ns[first][order], (None,), dtype=np.int64)
+
+    def _numbers(self, layout: PointLayout, heads: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Read the numbers that tell scans apart; of messages with longer strings than the first, from the whole message."""
+        frame, point = layout.numbers(heads)
+        for row in np.flatnonzero(layout.misfits(heads)).tolist():
+            with contextlib.suppress(MessageError):  # told when the scan itself is read
+                message = layout.message(self.topic.payload(row))
+                for numbers, name in ((frame, layout.frame_number), (point, layout.point_number)):
+                    if numbers is not None and name:
+                        numbers[row] = message.number(name)
+        return frame, point
 
     def scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
         """Decode the scans with start <= stamp <= end."""

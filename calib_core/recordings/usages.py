@@ -6,6 +6,7 @@ from calib_core.errors import MessageError, RecordingError
 from calib_core.recordings.camera_info import is_camera_info
 from calib_core.recordings.definitions import Definition
 from calib_core.recordings.images import ImageLayout, is_compressed_image, is_raw_image
+from calib_core.recordings.radar_axes import RadarAxes
 from calib_core.recordings.radar_layouts import RadarLayout, recognise
 from calib_core.recordings.topics import Topic, TopicKind
 
@@ -27,6 +28,12 @@ class Usage:
     problem: str | None = None
     radar: RadarLayout | None = None
     image: ImageLayout | None = None
+
+    def read_as(self, axes: RadarAxes | None) -> "Usage":
+        """Follow what a person says about the radar's axes."""
+        if self.radar is None or axes is None:
+            return self
+        return replace(self, radar=self.radar.with_plan(self.radar.plan.read_as(axes)))
 
 
 def usage_of(topic: Topic) -> Usage:
