@@ -12,15 +12,17 @@ from pathlib import Path
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.compression import unpack, unpack_what_is_there
+from calib_core.recordings.compression import refuse_bomb, unpack, unpack_what_is_there
 from calib_core.recordings.files import FileBytes
 from calib_core.recordings.gathering import gather_heads
 from calib_core.recordings.sources import Channel, Heads, MessageIndex
 from calib_core.results import Caution
 
-__all__ = ["CACHE_BYTES", "Chunk", "ChunkedSource"]
+__all__ = ["CACHE_BYTES", "MAX_MESSAGE_BYTES", "Chunk", "ChunkedSource"]
 
 CACHE_BYTES = 64 * 2**20
+MAX_MESSAGE_BYTES = 1 << 28
+"""No message of a sensor is larger; one that claims to be is damaged or made to harm."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +58,13 @@ class ChunkedSource:
         self.file = file
         self.chunks: list[Chunk] = []
         self.channels: tuple[Channel, ...] = ()
-        self.cautions: tuple[Caution, ...] = ()
+        self.cautions: tuple[Caution, ...] = file.cautions
         self.indexes: dict[int, MessageIndex] = {}
         self.recovered = False
         """The file was not closed; its chunks may be cut off."""
         self._cache: OrderedDict[int, bytes] = OrderedDict()
         self._cache_bytes = 0
+        self._damaged_chunks: dict[int, str] = {}
         self._lock = threading.Lock()
 
     @property
@@ -109,14 +112,24 @@ class ChunkedSource:
 
     def read(self, chunk: int, offset: int) -> bytes:
         """Read one message whole."""
-        start, length = self.locate(chunk, offset)
+        try:
+            start, length = self.locate(chunk, offset)
+        except RecordingError as error:
+            raise RecordingError(self.fault_of(chunk) or str(error)) from error
+        if length > MAX_MESSAGE_BYTES:
+            raise RecordingError(f"{self.path}: a message that claims {length} bytes is refused as damaged")
         data = self.piece(chunk, start, length)
         if len(data) != length:
             raise RecordingError(
-                f"{self.path}: a message of {length} bytes at byte {start} of chunk {chunk} runs past the chunk's end; "
+                self.fault_of(chunk)
+                or f"{self.path}: a message of {length} bytes at byte {start} of chunk {chunk} runs past the chunk's end; "
                 "the file is damaged: copy it again"
             )
         return data
+
+    def room(self, chunk: int) -> int:
+        """Return how many bytes a chunk has; messages cannot reach past them."""
+        return self.chunks[chunk].size_bytes
 
     def locate(self, chunk: int, offset: int) -> tuple[int, int]:
         """Return where in the chunk the message itself begins, and its length."""
@@ -150,12 +163,24 @@ class ChunkedSource:
         return data
 
     def _unpack(self, chunk: int) -> bytes:
+        """Unpack a chunk; of a damaged one return what comes before the damage, and remember what is wrong."""
         where = self.chunks[chunk]
+        place = f"{self.path}: chunk {chunk} at byte {where.position}"
+        refuse_bomb(where.stored_bytes, where.size_bytes, where=place)
         data = self.file.at(where.position, where.stored_bytes)
         if self.recovered:
             return unpack_what_is_there(data, where.compression, where.size_bytes)
-        place = f"{self.path}: chunk {chunk} at byte {where.position}"
-        return unpack(data, where.compression, where.size_bytes, where=place)
+        try:
+            return unpack(data, where.compression, where.size_bytes, where=place)
+        except RecordingError as error:
+            with self._lock:
+                self._damaged_chunks[chunk] = str(error)
+            return unpack_what_is_there(data, where.compression, where.size_bytes)
+
+    def fault_of(self, chunk: int) -> str:
+        """Say what is wrong with a chunk that was unpacked; "" where nothing is."""
+        with self._lock:
+            return self._damaged_chunks.get(chunk, "")
 
     def in_memory(self, chunk: int, *, keep: bool) -> bytes | None:
         """Return a packed chunk unpacked, and keep it in the cache if asked to; None for one stored as it is."""

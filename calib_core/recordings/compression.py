@@ -6,11 +6,13 @@ from typing import Protocol
 
 from calib_core.errors import RecordingError
 
-__all__ = ["MAX_CHUNK_BYTES", "unpack", "unpack_message", "unpack_what_is_there"]
+__all__ = ["MAX_CHUNK_BYTES", "refuse_bomb", "unpack", "unpack_message", "unpack_what_is_there"]
 
-MAX_CHUNK_BYTES = 1 << 30
-"""Recorders write chunks of about 1 MB; one that declares more than 1 GiB is damaged or made to harm."""
+MAX_CHUNK_BYTES = 1 << 28
+"""Recorders write chunks of about 1 MB; a packed one that declares more than 256 MiB is damaged or made to harm."""
 
+_SUSPICIOUS_BYTES = 1 << 25
+_SUSPICIOUS_RATIO = 1000
 
 _PIECE_BYTES = 1 << 12
 
@@ -35,12 +37,11 @@ def unpack(data: bytes, kind: str, size: int, *, where: str) -> bytes:
         where: the file and place, for the error.
 
     Raises:
-        RecordingError: an unknown compression, damaged bytes, another size than declared, or more than 1 GiB.
+        RecordingError: an unknown compression, damaged bytes, another size than declared, or more than 256 MiB.
     """
-    if size > MAX_CHUNK_BYTES:
-        raise RecordingError(f"{where}: a chunk declares {size / 2**30:.1f} GiB; over 1 GiB is refused as damaged")
     if kind in ("", "none"):
         return data
+    refuse_bomb(len(data), size, where=where)
     parts: list[bytes] = []
     left = size
     while data and left > 0:
@@ -59,6 +60,24 @@ def unpack(data: bytes, kind: str, size: int, *, where: str) -> bytes:
     return parts[0] if len(parts) == 1 else b"".join(parts)
 
 
+def refuse_bomb(stored: int, size: int, *, where: str) -> None:
+    """Refuse a packed chunk before it is unpacked if it declares more than can be true.
+
+    Raises:
+        RecordingError: it declares over 256 MiB, or over 32 MiB and a thousand times what it takes in the file.
+    """
+    if size > MAX_CHUNK_BYTES:
+        raise RecordingError(
+            f"{where}: a chunk declares {size / 2**20:.0f} MiB; packed chunks over {MAX_CHUNK_BYTES >> 20} MiB are "
+            "refused as damaged"
+        )
+    if size > _SUSPICIOUS_BYTES and size > _SUSPICIOUS_RATIO * stored:
+        raise RecordingError(
+            f"{where}: a chunk of {stored} bytes declares {size / 2**20:.0f} MiB, over a thousand times as much; "
+            "it is refused as damaged or made to harm"
+        )
+
+
 def unpack_what_is_there(data: bytes, kind: str, size: int) -> bytes:
     """Decompress a chunk that may be cut off or damaged; return the bytes before the damage.
 
@@ -73,7 +92,7 @@ def unpack_what_is_there(data: bytes, kind: str, size: int) -> bytes:
         return b""
     unpacker = _unpacker(kind, "")
     parts: list[bytes] = []
-    left = size
+    left = min(size, MAX_CHUNK_BYTES)
     try:
         for place in range(0, len(data), _PIECE_BYTES):
             if unpacker.eof or left <= 0:
@@ -86,7 +105,7 @@ def unpack_what_is_there(data: bytes, kind: str, size: int) -> bytes:
 
 
 def unpack_message(data: bytes, *, where: str) -> bytes:
-    """Decompress one Zstandard frame that may not declare its size; refuse more than 1 GiB.
+    """Decompress one Zstandard frame that may not declare its size; refuse more than 256 MiB.
 
     Raises:
         RecordingError: damaged, or too large.
@@ -97,7 +116,7 @@ def unpack_message(data: bytes, *, where: str) -> bytes:
     except _zstd_error() as error:
         raise RecordingError(f"{where}: a zstd message is damaged ({error}); copy the file again") from error
     if not unpacker.eof:
-        raise RecordingError(f"{where}: a zstd message is cut short or over 1 GiB; copy the file again")
+        raise RecordingError(f"{where}: a zstd message is cut short or over 256 MiB; copy the file again")
     return message
 
 

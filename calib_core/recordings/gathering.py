@@ -35,6 +35,14 @@ class ChunkAccess(Protocol):
         """Return where in the chunk a message itself begins, and its length."""
         ...
 
+    def room(self, chunk: int) -> int:
+        """Return how many bytes a chunk has."""
+        ...
+
+    def fault_of(self, chunk: int) -> str:
+        """Say what is wrong with a chunk that was unpacked; "" where nothing is."""
+        ...
+
     def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tell which records (n, lead_bytes) have their message at lead_bytes, and how long the messages are."""
         ...
@@ -87,12 +95,13 @@ class _Gather:
         order = group[np.argsort(self.index.offset[group], kind="stable")]
         try:
             whole = self.source.in_memory(chunk, keep=self.keep)
-            for first, last in pairwise(self._edges(order)):
-                self._run(chunk, order[first:last], whole)
+            room = self.source.room(chunk) if whole is None else len(whole)
+            faults = [self._run(chunk, order[a:b], whole, room) for a, b in pairwise(self._edges(order))]
         except RecordingError as error:
             self.lengths[group] = -1
             return str(error)
-        return ""
+        fault = next((fault for fault in faults if fault), "")
+        return fault and (self.source.fault_of(chunk) or fault)
 
     def _edges(self, order: np.ndarray) -> list[int]:
         """Cut messages into runs of neighbours that are read in one go."""
@@ -102,24 +111,33 @@ class _Gather:
         cuts = {*(np.flatnonzero(far) + 1).tolist(), *range(_RUN_MESSAGES, len(order), _RUN_MESSAGES)}
         return [0, *sorted(cuts), len(order)]
 
-    def _run(self, chunk: int, order: np.ndarray, whole: bytes | None) -> None:
+    def _run(self, chunk: int, order: np.ndarray, whole: bytes | None, room: int) -> str:
+        """Fill the rows of neighbours; return why one of them cannot be read."""
         lead = self.source.lead_bytes
         offsets = self.index.offset[order]
         base, end = int(offsets[0]), int(offsets[-1]) + lead + self.size
         data = self.source.piece(chunk, base, end - base) if whole is None else whole[base:end]
-        buffer = np.frombuffer(data, dtype=np.uint8)
-        if not len(buffer):
-            raise RecordingError(f"chunk {chunk} is shorter than its index says; the file is damaged: copy it again")
+        buffer = np.frombuffer(data or bytes(1), dtype=np.uint8)
         reach = (offsets - base)[:, None] + np.arange(lead + self.size)
         gathered = buffer[np.minimum(reach, len(buffer) - 1)]
-        usual, self.lengths[order] = self.source.usual(gathered[:, :lead])
+        usual, lengths = self.source.usual(gathered[:, :lead])
+        past = offsets + lead + lengths > room
+        lengths[past] = -1
+        self.lengths[order] = lengths
         self.rows[order] = gathered[:, lead:]
+        fault = f"chunk {chunk} ends before its messages do" if (past & usual).any() else ""
         for place in np.flatnonzero(~usual).tolist():
-            self._single(chunk, int(offsets[place]), int(order[place]))
+            fault = self._single(chunk, int(offsets[place]), int(order[place])) or fault
+        return fault
 
-    def _single(self, chunk: int, offset: int, row: int) -> None:
-        """Read the head of a message whose record is laid out in another way."""
-        start, length = self.source.locate(chunk, offset)
+    def _single(self, chunk: int, offset: int, row: int) -> str:
+        """Read the head of a message whose record is laid out in another way; return why it cannot be read."""
+        try:
+            start, length = self.source.locate(chunk, offset)
+        except RecordingError as error:
+            self.lengths[row] = -1
+            return str(error)
         head = self.source.piece(chunk, start, min(self.size, length))
         self.rows[row, : len(head)] = np.frombuffer(head, dtype=np.uint8)
-        self.lengths[row] = length
+        self.lengths[row] = length if len(head) == min(self.size, length) else -1
+        return "" if self.lengths[row] >= 0 else f"chunk {chunk} ends before its messages do"

@@ -9,9 +9,9 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.chunks import Chunk, ChunkedSource
+from calib_core.recordings.recovery import about_recovery
 from calib_core.recordings.rosbag1_recovery import fields_of, scan_bag
 from calib_core.recordings.sources import Channel, MessageIndex
-from calib_core.results import Caution
 
 if TYPE_CHECKING:
     from calib_core.recordings.files import FileBytes
@@ -24,6 +24,7 @@ _U32 = struct.Struct("<I")
 _ENTRY = np.dtype([("sec", "<u4"), ("nanosec", "<u4"), ("offset", "<u4")])
 _MESSAGE_HEADER_BYTES = 38  # conn, op and time fields, in any order
 _MAX_HEADER_BYTES = 1 << 24
+_MAX_INDEX_BYTES = 1 << 26
 
 
 class Rosbag1Source(ChunkedSource):
@@ -52,34 +53,43 @@ class Rosbag1Source(ChunkedSource):
             infos = self._read_tail(index_position)
             if len(infos) != _number(header.get("chunk_count", b""), 4):
                 raise self._damaged(index_position)
-            self._read_indexes(sorted(infos), index_position)
+            self._read_indexes(sorted(place for place, _ in infos), index_position)
+            if sum(map(len, self.indexes.values())) < sum(count for _, count in infos):
+                raise self._damaged(index_position)
         except RecordingError as fault:
             self._recover(after[0] + after[1], fault)
 
     def _recover(self, start: int, fault: RecordingError) -> None:
         """Index a bag that has no index, or a damaged one, by walking over all of it."""
         found = scan_bag(self.file, start)
-        if not found.messages:
-            raise fault
         self.recovered = True
         self.chunks = found.chunks
-        channels = [self._channel(fields, data, 0) for fields, data in found.connections.values()]
-        self.channels = tuple(channels)
+        channels: dict[int, Channel] = {}
+        for fields, data in found.connections.values():
+            if fields_of(data) is not None:
+                channel = self._channel(fields, data, 0)
+                channels[channel.id] = channel
+        self.channels = tuple(channels.values())
+        known = {number: entries for number, entries in found.messages.items() if number in channels}
+        if not known:
+            raise RecordingError(
+                f"{fault}; all of its {self.size_bytes} bytes were searched, and there is no whole message in them"
+            )
         self.indexes = {}
-        for connection, entries in found.messages.items():
+        for connection, entries in known.items():
             columns = np.array(entries, dtype=np.int64)
             self.note_index(connection, MessageIndex.sorted_from(columns[:, 0], columns[:, 1], columns[:, 2]))
         count = sum(map(len, found.messages.values()))
-        lost = self.size_bytes - found.kept_bytes
-        self.cautions = (
-            Caution(
-                "not-closed",
-                f"{self.path.name} has no usable index (it was not closed properly, or cut short): {count} whole messages "
-                f"were found by reading all of it"
-                + (f"; the last {lost} bytes could not be understood" if lost else ""),
-                f"check that what you need is there; rosbag reindex {self.path.name} makes opening fast again",
-            ),
+        caution = about_recovery(
+            self.path,
+            messages=count,
+            lost_bytes=found.lost_bytes,
+            tool="rosbag reindex",
+            damaged_chunks=found.damaged_chunks,
+            fault=found.fault,
+            unknown=count - sum(map(len, known.values())),
         )
+        self.cautions = (*self.file.cautions, caution)
 
     # -- opening
 
@@ -100,10 +110,10 @@ class Rosbag1Source(ChunkedSource):
             f"repair it first: rosbag reindex {self.path.name}"
         )
 
-    def _read_tail(self, position: int) -> list[int]:
-        """Read connections and chunk positions, which follow one another until the file's end."""
+    def _read_tail(self, position: int) -> list[tuple[int, int]]:
+        """Read connections, and each chunk's place and count of messages, which follow one another to the end."""
         channels: dict[int, Channel] = {}
-        infos: list[int] = []
+        infos: list[tuple[int, int]] = []
         while position < self.size_bytes:
             header, (data, size) = self._record(position)
             kind = _number(header.get("op", b""), 1)
@@ -111,7 +121,8 @@ class Rosbag1Source(ChunkedSource):
                 channel = self._channel(header, self.file.at(data, size), position)
                 channels[channel.id] = channel
             elif kind == _CHUNK_INFO:
-                infos.append(_number(header.get("chunk_pos", b""), 8))
+                counts = np.frombuffer(self.file.at(data, size // 8 * 8), dtype="<u4")[1::2]
+                infos.append((_number(header.get("chunk_pos", b""), 8), int(counts.sum(dtype=np.int64))))
             position = data + size
         if position > self.size_bytes:
             raise self._damaged(position - size)
@@ -138,6 +149,8 @@ class Rosbag1Source(ChunkedSource):
             header, (data, size) = self._record(position, _CHUNK)
             compression = _text(header.get("compression", b""))
             self.chunks.append(Chunk(data, size, _number(header.get("size", b""), 4), compression))
+            if following - data - size > _MAX_INDEX_BYTES:
+                raise self._damaged(data + size)
             block = self.file.at(data + size, following - data - size) if following > data + size else b""
             for connection, entries in self._index_records(block, data + size):
                 found.setdefault(connection, []).append((number, entries))

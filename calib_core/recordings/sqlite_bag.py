@@ -2,16 +2,15 @@
 
 import sqlite3
 import threading
-from itertools import chain
-from pathlib import Path
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote
 
 import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.compression import unpack_message
 from calib_core.recordings.sources import Channel, Heads, MessageIndex
+from calib_core.recordings.sqlite_recovery import about_rows, connect, damaged_database, scan_rows
 from calib_core.results import Caution
 
 if TYPE_CHECKING:
@@ -35,36 +34,27 @@ class SqliteSource:
 
     def __init__(self, file: "FileBytes", *, packed: bool = False) -> None:
         self.path, self.size_bytes = file.path, file.size_bytes
-        self.cautions: tuple[Caution, ...] = ()
+        self.cautions: tuple[Caution, ...] = file.cautions
+        self._file = file
         self._packed = packed
         self._lock = threading.Lock()
-        file.close()
-        self._connection = self._connect()
-        self.channels: tuple[Channel, ...] = self._read_channels()
+        self._indexes: dict[int, MessageIndex] | None = None
+        self._until_closed = ExitStack()
+        try:
+            self._connection = connect(file, self._until_closed)
+            self._until_closed.callback(self._connection.close)
+            self.channels: tuple[Channel, ...] = self._read_channels()
+        except RecordingError:
+            self._until_closed.close()
+            raise
 
     @property
     def container(self) -> str:
         """Name the format and its compression."""
         return "ROS 2 SQLite, zstd" if self._packed else "ROS 2 SQLite"
 
-    def _connect(self) -> sqlite3.Connection:
-        """Open for reading only. A write-ahead log left by a killed recorder is read too, never passed over."""
-        log = Path(f"{self.path}-wal")
-        mode = "mode=ro" if log.exists() and log.stat().st_size else "mode=ro&immutable=1"
-        address = f"file:{quote(str(self.path.resolve()))}?{mode}"
-        try:
-            connection = sqlite3.connect(address, uri=True, check_same_thread=False, isolation_level=None)
-        except sqlite3.Error as error:
-            raise self._damaged(error) from error
-        connection.text_factory = lambda raw: raw.decode("utf-8", "replace")
-        return connection
-
     def _damaged(self, error: object) -> RecordingError:
-        why = " ".join(str(error).split())[:200]
-        return RecordingError(
-            f"{self.path}: not a readable ROS 2 SQLite bag ({why}); if the recorder was killed, keep the -wal file "
-            "beside it in a writable folder; otherwise copy the file again"
-        )
+        return damaged_database(self.path, error)
 
     def _rows(self, query: str, *values: Any) -> list[tuple[Any, ...]]:
         try:
@@ -80,10 +70,7 @@ class SqliteSource:
                 f"{self.path}: an SQLite file without the tables of a ROS 2 bag (messages, topics); "
                 "give a file that ros2 bag record wrote"
             )
-        definitions: dict[Any, tuple[str, str]] = {}
-        if "message_definitions" in tables:
-            query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions ORDER BY id DESC"
-            definitions = {name: (_FORMATS.get(form, ""), str(text or "")) for name, form, text in self._rows(query)}
+        definitions = self._definitions() if "message_definitions" in tables else {}
         channels = []
         for number, topic, kind, encoding in self._rows("SELECT id, name, type, serialization_format FROM topics"):
             form, text = definitions.get(kind, ("", ""))
@@ -91,14 +78,40 @@ class SqliteSource:
             channels.append(Channel(number, str(topic), str(kind), str(encoding), text, form))
         return tuple(channels)
 
-    def index(self, channel_id: int) -> MessageIndex:
-        """Tell where the messages of a channel lie: SQLite walks over all rows' heads once."""
-        rows = self._rows("SELECT timestamp, id FROM messages WHERE topic_id = ?", channel_id)
+    def _definitions(self) -> dict[Any, tuple[str, str]]:
+        """Read the definitions; where they are damaged the well-known ones have to do."""
+        query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions ORDER BY id DESC"
         try:
-            columns = np.fromiter(chain.from_iterable(rows), dtype=np.int64, count=2 * len(rows)).reshape(-1, 2)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise self._damaged(f"a row without a time: {error}") from error
-        return MessageIndex.sorted_from(columns[:, 0], columns[:, 1], np.zeros(len(columns), dtype=np.int64))
+            return {name: (_FORMATS.get(form, ""), str(text or "")) for name, form, text in self._rows(query)}
+        except RecordingError as error:
+            caution = Caution(
+                "definitions-damaged",
+                f"{self.path.name}: its message definitions cannot be read; well-known ones are used instead ({error})",
+                "copy the file again from its source",
+            )
+            self.cautions = (*self.cautions, caution)
+        return {}
+
+    def index(self, channel_id: int) -> MessageIndex:
+        """Tell where the messages of a channel lie: SQLite walks over all rows' heads once, for all channels."""
+        if self._indexes is None:
+            with self._lock:
+                found = scan_rows(self._connection, self.path)
+            self._indexes = self._sorted(found.columns)
+            known = {channel.id for channel in self.channels}
+            unknown = sum(len(index) for number, index in self._indexes.items() if number not in known)
+            self.cautions = (*self.cautions, *about_rows(self.path, found, unknown))
+        empty = np.zeros(0, dtype=np.int64)
+        return self._indexes.get(channel_id, MessageIndex(empty, empty, empty))
+
+    def _sorted(self, columns: np.ndarray) -> dict[int, MessageIndex]:
+        topics = columns[:, 0]
+        zeros = np.zeros(len(columns), dtype=np.int64)
+        return {
+            int(number): MessageIndex.sorted_from(columns[rows, 1], columns[rows, 2], zeros[rows])
+            for number in np.unique(topics)
+            for rows in (np.flatnonzero(topics == number),)
+        }
 
     def read(self, chunk: int, offset: int) -> bytes:
         """Read one message whole; chunk is its row."""
@@ -142,7 +155,11 @@ class SqliteSource:
             stretch = numbers[first : first + _QUERY_ROWS]
             if int(stretch[-1] - stretch[0]) > 4 * _QUERY_ROWS:
                 continue  # many rows of other topics lie between: one by one is cheaper
-            found = [row for row in self._rows(query, size, int(stretch[0]), int(stretch[-1])) if type(row[1]) is bytes]
+            try:
+                answer = self._rows(query, size, int(stretch[0]), int(stretch[-1]))
+            except RecordingError:
+                continue  # damaged somewhere: one by one
+            found = [row for row in answer if type(row[1]) is bytes]
             ids = np.fromiter((row[0] for row in found), dtype=np.int64, count=len(found))
             heads = np.frombuffer(b"".join(row[1].ljust(size, b"\0") for row in found), dtype=np.uint8).reshape(
                 -1, size
@@ -167,4 +184,5 @@ class SqliteSource:
     def close(self) -> None:
         """Close the database."""
         with self._lock:
-            self._connection.close()
+            self._until_closed.close()
+        self._file.close()
