@@ -2,9 +2,9 @@
 /** One key, one deed; the same when the hand is in the 3D view. */
 
 import { flushNudge, nudgeBy, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
+import { openExport } from "./exporting.js";
 import { toggleHelp } from "./help.js";
 import { toggleLayer } from "./layers.js";
-import { close as closeMenu } from "./menus.js";
 import { nextWorst } from "./pairs.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
@@ -26,6 +26,7 @@ export const KEYS = [
   { keys: ["F"], does: "fit the picture" },
   { keys: ["+", "−"], does: "zoom" },
   { keys: ["1", "–", "4"], does: "overlays on and off" },
+  { keys: ["E"], does: "export" },
   { keys: ["?"], does: "this help" },
 ];
 
@@ -37,6 +38,7 @@ const PLAIN = {
   j: nextWorst,
   x: toggleExcluded,
   f: fit,
+  e: openExport,
   "+": () => zoomBy(1.25),
   "=": () => zoomBy(1.25),
   "-": () => zoomBy(0.8),
@@ -49,7 +51,6 @@ const PLAIN = {
   Backspace: removeSelected,
   Home: () => goTo(0),
   End: () => goTo(state.seconds.length - 1),
-  Escape: closeMenu,
 };
 /** @type {Record<string, [number, number]>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -73,11 +74,11 @@ function pressed(event) {
 function typing(event) {
   const target = event.target;
   if (!(target instanceof HTMLElement)) return false;
-  if (target.closest("dialog")) return event.key !== "?";
+  if (target.closest("dialog")) return event.key !== "?" || !target.closest("#help-dialog");
   if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
   const presses = event.key === " " || event.key === "Enter";
-  if (target.matches("button, a, summary, label, [role=menuitem], input") && presses) return !target.matches("#play");
-  return target.closest("[role=tablist], .divider, .menu") !== null && event.key.startsWith("Arrow");
+  if (target.matches("button, a, summary, label, input") && presses) return !target.matches("#play");
+  return target.closest("[role=tablist], .divider") !== null && event.key.startsWith("Arrow");
 }
 
 /** @param {KeyboardEvent} event @returns {(() => unknown)|undefined} */

@@ -2,6 +2,7 @@
 /** The page: wires the parts together and gives the server's messages to those who draw them. */
 
 import { startClicking, turnBack } from "./clicking.js";
+import { setFormats, startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
 import { toggleHelp } from "./help.js";
@@ -10,7 +11,6 @@ import { activity } from "./lanes.js";
 import { startLayers } from "./layers.js";
 import { startLayout } from "./layout.js";
 import { startLoupe } from "./loupe.js";
-import { setFormats, startMenus } from "./menus.js";
 import { setBanner, startTips, toast } from "./notices.js";
 import { startOptions } from "./options.js";
 import { startPairs } from "./pairs.js";
@@ -106,7 +106,7 @@ startPairs();
 startFigures();
 startScatter();
 startOptions();
-startMenus();
+startExporting();
 startGuide();
 listen(window);
 press("undo", () => turnBack("undo"));

@@ -6,18 +6,21 @@ import http
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Protocol
 
 import msgspec
 
+from app.session import Session
 from app.solving import RecordingSource, calibration_text
 from app.view import sentence
+from app.view.drawing import MIN_PLACEMENTS
+from app.web.exports import NoPreview, export_preview, exported, format_rows
 from app.web.survey import Survey
 from app.workspace import Workspace
 from calib_core.errors import CalibrationError
-from calib_core.interchange import FORMATS, export, read_calibration
+from calib_core.interchange import FORMATS, CalibrationFile, read_calibration
 from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration
 
@@ -106,49 +109,65 @@ class Routes:
         self._workspace = workspace
         self._recording = recording
         self._hub = hub
-        self._made: dict[str, Callable[[], Reply]] = {
+        self._made: dict[str, Callable[[str], Reply]] = {
             "/api/calibration.json": self._calibration,
             "/api/clicks.json": self._clicks,
             "/api/formats.json": _formats,
             "/api/activity.json": self._activity,
-            **{f"/api/export/{form.name}": lambda name=form.name: self._export(name) for form in FORMATS},  # type: ignore[misc]
+            **{f"/api/export/{form.name}": partial(self._export, form.name) for form in FORMATS},
+            **{f"/api/preview/{form.name}": partial(self._preview, form.name) for form in FORMATS},
         }
 
-    async def answer(self, path: str) -> Reply:
+    async def answer(self, address: str) -> Reply:
         """Answer a GET; files and exports are made off the event loop.
 
         Args:
-            path: as sent, without the query.
+            address: path and query, as sent.
         """
+        path, _, query = address.partition("?")
         make = self._made.get(path)
         if path in self._files:
-            make = lambda: _file(self._files[path])  # noqa: E731
+            make = lambda _query: _file(self._files[path])  # noqa: E731
         elif _VISER_PAGE.fullmatch(path):
-            make = _viser_page
+            make = lambda _query: _viser_page()  # noqa: E731
         if make is None:
             return refusal(404, "There is nothing here.")
-        return await asyncio.get_running_loop().run_in_executor(None, make)
+        return await asyncio.get_running_loop().run_in_executor(None, make, query)
 
-    def _calibration(self) -> Reply:
-        outcome = self._workspace.session.outcome
-        if not isinstance(outcome, Calibration):
-            return refusal(409, _why_none(outcome))
-        return _download(calibration_text(outcome, self._recording).encode(), "calibration.json")
+    def _calibration(self, _query: str) -> Reply:
+        return self._of_calibration(lambda text: _download(text.encode(), "calibration.json"))
 
-    def _export(self, name: str) -> Reply:
-        outcome = self._workspace.session.outcome
-        if not isinstance(outcome, Calibration):
-            return refusal(409, _why_none(outcome))
+    def _export(self, name: str, query: str) -> Reply:
+        def make(text: str) -> Reply:
+            written = exported(_file_of(text), name, query)
+            return _download(written.data, written.file_name)
+
+        return self._of_calibration(make)
+
+    def _preview(self, name: str, query: str) -> Reply:
+        def make(text: str) -> Reply:
+            preview = export_preview(_file_of(text), name, query, self._workspace.facts.name)
+            return _reply(msgspec.json.encode(preview), _TYPES[".json"])
+
+        reply = self._of_calibration(make)
+        if reply.status != 409:
+            return reply
+        return _reply(msgspec.json.encode(NoPreview(reply.body.decode().strip())), _TYPES[".json"])
+
+    def _of_calibration(self, make: Callable[[str], Reply]) -> Reply:
+        """Make something of the calibration-1 text of now, or say why there is none; an older answer is never handed out."""
+        session = self._workspace.session
+        if not session.is_solved or not isinstance(session.outcome, Calibration):
+            return refusal(409, _why_none(session))
         try:
-            exported = export(read_calibration(calibration_text(outcome, self._recording), "the calibration"), name)
+            return make(calibration_text(session.outcome, self._recording))
         except CalibrationError as error:
-            return refusal(409, str(error))
-        return _download(exported.data, exported.file_name)
+            return refusal(409, sentence(str(error)))
 
-    def _clicks(self) -> Reply:
+    def _clicks(self, _query: str) -> Reply:
         return _download(self._workspace.clicks_text().encode(), "clicks.json")
 
-    def _activity(self) -> Reply:
+    def _activity(self, _query: str) -> Reply:
         survey = self._hub.survey
         if survey is None:
             return refusal(409, "The radar is still being read.")
@@ -164,9 +183,12 @@ def _download(data: bytes, name: str) -> Reply:
     return _reply(data, kind, more=(("Content-Disposition", f'attachment; filename="{name}"'),))
 
 
-def _formats() -> Reply:
-    rows = [{"key": form.name, "label": form.title, "hint": form.file_name} for form in FORMATS if form.name != "json"]
-    return _reply(msgspec.json.encode(rows), _TYPES[".json"])
+def _formats(_query: str) -> Reply:
+    return _reply(msgspec.json.encode(format_rows()), _TYPES[".json"])
+
+
+def _file_of(text: str) -> CalibrationFile:
+    return read_calibration(text, "the calibration")
 
 
 @cache
@@ -182,7 +204,9 @@ def _viser_page() -> Reply:
     return _reply(body, _TYPES[".html"], policy=_VISER_POLICY, more=(("Content-Encoding", "gzip"),))
 
 
-def _why_none(outcome: Unsolvable | None) -> str:
-    if outcome is None:
-        return "There is no calibration yet: click the reflector in at least four placements."
-    return f"{sentence(outcome.reason)} {sentence(outcome.hint)}"
+def _why_none(session: Session) -> str:
+    if session.needs_solving and len(session.clicks) >= MIN_PLACEMENTS:
+        return "The newest change is still being solved; in a moment the calibration is there."
+    if session.is_solved and isinstance(session.outcome, Unsolvable):
+        return f"{sentence(session.outcome.reason)} {sentence(session.outcome.hint)}"
+    return "There is no calibration yet: click the reflector in at least four placements."

@@ -125,7 +125,7 @@ class RunningServer:
             if asked.is_websocket:
                 known = path.startswith(("/ws/", "/viser/"))
                 return None if known else _response(refusal(404, "There is no WebSocket here."))
-            return _response(await self._routes.answer(path))
+            return _response(await self._routes.answer(request.path))
 
         return process
 

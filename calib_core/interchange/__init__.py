@@ -12,10 +12,12 @@ from calib_core.interchange.cameras import camera_info_text, read_camera, read_c
 from calib_core.interchange.checking import CheckReport, Finding, check
 from calib_core.interchange.clicks import read_clicks, write_clicks
 from calib_core.interchange.comparing import Comparison, PixelDifference, compare
+from calib_core.interchange.contents import contents_text
 from calib_core.interchange.formats import FORMATS, ExportBytes, ExportText, Format, export, format_named
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.importing import imported, read_any, read_any_file
 from calib_core.interchange.pairs import PairsFile, read_pairs, write_pairs
+from calib_core.interchange.parent_pose import parent_pose
 
 __all__ = [
     "FORMATS",
@@ -39,9 +41,11 @@ __all__ = [
     "check",
     "choose_check_point",
     "compare",
+    "contents_text",
     "export",
     "format_named",
     "imported",
+    "parent_pose",
     "read_any",
     "read_any_file",
     "read_calibration",

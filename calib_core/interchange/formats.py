@@ -41,6 +41,7 @@ class Format:
     Attributes:
         name: what `--to` takes.
         title: one line for people.
+        numbers: what the file's numbers are, in one line: which way they carry points, and in which order they stand.
         file_name: what the file is called unless a person says otherwise.
         carries_camera: whether the camera's intrinsics are in it too.
         comment: how it says its frames and check point in words: "#", "<!-- -->", its own keys, or none.
@@ -51,6 +52,7 @@ class Format:
 
     name: str
     title: str
+    numbers: str
     file_name: str
     carries_camera: bool
     comment: Comment
@@ -96,17 +98,35 @@ class ExportBytes:
 
 _POSE_ONLY = ("carries the pose only: keep your camera_info, or export the camera with --to opencv",)
 _KIT = (
-    "poses are in sensor_kit_base_link; the radar is put at the kit's origin (in Python, parent_from_radar= places it)",
+    "poses are in sensor_kit_base_link; the radar is put at the kit's origin (parent_from_radar places it elsewhere)",
     *_POSE_ONLY,
 )
 _KALIBR = ("T_cam_radar is our key: Kalibr itself has none for radars",)
 
 FORMATS: tuple[Format, ...] = (
-    Format("json", "cocalib's own calibration-1", "calibration.json", True, "keys", write_calibration),
-    Format("tf2", "ROS 2 command", "static_transform.sh", False, "#", write_tf2_command, _POSE_ONLY),
+    Format(
+        "json",
+        "cocalib's own calibration-1",
+        "camera_from_radar and its inverse, both as matrix, translation and quaternion w x y z",
+        "calibration.json",
+        True,
+        "keys",
+        write_calibration,
+    ),
+    Format(
+        "tf2",
+        "ROS 2 command",
+        "pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
+        "static_transform.sh",
+        False,
+        "#",
+        write_tf2_command,
+        _POSE_ONLY,
+    ),
     Format(
         "tf2-launch-py",
         "ROS 2 launch file, Python",
+        "pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
         "radar_camera.launch.py",
         False,
         "#",
@@ -116,19 +136,37 @@ FORMATS: tuple[Format, ...] = (
     Format(
         "tf2-launch-xml",
         "ROS 2 launch file, XML",
+        "pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
         "radar_camera.launch.xml",
         False,
         "<!-- -->",
         write_ros2_launch_xml,
         _POSE_ONLY,
     ),
-    Format("tf1-launch", "ROS 1 launch file", "radar_camera.launch", False, "<!-- -->", write_ros1_launch, _POSE_ONLY),
     Format(
-        "urdf", "URDF: camera_link and optical frame", "radar_camera.urdf", False, "<!-- -->", write_urdf, _POSE_ONLY
+        "tf1-launch",
+        "ROS 1 launch file",
+        "pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
+        "radar_camera.launch",
+        False,
+        "<!-- -->",
+        write_ros1_launch,
+        _POSE_ONLY,
+    ),
+    Format(
+        "urdf",
+        "URDF: camera_link and optical frame",
+        "pose of camera_link (body axes) in the radar, roll pitch yaw about fixed axes; then the optical joint",
+        "radar_camera.urdf",
+        False,
+        "<!-- -->",
+        write_urdf,
+        _POSE_ONLY,
     ),
     Format(
         "autoware",
         "Autoware sensor kit",
+        "pose of each sensor in sensor_kit_base_link, roll pitch yaw about fixed axes; camera_link has body axes",
         "sensor_kit_calibration.yaml",
         False,
         "#",
@@ -136,13 +174,49 @@ FORMATS: tuple[Format, ...] = (
         _KIT,
         write_autoware_in_kit,
     ),
-    Format("apollo", "Apollo extrinsics", "radar_camera_extrinsics.yaml", False, "#", write_apollo, _POSE_ONLY),
-    Format("kalibr", "Kalibr camera chain", "camchain.yaml", True, "#", write_kalibr, _KALIBR),
-    Format("opencv", "OpenCV FileStorage", "radar_camera.yml", True, "#", write_opencv),
-    Format("kitti", "KITTI and View-of-Delft calibration", "calib.txt", True, "none", write_kitti, KITTI_NOTES),
+    Format(
+        "apollo",
+        "Apollo extrinsics",
+        "pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
+        "radar_camera_extrinsics.yaml",
+        False,
+        "#",
+        write_apollo,
+        _POSE_ONLY,
+    ),
+    Format(
+        "kalibr",
+        "Kalibr camera chain",
+        "T_cam_radar carries radar points into the camera; our key, Kalibr has none for radars",
+        "camchain.yaml",
+        True,
+        "#",
+        write_kalibr,
+        _KALIBR,
+    ),
+    Format(
+        "opencv",
+        "OpenCV FileStorage",
+        "R, T, rvec carry radar points into the camera",
+        "radar_camera.yml",
+        True,
+        "#",
+        write_opencv,
+    ),
+    Format(
+        "kitti",
+        "KITTI and View-of-Delft calibration",
+        "Tr_velo_to_cam carries radar points into the camera; images undistorted",
+        "calib.txt",
+        True,
+        "none",
+        write_kitti,
+        KITTI_NOTES,
+    ),
     Format(
         "nuscenes",
         "nuScenes calibrated_sensor",
+        "pose of each sensor in the ego frame, quaternion w x y z; images undistorted",
         "calibrated_sensor.json",
         True,
         "none",
@@ -150,11 +224,55 @@ FORMATS: tuple[Format, ...] = (
         NUSCENES_NOTES,
         write_nuscenes_in_ego,
     ),
-    Format("foxglove", "Foxglove messages", "foxglove.json", True, "none", write_foxglove, FOXGLOVE_NOTES),
-    Format("colmap", "COLMAP text model", "colmap.zip", True, "#", write_colmap, COLMAP_NOTES),
-    Format("matlab", "MATLAB mat file", "radar_camera.mat", True, "keys", write_matlab, MATLAB_NOTES),
-    Format("numpy", "NumPy arrays, no pickle", "radar_camera.npz", True, "keys", write_numpy),
-    Format("matrix", "4x4 matrix as text", "camera_from_radar.txt", False, "#", write_matrix, _POSE_ONLY),
+    Format(
+        "foxglove",
+        "Foxglove messages",
+        "FrameTransform: pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
+        "foxglove.json",
+        True,
+        "none",
+        write_foxglove,
+        FOXGLOVE_NOTES,
+    ),
+    Format(
+        "colmap",
+        "COLMAP text model",
+        "world (radar) into camera, quaternion w x y z; principal point half a pixel larger",
+        "colmap.zip",
+        True,
+        "#",
+        write_colmap,
+        COLMAP_NOTES,
+    ),
+    Format(
+        "matlab",
+        "MATLAB mat file",
+        "camera_from_radar.A carries radar points into the camera; camera.PrincipalPoint counts from 1",
+        "radar_camera.mat",
+        True,
+        "keys",
+        write_matlab,
+        MATLAB_NOTES,
+    ),
+    Format(
+        "numpy",
+        "NumPy arrays, no pickle",
+        "camera_from_radar (4x4), R and t carry radar points into the camera; K and D are the camera's",
+        "radar_camera.npz",
+        True,
+        "keys",
+        write_numpy,
+    ),
+    Format(
+        "matrix",
+        "4x4 matrix as text",
+        "rows of the 4x4 matrix that carries radar points into the camera",
+        "camera_from_radar.txt",
+        False,
+        "#",
+        write_matrix,
+        _POSE_ONLY,
+    ),
 )
 
 

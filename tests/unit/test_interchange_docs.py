@@ -16,12 +16,12 @@ def test_the_published_schema_is_the_one_the_types_give(project_root: Path, name
     assert published == schema_texts()[name], "run: python -m calib_core.interchange.schemas docs/schemas"
 
 
-def test_the_page_lists_every_format_with_its_file_name(project_root: Path):
+def test_the_page_lists_every_format_with_its_file_name_and_what_its_numbers_are(project_root: Path):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
 
-    rows = dict(re.findall(r"^\| `([\w-]+)` \| [^|]* \| `([^`]+)` \|", page, flags=re.MULTILINE))
+    rows = re.findall(r"^\| `([\w-]+)` \| [^|]* \| `([^`]+)` \| (.*) \|$", page, flags=re.MULTILINE)
 
-    assert rows == {known.name: known.file_name for known in FORMATS}
+    assert rows == [(known.name, known.file_name, known.numbers) for known in FORMATS]
 
 
 def test_the_examples_on_the_page_are_read(project_root: Path):

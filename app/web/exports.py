@@ -1,0 +1,166 @@
+"""What the export panel shows of one format: the file's text, what its numbers are, and the proof that it reads back."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+from urllib.parse import parse_qs
+
+from app.view import CautionRow, sentence
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+from calib_core.interchange import (
+    FORMATS,
+    CalibrationFile,
+    ExportBytes,
+    ExportText,
+    check,
+    contents_text,
+    export,
+    format_named,
+    imported,
+    parent_pose,
+    read_any,
+)
+
+__all__ = ["ExportPreview", "FormatRow", "NoPreview", "export_preview", "exported", "format_rows", "parent_in"]
+
+_PARENT = "parent_from_radar"
+
+
+@dataclass(frozen=True, slots=True)
+class FormatRow:
+    """One line of the list of formats.
+
+    Attributes:
+        key: what `--to` takes.
+        label: one line for people.
+        takes_parent: the radar can be posed in a third frame.
+    """
+
+    key: str
+    label: str
+    takes_parent: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ExportPreview:
+    """One format, before it is saved.
+
+    Attributes:
+        key: of the format.
+        file_name: what to call the file: recording, then format.
+        text: the file, or what is in it where it is binary.
+        is_binary: the file itself is no text.
+        size_bytes: of the file.
+        numbers: what the file's numbers are.
+        notes: what a person must know who uses it.
+        carries: which way the pose in the file carries points, as it is read back.
+        check: what `cocalib check` says about the file.
+        check_is_good: whether it found nothing wrong.
+        radar_frame: name of the radar's frame.
+        camera_frame: name of the camera's optical frame.
+        rotation: camera_from_radar, by rows.
+        translation_m: of camera_from_radar.
+        quaternion_xyzw: of camera_from_radar.
+        cautions: what the solve warns of.
+    """
+
+    key: str
+    file_name: str
+    text: str
+    is_binary: bool
+    size_bytes: int
+    numbers: str
+    notes: tuple[str, ...]
+    carries: Literal["camera_from_radar", "radar_from_camera"]
+    check: str
+    check_is_good: bool
+    radar_frame: str
+    camera_frame: str
+    rotation: tuple[tuple[float, ...], ...]
+    translation_m: tuple[float, ...]
+    quaternion_xyzw: tuple[float, ...]
+    cautions: tuple[CautionRow, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NoPreview:
+    """There is nothing to save yet: why, and what to do."""
+
+    reason: str
+
+
+def format_rows() -> tuple[FormatRow, ...]:
+    """Return the list of formats."""
+    return tuple(FormatRow(form.name, form.title, form.write_in_parent is not None) for form in FORMATS)
+
+
+def parent_in(query: str) -> RigidTransform | None:
+    """Return the radar's pose in a third frame as an address gives it, `parent_from_radar=x,y,z,qx,qy,qz,qw`, if it does.
+
+    Raises:
+        InputError: it is not seven numbers, or no pose.
+    """
+    given = parse_qs(query).get(_PARENT)
+    if not given:
+        return None
+    try:
+        numbers = [float(word) for word in given[-1].split(",")]
+    except ValueError:
+        raise InputError(f"{_PARENT}: {given[-1]!r} is not seven numbers") from None
+    return parent_pose(numbers)
+
+
+def exported(file: CalibrationFile, key: str, query: str) -> ExportText | ExportBytes:
+    """Write a calibration in a format, with the pose that the address may hold.
+
+    Raises:
+        InputError: the format cannot carry this calibration, or has no third frame.
+    """
+    return export(file, key, parent_from_radar=parent_in(query))
+
+
+def export_preview(file: CalibrationFile, key: str, query: str, recording_name: str) -> ExportPreview:
+    """Show a calibration in a format before it is saved.
+
+    Args:
+        file: the calibration.
+        key: of the format.
+        query: of the address; it may pose the radar in a third frame.
+        recording_name: what the person calls the recording.
+
+    Raises:
+        InputError: the format cannot carry this calibration, or has no third frame.
+    """
+    written = exported(file, key, query)
+    report = check(read_any(written.data, written.file_name), against=imported(file))
+    pose = file.calibration.camera_from_radar
+    wxyz = quaternion_wxyz_from_matrix(pose.rotation).tolist()
+    cautions = file.calibration.cautions
+    return ExportPreview(
+        key=key,
+        file_name=f"{_slug(recording_name)}_{written.file_name}",
+        text=contents_text(written),
+        is_binary=isinstance(written, ExportBytes),
+        size_bytes=len(written.data),
+        numbers=sentence(format_named(key).numbers),
+        notes=tuple(sentence(note) for note in written.notes),
+        carries=report.imported.pose.direction,
+        check=f"Read back: {report.findings[0].message}."
+        if report.findings
+        else "Read back; it states no check point.",
+        check_is_good=report.ok,
+        radar_frame=file.frames.radar,
+        camera_frame=file.frames.camera,
+        rotation=tuple(tuple(row) for row in pose.rotation.tolist()),
+        translation_m=tuple(pose.translation_m.tolist()),
+        quaternion_xyzw=(*wxyz[1:], wxyz[0]),
+        cautions=tuple(CautionRow(row.code, sentence(row.message), sentence(row.hint)) for row in cautions),
+    )
+
+
+def _slug(name: str) -> str:
+    """Return a recording's name as the beginning of a file's: letters, digits and underscores."""
+    stem = Path(name).stem if re.search(r"\.\w{2,6}$", name) else name
+    return re.sub(r"\W+", "_", stem.removeprefix("the ")).strip("_") or "recording"

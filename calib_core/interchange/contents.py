@@ -1,0 +1,52 @@
+"""What is inside an exported file, as text for people: binary files are unpacked, their arrays written out."""
+
+import io
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from calib_core.interchange.archives import unpack
+from calib_core.interchange.formats import ExportBytes, ExportText
+from calib_core.interchange.mat_file import load_mat
+
+__all__ = ["contents_text"]
+
+_MAT_TEXT_BYTES = 116
+
+
+def contents_text(written: ExportText | ExportBytes) -> str:
+    """Return a text file as it is, and what a binary file holds, one member after the other."""
+    if isinstance(written, ExportText):
+        return written.text
+    if written.data.startswith(b"PK"):
+        members = unpack(written.data, source=written.file_name)
+        return "\n".join(_member(name, data) for name, data in members.items())
+    comment = written.data[:_MAT_TEXT_BYTES].decode("ascii", errors="replace").rstrip("\0 ")
+    return "\n".join([comment, "", *_variables(load_mat(written.data, source=written.file_name))]) + "\n"
+
+
+def _member(name: str, data: bytes) -> str:
+    if not name.endswith(".npy"):
+        return f"[{name}]\n{data.decode('utf-8', errors='replace')}"
+    array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    return "\n".join(_variables({name.removesuffix(".npy"): array})) + "\n"
+
+
+def _variables(values: Mapping[str, Any], owner: str = "") -> Iterator[str]:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _variables(value, f"{owner}{key}.")
+            continue
+        array = np.asarray(value)
+        if array.dtype.kind in "US":
+            yield f"{owner}{key} = {str(value)!r}"
+            continue
+        yield f"{owner}{key}  {array.dtype}  {' x '.join(map(str, array.shape)) or 'scalar'}"
+        yield from (f"    {row}" for row in _rows(array))
+
+
+def _rows(array: np.ndarray) -> list[str]:
+    """Write an array row by row, each number with six digits."""
+    rows = np.atleast_2d(array)
+    return ["".join(f"{value:>13.6g}" for value in row.ravel().tolist()) for row in rows]

@@ -1,0 +1,41 @@
+// @ts-check
+/** Parts of the export panel: the text with its comments set apart, the pose in numbers, the cautions. */
+
+import { icon, make } from "./notices.js";
+
+/** The text with its comments set apart. @param {string} content */
+export function lines(content) {
+  let inside = false;
+  return content.split(/(?<=\n)/).map((line) => {
+    const opens = line.includes("<!--");
+    const said = inside || opens || /^\s*(#|%)/.test(line);
+    inside = (inside || opens) && !line.includes("-->");
+    return said ? make("i", "", line) : line;
+  });
+}
+
+/** The pose in numbers, the order of the quaternion in its name. @param {Record<string, any>} preview */
+export function numbers(preview) {
+  const [x, y, z] = preview.translation_m.map((/** @type {number} */ value) => value.toFixed(4));
+  const row = (/** @type {string} */ name, /** @type {string[]} */ values) =>
+    make("tr", "", [make("th", "", name), ...values.map((value) => make("td", "", value))]);
+  const table = make("table", "pose-numbers", [
+    make("caption", "", "camera_from_radar"),
+    row("translation_m", [x, y, z, ""]),
+    row("quaternion_xyzw", preview.quaternion_xyzw.map((/** @type {number} */ value) => value.toFixed(4))),
+  ]);
+  table.dataset.hint = "Rounded here; the file has every digit.";
+  return table;
+}
+
+/** What the solve warns of. @param {import("./messages.js").CautionRow[]} rows */
+export function cautionBox(rows) {
+  if (!rows.length) return [];
+  const title = rows.length === 1 ? "One caution comes with this calibration" : `${rows.length} cautions come with this calibration`;
+  const items = rows.map((row) => {
+    const item = make("li", "", row.message);
+    item.dataset.hint = row.hint;
+    return item;
+  });
+  return [make("div", "with-cautions", [make("strong", "", [icon("caution"), title]), make("ul", "", items)])];
+}

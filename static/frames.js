@@ -1,0 +1,86 @@
+// @ts-check
+/** A small drawing of the radar's and the camera's axes, with the arrow that says which way points are carried. */
+
+const NS = "http://www.w3.org/2000/svg";
+const WIDTH = 280;
+const HEIGHT = 212;
+const RADAR = [72, 78];
+const CAMERA = [206, 78];
+const LENGTH = 44;
+/** Where the radar's x (forward), y (left) and z (up) point on the paper: seen from behind, to the left and above. */
+const PAPER = [
+  [0.64, -0.4],
+  [-0.82, -0.26],
+  [0, -0.94],
+];
+const COLOURS = ["var(--axis-x)", "var(--axis-y)", "var(--axis-z)"];
+
+/**
+ * Draw both frames. The directions of the axes are the solved ones; the places are not to scale.
+ * @param {Record<string, any>} preview ExportPreview of app/web/exports.py
+ */
+export function frameDrawing(preview) {
+  const svg = shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "frames", role: "img" });
+  const inFile = preview.carries === "radar_from_camera" ? "The file states the pose of the camera in the radar." : "";
+  svg.append(said(`Points are carried from ${preview.radar_frame} to ${preview.camera_frame}: p_camera = R p_radar + t. ${inFile}`));
+  svg.append(arrow(RADAR, CAMERA, 0, "carry"), label(136, 70, "R, t", "equation"), label(WIDTH / 2, 176, "p_camera = R p_radar + t", "equation"));
+  if (preview.carries === "radar_from_camera") {
+    svg.append(arrow(CAMERA, RADAR, 13, "stated"), label(WIDTH / 2, 196, "⇠ in this file: the pose of the camera", "stated"));
+  } else svg.append(label(WIDTH / 2, 196, "in this file: the same R and t", "stated"));
+  const unit = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+  axes(svg, RADAR, unit);
+  axes(svg, CAMERA, preview.rotation);
+  svg.append(label(RADAR[0], 146, preview.radar_frame, "frame"), label(CAMERA[0], 146, preview.camera_frame, "frame"));
+  return svg;
+}
+
+/** Three arrows with their letters; `directions` are the axes in the radar frame, those farther away drawn first. @param {Element} svg @param {number[]} at @param {number[][]} directions */
+function axes(svg, at, directions) {
+  for (const [index, [x, y, z]] of directions.entries()) {
+    const dx = LENGTH * (x * PAPER[0][0] + y * PAPER[1][0] + z * PAPER[2][0]);
+    const dy = LENGTH * (x * PAPER[0][1] + y * PAPER[1][1] + z * PAPER[2][1]);
+    const length = Math.hypot(dx, dy) || 1;
+    const [ux, uy] = [dx / length, dy / length];
+    const [ex, ey] = [at[0] + dx, at[1] + dy];
+    const head = `M${ex} ${ey}L${ex - 7 * ux + 3 * uy} ${ey - 7 * uy - 3 * ux}L${ex - 7 * ux - 3 * uy} ${ey - 7 * uy + 3 * ux}Z`;
+    svg.append(shape("path", { d: `M${at[0]} ${at[1]}L${ex - 5 * ux} ${ey - 5 * uy}`, stroke: COLOURS[index], "stroke-width": 2, fill: "none" }));
+    svg.append(shape("path", { d: head, fill: COLOURS[index] }));
+    const letter = label(ex + 8 * ux, ey + 8 * uy + 3.5, "xyz"[index], "axis");
+    letter.setAttribute("fill", COLOURS[index]);
+    svg.append(letter);
+  }
+  svg.append(shape("circle", { cx: at[0], cy: at[1], r: 3, class: "origin" }));
+}
+
+/** An arrow from one frame to the other. @param {number[]} from @param {number[]} to @param {number} lower how far below the origins @param {string} name */
+function arrow(from, to, lower, name) {
+  const sign = Math.sign(to[0] - from[0]);
+  const [start, end, y] = [from[0] + sign * 14, to[0] - sign * 14, from[1] + lower];
+  const group = shape("g", { class: name });
+  group.append(
+    shape("path", { d: `M${start} ${y}H${end}`, fill: "none" }),
+    shape("path", { d: `M${end - sign * 7} ${y - 4}L${end} ${y}L${end - sign * 7} ${y + 4}`, fill: "none" }),
+  );
+  return group;
+}
+
+/** @param {number} x @param {number} y @param {string} words @param {string} name */
+function label(x, y, words, name) {
+  const element = shape("text", { x, y, class: name, "text-anchor": "middle" });
+  element.textContent = words;
+  return element;
+}
+
+/** @param {string} words */
+function said(words) {
+  const title = shape("title", {});
+  title.textContent = words;
+  return title;
+}
+
+/** @param {string} name @param {Record<string, string|number>} attributes */
+function shape(name, attributes) {
+  const element = document.createElementNS(NS, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+  return element;
+}

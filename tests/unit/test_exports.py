@@ -1,0 +1,96 @@
+"""What the port hands out of a calibration, and what it refuses."""
+
+import asyncio
+import dataclasses
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from app.session import Session
+from app.web.routes import Reply, Routes
+from calib_core.errors import InputError
+from calib_core.interchange import FORMATS, CalibrationFile, contents_text, export, parent_pose, read_calibration
+from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
+from tests.picture_recording import PictureRecording, grey_pictures
+
+
+@pytest.fixture
+def file(project_root: Path) -> CalibrationFile:
+    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+
+
+CLICKS = tuple(ReflectorClick(TimeNs(index), f"c{index}", 10.0, 10.0) for index in range(5))
+
+
+@pytest.fixture
+def ask(project_root: Path) -> Callable[[Session, str], Reply]:
+    def answer(session: Session, address: str) -> Reply:
+        workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive 7.mcap"))
+        hub: Any = SimpleNamespace(survey=None)
+        routes = Routes(project_root / "static", workspace, PictureRecording(grey_pictures(1)), hub)
+        return asyncio.run(routes.answer(address))
+
+    return answer
+
+
+def test_a_calibration_that_answers_an_older_revision_is_not_handed_out(file, ask):
+    solved = Session(CLICKS, revision=7, outcome=file.calibration, outcome_revision=7)
+    changed = dataclasses.replace(solved, revision=8)
+    for path in ("/api/calibration.json", "/api/export/tf2"):
+        assert ask(solved, path).status == 200
+        assert ask(changed, path).status == 409
+        assert b"still being solved" in ask(changed, path).body
+    assert "still being solved" in json.loads(ask(changed, "/api/preview/tf2").body)["reason"]
+
+
+def test_why_there_is_none_is_said_in_words(ask):
+    refused = Unsolvable("mirrored", "the axes are mirrored", "swap left and right")
+    solved = Session(CLICKS, revision=3, outcome=refused, outcome_revision=3)
+    assert ask(solved, "/api/export/urdf").body == b"The axes are mirrored. Swap left and right.\n"
+    assert b"four placements" in ask(Session(), "/api/export/urdf").body
+
+
+@pytest.mark.parametrize("name", [form.name for form in FORMATS])
+def test_a_preview_reads_its_own_text_back(file, ask, name):
+    preview = json.loads(
+        ask(Session(CLICKS, outcome=file.calibration, outcome_revision=0), f"/api/preview/{name}").body
+    )
+    assert preview["check_is_good"]
+    assert preview["file_name"].startswith("drive_7_")
+    assert preview["numbers"]
+    assert preview["size_bytes"] > 0
+
+
+def test_the_address_may_pose_the_radar_in_the_kit(file, ask):
+    solved = Session(CLICKS, outcome=file.calibration, outcome_revision=0)
+    posed = ask(solved, "/api/export/autoware?parent_from_radar=1.5,0,0.25,0,0,0,1")
+    assert b"x: 1.5" in posed.body
+    for query, words in (
+        ("1,2", b"seven"),
+        ("a,0,0,0,0,0,1", b"seven numbers"),
+        ("0,0,0,0,0,0,9", b"length 9"),
+        ("nan,0,0,0,0,0,1", b"finite"),
+    ):
+        refused = ask(solved, f"/api/export/autoware?parent_from_radar={query}")
+        assert refused.status == 409
+        assert words in refused.body
+    assert ask(solved, "/api/export/tf2?parent_from_radar=0,0,0,0,0,0,1").status == 409
+
+
+def test_binary_files_say_what_is_in_them(file):
+    numpy, matlab, colmap = (contents_text(export(file, name)) for name in ("numpy", "matlab", "colmap"))
+    assert "camera_from_radar  float64  4 x 4" in numpy
+    assert "camera_from_radar.A  float64  4 x 4" in matlab
+    assert "[images.txt]" in colmap
+    assert contents_text(export(file, "tf2")) == export(file, "tf2").data.decode()
+
+
+def test_a_pose_in_the_parent_takes_the_quaternion_with_w_last():
+    turned = parent_pose([1, 2, 3, 0, 0, 0.7071067811865476, 0.7071067811865476])
+    assert turned.rotation[1, 0] == pytest.approx(1.0)
+    with pytest.raises(InputError, match="qw last"):
+        parent_pose([0, 0, 0, 0, 0, 0, 0.3])
