@@ -17,6 +17,7 @@ from calib_core.measurements import RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.images import EncodedImage
 from calib_core.recordings.opening import open_sources
+from calib_core.recordings.plain_opening import files_behind, open_plain_sources
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.sources import Source
 from calib_core.recordings.topics import TopicSummary
@@ -29,7 +30,7 @@ _HASH_BYTES = 1 << 22
 
 @dataclass(frozen=True, slots=True)
 class InputFile:
-    """A file by its contents: what a calibration was made from."""
+    """A file, or the files of a folder in order of their names, by its contents: what a calibration was made from."""
 
     name: str
     size_bytes: int
@@ -187,12 +188,13 @@ class Recording:
         for source in self.sources:
             digest = hashlib.sha256()
             try:
-                with source.path.open("rb") as file:
-                    while piece := file.read(_HASH_BYTES):
-                        digest.update(piece)
-                        done += len(piece)
-                        if progress:
-                            progress(done, total)
+                for path in files_behind(source.path):
+                    with path.open("rb") as file:
+                        while piece := file.read(_HASH_BYTES):
+                            digest.update(piece)
+                            done += len(piece)
+                            if progress:
+                                progress(min(done, total), total)
             except OSError as error:
                 raise RecordingError(f"{source.path}: cannot be read any more: {error.strerror}") from error
             files.append(InputFile(source.path.name, source.size_bytes, digest.hexdigest()))
@@ -212,7 +214,8 @@ def open_recording(
     few bytes per message, of packed chunks that hold such messages everything, once.
 
     Args:
-        paths: ROS 1 .bag, ROS 2 .mcap and .db3 files, and folders of them.
+        paths: ROS 1 .bag, ROS 2 .mcap and .db3 files, and folders of them; folders of pictures or of radar .pcd and .bin
+            files; radar CSV; videos.
         options: topics and clock.
         require: what it must have; intrinsics need only "image".
 
@@ -220,9 +223,12 @@ def open_recording(
         RecordingError: it cannot be opened, or lacks what is required.
     """
     chosen = (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
-    sources = open_sources(require_files(chosen))
+    options = options or RecordingOptions()
+    plain, others = open_plain_sources(require_files(chosen), options.video_start)
+    sources: tuple[Source, ...] = plain
     try:
-        return Recording(chosen, sources, assemble(chosen, sources, options or RecordingOptions(), require))
+        sources = (*(open_sources(others) if others else ()), *plain)
+        return Recording(chosen, sources, assemble(chosen, sources, options, require))
     except BaseException:
         for source in sources:
             source.close()

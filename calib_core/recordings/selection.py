@@ -31,6 +31,8 @@ class RecordingOptions:
     """The topic with the camera's intrinsics; the one beside the images when not given."""
     radar_axes: str | None = None
     """Where the radar message's x, y and z point, such as forward,right,up; add degrees or radians for its angles."""
+    video_start: str | None = None
+    """When a video's first frame was taken: seconds since 1970, or a date such as 2024-05-01T12:00:00.25+02:00."""
     clock: Clock = "auto"
     """Times to go by: stamps in the messages, receive times, or auto: stamps unless they cannot be right."""
 

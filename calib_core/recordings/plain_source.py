@@ -1,0 +1,75 @@
+"""A recording that is no ROS container: times in a list, messages made when they are asked for."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.measurements import TimeNs
+from calib_core.recordings.plain_messages import header_bytes
+from calib_core.recordings.sources import Channel, Heads, MessageIndex
+from calib_core.results import Caution
+
+__all__ = ["PlainSource", "topic_of"]
+
+_HEADER_BYTES = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlainSource:
+    """One folder or file with one topic; a Source.
+
+    Attributes:
+        path: the folder or file.
+        size_bytes: of all it holds.
+        container: for people.
+        channel: its topic.
+        times_ns: (n,) ascending.
+        message: makes the message of a row.
+        cautions: what opening it brought to light.
+        closed: called when no more is read.
+    """
+
+    path: Path
+    size_bytes: int
+    container: str
+    channel: Channel
+    times_ns: TimesNs
+    message: Callable[[int], bytes]
+    cautions: tuple[Caution, ...] = ()
+    closed: Callable[[], None] | None = None
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The topic."""
+        return (self.channel,)
+
+    def index(self, channel_id: int) -> MessageIndex:
+        """Tell where the messages lie: row by row."""
+        rows = np.arange(len(self.times_ns) if channel_id == self.channel.id else 0, dtype=np.int64)
+        return MessageIndex(self.times_ns[rows], rows, np.zeros_like(rows))
+
+    def read(self, chunk: int, offset: int) -> bytes:
+        """Make one message."""
+        return self.message(chunk)
+
+    def heads(self, index: MessageIndex, size: int) -> Heads:
+        """Return the first bytes of many messages; for stamps alone, no file is read."""
+        rows = np.zeros((len(index), size), dtype=np.uint8)
+        for place, row in enumerate(index.chunk.tolist()):
+            head = header_bytes(TimeNs(int(self.times_ns[row])), "") if size <= _HEADER_BYTES else self.message(row)
+            rows[place, : min(len(head), size)] = np.frombuffer(head[:size], dtype=np.uint8)
+        return Heads(rows, np.full(len(index), max(size, _HEADER_BYTES), dtype=np.int64))
+
+    def close(self) -> None:
+        """Close what is open."""
+        if self.closed is not None:
+            self.closed()
+
+
+def topic_of(path: Path, word: str) -> str:
+    """Name a topic after a folder or file."""
+    name = "".join(letter if letter.isalnum() else "_" for letter in path.stem).strip("_")
+    return f"/{name or word}/{word}"

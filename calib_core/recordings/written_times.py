@@ -1,0 +1,74 @@
+"""Times as people and programs write them: in file names, columns and options. Never through floating point."""
+
+import re
+from datetime import UTC, datetime, timedelta
+from typing import Literal
+
+from calib_core.errors import RecordingError
+from calib_core.measurements import NS_PER_S, TimeNs
+
+__all__ = ["TimeUnit", "read_time", "time_from_name"]
+
+TimeUnit = Literal["ns", "us", "ms", "s"]
+_SCALE: dict[TimeUnit, int] = {"ns": 1, "us": 1000, "ms": 1_000_000, "s": NS_PER_S}
+_UNIT_OF_DIGITS: dict[int, TimeUnit] = {19: "ns", 16: "us", 13: "ms", 10: "s"}
+_NUMBER = re.compile(r"^([+-]?)(\d+)(?:\.(\d*))?$")
+_IN_NAME = re.compile(r"(?<!\d)(\d{10})(?:\.(\d{1,9})|[_-](\d{9}))(?!\d)|(?<!\d)(\d{19}|\d{16}|\d{13}|\d{10})(?!\d)")
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_YEARS_NS = (978_307_200 * NS_PER_S, 4_102_444_800 * NS_PER_S)
+
+
+def time_from_name(stem: str) -> TimeNs | None:
+    """Find the time since 1970 in a file's name: 19 digits are ns, 16 us, 13 ms, 10 s, with a fraction or without.
+
+    Several numbers may be in a name; the last that is a time between 2001 and 2100 counts.
+    """
+    found = None
+    for match in _IN_NAME.finditer(stem):
+        seconds, fraction, nanosec, digits = match.groups()
+        if digits:
+            time = int(digits) * _SCALE[_UNIT_OF_DIGITS[len(digits)]]
+        else:
+            time = int(seconds) * NS_PER_S + int((fraction or nanosec).ljust(9, "0"))
+        if _YEARS_NS[0] <= time <= _YEARS_NS[1]:
+            found = TimeNs(time)
+    return found
+
+
+def read_time(text: str, unit: TimeUnit | None = None) -> TimeNs:
+    """Read a time since 1970 exactly.
+
+    Args:
+        text: a number, or a date such as 2024-05-01T12:00:00.25+02:00 (without a zone: UTC).
+        unit: of the number; by the count of its digits when not given.
+
+    Raises:
+        RecordingError: it is neither.
+    """
+    text = text.strip()
+    match = _NUMBER.match(text)
+    if match is None:
+        return _read_date(text)
+    sign, whole, fraction = match.groups()
+    unit = unit or _UNIT_OF_DIGITS.get(len(whole))
+    if unit is None:
+        raise RecordingError(
+            f"'{text}' has {len(whole)} digits, so its unit cannot be told; 10 are taken as seconds, 13 ms, 16 us, 19 ns"
+        )
+    scale = _SCALE[unit]
+    digits = (fraction or "").ljust(9, "0")[:9]
+    return TimeNs((-1 if sign == "-" else 1) * (int(whole) * scale + int(digits) * scale // NS_PER_S))
+
+
+def _read_date(text: str) -> TimeNs:
+    text = text.removesuffix("Z") + ("+00:00" if text.endswith("Z") else "")
+    fraction = re.search(r"\.(\d+)", text)
+    try:
+        moment = datetime.fromisoformat(re.sub(r"\.\d+", "", text))
+    except ValueError as error:
+        raise RecordingError(
+            f"'{text}' is no time; write seconds since 1970 (1714557600.25) or a date (2024-05-01T12:00:00.25+02:00)"
+        ) from error
+    moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    seconds = (moment - _EPOCH) // timedelta(seconds=1)
+    return TimeNs(seconds * NS_PER_S + (int(fraction[1].ljust(9, "0")[:9]) if fraction else 0))
