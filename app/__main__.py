@@ -1,6 +1,10 @@
 """The command `cocalib`."""
 
+import os
 import sys
+
+# Our matrices are small: threads inside one product only take the time of the server beside it. Set before NumPy loads.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from app.cli import run
 

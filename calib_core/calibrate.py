@@ -164,7 +164,8 @@ def _best_fit(evidence: Evidence, options: CalibrationOptions) -> _Fit | Unsolva
     refined = refine(evidence, found[0], estimate_scale=estimate_scale)
     gain = -np.inf
     if not _beyond_doubt(evidence, refined):
-        gain = mirror_gain(few, found[0], estimate_scale=estimate_scale, seed=seed)
+        fitted = refined if few is evidence else None
+        gain = mirror_gain(few, found[0], plain=fitted, estimate_scale=estimate_scale, seed=seed)
     inliers = int(_inliers(refined).sum())
     if inliers < MIN_PAIRS:
         reason = f"only {inliers} of {len(evidence)} pairs agree on any pose"

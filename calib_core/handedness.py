@@ -5,7 +5,7 @@ import numpy as np
 from calib_core.consensus import Consensus, find_consensus, mixture_cost
 from calib_core.evidence import Evidence
 from calib_core.initial_pose import starting_poses
-from calib_core.refining import refine
+from calib_core.refining import Refined, refine
 
 __all__ = ["MIRRORED_GAIN", "mirror_gain"]
 
@@ -16,13 +16,22 @@ _STARTS = 2
 _BEYOND_DOUBT = 30.0  # a difference that noise levels cannot turn
 
 
-def mirror_gain(evidence: Evidence, best: Consensus, *, estimate_scale: bool, seed: int) -> float:
+def mirror_gain(
+    evidence: Evidence, best: Consensus, *, plain: Refined | None = None, estimate_scale: bool, seed: int
+) -> float:
     """Return by how much twice the log-likelihood rises when the radar's y axis is mirrored.
 
     A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be told by its residuals:
     placements on the ground fit a camera mirrored below the ground just as well. Only what is known of the camera
     position, or placements at varied heights, tell the two apart. The 24 right-handed conventions need no test: they are
     rotations, and the pose absorbs them. Each hand is fitted with its own noise level.
+
+    Args:
+        evidence: the pairs.
+        best: what they agree on, axes as they are.
+        plain: the fit that starts there, where it has been made already.
+        estimate_scale: estimate the noise level of either fit.
+        seed: of the draws.
     """
     mirrored = evidence.mirrored()
     starts = starting_poses(mirrored, most=_STARTS, rng=np.random.default_rng(seed))
@@ -31,7 +40,6 @@ def mirror_gain(evidence: Evidence, best: Consensus, *, estimate_scale: bool, se
         return -np.inf
     if abs(best.cost - found[0].cost) > _BEYOND_DOUBT:
         return best.cost - found[0].cost
-    plain, other = (
-        refine(pairs, start, estimate_scale=estimate_scale) for pairs, start in ((evidence, best), (mirrored, found[0]))
-    )
+    plain = plain or refine(evidence, best, estimate_scale=estimate_scale)
+    other = refine(mirrored, found[0], estimate_scale=estimate_scale)
     return mixture_cost(plain.evidence, plain.camera_from_radar) - mixture_cost(other.evidence, other.camera_from_radar)

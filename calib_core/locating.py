@@ -5,12 +5,14 @@ sought there. A window is never averaged as a whole: one object beside the refle
 Averaging inside a cluster does not make angle bins, clutter and calibration errors smaller; hence the noise floor.
 """
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points3, Values, Vector3, frozen_array
+from calib_core.arrays import Flags, Points3, TimesNs, Values, Vector3, frozen_array
 from calib_core.measurements import NS_PER_S, Candidate, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
 from calib_core.radar import covariance_from_sigma_polar, direction_cosines
@@ -67,8 +69,24 @@ def window_around(scans: RadarScans, time: TimeNs, *, window_s: float) -> RadarS
     return scans.between(TimeNs(centre - half_ns), TimeNs(centre + half_ns))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Recognised:
+    """A window that equals another one of the same content: what `clusters_of` remembers by."""
+
+    window: RadarScans
+    digest: bytes
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Recognised) and self.digest == other.digest
+
+
 def clusters_of(window: RadarScans, *, most: int) -> tuple[Cluster, ...]:
     """Find the clusters of a window, the heaviest first.
+
+    The windows of the last clicks are remembered: a solve after every click looks at all of them again.
 
     Args:
         window: the static returns around one click.
@@ -76,6 +94,15 @@ def clusters_of(window: RadarScans, *, most: int) -> tuple[Cluster, ...]:
     """
     if not len(window.points_radar_m):
         return ()
+    content = hashlib.blake2b()
+    for column in (window.first_return, window.points_radar_m, window.snr_db, window.sigma_polar):
+        content.update(np.ascontiguousarray(column).data)
+    return _found_clusters(_Recognised(window, content.digest()), most)
+
+
+@lru_cache(maxsize=256)
+def _found_clusters(recognised: _Recognised, most: int) -> tuple[Cluster, ...]:
+    window = recognised.window
     steps = direction_cosines(window.points_radar_m) / CLUSTER_SCALE
     amplitude = _amplitudes(window.snr_db)
     free = np.ones(len(steps), dtype=bool)
@@ -151,31 +178,36 @@ def scores_of(windows: Sequence[RadarScans], clusters: Sequence[tuple[Cluster, .
     Novelty is what tells the one reflector, which moves, from what is always there: the share of the other windows in
     which the place is empty. Windows that overlap show the same placement and are no witnesses.
     """
+    places = np.array([cluster.centre for own in clusters for cluster in own]).reshape(-1, 3) / CLUSTER_SCALE
+    persistence = np.array([cluster.persistence for own in clusters for cluster in own])
+    first = np.concatenate([[0], np.cumsum([len(own) for own in clusters])]).astype(np.int64)
+    spans = np.array([(window.times_ns[0], window.times_ns[-1]) for window in windows], dtype=np.int64).reshape(-1, 2)
     scores = []
     for i, own in enumerate(clusters):
-        witnesses = [other for j, other in enumerate(clusters) if j != i and not _overlap(windows[i], windows[j])]
+        witnesses = (spans[:, 0] > spans[i, 1]) | (spans[:, 1] < spans[i, 0])
         plain = np.array([cluster.amplitude * cluster.persistence**2 for cluster in own])
-        score = plain * _novelty(own, witnesses)
+        score = plain * _novelty(places[first[i] : first[i + 1]], places, persistence, first, witnesses)
         scores.append(score / score.sum() if len(score) else score)
     return tuple(scores)
 
 
-def _overlap(a: RadarScans, b: RadarScans) -> bool:
-    return bool(a.times_ns[0] <= b.times_ns[-1] and b.times_ns[0] <= a.times_ns[-1])
+def _novelty(own: Points3, places: Points3, persistence: Values, first: TimesNs, witnesses: Flags) -> Values:
+    """Return how new each place of one window (k, 3) is, 1 when no witness knows it.
 
-
-def _novelty(own: tuple[Cluster, ...], witnesses: Sequence[tuple[Cluster, ...]]) -> Values:
-    if not own or not witnesses:
+    Args:
+        own: in steps.
+        places: (n, 3) of all windows below one another.
+        persistence: (n,).
+        first: (m + 1,) window j owns the rows first[j] to first[j + 1].
+        witnesses: (m,) the windows that have a say.
+    """
+    if not len(own) or not witnesses.any():
         return np.ones(len(own))
-    centres = np.array([cluster.centre for cluster in own]) / CLUSTER_SCALE
-    occupied = np.zeros(len(own))
-    for clusters in witnesses:
-        if clusters:
-            others = np.array([cluster.centre for cluster in clusters]) / CLUSTER_SCALE
-            persistence = np.array([cluster.persistence for cluster in clusters])
-            same = ((centres[:, None] - others[None]) ** 2).sum(axis=2) <= _SAME_PLACE**2
-            occupied += (same * persistence).max(axis=1)
-    return np.asarray(np.maximum((1.0 - np.minimum(occupied / len(witnesses), 1.0)) ** 4, _NOVELTY_FLOOR))
+    filled = np.flatnonzero(np.diff(first) > 0)
+    same = ((own[:, None] - places[None]) ** 2).sum(axis=2) <= _SAME_PLACE**2
+    seen = np.maximum.reduceat(same * persistence, first[filled], axis=1)
+    occupied = seen[:, witnesses[filled]].sum(axis=1) / witnesses.sum()
+    return np.asarray(np.maximum((1.0 - np.minimum(occupied, 1.0)) ** 4, _NOVELTY_FLOOR))
 
 
 def candidates_of(
