@@ -1,5 +1,6 @@
 """Recordings: ROS 1 and ROS 2 files in, radar scans, images and intrinsics out. Only here are containers known."""
 
+from calib_core.recordings.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.describing import describe
 from calib_core.recordings.images import EncodedImage
 from calib_core.recordings.recording import InputFile, Recording, inspect_recording, open_recording, require_files
@@ -8,6 +9,7 @@ from calib_core.recordings.summary import RecordingSummary, recording_summary
 from calib_core.recordings.topics import TopicSummary
 
 __all__ = [
+    "ClockDiagnosis",
     "EncodedImage",
     "InputFile",
     "Recording",

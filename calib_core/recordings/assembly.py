@@ -12,6 +12,7 @@ from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import TimeNs
 from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap
+from calib_core.recordings.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
 from calib_core.recordings.clocks import ClockChoice, Stamps, choose_clock, choose_clocks
 from calib_core.recordings.decoding import Message
 from calib_core.recordings.images import ImageLayout
@@ -70,16 +71,18 @@ def assemble(
     inventory = Inventory(name, topics, {topic.name: usage_of(topic).read_as(axes) for topic in topics})
     selection = select(inventory, options, require)
     selection, stamped, lost = _stamped(selection, inventory)
-    clocks, stamps, about_clocks = _clocks(stamped, options)
-    cautions.extend([*lost, *about_clocks])
+    clocks, stamps, about_choice = _clocks(stamped, options)
+    cautions.extend([*lost, *about_choice])
     heads = {name: both.heads for name, both in stamped.items()}
     radar = _radar_stream(selection.radar, inventory, stamps, heads)
     images = _image_stream(selection.image, inventory, stamps)
     cautions.extend(check_overlap(name, radar, images, required=len(require) == 2))
+    diagnoses = _diagnoses(stamped, (radar, images), clocks, options)
+    cautions.extend(about_clocks(list(diagnoses.values())))
     camera, about_camera = recorded_camera(selection.camera_info, images)
     cautions.extend([*about_camera, *about_radar(radar), *about_claims(radar), *about_images(images)])
     return Assembly(
-        topics=tuple(_summary(topic, inventory, selection, clocks, stamps) for topic in topics),
+        topics=tuple(_summary(topic, inventory, selection, stamps, diagnoses.get(topic.name)) for topic in topics),
         radar_topic=selection.radar.name if selection.radar else None,
         image_topic=selection.image.name if selection.image else None,
         camera_info_topic=selection.camera_info.name if selection.camera_info else None,
@@ -123,6 +126,27 @@ def _clocks(
     clocks = dict(zip(stamped, choice.clocks, strict=True))
     stamps = {both.topic: _times(both, clock) for both, clock in zip(read, choice.clocks, strict=True)}
     return clocks, stamps, choice.cautions
+
+
+def _diagnoses(
+    stamped: Mapping[str, StampedTopic],
+    streams: Sequence[RadarStream | ImageStream | None],
+    clocks: Mapping[str, Literal["header", "receive"]],
+    options: RecordingOptions,
+) -> Mapping[str, ClockDiagnosis]:
+    """Look at the clocks of the topics in use."""
+    found = {}
+    for stream in streams:
+        if stream is not None:
+            name = stream.topic.name
+            found[name] = diagnose(
+                Stamps(name, stamped[name].topic.receive_ns, stamped[name].header_ns),
+                times_ns=stream.times_ns,
+                chosen=clocks[name],
+                wish=options.clock,
+                one_per_return=isinstance(stream, RadarStream) and isinstance(stream.layout, PointLayout),
+            )
+    return found
 
 
 def _times(both: Stamps, clock: str) -> TimesNs:
@@ -170,8 +194,8 @@ def _summary(
     topic: Topic,
     inventory: Inventory,
     selection: Selection,
-    clocks: Mapping[str, Literal["header", "receive"]],
     stamps: Mapping[str, TimesNs],
+    diagnosis: ClockDiagnosis | None,
 ) -> TopicSummary:
     usage = inventory.usages[topic.name]
     times = stamps.get(topic.name, topic.receive_ns)
@@ -183,11 +207,12 @@ def _summary(
         kind=usage.kind,
         start=TimeNs(int(times.min())) if len(times) else None,
         end=TimeNs(int(times.max())) if len(times) else None,
-        clock=clocks.get(topic.name, "receive"),
+        clock=diagnosis.chosen if diagnosis else "receive",
         problem=usage.problem,
-        chosen=any(topic is chosen for chosen in (selection.radar, selection.image, selection.camera_info)),
+        chosen=any(t and t.name == topic.name for t in (selection.radar, selection.image, selection.camera_info)),
         layout=usage.radar.description if usage.radar else "",
         rate_hz=rhythm.rate_hz,
         longest_gap_s=rhythm.longest_gap_s,
         jitter_s=rhythm.jitter_s,
+        clocks=diagnosis,
     )

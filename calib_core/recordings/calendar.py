@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 
 from calib_core.measurements import NS_PER_S, TimeNs
 
-__all__ = ["utc"]
+__all__ = ["span_text", "utc"]
 
 
 def utc(time: TimeNs) -> str:
@@ -15,3 +15,12 @@ def utc(time: TimeNs) -> str:
     except (OverflowError, ValueError, OSError):
         return f"{seconds}.{rest // 1_000_000:03d} s"
     return f"{moment:%Y-%m-%d %H:%M:%S}.{rest // 1_000_000:03d} UTC"
+
+
+def span_text(seconds: float) -> str:
+    """Write how far times are apart, in the unit that keeps it short."""
+    seconds = abs(seconds)
+    for size, unit in ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.1f} {unit}"
+    return f"{seconds:.3f} s"

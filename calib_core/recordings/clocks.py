@@ -11,6 +11,7 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S
+from calib_core.recordings.calendar import span_text
 from calib_core.results import Caution
 
 __all__ = ["Clock", "ClockChoice", "Stamps", "choose_clock", "choose_clocks", "header_fault"]
@@ -109,7 +110,7 @@ def choose_clocks(radar: Stamps, camera: Stamps, wish: Clock = "auto") -> ClockC
             if abs(lag_s) <= 1.0:
                 clocks: tuple[Literal["header", "receive"], ...] = ("receive", "header")
                 return ClockChoice(clocks if number else clocks[::-1], tuple(cautions))
-            cautions.append(_mixed(f"the stamps of {sound.topic} are {_span(lag_s)} away from receive time"))
+            cautions.append(_mixed(f"the stamps of {sound.topic} are {span_text(lag_s)} away from receive time"))
     return ClockChoice(("receive", "receive"), tuple(cautions))
 
 
@@ -135,7 +136,7 @@ def _both_usable(radar: Stamps, camera: Stamps) -> ClockChoice:
     apart_s = (radar.offset_ns - camera.offset_ns) / NS_PER_S
     return ClockChoice(
         ("receive", "receive"),
-        (_mixed(f"the stamps of {radar.topic} and {camera.topic} are on clocks {_span(apart_s)} apart"),),
+        (_mixed(f"the stamps of {radar.topic} and {camera.topic} are on clocks {span_text(apart_s)} apart"),),
     )
 
 
@@ -159,14 +160,6 @@ def _fell_back(stamps: Stamps, fault: str) -> Caution:
         "receive times include the delay of the driver: stand still longer at each placement, and have the driver fill in "
         "header.stamp next time",
     )
-
-
-def _span(seconds: float) -> str:
-    seconds = abs(seconds)
-    for size, unit in ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
-        if seconds >= 2 * size:
-            return f"{seconds / size:.1f} {unit}"
-    return f"{seconds:.3f} s"
 
 
 def choose_clock(stamps: Stamps, wish: Clock = "auto") -> ClockChoice:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from calib_core.recordings.calendar import utc
+from calib_core.recordings.calendar import span_text, utc
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.summary import CameraSummary, RadarSummary, RecordingSummary, TopicReport, recording_summary
 
@@ -26,6 +26,7 @@ def summary_text(summary: RecordingSummary) -> str:
         "",
         *_topic_table(summary.topics),
         "",
+        *_labelled("clocks", _clocks(summary.topics)),
         *_labelled("radar", _radar(summary.radar)),
         *_labelled("camera", _camera(summary.camera)),
     ]
@@ -44,6 +45,8 @@ def _times(summary: RecordingSummary) -> list[str]:
     if summary.start is None or summary.end is None:
         return _labelled("time", ["no messages"])
     lines = [f"{utc(summary.start.time)} to {utc(summary.end.time)}, {duration_text(summary.duration_s)}"]
+    counts = [topic.count for topic in summary.topics]
+    lines.append(f"{sum(counts)} messages in {len(counts)} topic{'s' if len(counts) != 1 else ''}")
     if summary.overlap_s is not None:
         lines.append(f"radar and camera share {duration_text(summary.overlap_s)}")
     return _labelled("time", lines)
@@ -71,6 +74,31 @@ def _topic_table(topics: Sequence[TopicReport]) -> list[str]:
         if topic.problem and topic.problem != "no messages":
             lines.append(topic.problem if topic.name in topic.problem else f"{topic.name}: {topic.problem}")
     return lines
+
+
+def _clocks(topics: Sequence[TopicReport]) -> list[str]:
+    """Say, topic by topic, which clock is used, why, and what is known about both."""
+    lines = []
+    for topic in topics:
+        if (found := topic.clocks) is None:
+            continue
+        used = {"header": "stamps of measurement", "receive": "times of receiving"}[found.chosen]
+        lines.append(f"{topic.name}: {used}, because {found.reason}")
+        about = []
+        if found.delay_s is not None:
+            about.append(
+                f"received {_delay_text(found.delay_s)} the stamp (± {(found.delay_jitter_s or 0) * 1e3:.1f} ms)"
+            )
+        about.extend(found.remarks)
+        if about:
+            lines.append(f"  {'; '.join(about)}")
+    return lines
+
+
+def _delay_text(delay_s: float) -> str:
+    near = abs(delay_s) < 2
+    span = f"{abs(delay_s) * 1e3:.1f} ms" if near else span_text(delay_s)
+    return f"{span} {'after' if delay_s >= 0 else 'before'}"
 
 
 def _radar(radar: RadarSummary | None) -> list[str]:

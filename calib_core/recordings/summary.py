@@ -6,6 +6,7 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs, time_parts
+from calib_core.recordings.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.topics import Rhythm, TopicSummary
 from calib_core.results import Caution
@@ -67,6 +68,7 @@ class TopicReport:
     jitter_s: float | None
     layout: str
     problem: str | None
+    clocks: ClockDiagnosis | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,6 +190,7 @@ def _report(topic: TopicSummary) -> TopicReport:
         jitter_s=topic.jitter_s,
         layout=topic.layout,
         problem=topic.problem,
+        clocks=topic.clocks,
     )
 
 

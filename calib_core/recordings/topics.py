@@ -8,6 +8,7 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.recordings.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.decoding import Message, decode
 from calib_core.recordings.definitions import Definition, definition_of
 from calib_core.recordings.sources import Channel, Heads, MessageIndex, Source
@@ -36,6 +37,7 @@ class TopicSummary:
         rate_hz: messages per second from first to last; None with fewer than two.
         longest_gap_s: longest time between neighbours [s]; None with fewer than two.
         jitter_s: median deviation of that time from its median [s]; None with fewer than two.
+        clocks: what is known about its two clocks; None where its messages were not looked into.
     """
 
     name: str
@@ -51,6 +53,7 @@ class TopicSummary:
     rate_hz: float | None = None
     longest_gap_s: float | None = None
     jitter_s: float | None = None
+    clocks: ClockDiagnosis | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,7 +87,7 @@ def test_one_damaged_chunk_costs_its_own_messages_and_is_said(container, ros1, r
     path.write_bytes(raw)
     with open_recording(path) as recording:
         codes = [caution.code for caution in recording.cautions]
-        assert set(codes) == {"unreadable-messages"}
+        assert set(codes) == {"unreadable-messages", "islands"}
         assert "of 900 messages of /radar/points cannot be read and are left out" in recording.cautions[0].message
         scans = recording.radar_scans()
         assert 100 < len(scans) < 900

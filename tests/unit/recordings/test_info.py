@@ -25,6 +25,7 @@ def test_the_text_names_files_times_topics_radar_camera_and_cautions(ros1, write
         == f"""\
 files     recording.bag  {size}  ROS 1 bag, lz4
 time      2023-11-14 22:13:20.030 UTC to 2023-11-14 22:13:21.950 UTC, 1.9 s
+          61 messages in 4 topics
           radar and camera share 1.9 s
 
 used as     topic                     type                         messages     rate  longest gap  jitter  stamps
@@ -33,6 +34,10 @@ camera      /camera/image/compressed  sensor_msgs/CompressedImage        20  10.
             /odd                      std_msgs/String                     1                                received
 radar       /radar/points             sensor_msgs/PointCloud2            20  10.0 Hz      0.100 s  0.0 ms  measured
 
+clocks    /camera/image/compressed: stamps of measurement, because the stamps are sound
+            received 30.0 ms after the stamp (± 0.0 ms)
+          /radar/points: stamps of measurement, because the stamps are sound
+            received 0.0 ms after the stamp (± 0.0 ms)
 radar     /radar/points, frame 'radar': 20 scans at 10.0 Hz, longest gap 0.100 s
           returns per scan: 4 (4 to 4)
           position from x, y, z; speed from velocity; amplitude from snr
