@@ -43,6 +43,9 @@ bench: dev  ## Speed, as ratios within one run; writes docs/speed.md.
 	@$(BIN)/python tests/find_browser.py --install
 	$(BIN)/python -m benchmarks.speed
 
+bench-accuracy: dev  ## Accuracy against the bound and other estimators; writes docs/accuracy.md (about an hour).
+	$(BIN)/python -m benchmarks.accuracy
+
 sample: env  ## Make sample_data/ again, bit for bit.
 	$(BIN)/python -m calib_core.synthetic.sample sample_data
 
