@@ -13,6 +13,9 @@ settings.load_profile("cocalib")
 ROOT = Path(__file__).resolve().parent.parent
 
 
+os.environ["COCALIB_CACHE"] = "off"  # tests leave nothing in the user's cache folder
+
+
 @pytest.fixture(scope="session")
 def project_root() -> Path:
     """Return the checkout's top folder."""

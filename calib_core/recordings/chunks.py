@@ -15,6 +15,8 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.compression import refuse_bomb, unpack, unpack_what_is_there
 from calib_core.recordings.files import FileBytes
 from calib_core.recordings.gathering import gather_heads
+from calib_core.recordings.index_cache import cache_of
+from calib_core.recordings.kept_indexes import KeptIndex, heads_from, index_from, keep_heads, keep_index
 from calib_core.recordings.sources import Channel, Heads, MessageIndex
 from calib_core.results import Caution
 
@@ -66,6 +68,32 @@ class ChunkedSource:
         self._cache_bytes = 0
         self._damaged_chunks: dict[int, str] = {}
         self._lock = threading.Lock()
+        self._kept = cache_of(file)
+
+    def restore(self) -> bool:
+        """Take what opening finds out from the cache; False where it is not there."""
+        kept = index_from(self._kept) if self._kept is not None else None
+        if kept is None:
+            return False
+        self.channels = kept.channels
+        places = zip(kept.chunks.tolist(), kept.compressions, strict=True)
+        self.chunks = [Chunk(position, stored, size, name) for (position, stored, size), name in places]
+        try:
+            for channel, index in kept.indexes.items():
+                self.note_index(channel, index)
+        except RecordingError:
+            self.channels, self.chunks, self.indexes = (), [], {}
+            return False
+        return True
+
+    def keep(self) -> None:
+        """Put what opening found out into the cache, if the file is sound."""
+        if self._kept is None or self.recovered or self.cautions:
+            return
+        places = [(chunk.position, chunk.stored_bytes, chunk.size_bytes) for chunk in self.chunks]
+        names = tuple(chunk.compression for chunk in self.chunks)
+        table = np.array(places, dtype=np.int64).reshape(-1, 3)
+        keep_index(self._kept, KeptIndex(self.channels, table, names, self.indexes))
 
     @property
     def path(self) -> Path:
@@ -194,4 +222,8 @@ class ChunkedSource:
 
     def heads(self, index: MessageIndex, size: int) -> Heads:
         """Read the first bytes of many messages, in the order of the index."""
-        return gather_heads(self, index, size)
+        found = heads_from(self._kept, index, size)
+        if found is None:
+            found = gather_heads(self, index, size)
+            keep_heads(self._kept, index, size, found)
+        return found

@@ -47,6 +47,14 @@ class McapSource(ChunkedSource):
         super().__init__(file)
         self._found: dict[int, list[np.ndarray]] = {}
         self._counted = 0
+        if not self.restore():
+            self._open()
+            self.keep()
+
+    # -- opening
+
+    def _open(self) -> None:
+        """Read the index, or make one."""
         closed, indexed = True, False
         try:
             summary = self._summary_start()
@@ -59,8 +67,6 @@ class McapSource(ChunkedSource):
         if not indexed:
             self._scan(closed=closed)
         self._found.clear()
-
-    # -- opening
 
     def _summary_start(self) -> int | None:
         """Return where the summary begins, 0 for a file without one, None for a file that was not closed."""

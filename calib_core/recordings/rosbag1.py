@@ -43,6 +43,8 @@ class Rosbag1Source(ChunkedSource):
         header, after = self._record(magic.end(), _BAG_HEADER)
         if header.get("encryptor"):
             raise RecordingError(f"{file.path}: the bag is encrypted; decrypt it first: rosbag decrypt")
+        if self.restore():
+            return
         index_position = _number(header.get("index_pos", b""), 8)
         try:
             if not 0 < index_position <= file.size_bytes:
@@ -58,6 +60,7 @@ class Rosbag1Source(ChunkedSource):
                 raise self._damaged(index_position)
         except RecordingError as fault:
             self._recover(after[0] + after[1], fault)
+        self.keep()
 
     def _recover(self, start: int, fault: RecordingError) -> None:
         """Index a bag that has no index, or a damaged one, by walking over all of it."""

@@ -3,14 +3,17 @@
 import sqlite3
 import threading
 from contextlib import ExitStack
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.compression import unpack_message
+from calib_core.recordings.index_cache import cache_of
+from calib_core.recordings.kept_indexes import heads_from, keep_heads
 from calib_core.recordings.sources import Channel, Heads, MessageIndex
-from calib_core.recordings.sqlite_recovery import about_rows, connect, damaged_database, scan_rows
+from calib_core.recordings.sqlite_recovery import FoundRows, about_rows, connect, damaged_database, scan_rows
 from calib_core.results import Caution
 
 if TYPE_CHECKING:
@@ -40,6 +43,8 @@ class SqliteSource:
         self._lock = threading.Lock()
         self._indexes: dict[int, MessageIndex] | None = None
         self._until_closed = ExitStack()
+        log = Path(f"{file.stored}-wal")
+        self._kept = None if log.exists() and log.stat().st_size else cache_of(file)
         try:
             self._connection = connect(file, self._until_closed)
             self._until_closed.callback(self._connection.close)
@@ -95,14 +100,24 @@ class SqliteSource:
     def index(self, channel_id: int) -> MessageIndex:
         """Tell where the messages of a channel lie: SQLite walks over all rows' heads once, for all channels."""
         if self._indexes is None:
-            with self._lock:
-                found = scan_rows(self._connection, self.path)
+            found = self._all_rows()
             self._indexes = self._sorted(found.columns)
             known = {channel.id for channel in self.channels}
             unknown = sum(len(index) for number, index in self._indexes.items() if number not in known)
             self.cautions = (*self.cautions, *about_rows(self.path, found, unknown))
         empty = np.zeros(0, dtype=np.int64)
         return self._indexes.get(channel_id, MessageIndex(empty, empty, empty))
+
+    def _all_rows(self) -> FoundRows:
+        """Return topic, time and number of every row, from the cache where they are there."""
+        kept = self._kept.get("rows") if self._kept is not None else None
+        if kept is not None and kept.keys() == {"columns"} and kept["columns"].dtype == np.int64:
+            return FoundRows(kept["columns"].reshape(-1, 3))
+        with self._lock:
+            found = scan_rows(self._connection, self.path)
+        if self._kept is not None and not (found.fault or found.strange):
+            self._kept.put("rows", {"columns": found.columns})
+        return found
 
     def _sorted(self, columns: np.ndarray) -> dict[int, MessageIndex]:
         topics = columns[:, 0]
@@ -127,6 +142,13 @@ class SqliteSource:
 
     def heads(self, index: MessageIndex, size: int) -> Heads:
         """Read the first bytes of many messages: short ones by query, long ones without their overflow pages."""
+        kept = heads_from(self._kept, index, size)
+        if kept is None:
+            kept = self._read_heads(index, size)
+            keep_heads(self._kept, index, size, kept)
+        return kept
+
+    def _read_heads(self, index: MessageIndex, size: int) -> Heads:
         rows = np.zeros((len(index), size), dtype=np.uint8)
         lengths = np.full(len(index), -1, dtype=np.int64)
         if not self._packed and len(index) > 1:
