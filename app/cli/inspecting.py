@@ -6,6 +6,7 @@ from typing import Annotated
 
 import tyro
 
+from app.cli.flags import Topics
 from calib_core.recordings import RecordingOptions
 
 __all__ = ["Info"]
@@ -19,7 +20,7 @@ class Info:
     """One or more .bag, .mcap, .db3 files or bag folders; several together are one recording."""
     json: bool = False
     """Print the same as JSON on stdout."""
-    topics: Annotated[RecordingOptions, tyro.conf.arg(name="")] = field(default_factory=RecordingOptions)
+    topics: Topics = field(default_factory=RecordingOptions)
 
     def run(self) -> int:
         """Print the description; return the exit code."""

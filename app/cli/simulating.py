@@ -2,10 +2,8 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
 
-import tyro
-
+from app.cli.flags import Simulation
 from app.cli.printing import progress_bar
 from calib_core.errors import InputError
 from calib_core.synthetic import Container, SimulationOptions
@@ -21,7 +19,7 @@ class Simulate:
     """Folder to write to; made when missing, and must be empty."""
     containers: tuple[Container, ...] = ("ros1",)
     """What to write: ros1 (radar.bag and camera.bag), mcap, db3."""
-    options: Annotated[SimulationOptions, tyro.conf.arg(name="")] = field(default_factory=SimulationOptions)
+    options: Simulation = field(default_factory=SimulationOptions)
 
     def run(self) -> int:
         """Write the recording; return the exit code."""

@@ -1,6 +1,5 @@
 """`cocalib solve`: a calibration without a browser."""
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import tyro
 
+from app.cli.flags import CameraPosition, MeasuredCamera, Options, Topics
 from app.cli.printing import explain_unsolvable, read_text, required_camera, seconds_text, write_whole
 from app.view import summary_lines
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
-from calib_core.options import CalibrationOptions, CameraPositionPrior
+from calib_core.options import CalibrationOptions
 from calib_core.recordings import RecordingOptions
 from calib_core.results import Calibration
 
@@ -33,20 +33,17 @@ class Solve:
 
     recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")] = ()
     """One or more .bag, .mcap, .db3 files or bag folders; several together are one recording."""
-    clicks: Path | None = None
+    clicks: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Clicks in this recording (cocalib/clicks-1 JSON)."""
-    pairs: Path | None = None
+    pairs: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Pairs of radar positions and pixels (cocalib/pairs-1 JSON), instead of a recording."""
-    camera: Path | None = None
+    camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
-    out: Path | None = None
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Where the calibration goes (cocalib/calibration-1 JSON); without it, to stdout."""
-    camera_position_m: tuple[float, float, float] | None = None
-    """Tape-measured camera position in the radar frame: forward, left, up [m]. The most valuable extra fact there is."""
-    camera_position_sigma_m: float = 0.01
-    """How well that position is known, per axis [m]."""
-    topics: Annotated[RecordingOptions, tyro.conf.arg(name="")] = field(default_factory=RecordingOptions)
-    options: Annotated[CalibrationOptions, tyro.conf.arg(name="")] = field(default_factory=CalibrationOptions)
+    measured: CameraPosition = field(default_factory=MeasuredCamera)
+    topics: Topics = field(default_factory=RecordingOptions)
+    options: Options = field(default_factory=CalibrationOptions)
 
     def run(self) -> int:
         """Solve, write the calibration, print its summary; return the exit code."""
@@ -69,7 +66,7 @@ class Solve:
         with open_recording(self.recording, self.topics) as recording:
             camera = required_camera(recording, self.camera)
             _require_inside(clicks, recording, camera, source=clicks_path)
-            outcome = solve_clicks(recording, clicks, camera, self._options())
+            outcome = solve_clicks(recording, clicks, camera, self.measured.over(self.options))
             if isinstance(outcome, Unsolvable):
                 return explain_unsolvable(outcome)
             return self._deliver(outcome, calibration_text(outcome, recording))
@@ -78,18 +75,10 @@ class Solve:
         from app.solving import calibration_text_of_pairs, solve_pairs
 
         text = read_text(path)
-        outcome = solve_pairs(text, source=str(path), options=self._options())
+        outcome = solve_pairs(text, source=str(path), options=self.measured.over(self.options))
         if isinstance(outcome, Unsolvable):
             return explain_unsolvable(outcome)
         return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name=path.name))
-
-    def _options(self) -> CalibrationOptions:
-        if self.camera_position_m is None:
-            return self.options
-        prior = CameraPositionPrior(self.camera_position_m, self.camera_position_sigma_m)
-        return dataclasses.replace(
-            self.options, solving=dataclasses.replace(self.options.solving, camera_position=prior)
-        )
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
         if self.out is None:

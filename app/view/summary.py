@@ -1,5 +1,6 @@
 """A calibration in a few lines of text, for the command line: the same figures as on the page."""
 
+from app.view.digits import plain
 from app.view.drawn import Figure
 from app.view.figures import metric_figures, pose_figures
 from app.view.wording import sentence
@@ -9,10 +10,15 @@ __all__ = ["summary_lines"]
 
 
 def summary_lines(calibration: Calibration) -> tuple[str, ...]:
-    """Return the figures, one per line and aligned, then the cautions with what to do about them."""
+    """Return the figures, one per line and aligned, then the pairs that disagree and the cautions."""
     figures = (*metric_figures(calibration), *pose_figures(calibration))
     width = max(len(figure.label) for figure in figures)
     lines = [_line(figure, width) for figure in figures]
+    lines += [
+        f"disagrees: {pair.id}: {plain(pair.distance_px)} px from its radar position"
+        for pair in calibration.pairs
+        if not pair.inlier and not pair.excluded
+    ]
     lines += [f"caution: {sentence(caution.message)} {sentence(caution.hint)}" for caution in calibration.cautions]
     lines += [f"unpaired: {row.id}: {sentence(row.reason)} {sentence(row.hint)}" for row in calibration.unpaired]
     return tuple(lines)

@@ -190,6 +190,9 @@ def test_an_unwritable_folder_is_named(cocalib: Cocalib, pairs_file: Callable[..
         (["check", "absent.json"], "absent.json"),
         (["info", "absent.bag"], "absent.bag"),
         (["open", "absent.bag", "--no-browser"], "absent.bag"),
+        (["demo", "--no-browser", "--port", "99999"], "65535"),
+        (["demo", "--no-browser", "--host", "203.0.113.5"], "203.0.113.5"),
+        (["demo", "--no-browser", "--token", ""], "empty"),
     ],
 )
 def test_wrong_usage_is_answered_in_words(cocalib: Cocalib, arguments: list[str], expected: str) -> None:

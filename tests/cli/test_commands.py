@@ -74,6 +74,18 @@ def test_a_measured_camera_position_pulls_the_answer_to_it(
     assert max(sigma["x_m"], sigma["y_m"], sigma["z_m"]) < 0.01
 
 
+def test_solve_names_the_pairs_that_disagree(
+    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path
+) -> None:
+    document = json.loads(clicks_file.read_text())
+    document["clicks"][5]["pixel_px"][1] += 60.0
+    clicks_file.write_text(json.dumps(document))
+    answer = cocalib("solve", made(), "--clicks", clicks_file, "--out", tmp_path / "calibration.json")
+    assert answer.code == 0
+    (line,) = (line for line in answer.out.splitlines() if line.startswith("disagrees: "))
+    assert line.startswith("disagrees: c5: ")
+
+
 def test_info_names_topics_rates_and_choices(cocalib: Cocalib, made: Callable[..., Path]) -> None:
     answer = cocalib("info", made())
     assert answer.code == 0
@@ -135,8 +147,43 @@ def test_version_is_printed(cocalib: Cocalib) -> None:
     assert cocalib("--version").out.startswith("cocalib ")
 
 
-@pytest.mark.parametrize("command", ["demo", "open", "info", "solve", "export", "check", "simulate"])
+@pytest.mark.parametrize("command", ["demo", "open", "info", "solve", "export", "check", "import", "simulate"])
 def test_help_shows_every_command(cocalib: Cocalib, command: str) -> None:
     answer = cocalib(command, "--help")
     assert answer.code == 0
     assert f"cocalib {command}" in answer.out
+
+
+def test_import_turns_another_stacks_file_into_a_calibration_again(
+    cocalib: Cocalib, calibration: Path, tmp_path: Path
+) -> None:
+    other, back = tmp_path / "calib.txt", tmp_path / "back.json"
+    assert cocalib("export", calibration, "--to", "kitti", "--out", other).code == 0
+    assert cocalib("import", other, "--out", back, "--camera", calibration).code == 0
+    checked = cocalib("check", back, "--against", calibration)
+    assert checked.code == 0
+    assert "0 deg apart" in checked.out
+
+
+def test_import_says_that_the_camera_is_missing(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+    cocalib("export", calibration, "--to", "tf2", "--out", tmp_path / "tf.sh")
+    refused = cocalib("import", tmp_path / "tf.sh", "--out", tmp_path / "back.json")
+    assert refused.code == 2
+    assert "--camera FILE" in refused.err
+    assert not (tmp_path / "back.json").exists()
+
+
+def test_export_poses_the_radar_in_the_kit(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+    posed = cocalib("export", calibration, "--to", "autoware", "--parent-from-radar", *"1.5 0 0.25 0 0 0 1".split())
+    assert "x: 1.5" in posed.out
+    (tmp_path / "kit.yaml").write_text(posed.out)
+    assert cocalib("check", tmp_path / "kit.yaml", "--against", calibration).code == 0
+    wrong = cocalib("export", calibration, "--to", "autoware", "--parent-from-radar", *"0 0 0 0 0 0 2".split())
+    assert wrong.code == 2
+    assert "qw last" in wrong.err
+
+
+def test_check_takes_the_camera_that_the_file_lacks(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+    cocalib("export", calibration, "--to", "matrix", "--out", tmp_path / "m.txt")
+    compared = cocalib("check", tmp_path / "m.txt", "--against", tmp_path / "m.txt", "--camera", calibration)
+    assert "at 20 m" in compared.out
