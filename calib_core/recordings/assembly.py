@@ -27,6 +27,7 @@ from calib_core.recordings.stamping import StampedTopic, read_stamps
 from calib_core.recordings.streams import ImageStream, RadarStream
 from calib_core.recordings.topics import Rhythm, Topic, TopicSummary, join_topics
 from calib_core.recordings.usages import Usage, usage_of
+from calib_core.recordings.video_stream import about_video, image_stream
 from calib_core.results import Caution
 
 __all__ = ["Assembly", "assemble"]
@@ -80,7 +81,7 @@ def assemble(
     diagnoses = _diagnoses(stamped, (radar, images), clocks, options)
     cautions.extend(about_clocks(list(diagnoses.values())))
     camera, about_camera = recorded_camera(selection.camera_info, images)
-    cautions.extend([*about_camera, *about_radar(radar), *about_claims(radar), *about_images(images)])
+    cautions.extend([*about_camera, *about_radar(radar), *about_claims(radar), *about_images(images), *about_video(images)])
     return Assembly(
         topics=tuple(_summary(topic, inventory, selection, stamps, diagnoses.get(topic.name)) for topic in topics),
         radar_topic=selection.radar.name if selection.radar else None,
@@ -174,7 +175,7 @@ def _image_stream(topic: Topic | None, inventory: Inventory, stamps: Mapping[str
     if topic is None:
         return None
     layouts = [ImageLayout(topic.definition(number), topic.name) for number in range(len(topic.parts))]
-    return ImageStream.build(topic, layouts, stamps[topic.name])
+    return image_stream(topic, layouts, stamps[topic.name])
 
 
 def _frame(topic: Topic | None) -> str:

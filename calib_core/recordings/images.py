@@ -1,7 +1,7 @@
 """Camera images: recorded JPEG and PNG passed through, raw pixels converted and encoded once."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -9,29 +9,15 @@ from calib_core.errors import MessageError
 from calib_core.recordings.decoding import Message, decode
 from calib_core.recordings.definitions import Definition
 from calib_core.recordings.jpeg import JPEG_MAGIC, PNG_MAGIC, mended_jpeg, png_size
+from calib_core.recordings.packets import Packet, packet_of, require_codec
+from calib_core.recordings.raw_pixels import READABLE, check_size, converted_pixels, raw_pixels, stretched
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-__all__ = ["EncodedImage", "ImageLayout", "is_compressed_image", "is_raw_image"]
+__all__ = ["EncodedImage", "ImageLayout", "encoded_pixels", "is_compressed_image", "is_packet", "is_raw_image"]
 
 _RAW_NAMES = frozenset({"height", "width", "encoding", "step", "data"})
 _COMPRESSED_NAMES = frozenset({"format", "data"})
-_MAX_PIXELS = 200_000_000
+_PACKET_NAMES = frozenset({"encoding", "pts", "flags", "data"})
 _JPEG_QUALITY = 95
-
-# encoding: bytes per pixel, name of OpenCV's conversion to BGR ("" for none)
-_ENCODINGS: "Mapping[str, tuple[int, str]]" = {
-    "bgr8": (3, ""), "8UC3": (3, ""), "rgb8": (3, "COLOR_RGB2BGR"),
-    "bgra8": (4, "COLOR_BGRA2BGR"), "8UC4": (4, "COLOR_BGRA2BGR"), "rgba8": (4, "COLOR_RGBA2BGR"),
-    "mono8": (1, "COLOR_GRAY2BGR"), "8UC1": (1, "COLOR_GRAY2BGR"),
-    "bayer_rggb8": (1, "COLOR_BayerRGGB2BGR"), "bayer_bggr8": (1, "COLOR_BayerBGGR2BGR"),
-    "bayer_gbrg8": (1, "COLOR_BayerGBRG2BGR"), "bayer_grbg8": (1, "COLOR_BayerGRBG2BGR"),
-    "yuv422": (2, "COLOR_YUV2BGR_UYVY"), "uyvy": (2, "COLOR_YUV2BGR_UYVY"),
-    "yuv422_yuy2": (2, "COLOR_YUV2BGR_YUYV"), "yuyv": (2, "COLOR_YUV2BGR_YUYV"),
-}  # fmt: skip
-_WORKS = "jpeg, png, mono8, rgb8, bgr8, rgba8, bgra8, bayer_*8, yuv422 and yuv422_yuy2 can be read"
-_DEPTH = ("16UC1", "32FC1", "mono16", "16SC1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +47,11 @@ def is_compressed_image(definition: Definition) -> bool:
     return definition.names >= _COMPRESSED_NAMES and not is_raw_image(definition)
 
 
+def is_packet(definition: Definition) -> bool:
+    """Tell whether a message is laid out as the packets of ffmpeg_image_transport: one frame of a video."""
+    return definition.names >= _PACKET_NAMES and not is_raw_image(definition)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageLayout:
     """Reads the images of one topic; errors begin with the topic's name."""
@@ -71,7 +62,7 @@ class ImageLayout:
     @property
     def compressed(self) -> bool:
         """Tell whether messages hold files rather than pixels."""
-        return is_compressed_image(self.definition)
+        return not is_raw_image(self.definition)
 
     def check(self, payload: bytes) -> None:
         """Refuse a topic by its first message, without decoding the picture.
@@ -79,7 +70,24 @@ class ImageLayout:
         Raises:
             MessageError: the encoding cannot be read; the text says which would.
         """
-        self.size_px(payload)
+        packet = self.packet(payload)
+        if packet is None:
+            self.size_px(payload)
+            return
+        try:
+            require_codec(packet)
+        except MessageError as error:
+            raise self._refused(str(error)) from error
+
+    def packet(self, payload: bytes) -> Packet | None:
+        """Return the piece of video a message holds; None for one that holds a picture of its own.
+
+        Raises:
+            MessageError: the message cannot be read.
+        """
+        if is_raw_image(self.definition):
+            return None
+        return packet_of(self._message(payload))
 
     def size_px(self, payload: bytes) -> tuple[int, int]:
         """Return width and height without decoding the picture.
@@ -91,7 +99,10 @@ class ImageLayout:
         if self.compressed:
             file = self._file(message)
             return file.width_px, file.height_px
-        pixels = self._pixels(message)
+        try:
+            pixels = raw_pixels(message)
+        except MessageError as error:
+            raise self._refused(str(error)) from error
         return pixels.shape[1], pixels.shape[0]
 
     def encoded(self, payload: bytes) -> EncodedImage:
@@ -103,15 +114,7 @@ class ImageLayout:
         message = self._message(payload)
         if self.compressed:
             return self._file(message)
-        import cv2
-
-        picture = self._converted(message)
-        settings = [
-            cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY,
-            cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
-        ]  # fmt: skip
-        _, data = cv2.imencode(".jpg", picture, settings)
-        return EncodedImage(data.tobytes(), "jpeg", picture.shape[1], picture.shape[0])
+        return encoded_pixels(self._converted(message))
 
     def picture(self, payload: bytes) -> np.ndarray:
         """Return the frame's pixels: uint8 (h, w, 3), blue first.
@@ -131,6 +134,12 @@ class ImageLayout:
             raise self._refused(f"a {file.format} picture of {len(file.data)} bytes is damaged; choose another frame")
         return np.asarray(picture)
 
+    def _converted(self, message: Message) -> np.ndarray:
+        try:
+            return converted_pixels(message)
+        except MessageError as error:
+            raise self._refused(str(error)) from error
+
     def _refused(self, why: str) -> MessageError:
         return MessageError(f"topic {self.topic}: {why}")
 
@@ -146,67 +155,46 @@ class ImageLayout:
         said = message.text("format")
         if "compressedDepth" in said:
             raise self._refused(
-                f"'{said}' is a depth image, not a picture; choose a colour or grey image topic: {_WORKS}"
+                f"'{said}' is a depth image, not a picture; choose a colour or grey image topic: {READABLE}"
             )
         try:
             if data.startswith(JPEG_MAGIC):
                 data, width, height = mended_jpeg(data)
-                self._limit(width, height)
+                check_size(width, height)
                 return EncodedImage(data, "jpeg", width, height)
             if data.startswith(PNG_MAGIC):
                 return self._png(data, said)
         except MessageError as error:
             raise self._refused(str(error)) from error
         kind = "qoi" if data.startswith(b"qoif") else said or data[:4].hex() or "nothing"
-        raise self._refused(f"the encoding '{kind}' cannot be read; record or convert it to jpeg or png: {_WORKS}")
+        raise self._refused(f"the encoding '{kind}' cannot be read; record or convert it to jpeg or png: {READABLE}")
 
     def _png(self, data: bytes, said: str) -> EncodedImage:
         width, height, bits, colour = png_size(data)
-        self._limit(width, height)
-        if bits == 16 and colour == 0:
+        check_size(width, height)
+        if bits != 16 or colour != 0:
+            return EncodedImage(data, "png", width, height)
+        if "16UC1" in said or "mono16" not in said:
             raise MessageError(
                 f"'{said}' is a PNG of 16-bit grey, a depth or raw image without an agreed brightness; "
-                f"convert it to mono8: {_WORKS}"
+                f"convert it to mono8: {READABLE}"
             )
-        return EncodedImage(data, "png", width, height)
-
-    def _limit(self, width: int, height: int) -> None:
-        if not 0 < width * height <= _MAX_PIXELS:
-            raise MessageError(
-                f"an image of {width} x {height} pixels is refused; 1 to {_MAX_PIXELS // 10**6} million can be read"
-            )
-
-    def _pixels(self, message: Message) -> np.ndarray:
-        """View raw pixels as (h, w, bytes per pixel), padding of rows left out."""
-        encoding = message.text("encoding")
-        if encoding not in _ENCODINGS:
-            hint = (
-                "a depth or 16-bit image has no agreed brightness; convert it to mono8: " if encoding in _DEPTH else ""
-            )
-            raise self._refused(f"the encoding '{encoding}' cannot be read; {hint}{_WORKS}")
-        height, width, step = message.whole("height"), message.whole("width"), message.whole("step")
-        try:
-            self._limit(width, height)
-        except MessageError as error:
-            raise self._refused(str(error)) from error
-        row = width * _ENCODINGS[encoding][0]
-        step = step or row
-        data = message.octets("data")
-        if step < row or len(data) < step * (height - 1) + row:
-            raise self._refused(
-                f"an image of {width} x {height} {encoding} pixels with rows of {step} bytes has {len(data)} bytes of data; "
-                f"{step * (height - 1) + row} are needed with rows of at least {row}: the message is damaged"
-            )
-        rows = np.ndarray((height, row), np.uint8, np.ascontiguousarray(data), 0, (step, 1))
-        return rows.reshape(height, width, -1)
-
-    def _converted(self, message: Message) -> np.ndarray:
         import cv2
 
-        pixels = self._pixels(message)
-        conversion = _ENCODINGS[message.text("encoding")][1]
-        if not conversion:
-            return np.ascontiguousarray(pixels)
-        if conversion.startswith("COLOR_YUV") and pixels.shape[1] % 2:
-            raise self._refused(f"a 4:2:2 image must have an even width, not {pixels.shape[1]}")
-        return np.asarray(cv2.cvtColor(np.ascontiguousarray(pixels), getattr(cv2, conversion)))
+        pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+        if pixels is None:
+            raise MessageError(f"a png picture of {len(data)} bytes is damaged; choose another frame")
+        eight = cv2.imencode(".png", stretched(np.asarray(pixels)))[1].tobytes()
+        return EncodedImage(eight, "png", width, height)
+
+
+def encoded_pixels(picture: np.ndarray) -> EncodedImage:
+    """Encode pixels as JPEG, fine enough to click in."""
+    import cv2
+
+    settings = [
+        cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY,
+        cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
+    ]  # fmt: skip
+    _, data = cv2.imencode(".jpg", picture, settings)
+    return EncodedImage(data.tobytes(), "jpeg", picture.shape[1], picture.shape[0])

@@ -112,16 +112,64 @@ def test_yuv_images_give_the_right_colours(ros1, write, encoding, order):
     np.testing.assert_allclose([blue, green, red], expected, atol=2)
 
 
+@pytest.mark.parametrize("big", [False, True])
+@pytest.mark.parametrize("bits", [10, 12, 16])
+def test_grey_of_16_bits_is_stretched_whatever_the_camera_fills(ros1, write, big, bits) -> None:
+    ramp = np.linspace(0, 2**bits - 1, 64 * 64).astype(np.uint16).reshape(64, 64)
+    rows = ramp.astype(">u2" if big else "<u2").view(np.uint8)
+    padded = np.pad(rows, ((0, 0), (0, 6)))
+    message = ros1.image(START_NS, padded, "mono16", width=64, is_bigendian=int(big))
+    with opened(write, ros1, message) as recording:
+        found = recording.image(0)
+    assert found.shape == (64, 64, 3)
+    np.testing.assert_allclose(found[:, :, 0], np.linspace(0, 255, 64 * 64).reshape(64, 64), atol=1.6)
+    np.testing.assert_array_equal(found[:, :, 0], found[:, :, 2])
+
+
+@pytest.mark.parametrize(
+    ("encoding", "values"),
+    [
+        ("rgb16", (200, 120, 40)),
+        ("bgr16", (40, 120, 200)),
+        ("rgba16", (200, 120, 40, 7)),
+        ("bgra16", (40, 120, 200, 7)),
+    ],
+)
+def test_colour_of_16_bits_keeps_its_order_of_channels(ros1, write, encoding, values) -> None:
+    pixels16 = np.zeros((16, 16, len(values)), dtype="<u2")
+    pixels16[:8] = np.array(values) * 256
+    message = ros1.image(START_NS, pixels16.reshape(16, -1).view(np.uint8), encoding, width=16)
+    with opened(write, ros1, message) as recording:
+        blue, green, red = recording.image(0)[2, 2].astype(int)
+    assert blue < green < red == 255
+
+
+@pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
+def test_bayer_patterns_of_16_bits_give_the_right_colours(ros1, write, pattern) -> None:
+    colour = {"r": 4095, "g": 2048, "b": 0}
+    tile = np.array([[colour[pattern[0]], colour[pattern[1]]], [colour[pattern[2]], colour[pattern[3]]]], dtype="<u2")
+    rows = np.tile(tile, (12, 16)).view(np.uint8)
+    with opened(write, ros1, ros1.image(START_NS, rows, f"bayer_{pattern}16", width=32)) as recording:
+        np.testing.assert_array_equal(recording.image(0)[4:-4, 4:-4].reshape(-1, 3), [[0, 128, 255]] * (16 * 24))
+
+
+def test_a_png_of_16_bit_grey_that_says_mono16_is_stretched(ros, write) -> None:
+    ramp = np.linspace(0, 4095, 32 * 32).astype(np.uint16).reshape(32, 32)
+    data = cv2.imencode(".png", ramp)[1].tobytes()
+    with opened(write, ros, ros.compressed(START_NS, data, "mono16; png compressed ")) as recording:
+        assert recording.image_bytes(0).format == "png"
+        np.testing.assert_allclose(recording.image(0)[:, :, 1], ramp / 4095 * 255, atol=1.6)
+
+
 @pytest.mark.parametrize(
     ("encoding", "words"),
     [
         (
             "16UC1",
-            "the encoding '16UC1' cannot be read; a depth or 16-bit image has no agreed brightness; convert it to mono8",
+            "the encoding '16UC1' cannot be read; a depth image has no agreed brightness; convert it to mono8",
         ),
-        ("mono16", "convert it to mono8"),
-        ("32FC1", "a depth or 16-bit image"),
-        ("bayer_rggb16", "'bayer_rggb16' cannot be read; jpeg, png, mono8"),
+        ("32FC1", "a depth image has no agreed brightness"),
+        ("bayer_rggb12", "'bayer_rggb12' cannot be read; jpeg, png, mono8"),
         ("nonsense", "'nonsense' cannot be read; jpeg, png, mono8"),
     ],
 )
