@@ -10,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from app.option_changes import checked_options
 from app.resources import version
 from app.session import Outcome, Solved
@@ -25,9 +27,10 @@ from calib_core.interchange import (
     read_pairs,
 )
 from calib_core.interchange import calibration_text as interchange_text
-from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
+from calib_core.measurements import Pair, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.results import Calibration
+from calib_core.pairing import pair_clicks
+from calib_core.results import Calibration, PairResult
 
 __all__ = [
     "RadarSource",
@@ -36,6 +39,7 @@ __all__ = [
     "calibration_text",
     "calibration_text_of_pairs",
     "camera_for",
+    "check_clicks",
     "half_window_s",
     "solve_clicks",
     "solve_pairs",
@@ -121,6 +125,31 @@ def solve_clicks(
     times = sorted({click.image_time for click in clicks})
     scans = recording.radar_scans_around(times, half_window_s(options))
     return calibrate(clicks, scans, camera, options)
+
+
+def check_clicks(
+    recording: RadarSource, clicks: Sequence[ReflectorClick], reference: Calibration, options: CalibrationOptions
+) -> tuple[PairResult, ...]:
+    """Look at clicks under a calibration that they had no part in: each is marked as excluded.
+
+    Of a click's radar positions the one that comes out nearest to it is taken, which flatters the calibration a little.
+
+    Raises:
+        CalibrationError: the recording cannot be read where the clicks lie.
+    """
+    times = sorted({click.image_time for click in clicks})
+    scans = recording.radar_scans_around(times, half_window_s(options))
+    return tuple(_under(pair, reference) for pair in pair_clicks(clicks, scans, options).pairs)
+
+
+def _under(pair: Pair, reference: Calibration) -> PairResult:
+    points_radar_m = np.array([candidate.position_radar_m for candidate in pair.candidates])
+    pixels_px = reference.reproject(points_radar_m)
+    distances_px = np.linalg.norm(pixels_px - pair.pixel_px, axis=1)
+    nearest = int(np.argmin(np.where(np.isfinite(distances_px), distances_px, np.inf)))
+    return PairResult(
+        pair.id, pair.pixel_px, pixels_px[nearest], points_radar_m[nearest], False, True, image_time=pair.image_time
+    )
 
 
 def half_window_s(options: CalibrationOptions) -> float:
@@ -214,9 +243,10 @@ class _Request:
 class SolverWorker:
     """Solves in one thread of its own; of several requests waiting, only the newest is worked on."""
 
-    def __init__(self, recording: RadarSource, camera: Camera | None) -> None:
+    def __init__(self, recording: RadarSource, camera: Camera | None, reference: Calibration | None = None) -> None:
         self._recording = recording
         self._camera = camera
+        self._reference = reference
         self._lock = threading.Lock()
         self._newest_revision = -1
         self._closed = False
@@ -252,20 +282,24 @@ class SolverWorker:
             self._newest_revision += 1
         self._executor.shutdown(wait=True, cancel_futures=True)
 
-    def _answer(self, request: _Request) -> Outcome | None:
+    def _answer(self, request: _Request) -> Solved | None:
         if request.revision != self._newest_revision:
             return None
-        return solve_clicks(self._recording, request.clicks, self._camera, request.options)
+        outcome = solve_clicks(self._recording, request.clicks, self._camera, request.options)
+        checked: tuple[PairResult, ...] = ()
+        if isinstance(outcome, Unsolvable) and self._reference is not None:
+            checked = check_clicks(self._recording, request.clicks, self._reference, request.options)
+        return Solved(request.revision, outcome, checked)
 
 
-def _deliver(request: _Request, future: "Future[Outcome | None]") -> None:
+def _deliver(request: _Request, future: "Future[Solved | None]") -> None:
     """Hand the answer over. A failure is an answer too: it is shown where the person looks, and logged if it is ours."""
     if future.cancelled():
         return
     error = future.exception()
-    outcome = future.result() if error is None else _failure(error)
-    if outcome is not None:
-        request.when_done(Solved(request.revision, outcome))
+    solved = future.result() if error is None else Solved(request.revision, _failure(error))
+    if solved is not None:
+        request.when_done(solved)
 
 
 def _failure(error: BaseException) -> Unsolvable:

@@ -9,7 +9,7 @@ from typing import Protocol, TypeAlias
 from app.session import ClicksImported, History, RecordingFacts, Redo, Session, Solved, Step, Undo, advance, settled
 from app.session_file import Restored, open_session_file
 from app.solving import RecordingSource, SolverWorker
-from app.view import View, view
+from app.view import Reference, View, view
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import read_clicks, write_clicks
@@ -56,11 +56,20 @@ class Workspace:
     Attributes:
         facts: the recording's frames.
         restored: what was found in the session's folder at the start.
+        reference: a calibration to look at until the clicks give one of their own; None without one.
     """
 
-    def __init__(self, facts: RecordingFacts, restored: Restored, journal: Journal, solver: Solver) -> None:
+    def __init__(
+        self,
+        facts: RecordingFacts,
+        restored: Restored,
+        journal: Journal,
+        solver: Solver,
+        reference: Reference | None = None,
+    ) -> None:
         self.facts = facts
         self.restored = restored
+        self.reference = reference
         self._history = restored.history
         self._journal = journal
         self._solver = solver
@@ -83,7 +92,7 @@ class Workspace:
     @property
     def view(self) -> View:
         """What there is to draw now."""
-        return view(self._history, self.facts)
+        return view(self._history, self.facts, self.reference)
 
     def dispatch(self, step: Step) -> None:
         """Take one step: apply it, journal it, then tell the subscribers.
@@ -101,7 +110,7 @@ class Workspace:
             if not isinstance(step, Solved):
                 self._journal.append(step, after)
             self._history = after
-            self._untold.append((view(after, self.facts), self._subscribers))
+            self._untold.append((view(after, self.facts, self.reference), self._subscribers))
         self._ask_for_answer(after.present)
         self._tell()
 
@@ -121,7 +130,7 @@ class Workspace:
         """
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
-            self._untold.append((view(self._history, self.facts), (subscriber,)))
+            self._untold.append((view(self._history, self.facts, self.reference), (subscriber,)))
         self._tell()
 
         def end() -> None:
@@ -192,7 +201,14 @@ def recording_facts(recording: RecordingSource, name: str) -> RecordingFacts:
     return RecordingFacts(name, recording.image_times, picture.width_px, picture.height_px)
 
 
-def open_workspace(recording: RecordingSource, *, camera: Camera | None, session_folder: Path, name: str) -> Workspace:
+def open_workspace(
+    recording: RecordingSource,
+    *,
+    camera: Camera | None,
+    session_folder: Path,
+    name: str,
+    reference: Reference | None = None,
+) -> Workspace:
     """Open or begin the session of a recording, with a solver beside it.
 
     Args:
@@ -200,6 +216,7 @@ def open_workspace(recording: RecordingSource, *, camera: Camera | None, session
         camera: the intrinsics to solve with; None where there are none.
         session_folder: where the session is kept.
         name: what to call the recording.
+        reference: a calibration to look at and to compare with; None without one.
 
     Raises:
         InputError: the recording has no frames.
@@ -207,4 +224,5 @@ def open_workspace(recording: RecordingSource, *, camera: Camera | None, session
     """
     facts = recording_facts(recording, name)
     session_file = open_session_file(session_folder, facts)
-    return Workspace(facts, session_file.restored, session_file, SolverWorker(recording, camera))
+    solver = SolverWorker(recording, camera, reference.calibration if reference else None)
+    return Workspace(facts, session_file.restored, session_file, solver, reference)

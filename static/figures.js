@@ -19,12 +19,15 @@ const EMPTY = [
 /** Cautions that the person has opened stay open. @type {Set<string>} */
 const openCodes = new Set();
 export const poseTable = make("table", "", []);
+const poseHead = make("div", "pose-head", "");
+const apartTable = make("table", "", []);
+const apart = make("div", "apart", []);
 const adviceLine = make("p", "advice", "");
 let cautionText = "";
 
 export function startFigures() {
   const pose = make("div", "pose", [poseTable, adviceLine]);
-  posePage.append(pose);
+  posePage.append(poseHead, pose, apart);
   on(["view", "recording"], draw);
 }
 
@@ -36,7 +39,17 @@ function draw() {
   figures.replaceChildren(...shown.map(cell));
   poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Appears with the first calibration.")])]));
   adviceLine.textContent = view.advice?.words ?? "";
+  drawReference(view);
   drawCautions([...(state.recording?.cautions ?? []), ...view.cautions]);
+}
+
+/** Where the pose comes from while it is a file's, and how far the solved one lies from it. @param {import("./messages.js").View} view */
+function drawReference(view) {
+  poseHead.hidden = !view.reference || view.has_calibration;
+  poseHead.textContent = `From ${view.reference}, not from the clicks`;
+  apart.hidden = view.comparison.length === 0;
+  apart.replaceChildren(make("div", "pose-head", `Solved, against ${view.reference}`), apartTable);
+  apartTable.replaceChildren(...view.comparison.map(row));
 }
 
 /** @param {Omit<Figure, "level"> & {level: string}} figure */

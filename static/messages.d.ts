@@ -140,6 +140,8 @@ export interface View {
   options: CalibrationOptions;
   residual_limit_px: number | null;
   advice: Advice | null;
+  reference: string;
+  comparison: Figure[];
 }
 
 /** Many stamps, as two columns. */

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import tyro
 
 from app.cli.exporting import Check, Export
+from app.cli.importing import Import
 from app.cli.inspecting import Info
 from app.cli.opening import Demo, Open
 from app.cli.printing import refuse
@@ -28,6 +29,7 @@ _Command = (
     | Annotated[Solve, tyro.conf.subcommand("solve")]
     | Annotated[Export, tyro.conf.subcommand("export")]
     | Annotated[Check, tyro.conf.subcommand("check")]
+    | Annotated[Import, tyro.conf.subcommand("import")]
     | Annotated[Simulate, tyro.conf.subcommand("simulate")]
 )
 

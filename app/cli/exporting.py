@@ -23,10 +23,14 @@ class Export:
     """The format: tf2, urdf, ...; "list" names them all."""
     out: Path | None = None
     """Where it goes, a file or a folder; without it, text goes to stdout."""
+    parent_from_radar: Annotated[
+        tuple[float, float, float, float, float, float, float] | None, tyro.conf.arg(metavar="X Y Z QX QY QZ QW")
+    ] = None
+    """Pose of the radar in the third frame of autoware (kit) or nuscenes (ego): metres, then the quaternion, w last."""
 
     def run(self) -> int:
         """Write the export; return the exit code."""
-        from calib_core.interchange import FORMATS, ExportBytes, export, format_named, read_calibration
+        from calib_core.interchange import FORMATS, ExportBytes, export, format_named, parent_pose, read_calibration
 
         if self.to == "list":
             width = max(len(known.name) for known in FORMATS)
@@ -36,7 +40,8 @@ class Export:
         if len(self.calibration) != 1:
             raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
         path = self.calibration[0]
-        written = export(read_calibration(read_text(path), source=str(path)), self.to)
+        parent = parent_pose(self.parent_from_radar) if self.parent_from_radar else None
+        written = export(read_calibration(read_text(path), source=str(path)), self.to, parent_from_radar=parent)
         for note in written.notes:
             print(f"note: {note}", file=sys.stderr)
         if self.out is not None:
@@ -58,12 +63,15 @@ class Check:
     """A calibration in any format that export writes."""
     against: Path | None = None
     """Another one to compare with: in degrees, centimetres, and pixels at 5, 20 and 60 m."""
+    camera: Path | None = None
+    """Intrinsics, where the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
 
     def run(self) -> int:
         """Print the findings; return 0 when all is well, 1 when something is wrong."""
-        from calib_core.interchange import check, read_any_file
+        from calib_core.interchange import check, read_any_file, read_camera_file
 
         other = read_any_file(self.against) if self.against else None
-        report = check(read_any_file(self.calibration), against=other)
+        camera = read_camera_file(self.camera) if self.camera else None
+        report = check(read_any_file(self.calibration), against=other, camera=camera)
         print("\n".join(report.lines()))
         return 0 if report.ok else 1

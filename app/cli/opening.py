@@ -9,9 +9,11 @@ from typing import Annotated
 
 import tyro
 
+from app.cli.importing import camera_in, reference_from
 from app.cli.printing import read_text, required_camera
+from calib_core.camera import Camera
 from calib_core.options import CalibrationOptions
-from calib_core.recordings import RecordingOptions
+from calib_core.recordings import Recording, RecordingOptions
 
 __all__ = ["Demo", "Open"]
 
@@ -63,6 +65,8 @@ class Open:
     """One or more .bag, .mcap, .db3 files or bag folders; several together are one recording."""
     camera: Path | None = None
     """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    calibration: Path | None = None
+    """A calibration to look at, in any format: shown until the clicks give one of their own, then compared with it."""
     clicks: Path | None = None
     """Clicks that a new session begins with (cocalib/clicks-1 JSON)."""
     session: Path | None = None
@@ -87,6 +91,7 @@ class Open:
             name=paths[0].name,
             camera_file=self.camera,
             clicks_file=self.clicks,
+            calibration_file=self.calibration,
             topics=self.topics,
             options=self.options,
         )
@@ -101,6 +106,7 @@ def _serve(
     name: str,
     camera_file: Path | None = None,
     clicks_file: Path | None = None,
+    calibration_file: Path | None = None,
     topics: RecordingOptions | None = None,
     options: CalibrationOptions | None = None,
 ) -> int:
@@ -119,10 +125,11 @@ def _serve(
     check_installation()
     with ExitStack() as stack:
         recording = stack.enter_context(open_recording(paths, topics or RecordingOptions()))
-        camera = required_camera(recording, camera_file)
+        camera = _camera(recording, camera_file, calibration_file)
+        reference = reference_from(calibration_file, camera) if calibration_file else None
         if fresh and (kept := set_aside(session)) is not None:
             print(f"The session of the last time is kept in {kept}")
-        workspace = open_workspace(recording, camera=camera, session_folder=session, name=name)
+        workspace = open_workspace(recording, camera=camera, session_folder=session, name=name, reference=reference)
         stack.callback(workspace.close)
         if options is not None and options != CalibrationOptions():
             workspace.dispatch(OptionsChanged(options))
@@ -132,3 +139,17 @@ def _serve(
             print(f"The session goes on as it was; {clicks_file} was not taken in again (--fresh begins anew)")
         serve(workspace, recording, ServerOptions(**dataclasses.asdict(serving)))
     return 0
+
+
+def _camera(recording: Recording, camera_file: Path | None, calibration_file: Path | None) -> Camera:
+    """Return the intrinsics: the file's, else the recording's, else those in the calibration that is to be looked at.
+
+    Raises:
+        InputError: there are none.
+    """
+    if camera_file is None and calibration_file is not None and recording.camera() is None:
+        picture = recording.image_bytes(0)
+        found = camera_in(calibration_file, picture.width_px, picture.height_px)
+        if found is not None:
+            return found
+    return required_camera(recording, camera_file)

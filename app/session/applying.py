@@ -38,7 +38,7 @@ def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
     if isinstance(event, Solved):
         if event.revision != session.revision:
             return session
-        return replace(session, outcome=event.outcome, outcome_revision=event.revision)
+        return replace(session, outcome=event.outcome, outcome_revision=event.revision, checked=event.checked)
     changed = _changed(event, session, facts)
     if changed.clicks == session.clicks and changed.options == session.options:
         return session
@@ -91,7 +91,7 @@ def _options_edited(event: OptionsEdited, session: Session, facts: RecordingFact
 
 @_changed.register
 def _cleared(event: Cleared, session: Session, facts: RecordingFacts) -> Session:
-    return replace(session, clicks=(), outcome=None, outcome_revision=-1)
+    return replace(session, clicks=(), outcome=None, outcome_revision=-1, checked=())
 
 
 @_changed.register

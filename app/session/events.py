@@ -7,6 +7,7 @@ from app.option_changes import OptionChange
 from app.session.state import Outcome
 from calib_core.measurements import ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
+from calib_core.results import PairResult
 
 __all__ = [
     "Cleared",
@@ -90,6 +91,7 @@ class Solved:
 
     revision: int
     outcome: Outcome
+    checked: tuple[PairResult, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import numpy as np
 from calib_core.arrays import TimesNs, frozen_array
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable, time_from_parts, time_parts
 from calib_core.options import CalibrationOptions
-from calib_core.results import Calibration
+from calib_core.results import Calibration, PairResult
 
 __all__ = ["Outcome", "RecordingFacts", "Session", "Stamp"]
 
@@ -73,6 +73,7 @@ class Session:
         revision: grows by one with every change of clicks or options, undo and redo included.
         outcome: the newest answer; it stays while a newer one is being worked out.
         outcome_revision: the revision that `outcome` answers; -1 before the first.
+        checked: while there is no calibration, the clicks under the one that was given for review.
     """
 
     clicks: tuple[ReflectorClick, ...] = ()
@@ -81,6 +82,7 @@ class Session:
     revision: int = 0
     outcome: Outcome | None = None
     outcome_revision: int = -1
+    checked: tuple[PairResult, ...] = ()
 
     @property
     def is_solved(self) -> bool:

@@ -2,6 +2,7 @@
 
 from app.view.drawing import view
 from app.view.drawn import Advice, CautionRow, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View
+from app.view.reference import Reference, shown_calibration
 from app.view.summary import summary_lines
 from app.view.wording import sentence
 
@@ -13,9 +14,11 @@ __all__ = [
     "Ellipse",
     "Figure",
     "Level",
+    "Reference",
     "Stage",
     "View",
     "sentence",
+    "shown_calibration",
     "summary_lines",
     "view",
 ]

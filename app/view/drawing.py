@@ -4,6 +4,7 @@ from app.session import History, RecordingFacts, Session
 from app.view.advice import advice_for
 from app.view.drawn import CautionRow, Stage, View
 from app.view.figures import metric_figures, pose_figures, residual_limit_px
+from app.view.reference import Reference, comparison_figures, reference_words, shown_calibration
 from app.view.rows import click_rows
 from app.view.wording import sentence
 from calib_core.measurements import Unpaired, Unsolvable
@@ -15,18 +16,20 @@ MIN_PLACEMENTS = 4
 """Fewer pairs than this give no pose."""
 
 
-def view(history: History, facts: RecordingFacts) -> View:
+def view(history: History, facts: RecordingFacts, reference: Reference | None = None) -> View:
     """Say everything there is to draw about the session of now.
 
     Args:
         history: the session with what can be undone and redone.
         facts: the recording's frames.
+        reference: a calibration to look at; None without one.
     """
     session = history.present
     outcome = session.outcome
     calibration = outcome if isinstance(outcome, Calibration) else None
+    shown = shown_calibration(session, reference)
     stage = _stage(session)
-    status, hint = _words(session, stage)
+    status, hint = _words(session, stage, reference)
     return View(
         revision=session.revision,
         stage=stage,
@@ -40,11 +43,13 @@ def view(history: History, facts: RecordingFacts) -> View:
         method=session.options.method,
         clicks=click_rows(session, facts),
         metrics=metric_figures(calibration) if calibration else (),
-        pose=pose_figures(calibration) if calibration else (),
+        pose=pose_figures(shown) if shown else (),
         cautions=_cautions(calibration) if calibration else (),
         options=session.options,
         residual_limit_px=residual_limit_px(calibration) if calibration else None,
         advice=advice_for(calibration) if calibration else None,
+        reference=reference.name if reference else "",
+        comparison=comparison_figures(reference, calibration) if reference and calibration else (),
     )
 
 
@@ -77,9 +82,11 @@ def _waits_for_clicks(session: Session) -> bool:
     return _missing(session) > 0 and not blocked
 
 
-def _words(session: Session, stage: Stage) -> tuple[str, str]:
+def _words(session: Session, stage: Stage, reference: Reference | None) -> tuple[str, str]:
     """Return the status line and the next thing to do."""
     missing, outcome = _missing(session), session.outcome
+    if reference is not None and _waits_for_clicks(session) and not isinstance(outcome, Calibration):
+        return reference_words(session, reference), _still_missing(session, missing)
     if _waits_for_clicks(session):
         return f"{missing} more placement{'s' if missing > 1 else ''} needed", _next_click(session)
     if stage == "solving":
@@ -89,6 +96,13 @@ def _words(session: Session, stage: Stage) -> tuple[str, str]:
     if isinstance(outcome, Calibration):
         return _agreement(outcome), _next_step(outcome)
     return "", ""
+
+
+def _still_missing(session: Session, missing: int) -> str:
+    """Say what a calibration of one's own takes beyond the reference, once there is a click."""
+    if _unpaired(session):
+        return _next_click(session)
+    return f"{missing} more placement{'s' if missing > 1 else ''} for a new calibration." if session.clicks else ""
 
 
 def _next_step(calibration: Calibration) -> str:

@@ -148,6 +148,8 @@ class View:
         options: as they are now; changes are sent as a part of this tree.
         residual_limit_px: residuals beyond this deserve a look; None without a calibration.
         advice: where to put the reflector next; None without a calibration.
+        reference: file name of the calibration that was given to look at; "" without one.
+        comparison: how far the solved calibration lies from it; empty without either.
     """
 
     revision: int
@@ -167,3 +169,5 @@ class View:
     options: CalibrationOptions
     residual_limit_px: float | None
     advice: Advice | None = None
+    reference: str = ""
+    comparison: tuple[Figure, ...] = ()

@@ -21,7 +21,7 @@ _CHI2_95_2D = 5.991464547107979  # 95 % quantile of chi-squared with 2 degrees o
 def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
     """Return one row per click, in order of image time."""
     calibration = session.outcome if isinstance(session.outcome, Calibration) else None
-    pairs = {pair.id: pair for pair in calibration.pairs} if calibration else {}
+    pairs = {pair.id: pair for pair in (calibration.pairs if calibration else session.checked)}
     unpaired = {row.id: row for row in session.outcome.unpaired} if session.outcome else {}
     return tuple(_row(click, facts, pairs, unpaired) for click in session.clicks)
 

@@ -162,7 +162,9 @@ class Channel:
         stamp = TimeNs(int(self._hub.recording.image_times[cursor.index]))
         session = self._hub.workspace.session
         scan = await self._scan(stamp)
-        overlay = overlay_of(cursor.index, session, scan, placements_at(self._hub.survey, stamp))
+        overlay = overlay_of(
+            cursor.index, session, scan, placements_at(self._hub.survey, stamp), self._hub.workspace.reference
+        )
         self.outbox.put(encode(overlay), kind="overlay")
 
     async def _draw_space(self, cursor: Cursor) -> None:
@@ -179,6 +181,7 @@ class Channel:
             window=await self._window(cursor),
             picture=await self._thumbnail(cursor.index),
             camera=hub.camera,
+            reference=hub.workspace.reference,
         )
         await asyncio.get_running_loop().run_in_executor(hub.executor, self.scene.show, sight)
         if cursor.playing:

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from app.session import Session
+from app.view import Reference, shown_calibration
 from app.web.messages import Overlay, OverlayReturn
 from calib_core.arrays import Flags, Points3
 from calib_core.gating import static_returns
@@ -48,7 +49,13 @@ def still_returns(scan: RadarScan, options: GatingOptions) -> Flags:
     return ~(np.abs(scan.doppler_mps) > options.max_speed_mps)
 
 
-def overlay_of(index: int, session: Session, scan: RadarScan | None, placements: Sequence[Placement]) -> Overlay:
+def overlay_of(
+    index: int,
+    session: Session,
+    scan: RadarScan | None,
+    placements: Sequence[Placement],
+    reference: Reference | None = None,
+) -> Overlay:
     """Carry the returns of a scan, and the placements of the moment, into a frame.
 
     Args:
@@ -56,9 +63,10 @@ def overlay_of(index: int, session: Session, scan: RadarScan | None, placements:
         session: its newest calibration is used.
         scan: the nearest one; None when there is none.
         placements: those that the frame lies in.
+        reference: drawn with as long as the session has no calibration of its own.
     """
-    calibration = session.outcome
-    if not isinstance(calibration, Calibration):
+    calibration = shown_calibration(session, reference)
+    if calibration is None:
         return Overlay(index, session.revision, None, ())
     returns = () if scan is None else _returns(calibration, scan, session.options.gating)
     return Overlay(index, session.revision, returns, _guesses(calibration, placements))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from app.session import Session
-from app.view import View
+from app.view import Reference, View, shown_calibration
 from app.web.frames import Frame
 from app.web.radar_sight import still_returns
 from app.web.scene_shapes import (
@@ -60,6 +60,7 @@ class Sight:
         window: (n, 3) still returns around the selected click [m].
         picture: a thumbnail of the frame; None when it cannot be read.
         camera: the recording's intrinsics, for the time before a calibration.
+        reference: a calibration to look at until there is one; None without one.
     """
 
     session: Session
@@ -69,6 +70,7 @@ class Sight:
     window: Points3
     picture: Frame | None
     camera: Camera | None
+    reference: Reference | None = None
 
 
 class TabScene:
@@ -143,12 +145,12 @@ class TabScene:
         if outcome is self._posed:
             return
         self._posed = outcome
-        calibration = outcome if isinstance(outcome, Calibration) else None
+        calibration = shown_calibration(sight.session, sight.reference)
         camera = calibration.camera if calibration else sight.camera
         camera_from_radar = calibration.camera_from_radar if calibration else nominal_camera_from_radar()
         self._radar_from_camera = camera_from_radar.inverse()
         _place(self._frustum, self._radar_from_camera)
-        self._frustum.color = _LIT if calibration else _DIM
+        self._frustum.color = _LIT if isinstance(outcome, Calibration) else _DIM
         if camera is not None:
             self._frustum.fov = vertical_field_of_view_rad(camera)
             self._frustum.aspect = camera.width_px / camera.height_px

@@ -1,5 +1,6 @@
 """Files in and out: clicks, pairs, cameras, calibrations, and every format others read."""
 
+from calib_core.interchange.adopting import adopt, adopted_calibration
 from calib_core.interchange.calibration_file import (
     CalibrationFile,
     FrameNames,
@@ -36,6 +37,8 @@ __all__ = [
     "Provenance",
     "StatedCheckPoint",
     "WrittenPose",
+    "adopt",
+    "adopted_calibration",
     "calibration_text",
     "camera_info_text",
     "check",

@@ -95,7 +95,7 @@ def check(
         findings += _by_its_pairs(imported)
     if all(finding.code in ("contradiction", "check-point-unused") for finding in findings) or against is None:
         findings += _by_plausibility(imported.pose, verified=any(finding.level == "good" for finding in findings))
-    comparison = compare(against, imported) if against is not None else None
+    comparison = compare(against, imported, camera=camera) if against is not None else None
     return CheckReport(imported, tuple(findings), comparison)
 
 

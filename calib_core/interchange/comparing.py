@@ -80,8 +80,14 @@ def _plus_minus(sigma: float, unit: str) -> str:
     return "" if np.isnan(sigma) else f" (standard deviation {sigma:.2g} {unit})"
 
 
-def compare(a: ImportedCalibration, b: ImportedCalibration) -> Comparison:
-    """Compare two calibrations of the same sensors; the covariances of both add up, as for independent data."""
+def compare(a: ImportedCalibration, b: ImportedCalibration, *, camera: Camera | None = None) -> Comparison:
+    """Compare two calibrations of the same sensors; the covariances of both add up, as for independent data.
+
+    Args:
+        a: one of them.
+        b: the other.
+        camera: the intrinsics, where neither has any.
+    """
     a_pose, b_pose = a.camera_from_radar, b.camera_from_radar
     error = b_pose.error_from(a_pose)
     covariance = _summed_covariance(a, b)
@@ -89,7 +95,7 @@ def compare(a: ImportedCalibration, b: ImportedCalibration) -> Comparison:
     position_jacobian = -a_pose.rotation.T @ np.hstack([np.eye(3), skew(a_pose.translation_m)])
     moved_m = b_position_m - a_position_m
     chi2, p_value = _chi2(error, covariance)
-    camera = a.camera or b.camera
+    camera = a.camera or b.camera or camera
     return Comparison(
         rotation_deg=float(np.degrees(np.linalg.norm(error[3:]))),
         rotation_sigma_deg=float(np.degrees(_sigma_along(error[3:], covariance[3:, 3:]))),

@@ -32,7 +32,7 @@ KITTI_NOTES = (
 )
 NUSCENES_NOTES = (
     "translation and rotation (w x y z) are the sensor's pose in the ego frame, camera optical; "
-    "the radar's frame is taken for the ego frame (in Python, parent_from_radar= places it)",
+    "the radar's frame is taken for the ego frame (parent_from_radar places it elsewhere)",
     f"the format {_UNDISTORTED}; tokens are made from the frames' names: put yours in",
 )
 

@@ -1,0 +1,52 @@
+"""Somebody else's calibration on the page: looked at, checked by clicks, compared with the own one."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.cli.importing import reference_from
+from app.web.server import ServerOptions, start
+from app.workspace import open_workspace
+from calib_core.recordings import Recording
+from tests.browser.driving import Driver
+
+pytestmark = pytest.mark.browser
+
+
+def test_a_calibration_is_shown_checked_and_compared(
+    open_page: Callable[..., Driver], sample: Recording, truth: Any, tmp_path: Path
+) -> None:
+    true, file = truth["camera_from_radar"], tmp_path / "factory.txt"
+    rows = np.hstack([true["rotation"], np.reshape(true["translation_m"], (3, 1))])
+    file.write_text("\n".join(" ".join(repr(float(value)) for value in row) for row in rows))
+    camera = sample.camera()
+    workspace = open_workspace(
+        sample,
+        camera=camera,
+        session_folder=tmp_path / "session",
+        name="sample",
+        reference=reference_from(file, camera),
+    )
+    running = start(workspace, sample, ServerOptions(port=0, token="test"))
+    try:
+        page = open_page(running.url)
+        assert page.text("#status-text").startswith("Showing the calibration from factory.txt; click reflectors")
+        page.until("__cocalib.state.overlay.returns.length > 0")
+        page.page.click("#tab-pose")
+        assert "From factory.txt" in page.text("#page-pose")
+        page.click_sample(truth, 1)
+        (first,) = page.view["clicks"]
+        assert first["residual_px"] < 30
+        assert "1 click lies" in page.text("#status-text")
+        page.click_sample(truth)
+        figures = {figure["key"]: figure for figure in page.view["comparison"]}
+        assert float(figures["rotation_apart"]["value"].split()[0]) < 1.0
+        assert "Solved, against factory.txt" in page.text("#page-pose")
+        assert "at 20 m" in page.text("#page-pose .apart")
+        assert page.text("#status-text").startswith("Solved")
+    finally:
+        running.close()
+        workspace.close()
