@@ -39,12 +39,12 @@ def cloud_message(time: TimeNs, frame: str, points: np.ndarray) -> bytes:
     Args:
         time: its stamp.
         frame: its frame_id.
-        points: (n,) structured, little endian; fields that are arrays are left out of the description.
+        points: (n,) structured, little endian; fields of types that a cloud has not are left out of the description.
     """
     described = [
         _string(name) + struct.pack("<IBI", place[1], _CODES[place[0].str[1:]], 1)
         for name, place in (points.dtype.fields or {}).items()
-        if place[0].subdtype is None
+        if place[0].str[1:] in _CODES
     ]
     data, step = points.tobytes(), points.dtype.itemsize
     parts = [

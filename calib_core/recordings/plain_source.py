@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from calib_core.arrays import TimesNs
-from calib_core.measurements import TimeNs
+from calib_core.errors import RecordingError
+from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.plain_messages import header_bytes
 from calib_core.recordings.sources import Channel, Heads, MessageIndex
 from calib_core.results import Caution
@@ -40,6 +41,19 @@ class PlainSource:
     message: Callable[[int], bytes]
     cautions: tuple[Caution, ...] = ()
     closed: Callable[[], None] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse times that no message can carry.
+
+        Raises:
+            RecordingError: one is before 1970 or after 2106.
+        """
+        low, high = int(self.times_ns.min(initial=0)), int(self.times_ns.max(initial=0))
+        if low < 0 or high >= NS_PER_S << 32:
+            raise RecordingError(
+                f"{self.path}: a time is {(low if low < 0 else high) / NS_PER_S:.6g} s, outside the years 1970 to 2106; "
+                "look at its unit"
+            )
 
     @property
     def channels(self) -> tuple[Channel, ...]:

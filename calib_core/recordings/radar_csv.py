@@ -15,7 +15,7 @@ from calib_core.recordings.plain_messages import cloud_channel, cloud_message
 from calib_core.recordings.plain_source import PlainSource, topic_of
 from calib_core.recordings.written_times import TimeUnit, read_time
 
-__all__ = ["CSV_EXAMPLE", "open_radar_csv"]
+__all__ = ["CSV_EXAMPLE", "csv_columns", "open_radar_csv"]
 
 CSV_EXAMPLE = "time_ns,x_m,y_m,z_m,doppler_mps,snr_db"
 _FRAME = "radar"
@@ -54,6 +54,15 @@ class _Header:
     time_unit: TimeUnit
     columns: tuple[_Column, ...]
     unused: tuple[str, ...]
+
+
+def csv_columns() -> tuple[str, ...]:
+    """Return the rows of the table of columns and units, for the documentation."""
+    rows = [f"| {', '.join(f'`{name}`' for name in _TIME_NAMES)} | {', '.join(_TIMES)} |"]
+    for becomes, units in dict(_QUANTITIES.values()).items():
+        names = ", ".join(f"`{name}`" for name, (quantity, _) in _QUANTITIES.items() if quantity == becomes)
+        rows.append(f"| {names} | {', '.join(units)} |")
+    return tuple(rows)
 
 
 def open_radar_csv(path: Path) -> PlainSource:

@@ -16,6 +16,7 @@ __all__ = ["open_bin_folder", "open_pcd_folder", "points_of_bin", "points_of_pcd
 _FRAME = "radar"
 _MAX_BYTES = 1 << 28
 _HEAD_BYTES = 1 << 16
+_MAX_POINT_BYTES = 1 << 16
 _DELFT = np.dtype([(name, "<f4") for name in ("x", "y", "z", "rcs", "v_r", "v_r_compensated", "time")])
 _KINDS = {"F": "f", "I": "i", "U": "u"}
 
@@ -137,8 +138,11 @@ def _dtype(path: Path, head: dict[str, list[str]]) -> "np.dtype[np.void]":
             )
             for number, (name, size, kind, count) in enumerate(zip(names, sizes, kinds, counts, strict=True))
         ]
-        return np.dtype(described)
-    except (KeyError, ValueError, TypeError) as error:
+        dtype = np.dtype(described)
+        if not 0 < dtype.itemsize <= _MAX_POINT_BYTES:
+            raise ValueError(f"a point has {dtype.itemsize} bytes")
+        return dtype
+    except (KeyError, ValueError, TypeError, OverflowError, MemoryError) as error:
         raise MessageError(
             f"{path.name} has a PCD header whose FIELDS, SIZE, TYPE and COUNT do not fit ({error})"
         ) from error

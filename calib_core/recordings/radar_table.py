@@ -6,6 +6,7 @@ python -m calib_core.recordings.radar_table docs/radar-formats.md
 import sys
 from pathlib import Path
 
+from calib_core.recordings.radar_csv import CSV_EXAMPLE, csv_columns
 from calib_core.recordings.radar_decoders import DECODERS, Decoder, MessageKind, plan_for
 
 __all__ = ["main", "radar_formats"]
@@ -62,12 +63,40 @@ From a sample of the messages, and said as cautions by `cocalib info` and on the
 """
 
 
+_FILES = """\
+## Files without ROS
+
+Folders and files can be given beside recordings of ROS or without any: `cocalib open RADAR_FRONT/ CAM_FRONT/`.
+
+| what | read as |
+|---|---|
+| folder of `.pcd` (version 0.7, binary or ascii) | radar, one scan per file; by its fields as a PointCloud2, nuScenes included |
+| folder of `.bin` | View-of-Delft radar, one scan per file |
+| `.csv` | radar; the first line names columns and units: `{example}` |
+| folder of pictures | camera |
+| video file, with `--video-start` | camera; most videos lose the frames' own times: give the recording where there is one |
+
+The time of a file is in a CSV beside it (`file,time_ns`), or in its name: the last number of 19 digits (ns), 16 (us),
+13 (ms) or 10 (s, with a fraction or without) that is a date after 2001. Files that are only numbered count as 0.1 s
+apart, and that is said.
+
+### Columns of a radar CSV
+
+A unit stands behind the name, as `x_m` or `x [m]`. Rows of one time are one scan. An unknown unit, or none, is an error;
+columns of other names are left out, and `cocalib info` says so. Axes and signs are those of the radar frame.
+
+| column | units |
+|---|---|
+{columns}
+"""
+
+
 def radar_formats() -> str:
     """Write the page."""
     parts = [_INTRODUCTION.rstrip("\n"), ""]
     for kind, title in _KINDS.items():
         parts += [f"## {title}", "", *_table([decoder for decoder in DECODERS if decoder.kind == kind]), ""]
-    parts += ["## Remarks", ""]
+    parts += [_FILES.format(example=CSV_EXAMPLE, columns="\n".join(csv_columns())).rstrip("\n"), "", "## Remarks", ""]
     parts += [
         f"* **{d.name}**: {'; '.join(filter(None, (d.note, d.assumed)))}." for d in DECODERS if d.note or d.assumed
     ]

@@ -55,9 +55,14 @@ def read_time(text: str, unit: TimeUnit | None = None) -> TimeNs:
         raise RecordingError(
             f"'{text}' has {len(whole)} digits, so its unit cannot be told; 10 are taken as seconds, 13 ms, 16 us, 19 ns"
         )
+    if len(whole) > 19:
+        raise RecordingError(f"'{text[:40]}' has {len(whole)} digits, too many for a time")
     scale = _SCALE[unit]
     digits = (fraction or "").ljust(9, "0")[:9]
-    return TimeNs((-1 if sign == "-" else 1) * (int(whole) * scale + int(digits) * scale // NS_PER_S))
+    time = (-1 if sign == "-" else 1) * (int(whole) * scale + int(digits) * scale // NS_PER_S)
+    if abs(time) >= 1 << 63:
+        raise RecordingError(f"'{text}' {unit} is no time; look at its unit")
+    return TimeNs(time)
 
 
 def _read_date(text: str) -> TimeNs:

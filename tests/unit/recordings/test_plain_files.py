@@ -369,3 +369,44 @@ def test_mixed_folders_and_single_files_are_explained(tmp_path) -> None:
     (mixed / "a.pcd").write_bytes(b"")
     assert "put pictures and radar files into folders of their own" in refusal(mixed)
     assert "give the folder that holds them all" in refusal(mixed / f"{START_NS}.png")
+
+
+def test_damaged_radar_files_and_csv_are_answered_with_values_or_one_clear_error(tmp_path) -> None:
+    import random
+
+    rng = random.Random(7)
+    rows = np.random.default_rng(1).uniform(1, 9, (6, 5)).astype(np.float32)
+    nuscenes(tmp_path / "whole" / f"{START_NS}.pcd", rows)
+    whole = (tmp_path / "whole" / f"{START_NS}.pcd").read_bytes()
+    text = b"time_ns,x_m,y_m,z_m,doppler_mps,snr_db\n" + b"1700000000100000000,3,1,0.5,-0.25,12\n" * 4
+    folder = tmp_path / "damaged"
+    folder.mkdir()
+    kept = 0
+    for number in range(300):
+        original, path = (whole, folder / f"{START_NS}.pcd") if number % 2 else (text, tmp_path / "damaged.csv")
+        data = bytearray(original)
+        for _ in range(rng.randrange(1, 4)):
+            place = rng.randrange(min(len(data), 420))
+            if rng.random() < 0.6:
+                data[place] = rng.choice(b"0123456789 -.,e\n\xff\0FIUxyz")
+            else:
+                del data[place : place + rng.randrange(1, 60)]
+        path.write_bytes(data)
+        try:
+            with inspect_recording(path.parent if number % 2 else path) as recording:
+                kept += len(recording.radar_scans().points_radar_m)
+        except RecordingError as error:
+            assert str(path.parent) in str(error)  # noqa: PT017
+    assert kept > 300
+
+
+@pytest.mark.parametrize(
+    ("time", "words"),
+    [
+        ("-5", "outside the years 1970 to 2106"),
+        ("99999999999999999999999", "too many for a time"),
+        ("9200000000000000000", "outside the years 1970 to 2106"),
+    ],
+)
+def test_times_that_no_message_can_carry_are_refused_in_words(tmp_path, time, words) -> None:
+    assert words in refusal(radar_csv(tmp_path / "a.csv", f"time_ns,x_m,y_m\n{time},1,2\n"))
