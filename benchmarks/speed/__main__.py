@@ -1,4 +1,4 @@
-"""Measure everything and write docs/speed.md."""
+"""Measure everything and write docs/speed.md; --large takes recordings of 5 GB and, sparse, 100 GB."""
 
 import sys
 import tempfile
@@ -6,6 +6,7 @@ from pathlib import Path
 
 from app.resources import sample_folder
 from benchmarks.speed.paging import measure_page
+from benchmarks.speed.recordings import measure_recordings
 from benchmarks.speed.rows import page
 from benchmarks.speed.solving import measure_solving
 from benchmarks.speed.starting import measure_starting
@@ -16,7 +17,12 @@ _PAGE = Path(__file__).resolve().parents[2] / "docs" / "speed.md"
 def main() -> int:
     """Run every measurement; the exit code is 0 whatever the figures are."""
     with tempfile.TemporaryDirectory() as scratch:
-        tables = [*measure_page(Path(scratch)), measure_solving(), measure_starting(sample_folder() / "rooftop")]
+        tables = [
+            *measure_page(Path(scratch)),
+            measure_solving(),
+            measure_starting(sample_folder() / "rooftop"),
+            measure_recordings(Path(scratch), large="--large" in sys.argv),
+        ]
     text = page(tables)
     _PAGE.write_text(text, encoding="utf-8")
     print(text)

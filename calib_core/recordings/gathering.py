@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.sources import Heads, MessageIndex
@@ -117,9 +118,9 @@ class _Gather:
         offsets = self.index.offset[order]
         base, end = int(offsets[0]), int(offsets[-1]) + lead + self.size
         data = self.source.piece(chunk, base, end - base) if whole is None else whole[base:end]
-        buffer = np.frombuffer(data or bytes(1), dtype=np.uint8)
-        reach = (offsets - base)[:, None] + np.arange(lead + self.size)
-        gathered = buffer[np.minimum(reach, len(buffer) - 1)]
+        buffer = np.frombuffer(data.ljust(end - base, b"\0"), dtype=np.uint8)
+        windows = as_strided(buffer, (end - base - lead - self.size + 1, lead + self.size), (1, 1), writeable=False)
+        gathered = windows[offsets - base]
         usual, lengths = self.source.usual(gathered[:, :lead])
         past = offsets + lead + lengths > room
         lengths[past] = -1

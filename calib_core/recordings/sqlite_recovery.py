@@ -204,7 +204,11 @@ def about_rows(path: Path, found: FoundRows, unknown: int) -> list[Caution]:
         where = ", ".join(_rows_text(low, high) for low, high in found.holes[:3])
         lost.append(
             f"it is damaged or cut short ({found.fault}): {len(found.columns)} messages were found; "
-            + (f"rows {where}{', ...' if len(found.holes) > 3 else ''} are lost" if where else "none are known to be lost")
+            + (
+                f"rows {where}{', ...' if len(found.holes) > 3 else ''} are lost"
+                if where
+                else "none are known to be lost"
+            )
         )
     if found.strange:
         lost.append(f"{found.strange} rows without a time or a topic are left out")

@@ -12,6 +12,7 @@ from calib_core.arrays import Points3, TimesNs, frozen_array
 from calib_core.errors import MessageError
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.recordings.images import EncodedImage, ImageLayout
+from calib_core.recordings.radar_clouds import CloudLayout
 from calib_core.recordings.radar_columns import Returns, no_returns
 from calib_core.recordings.radar_layouts import RadarLayout
 from calib_core.recordings.radar_lists import PointLayout, first_of_scans
@@ -19,7 +20,9 @@ from calib_core.recordings.topics import Topic
 
 __all__ = ["ImageStream", "RadarStream", "join_scans"]
 
-_BLOCK_SCANS = 64
+_BLOCK_SCANS = 128
+_USUAL_CLOUD_BYTES = 4096
+_LONGEST_TOGETHER = 1 << 17
 _CACHED_RETURNS = 1_000_000
 
 
@@ -41,6 +44,7 @@ class RadarStream:
         self._blocks: OrderedDict[int, RadarScans] = OrderedDict()
         self._lock = threading.Lock()
         self.unreadable: Mapping[int, str] = {}
+        self._cloud_bytes = _USUAL_CLOUD_BYTES
         first = np.arange(len(topic))
         if isinstance(self.layout, PointLayout):
             first = first_of_scans(stamps_ns, *self._numbers(self.layout, heads))
@@ -122,8 +126,25 @@ class RadarStream:
         """Decode the given scans, ascending."""
         if isinstance(self.layout, PointLayout):
             return self._decoded_points(self.layout, scans)
+        if isinstance(self.layout, CloudLayout) and len(self._layouts) == 1 and len(scans) > 1:
+            together = self._decoded_clouds(self.layout, scans)
+            if together is not None:
+                return together
         returns = [self._returns(int(message)) for message in self._first[scans]]
         return _stacked(self.times_ns[scans], [len(scan) for scan in returns], _joined(returns))
+
+    def _decoded_clouds(self, layout: CloudLayout, scans: np.ndarray) -> RadarScans | None:
+        """Decode clouds that are all alike in one go; None where they have to be read one by one."""
+        messages = self._first[scans]
+        heads = self.topic.heads(messages, self._cloud_bytes)
+        longest = int(heads.lengths.max())
+        if longest > self._cloud_bytes and longest <= _LONGEST_TOGETHER:
+            self._cloud_bytes = longest
+            heads = self.topic.heads(messages, longest)
+        if longest > heads.rows.shape[1] or int(heads.lengths.min()) < 0:
+            return None
+        found = layout.returns_of_rows(heads.rows, heads.lengths)
+        return None if found is None else _stacked(self.times_ns[scans], found[1].tolist(), found[0])
 
     def _returns(self, message: int) -> Returns:
         """Decode one message; one that cannot be read is an empty scan, and is told."""

@@ -1,0 +1,292 @@
+"""Recordings beside rosbags: opening, decoding, seeking, memory. Files are made here and deleted afterwards."""
+
+import os
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.speed.rows import Row, Table
+from calib_core.measurements import TimeNs
+from calib_core.recordings import open_recording
+
+__all__ = ["measure_recordings"]
+
+_START_NS = 1_700_000_000 * 10**9
+_FRAME_NS = 33_333_333
+_SEEKS = 150
+_OPENINGS = 5
+_WINDOW_SCANS = 512
+_MEMORY = """
+import resource, sys
+from calib_core.measurements import TimeNs
+from calib_core.recordings import open_recording
+import cv2
+def peak(): return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+before = peak()
+with open_recording(sys.argv[1]) as recording:
+    recording.image(0)
+    opened = peak()
+    n = len(recording.image_times)
+    for place in range(150):
+        recording.image(place * 7919 % n)
+        time = recording.image_times[place * 7919 % n]
+        recording.radar_scans_around([time], 0.5)
+    scrubbed = peak()
+    for index in range(min(n, 1500)):
+        recording.image_bytes(index)
+    print(before, opened, scrubbed, peak())
+"""
+
+
+def measure_recordings(scratch: Path, *, large: bool = False) -> Table:
+    """Measure on generated bags.
+
+    Args:
+        scratch: a folder with room for the files.
+        large: 5 GB instead of 0.6 GB, and a sparse bag of 100 GB.
+    """
+    os.environ["COCALIB_CACHE"] = "off"
+    frames = 16_000 if large else 2_000
+    plain = _write(scratch / "plain.bag", frames)
+    packed = _write(scratch / "packed.bag", frames // 10, compression="lz4")
+    rows = [
+        *_opening(plain, scratch / "cache"),
+        *_decoding(_write(scratch / "returns.bag", 1, returns=60_000), "RadarScan, one return per message", 15.0),
+        *_decoding(_write(scratch / "clouds.bag", 1, clouds=4_000), "PointCloud2 of 120 points", 10.0),
+        _seeking(plain, "none"),
+        _seeking(packed, "lz4"),
+        *_memory(plain, plain.stat().st_size),
+    ]
+    if large:
+        plain.unlink()
+        sparse = _write(scratch / "sparse.bag", 2_000, hole_bytes=50_000_000)
+        rows += [*_opening(sparse, scratch / "cache2"), *_memory(sparse, sparse.stat().st_size)]
+        sparse.unlink()
+    return Table(
+        "Recordings",
+        f"Bags made for this run ({frames} pictures of 1920 x 1080 and ten radar clouds a second), read by us and by rosbags "
+        "in turn. Cold: the file's pages are dropped from the system's cache first, once per opening; medians.",
+        tuple(rows),
+    )
+
+
+# -- files
+
+
+def _write(
+    path: Path, frames: int, *, compression: str = "", returns: int = 0, clouds: int = 0, hole_bytes: int = 0
+) -> Path:
+    """Write a bag with rosbags; with holes, its pictures lie far apart in a sparse file."""
+    from rosbags.rosbag1 import Writer
+
+    writer = Writer(path)
+    if compression:
+        writer.set_compression(Writer.CompressionFormat[compression.upper()])
+    pictures = _pictures()
+    with writer:
+        topics = _connections(writer, returns > 0)
+        for time_ns, topic, data in _messages(frames, returns, clouds, pictures):
+            if hole_bytes and topic == "/camera/image/compressed":
+                _flush(writer)
+                writer.bio.seek(hole_bytes, os.SEEK_CUR)  # a reader goes by the index and never looks here
+            writer.write(topics[topic], time_ns, data)
+    return path
+
+
+def _flush(writer: Any) -> None:
+    """End the current chunk, so that what follows is a new one."""
+    if writer.chunks[-1].data.tell():
+        writer.write_chunk(writer.chunks[-1])
+
+
+def _connections(writer: Any, returns: bool) -> dict[str, Any]:
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    from calib_core.recordings.writing import RADAR_SCAN_DEFINITION, RADAR_SCAN_TYPE
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(get_types_from_msg(RADAR_SCAN_DEFINITION, RADAR_SCAN_TYPE))
+    radar = RADAR_SCAN_TYPE if returns else "sensor_msgs/msg/PointCloud2"
+    types = {"/camera/image/compressed": "sensor_msgs/msg/CompressedImage", "/radar": radar}
+    return {topic: writer.add_connection(topic, kind, typestore=store) for topic, kind in types.items()}
+
+
+def _messages(frames: int, returns: int, clouds: int, pictures: list[bytes]) -> Iterator[tuple[int, str, bytes]]:
+    if returns:
+        for number in range(returns):
+            at = _START_NS + number * 1_000_000
+            yield at, "/radar", _header(at, "radar") + struct.pack("<HfffffHff", number % 12, 3, 1, 0, 3, 0, 1, 0.3, 10)
+        yield _START_NS, "/camera/image/compressed", _picture(_START_NS, pictures[0])
+        return
+    cloud = _cloud_body()
+    for number in range(max(frames, clouds)):
+        at = _START_NS + number * _FRAME_NS
+        if number < frames:
+            yield at, "/camera/image/compressed", _picture(at, pictures[number % len(pictures)])
+        if number % 3 == 0 or clouds:
+            yield at + 1, "/radar", _header(at, "radar") + cloud
+
+
+def _header(at: int, frame: str) -> bytes:
+    return struct.pack("<IIII", 0, *divmod(at, 10**9), len(frame)) + frame.encode()
+
+
+def _picture(at: int, jpeg: bytes) -> bytes:
+    return _header(at, "camera") + struct.pack("<I4sI", 4, b"jpeg", len(jpeg)) + jpeg
+
+
+def _cloud_body() -> bytes:
+    names = ("x", "y", "z", "velocity", "snr")
+    fields = b"".join(
+        struct.pack("<I", len(n)) + n.encode() + struct.pack("<IBI", 4 * i, 7, 1) for i, n in enumerate(names)
+    )
+    points = np.random.default_rng(1).uniform(1, 9, (120, 5)).astype("<f4").tobytes()
+    head = struct.pack("<III", 1, 120, 5) + fields
+    return head + struct.pack("<?III", False, 20, len(points), len(points)) + points + b"\x01"
+
+
+def _pictures() -> list[bytes]:
+    import cv2
+
+    rng = np.random.default_rng(2)
+    pictures = []
+    for _ in range(4):
+        small = rng.integers(0, 255, (68, 120, 3), dtype=np.uint8)
+        picture = cv2.resize(small, (1920, 1080), interpolation=cv2.INTER_CUBIC)
+        noise = rng.integers(-6, 6, picture.shape, dtype=np.int16)
+        picture = np.clip(picture + noise, 0, 255).astype(np.uint8)
+        pictures.append(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 75])[1].tobytes())
+    return pictures
+
+
+# -- measurements
+
+
+def _opening(path: Path, cache: Path) -> list[Row]:
+    gigabytes = f"{path.stat().st_size / 1e9:.1f} GB"
+    peer_s = [_cold(path, _first_frame_rosbags) for _ in range(_OPENINGS)]
+    ours_s = [_cold(path, _first_frame) for _ in range(_OPENINGS)]
+    os.environ["COCALIB_CACHE"] = str(cache)
+    _first_frame(path)
+    again_s = [_cold(path, _first_frame) for _ in range(_OPENINGS)]
+    os.environ["COCALIB_CACHE"] = "off"
+    peer, ours, again = (float(np.median(values)) for values in (peer_s, ours_s, again_s))
+    return [
+        Row(f"{gigabytes}: rosbags.AnyReader, cold, to the first picture", f"{peer * 1e3:.0f} ms"),
+        Row(f"{gigabytes}: the same, ours", *_against(ours, peer, 20.0)),
+        Row(f"{gigabytes}: ours again, with the index kept", *_against(again, peer, 20.0)),
+    ]
+
+
+def _against(ours_s: float, peer_s: float, times: float) -> tuple[str, str, str, bool]:
+    aim = f"at most 1/{times:.0f} of rosbags"
+    return f"{ours_s * 1e3:.1f} ms", f"1/{peer_s / ours_s:.1f} of rosbags", aim, ours_s * times <= peer_s
+
+
+def _cold(path: Path, work: Callable[[Path], None]) -> float:
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+        if hasattr(os, "posix_fadvise"):
+            os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
+    start = time.perf_counter()
+    work(path)
+    return time.perf_counter() - start
+
+
+def _first_frame(path: Path) -> None:
+    with open_recording(path) as recording:
+        recording.image_bytes(0)
+
+
+def _first_frame_rosbags(path: Path) -> None:
+    from rosbags.highlevel import AnyReader
+
+    with AnyReader([path]) as reader:
+        wanted = [connection for connection in reader.connections if "image" in connection.topic]
+        next(iter(reader.messages(connections=wanted)))
+
+
+def _decoding(path: Path, what: str, aim: float) -> list[Row]:
+    from rosbags.highlevel import AnyReader
+
+    with open_recording(path) as recording:
+        edges = [*recording.radar_times[::_WINDOW_SCANS].tolist(), int(recording.radar_times[-1]) + 1]
+        start = time.perf_counter()
+        scans = sum(len(recording.radar_scans(TimeNs(a), TimeNs(b - 1))) for a, b in pairwise(edges))
+        ours = time.perf_counter() - start
+    count = 0
+    start = time.perf_counter()
+    with AnyReader([path]) as reader:
+        opened = time.perf_counter()
+        wanted = [connection for connection in reader.connections if connection.topic == "/radar"]
+        for connection, _, data in reader.messages(connections=wanted):
+            reader.deserialize(data, connection.msgtype)
+            count += 1
+    peer = time.perf_counter() - opened
+    path.unlink()
+    assert scans == len(recording.radar_times)
+    return [
+        Row(f"{what}: rosbags, deserialised", f"{peer / count * 1e6:.1f} us a message"),
+        Row(
+            f"{what}: ours, to arrays",
+            f"{ours / count * 1e6:.2f} us a message",
+            f"{peer / ours:.1f} x as fast",
+            f"at least {aim:.0f} x",
+            peer >= aim * ours,
+        ),
+    ]
+
+
+def _seeking(path: Path, compression: str) -> Row:
+    import cv2
+
+    bare_s, ours_s = [], []
+    with open_recording(path) as recording:
+        n = len(recording.image_times)
+        order = np.random.default_rng(3).integers(0, n, _SEEKS).tolist()
+        for index in order:
+            data = np.frombuffer(recording.image_bytes(index).data, dtype=np.uint8)
+            start = time.perf_counter()
+            cv2.imdecode(data, cv2.IMREAD_COLOR)
+            bare_s.append(time.perf_counter() - start)
+        for index in np.random.default_rng(4).permutation(order).tolist():
+            start = time.perf_counter()
+            recording.image(index)
+            ours_s.append(time.perf_counter() - start)
+    ratio = float(np.median(ours_s) / np.median(bare_s))
+    return Row(
+        f"random seek and decode, 1080p JPEG, compression {compression}",
+        f"{np.median(ours_s) * 1e3:.2f} ms",
+        f"{ratio:.2f} x the bare decode",
+        "at most 1.1 x",
+        ratio <= 1.1,
+    )
+
+
+def _memory(path: Path, size_bytes: int) -> list[Row]:
+    answer = subprocess.run([sys.executable, "-c", _MEMORY, str(path)], check=True, capture_output=True, text=True)
+    before, opened, scrubbed, played = map(float, answer.stdout.split())
+    return [
+        Row(
+            f"peak memory, {size_bytes / 1e9:.1f} GB: opened, scrubbed, played",
+            f"{opened:.0f}, {scrubbed:.0f}, {played:.0f} MB ({before:.0f} MB of it imports)",
+            "",
+            "under 300 MB",
+            played < 300,
+        )
+    ]
+
+
+if __name__ == "__main__":
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        for row in measure_recordings(Path(folder), large="--large" in sys.argv).rows:
+            print(" | ".join((row.what, row.figure, row.ratio, row.aim, "met" if row.met else "MISSED")))
