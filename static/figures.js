@@ -27,7 +27,7 @@ let cautionText = "";
 
 export function startFigures() {
   const pose = make("div", "pose", [poseTable, adviceLine]);
-  posePage.append(poseHead, pose, apart);
+  posePage.append(poseHead, apart, pose);
   on(["view", "recording"], draw);
 }
 

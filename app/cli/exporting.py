@@ -26,7 +26,7 @@ class Export:
     parent_from_radar: Annotated[
         tuple[float, float, float, float, float, float, float] | None, tyro.conf.arg(metavar="X Y Z QX QY QZ QW")
     ] = None
-    """Pose of the radar in the third frame of autoware (kit) or nuscenes (ego): metres, then the quaternion, w last."""
+    """Pose of the radar in the third frame of autoware (kit), driveworks (rig), nuscenes (ego): metres, quaternion, w last."""
 
     def run(self) -> int:
         """Write the export; return the exit code."""

@@ -18,6 +18,7 @@ from calib_core.interchange.dataset_formats import (
     write_nuscenes,
     write_nuscenes_in_ego,
 )
+from calib_core.interchange.driveworks_format import DRIVEWORKS_NOTES, write_driveworks, write_driveworks_in_rig
 from calib_core.interchange.foxglove_format import FOXGLOVE_NOTES, write_foxglove
 from calib_core.interchange.opencv_format import write_opencv
 from calib_core.interchange.ros_formats import (
@@ -225,6 +226,17 @@ FORMATS: tuple[Format, ...] = (
         write_nuscenes_in_ego,
     ),
     Format(
+        "driveworks",
+        "NVIDIA DriveWorks rig",
+        "pose of each sensor in the rig, roll pitch yaw in degrees about fixed axes; the camera with body axes",
+        "rig.json",
+        False,
+        "none",
+        write_driveworks,
+        DRIVEWORKS_NOTES,
+        write_driveworks_in_rig,
+    ),
+    Format(
         "foxglove",
         "Foxglove messages",
         "FrameTransform: pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
@@ -300,7 +312,7 @@ def export(
     Args:
         file: what to export.
         name: one of FORMATS.
-        parent_from_radar: the radar's pose in the third frame of "autoware" (kit) or "nuscenes" (ego).
+        parent_from_radar: the radar's pose in the third frame of "autoware" (kit), "driveworks" (rig) or "nuscenes" (ego).
 
     Raises:
         InputError: no such format, or it cannot carry this calibration: why, and what to take instead.

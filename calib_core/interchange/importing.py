@@ -13,6 +13,7 @@ from calib_core.interchange.calibration_json import calibration_file_of, transfo
 from calib_core.interchange.colmap_format import read_colmap
 from calib_core.interchange.dataset_formats import read_kitti, read_nuscenes
 from calib_core.interchange.documents import CalibrationDocument, TransformDocument
+from calib_core.interchange.driveworks_format import is_rig, read_driveworks
 from calib_core.interchange.foxglove_format import read_foxglove
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.opencv_format import read_opencv
@@ -28,7 +29,8 @@ __all__ = ["imported", "read_any", "read_any_file"]
 _MAX_BYTES = 256 * 1024 * 1024
 _KNOWN = (
     "known are calibration-1, static_transform_publisher in a command or launch file, URDF, Autoware, Apollo and "
-    "stamped transforms, Kalibr with T_cam_radar, OpenCV with R and T, KITTI, nuScenes, Foxglove, COLMAP, mat, npz, matrix"
+    "stamped transforms, Kalibr with T_cam_radar, OpenCV with R and T, KITTI, nuScenes, DriveWorks, Foxglove, "
+    "COLMAP, mat, npz, matrix"
 )
 
 
@@ -119,6 +121,8 @@ def _read_json(text: str, source: str) -> ImportedCalibration:
         return read_nuscenes(content, source)
     if str(content.get("schema", "")).startswith("cocalib/calibration-"):
         return _read_ours(text, source)
+    if is_rig(content):
+        return read_driveworks(content, source)
     if "FrameTransform" in content or "parent_frame_id" in content:
         return read_foxglove(content, source)
     if "rotation" in content and "camera_intrinsic" in content:
