@@ -35,7 +35,7 @@ def open_plain_sources(
     opened: list[PlainSource] = []
     left: list[Path] = []
     try:
-        for path in paths:
+        for path in (inner for given in paths for inner in _expanded(given)):
             source = _open(path, video_start)
             if source is None:
                 left.append(path)
@@ -46,6 +46,32 @@ def open_plain_sources(
             source.close()
         raise
     return tuple(opened), tuple(left)
+
+
+def _expanded(path: Path) -> list[Path]:
+    """Return what a data set's folder holds one level down: folders of pictures or radar files, CSV files, videos.
+
+    Any other path stands for itself, so does a folder that holds a ROS recording or is one of pictures or radar files.
+    """
+    if not path.is_dir():
+        return [path]
+    inside = sorted(inner for inner in path.iterdir() if not inner.name.startswith("."))
+    if any(_is_ros(inner) or (inner.is_file() and inner.suffix.lower() in _FOLDERS) for inner in inside):
+        return [path]
+    if any(_is_ros(below) for inner in inside if inner.is_dir() for below in inner.iterdir()):
+        return [path]
+    files = [inner for inner in inside if inner.is_file() and inner.suffix.lower() in (".csv", *VIDEO_SUFFIXES)]
+    folders = [
+        inner
+        for inner in inside
+        if inner.is_dir() and any(below.suffix.lower() in _FOLDERS for below in inner.iterdir())
+    ]
+    beside = {folder.with_suffix(".csv") for folder in folders}  # times of a folder's files, not returns
+    return [*folders, *(file for file in files if file not in beside)] or [path]
+
+
+def _is_ros(path: Path) -> bool:
+    return path.name == "metadata.yaml" or any(suffix in (".bag", ".mcap", ".db3") for suffix in path.suffixes)
 
 
 def _open(path: Path, video_start: str | None) -> PlainSource | None:
@@ -67,7 +93,7 @@ def _open_folder(folder: Path) -> PlainSource | None:
     """Open a folder of pictures or radar files; None where it holds neither, or a ROS recording."""
     kinds: dict[Callable[[Path, Sequence[Path]], PlainSource], list[Path]] = {}
     for file in sorted(folder.iterdir()):
-        if file.suffix in (".bag", ".mcap", ".db3") or file.name == "metadata.yaml":
+        if _is_ros(file):
             return None
         opener = _FOLDERS.get(file.suffix.lower())
         if opener is not None and file.is_file() and not file.name.startswith("."):

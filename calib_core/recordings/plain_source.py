@@ -72,10 +72,19 @@ class PlainSource:
     def heads(self, index: MessageIndex, size: int) -> Heads:
         """Return the first bytes of many messages; for stamps alone, no file is read."""
         rows = np.zeros((len(index), size), dtype=np.uint8)
+        lengths = np.full(len(index), max(size, _HEADER_BYTES), dtype=np.int64)
+        fault = ""
         for place, row in enumerate(index.chunk.tolist()):
-            head = header_bytes(TimeNs(int(self.times_ns[row])), "") if size <= _HEADER_BYTES else self.message(row)
+            head = header_bytes(TimeNs(int(self.times_ns[row])), "")
+            if size > _HEADER_BYTES:
+                try:
+                    head = self.message(row)
+                    lengths[place] = len(head)
+                except RecordingError as error:
+                    lengths[place] = -1
+                    fault = fault or str(error)
             rows[place, : min(len(head), size)] = np.frombuffer(head[:size], dtype=np.uint8)
-        return Heads(rows, np.full(len(index), max(size, _HEADER_BYTES), dtype=np.int64))
+        return Heads(rows, lengths, fault)
 
     def close(self) -> None:
         """Close what is open."""

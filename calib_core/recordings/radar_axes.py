@@ -43,6 +43,12 @@ class RadarAxes:
             matrix[axis, column] = sign
         return matrix
 
+    @property
+    def words(self) -> str:
+        """The words of --radar-axes."""
+        unit = () if self.degrees is None else ("degrees" if self.degrees else "radians",)
+        return ",".join((*self.directions, *unit))
+
     def describe(self) -> str:
         """Say it in words."""
         words = ", ".join(f"{axis} {word}" for axis, word in zip("xyz", self.directions, strict=True))

@@ -66,7 +66,8 @@ From a sample of the messages, and said as cautions by `cocalib info` and on the
 _FILES = """\
 ## Files without ROS
 
-Folders and files can be given beside recordings of ROS or without any: `cocalib open RADAR_FRONT/ CAM_FRONT/`.
+Folders and files can be given beside recordings of ROS or without any: `cocalib open RADAR_FRONT/ CAM_FRONT/`, or the
+folder that holds them.
 
 | what | read as |
 |---|---|

@@ -101,6 +101,12 @@ class Recording:
         """The clock that image_times are by: "header" or "receive"; None without images."""
         return self._clock_of(self.image_topic)
 
+    @property
+    def radar_axes(self) -> str | None:
+        """What a person said about the radar's axes and units, as --radar-axes has it; None for nothing."""
+        axes = self._assembly.radar.layout.plan.axes if self._assembly.radar else None
+        return axes.words if axes else None
+
     def _clock_of(self, name: str | None) -> str | None:
         return next((topic.clock for topic in self.topics if topic.name == name), None)
 

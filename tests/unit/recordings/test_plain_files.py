@@ -410,3 +410,18 @@ def test_damaged_radar_files_and_csv_are_answered_with_values_or_one_clear_error
 )
 def test_times_that_no_message_can_carry_are_refused_in_words(tmp_path, time, words) -> None:
     assert words in refusal(radar_csv(tmp_path / "a.csv", f"time_ns,x_m,y_m\n{time},1,2\n"))
+
+
+def test_the_folder_of_a_data_set_stands_for_what_it_holds(tmp_path, ros1, write, plain, jpeg) -> None:
+    root = tmp_path / "drive"
+    root.mkdir()
+    pictures(root / "camera", ["a.png", "b.png"])
+    radar_csv(root / "camera.csv", f"file,time_ns\na.png,{START_NS}\nb.png,{START_NS + 10**8}\n")
+    radar_csv(root / "radar.csv", f"time_ns,x_m,y_m,z_m,doppler_mps\n{START_NS},1,2,3,0\n{START_NS},2,2,2,0\n")
+    (root / "empty").mkdir()
+    with open_recording(root) as recording:
+        assert (recording.radar_topic, recording.image_topic) == ("/radar/radar", "/camera/image")
+        assert recording.image_times.tolist() == [START_NS, START_NS + 10**8]
+    write(ros1, plain(ros1, jpeg), name="drive/all")
+    with open_recording(root) as recording:
+        assert recording.radar_topic == "/radar/points"  # a recording of ROS goes first

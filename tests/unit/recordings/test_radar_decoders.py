@@ -170,6 +170,7 @@ def test_axes_that_a_person_tells_hold_for_positions_and_noise_and_are_shown(ros
     with opened(write, ros, messages, radar_axes="right,forward,up") as recording:
         found = recording.radar_scans().points_radar_m[:5]
         assert "axes as told: x right, y forward, z up" in describe(recording)
+        assert recording.radar_axes == "right,forward,up"
     np.testing.assert_array_equal(found, np.stack([points["y"], -points["x"], points["z"]], axis=1))
 
 
