@@ -10,7 +10,7 @@ from calib_core.errors import MessageError
 from calib_core.recordings.decoding import Message, decode, payload_byte_order
 from calib_core.recordings.definitions import Definition
 from calib_core.recordings.radar_columns import ColumnPlan, Returns, no_returns, returns_from
-from calib_core.recordings.radar_decoders import plan_for, plan_like
+from calib_core.recordings.radar_plans import plan_for, plan_like
 
 __all__ = ["ChannelCloudLayout", "CloudLayout", "is_channel_cloud", "is_cloud"]
 

@@ -5,16 +5,13 @@ package: three packages are called radar_msgs. Of several that fit, the one with
 that fits none is read by its column names alone (radar_columns).
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
-from calib_core.recordings.radar_columns import ColumnPlan, plan_columns
+__all__ = ["DECODERS", "Decoder", "MessageKind"]
 
-__all__ = ["DECODERS", "Decoder", "MessageKind", "find_decoder", "plan_for", "plan_like"]
-
-MessageKind = Literal["cloud", "channels", "list", "point"]
-"""sensor_msgs/PointCloud2, sensor_msgs/PointCloud, a header with one list, or one return per message."""
+MessageKind = Literal["cloud", "channels", "list", "arrays", "point"]
+"""sensor_msgs/PointCloud2, sensor_msgs/PointCloud, a header with one list, arrays side by side, or one return each."""
 
 _RADIANS = "rad, azimuth positive to the left, elevation upwards"
 _BESIDE = "beside the position, not used"
@@ -47,6 +44,7 @@ class Decoder:
         covariance: the array with the position's covariance.
         needed: flags that are zero where there is no return.
         point_number: the field that numbers returns within a scan.
+        count_field: how many elements of arrays hold returns.
         shared_with_lidars: lidars have the same fields.
     """
 
@@ -70,6 +68,7 @@ class Decoder:
     covariance: str | None = None
     needed: tuple[str, ...] = ()
     point_number: str | None = None
+    count_field: str | None = None
     shared_with_lidars: bool = False
 
 
@@ -233,62 +232,14 @@ _POINTS = (
     ),
 )  # fmt: skip
 
-DECODERS: tuple[Decoder, ...] = (*_CLOUDS, *_CHANNELS, *_LISTS, *_POINTS)
+_ARRAYS = (
+    Decoder(
+        "Delphi ESR targets", "AutonomouStuff delphi_esr_msgs/EsrEthTx", "arrays",
+        _f("target_report_range target_report_range_rate target_report_theta target_report_amplitude pos_x pos_y"),
+        doppler="target_report_range_rate", amplitude_field="target_report_amplitude", count_field="target_report_count",
+        assumed="the definition does not state the axes of pos_x and pos_y; x forward and y to the left are taken",
+    ),
+)  # fmt: skip
+
+DECODERS: tuple[Decoder, ...] = (*_CLOUDS, *_CHANNELS, *_LISTS, *_ARRAYS, *_POINTS)
 """Every layout that is known by name."""
-
-
-def find_decoder(kind: MessageKind, names: Iterable[str]) -> Decoder | None:
-    """Return the layout with these fields, the one that asks for most of them; None where none fits.
-
-    Args:
-        kind: what the fields are fields of.
-        names: as the message spells them; nested ones dotted, arrays included.
-    """
-    have = {name.lower() for name in names}
-    fitting = [d for d in DECODERS if d.kind == kind and have.issuperset(field.lower() for field in d.fields)]
-    return max(fitting, key=lambda decoder: len(decoder.fields), default=None)
-
-
-def plan_for(kind: MessageKind, names: Iterable[str], arrays: Iterable[str] = ()) -> ColumnPlan | None:
-    """Plan the columns of a message: as the registry says, or by their names alone; None where there is no position.
-
-    Args:
-        kind: what the fields are fields of.
-        names: of single numbers, as the message spells them; nested ones dotted.
-        arrays: names of fixed arrays of numbers, and of strings.
-    """
-    names, arrays = tuple(names), tuple(arrays)
-    decoder = find_decoder(kind, (*names, *arrays))
-    plan = plan_columns(names)
-    if decoder is None:
-        return plan
-    spelt = {name.lower(): name for name in (*arrays, *names)}
-    if plan is None:
-        plan = ColumnPlan(position=(), polar=True)
-    if decoder.polar:
-        polar = tuple(spelt[name.lower()] for name in decoder.polar)
-        claimed = (polar[0], polar[1], polar[2] if len(polar) == 3 else None)
-        plan = replace(plan, position=polar, polar=True, claimed=claimed)
-    return replace(
-        plan,
-        degrees=decoder.degrees or plan.degrees,
-        azimuth_sign=float(decoder.azimuth_sign),
-        doppler=spelt[decoder.doppler.lower()] if decoder.doppler else plan.doppler,
-        velocity=() if decoder.doppler else plan.velocity,
-        amplitude=spelt[decoder.amplitude_field.lower()] if decoder.amplitude_field else plan.amplitude,
-        amplitude_scale=decoder.amplitude_scale,
-        covariance=spelt[decoder.covariance.lower()] if decoder.covariance else None,
-        needed=tuple(spelt[name.lower()] for name in decoder.needed),
-        decoder=decoder.name,
-        assumed=decoder.assumed,
-        shared_with_lidars=decoder.shared_with_lidars,
-    )
-
-
-def plan_like(first: ColumnPlan, kind: MessageKind, names: Iterable[str]) -> ColumnPlan | None:
-    """Plan a later message of a topic: its own columns, with what a person said about the first."""
-    plan = plan_for(kind, names)
-    if plan is None:
-        return None
-    plan = replace(plan, claiming=first.claiming)
-    return plan.read_as(first.axes) if first.axes else plan

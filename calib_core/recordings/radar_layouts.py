@@ -6,13 +6,14 @@ from typing import TypeAlias
 
 from calib_core.errors import MessageError
 from calib_core.recordings.definitions import Definition
+from calib_core.recordings.radar_arrays import ArrayLayout
 from calib_core.recordings.radar_clouds import ChannelCloudLayout, CloudLayout, is_channel_cloud, is_cloud
 from calib_core.recordings.radar_lists import ListLayout, PointLayout
 
 __all__ = ["RadarLayout", "ScanLayout", "layouts_of_parts", "recognise"]
 
 
-ScanLayout: TypeAlias = CloudLayout | ChannelCloudLayout | ListLayout
+ScanLayout: TypeAlias = CloudLayout | ChannelCloudLayout | ListLayout | ArrayLayout
 """Every message is a whole scan."""
 
 RadarLayout: TypeAlias = ScanLayout | PointLayout
@@ -30,7 +31,11 @@ def recognise(definition: Definition, payload: bytes) -> RadarLayout | None:
         return ChannelCloudLayout.recognise(definition, payload)
     if definition.stamp_offset is None:
         return None
-    return ListLayout.recognise(definition) or PointLayout.recognise(definition, payload)
+    return (
+        ListLayout.recognise(definition)
+        or ArrayLayout.recognise(definition)
+        or PointLayout.recognise(definition, payload)
+    )
 
 
 def layouts_of_parts(first: RadarLayout, definitions: Sequence[Definition]) -> tuple[RadarLayout, ...]:
@@ -50,7 +55,7 @@ def _same_layout(first: RadarLayout, definition: Definition) -> RadarLayout:
         return replace(first, definition=definition, _known={})
     if isinstance(first, ChannelCloudLayout) and is_channel_cloud(definition):
         return replace(first, definition=definition)
-    found = ListLayout.recognise(definition) if isinstance(first, ListLayout) else None
+    found = type(first).recognise(definition) if isinstance(first, ListLayout | ArrayLayout) else None
     if found is None:
         raise MessageError(
             f"the files hold {first.definition.type} and {definition.type} messages of different layout under one topic; "

@@ -9,7 +9,7 @@ from calib_core.arrays import TimesNs
 from calib_core.recordings.decoding import Message, Pin, decode, fixed_part
 from calib_core.recordings.definitions import PRIMITIVES, Definition
 from calib_core.recordings.radar_columns import ColumnPlan, Returns, no_returns, returns_from
-from calib_core.recordings.radar_decoders import find_decoder, plan_for
+from calib_core.recordings.radar_plans import find_decoder, plan_for
 
 __all__ = ["ListLayout", "PointLayout", "first_of_scans"]
 

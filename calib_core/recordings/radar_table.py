@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 
 from calib_core.recordings.radar_csv import CSV_EXAMPLE, csv_columns
-from calib_core.recordings.radar_decoders import DECODERS, Decoder, MessageKind, plan_for
+from calib_core.recordings.radar_decoders import DECODERS, Decoder, MessageKind
+from calib_core.recordings.radar_plans import plan_for
 
 __all__ = ["main", "radar_formats"]
 
@@ -15,6 +16,7 @@ _KINDS: dict[MessageKind, str] = {
     "cloud": "Clouds: sensor_msgs/PointCloud2",
     "channels": "Clouds: sensor_msgs/PointCloud",
     "list": "A header and one list per message",
+    "arrays": "Arrays side by side",
     "point": "One return per message",
 }
 _INTRODUCTION = """\

@@ -414,6 +414,26 @@ def mrr(ros: Any) -> Sample:
     return Sample(messages, points, np.full(2, 0.5), np.full(2, -7.0), cautions=told)
 
 
+def esr_ethernet(ros: Any) -> Sample:
+    columns = ("target_report_range", "target_report_range_rate", "target_report_theta", "target_report_amplitude")
+    columns += ("pos_x", "pos_y", "vel_x", "vel_y")
+    scalars = {
+        "xcp_format_version": "uint16", "scan_index": "uint16", "tcp_size": "uint16", "xcp_scan_type": "uint8",
+        "look_index": "uint16", "mmr_scan_index": "uint16", "target_report_host_speed": "float32",
+        "target_report_host_yaw_rate": "float32", "xcp_timestamp": "uint32", "release_revision": "uint8",
+        "promote_revision": "uint8", "field_revision": "uint8", "target_report_count": "uint8",
+    }  # fmt: skip
+    text = "".join(f"{kind} {name}\n" for name, kind in scalars.items())
+    text += "".join(f"float32[64] {name}\n" for name in columns)
+    values = {name: np.random.default_rng(len(name)).uniform(1, 9, 64).astype(np.float32) for name in columns}
+    row = {name: 0.0 if kind == "float32" else 1 for name, kind in scalars.items()} | values
+    row["target_report_count"] = 5
+    messages = singles(ros, "delphi_esr_msgs/msg/EsrEthTx", text, [row])
+    points = np.stack([values["pos_x"], values["pos_y"], np.zeros(64)], axis=1)[:5].astype(np.float64)
+    speed, amplitude = (values[f"target_report_{name}"][:5].astype(np.float64) for name in ("range_rate", "amplitude"))
+    return Sample(messages, points, speed, amplitude, cautions=("flat-radar", "radar-convention-assumed"))
+
+
 OTHERS: Mapping[str, Callable[[Any], Sample]] = {
     "Oculii cloud": lambda ros: oculii(ros, named=True),
     "Oculii cloud, unnamed channels": lambda ros: oculii(ros, named=False),
@@ -425,6 +445,7 @@ OTHERS: Mapping[str, Callable[[Any], Sample]] = {
     "Continental detections": continental,
     "derived objects": lambda ros: objects(ros, covariance=False),
     "derived objects with covariance": lambda ros: objects(ros, covariance=True),
+    "Delphi ESR targets": esr_ethernet,
     "TI mmWave returns": lambda ros: ti(ros, fork=False),
     "TI mmWave returns with frame numbers": lambda ros: ti(ros, fork=True),
     "Delphi ESR tracks": esr,
