@@ -3,6 +3,7 @@
 Exit codes: 0 done; 1 the data cannot give a calibration; 2 wrong usage or unreadable input.
 """
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -10,6 +11,7 @@ from typing import Annotated, Any
 import tyro
 
 from app.cli.exporting import Check, Export
+from app.cli.filming import Video
 from app.cli.importing import Import
 from app.cli.inspecting import Info
 from app.cli.opening import Demo, Open
@@ -30,6 +32,7 @@ _Command = (
     | Annotated[Export, tyro.conf.subcommand("export")]
     | Annotated[Check, tyro.conf.subcommand("check")]
     | Annotated[Import, tyro.conf.subcommand("import")]
+    | Annotated[Video, tyro.conf.subcommand("video")]
     | Annotated[Simulate, tyro.conf.subcommand("simulate")]
 )
 
@@ -59,10 +62,11 @@ def run(arguments: Sequence[str]) -> int:
         return int(command.run())
     except CalibrationError as error:
         return refuse(str(error))
+    except BrokenPipeError:  # whoever read our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except OSError as error:
         return refuse(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
     except KeyboardInterrupt:
         print(file=sys.stderr)
         return 130
-    except BrokenPipeError:
-        return 0

@@ -21,7 +21,7 @@ class Export:
     """A calibration that cocalib wrote (cocalib/calibration-1 JSON)."""
     to: str = "list"
     """The format: tf2, urdf, ...; "list" names them all."""
-    out: Path | None = None
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Where it goes, a file or a folder; without it, text goes to stdout."""
     parent_from_radar: Annotated[
         tuple[float, float, float, float, float, float, float] | None, tyro.conf.arg(metavar="X Y Z QX QY QZ QW")
@@ -61,9 +61,9 @@ class Check:
 
     calibration: Annotated[Path, tyro.conf.Positional]
     """A calibration in any format that export writes."""
-    against: Path | None = None
+    against: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Another one to compare with: in degrees, centimetres, and pixels at 5, 20 and 60 m."""
-    camera: Path | None = None
+    camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Intrinsics, where the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
 
     def run(self) -> int:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import tyro
 
+from app.cli.flags import CameraPosition, MeasuredCamera, Options, Topics
 from app.cli.importing import camera_in, reference_from
 from app.cli.printing import read_text, required_camera
 from calib_core.camera import Camera
@@ -25,7 +26,7 @@ class ServingFlags:
     host: str = "127.0.0.1"
     """Address to bind; anything but loopback lets other machines in, who then need the token."""
     port: int = 8080
-    """Port; 0 takes any free one."""
+    """Port; the next free one when it is taken, and 0 takes any."""
     token: str | None = None
     """The token to ask for; without it, one is made and printed in the link."""
     no_browser: bool = False
@@ -36,7 +37,7 @@ class ServingFlags:
 class Demo:
     """Open the sample recording in the browser."""
 
-    session: Path | None = None
+    session: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     """Folder of the session; without it, one in your user folder, kept from run to run."""
     fresh: bool = False
     """Begin without the clicks of the last time; they are kept beside."""
@@ -63,18 +64,19 @@ class Open:
 
     recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")]
     """One or more .bag, .mcap, .db3 files or bag folders; several together are one recording."""
-    camera: Path | None = None
+    camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
-    calibration: Path | None = None
+    calibration: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """A calibration to look at, in any format: shown until the clicks give one of their own, then compared with it."""
-    clicks: Path | None = None
+    clicks: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Clicks that a new session begins with (cocalib/clicks-1 JSON)."""
-    session: Path | None = None
+    session: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     """Folder of the session; without it, beside the recording where that can be written, else in your user folder."""
     fresh: bool = False
     """Begin without the clicks of the last time; they are kept beside."""
-    topics: Annotated[RecordingOptions, tyro.conf.arg(name="")] = field(default_factory=RecordingOptions)
-    options: Annotated[CalibrationOptions, tyro.conf.arg(name="")] = field(default_factory=CalibrationOptions)
+    measured: CameraPosition = field(default_factory=MeasuredCamera)
+    topics: Topics = field(default_factory=RecordingOptions)
+    options: Options = field(default_factory=CalibrationOptions)
     serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
 
     def run(self) -> int:
@@ -93,7 +95,7 @@ class Open:
             clicks_file=self.clicks,
             calibration_file=self.calibration,
             topics=self.topics,
-            options=self.options,
+            options=self.measured.over(self.options),
         )
 
 
@@ -118,11 +120,14 @@ def _serve(
     from app.resources import check_installation
     from app.session import OptionsChanged
     from app.session_file import set_aside
+    from app.web.address import require_address, require_token
     from app.web.server import ServerOptions, serve
     from app.workspace import open_workspace
     from calib_core.recordings import open_recording
 
     check_installation()
+    require_address(serving.host, serving.port)
+    require_token(serving.token)
     with ExitStack() as stack:
         recording = stack.enter_context(open_recording(paths, topics or RecordingOptions()))
         camera = _camera(recording, camera_file, calibration_file)
