@@ -22,7 +22,7 @@ _START_NS = 1_700_000_000 * 10**9
 _FRAME_NS = 33_333_333
 _SEEKS = 150
 _OPENINGS = 5
-_WINDOW_SCANS = 512
+_WINDOW_SCANS = 128
 _MEMORY = """
 import resource, sys
 from calib_core.measurements import TimeNs

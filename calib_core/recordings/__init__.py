@@ -7,6 +7,7 @@ from calib_core.recordings.recording import InputFile, Recording, inspect_record
 from calib_core.recordings.selection import RecordingOptions
 from calib_core.recordings.summary import RecordingSummary, recording_summary
 from calib_core.recordings.topics import TopicSummary
+from calib_core.recordings.video_writing import WrittenVideo, write_video
 
 __all__ = [
     "ClockDiagnosis",
@@ -16,9 +17,11 @@ __all__ = [
     "RecordingOptions",
     "RecordingSummary",
     "TopicSummary",
+    "WrittenVideo",
     "describe",
     "inspect_recording",
     "open_recording",
     "recording_summary",
     "require_files",
+    "write_video",
 ]

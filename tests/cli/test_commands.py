@@ -174,11 +174,11 @@ def test_import_says_that_the_camera_is_missing(cocalib: Cocalib, calibration: P
 
 
 def test_export_poses_the_radar_in_the_kit(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
-    posed = cocalib("export", calibration, "--to", "autoware", "--parent-from-radar", *"1.5 0 0.25 0 0 0 1".split())
+    posed = cocalib("export", calibration, "--to", "autoware", "--parent-from-radar", *["1.5", "0", "0.25", "0", "0", "0", "1"])
     assert "x: 1.5" in posed.out
     (tmp_path / "kit.yaml").write_text(posed.out)
     assert cocalib("check", tmp_path / "kit.yaml", "--against", calibration).code == 0
-    wrong = cocalib("export", calibration, "--to", "autoware", "--parent-from-radar", *"0 0 0 0 0 0 2".split())
+    wrong = cocalib("export", calibration, "--to", "autoware", "--parent-from-radar", *["0", "0", "0", "0", "0", "0", "2"])
     assert wrong.code == 2
     assert "qw last" in wrong.err
 
@@ -187,3 +187,13 @@ def test_check_takes_the_camera_that_the_file_lacks(cocalib: Cocalib, calibratio
     cocalib("export", calibration, "--to", "matrix", "--out", tmp_path / "m.txt")
     compared = cocalib("check", tmp_path / "m.txt", "--against", tmp_path / "m.txt", "--camera", calibration)
     assert "at 20 m" in compared.out
+
+
+def test_video_writes_the_camera_and_says_when_it_begins(
+    cocalib: Cocalib, made: Callable[..., Path], tmp_path: Path
+) -> None:
+    pytest.importorskip("av", reason="the extra 'video' is not installed")
+    answer = cocalib("video", made(), "--out", tmp_path / "camera.mp4")
+    assert answer.code == 0, answer.err
+    assert re.search(r"camera\.mp4: \d+ frames, [\d.]+ s, from \d+\.\d{9} s", answer.out)
+    assert (tmp_path / "camera.mp4").stat().st_size > 1000

@@ -1,0 +1,136 @@
+"""The camera as a video, each frame at its recorded time: recorded JPEG is put into the file as it is."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib.util import find_spec
+from pathlib import Path
+
+from calib_core.errors import InputError, RecordingError
+from calib_core.measurements import TimeNs
+from calib_core.recordings.images import EncodedImage
+from calib_core.recordings.recording import Recording
+
+__all__ = ["WrittenVideo", "write_video"]
+
+_FORMATS = {".mp4": "mp4", ".mov": "mov", ".mkv": "matroska"}
+_TICK_NS = 1000
+_JPEG_QUALITY = 95
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenVideo:
+    """What was written.
+
+    Attributes:
+        frames: in the video.
+        start: stamp of the first; its time in the video is 0.
+        duration_s: from the first to the last.
+        other_size: frames left out because they are of another size than the first.
+        unreadable: frames left out because they cannot be read.
+        fault: why the first of those cannot.
+    """
+
+    frames: int
+    start: TimeNs
+    duration_s: float
+    other_size: int = 0
+    unreadable: int = 0
+    fault: str = ""
+
+
+@dataclass(slots=True)
+class _LeftOut:
+    other_size: int = 0
+    unreadable: int = 0
+    fault: str = ""
+
+
+def write_video(
+    recording: Recording, path: Path, *, progress: Callable[[int, int], None] | None = None
+) -> WrittenVideo:
+    """Write the camera's frames into a video file; JPEG is not decoded, other pictures are encoded once.
+
+    Args:
+        recording: with a camera.
+        path: of the video; .mp4 and .mov keep times to a microsecond, .mkv to a millisecond.
+        progress: called with frames done and frames in all.
+
+    Raises:
+        InputError: PyAV is missing, or the suffix is of another format.
+        RecordingError: no frame can be read.
+        OSError: the file cannot be written.
+    """
+    form = _FORMATS.get(path.suffix.lower())
+    if form is None:
+        raise InputError(f"{path}: a video can be written as {', '.join(_FORMATS)}; name it so")
+    if find_spec("av") is None:
+        raise InputError("writing a video needs PyAV, which is not installed: pip install 'cocalib[video]'")
+    part = path.with_name(f".{path.name}.part")
+    try:
+        written = _write(recording, part, form, progress)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+    return written
+
+
+def _write(recording: Recording, path: Path, form: str, progress: Callable[[int, int], None] | None) -> WrittenVideo:
+    import av
+
+    left_out = _LeftOut()
+    frames = _frames(recording, left_out, progress)
+    first = next(frames, None)
+    if first is None:
+        raise RecordingError(
+            f"{recording.name}: none of its {len(recording.image_times)} frames can be read: {left_out.fault}"
+        )
+    start, picture = first
+    options = {} if form == "matroska" else {"video_track_timescale": str(10**9 // _TICK_NS)}
+    count, ticks = 0, -1
+    with av.open(str(path), "w", format=form, options=options) as container:
+        stream = container.add_stream("mjpeg")
+        stream.width, stream.height, stream.pix_fmt = picture.width_px, picture.height_px, "yuvj420p"
+        stream.time_base = Fraction(_TICK_NS, 10**9)
+        while first is not None:
+            time, image = first
+            ticks = max(ticks + 1, round((time - start) / _TICK_NS))
+            packet = av.Packet(image.data)
+            packet.stream, packet.time_base = stream, Fraction(_TICK_NS, 10**9)
+            packet.pts = packet.dts = ticks
+            packet.is_keyframe = True
+            container.mux(packet)
+            count, last = count + 1, time
+            first = next(frames, None)
+    return WrittenVideo(count, start, (last - start) / 1e9, left_out.other_size, left_out.unreadable, left_out.fault)
+
+
+def _frames(
+    recording: Recording, left_out: _LeftOut, progress: Callable[[int, int], None] | None
+) -> Iterator[tuple[TimeNs, EncodedImage]]:
+    """Yield the frames that can be read and are of the first one's size, as JPEG."""
+    size: tuple[int, int] | None = None
+    total = len(recording.image_times)
+    for index in range(total):
+        if progress:
+            progress(index, total)
+        try:
+            image = _as_jpeg(recording, index)
+        except RecordingError as error:
+            left_out.unreadable, left_out.fault = left_out.unreadable + 1, left_out.fault or str(error)
+            continue
+        size = size or (image.width_px, image.height_px)
+        if (image.width_px, image.height_px) == size:
+            yield TimeNs(int(recording.image_times[index])), image
+        else:
+            left_out.other_size += 1
+
+
+def _as_jpeg(recording: Recording, index: int) -> EncodedImage:
+    image = recording.image_bytes(index)
+    if image.format == "jpeg":
+        return image
+    import cv2
+
+    _, data = cv2.imencode(".jpg", recording.image(index), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    return EncodedImage(data.tobytes(), "jpeg", image.width_px, image.height_px)
