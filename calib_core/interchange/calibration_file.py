@@ -111,12 +111,14 @@ class CalibrationFile:
         frames: the names of the two frames.
         check_point: a radar point and the pixel it must come out at; None where a foreign file has none.
         provenance: where it comes from.
+        more: results that a later version wrote and this one does not know: key and JSON text; kept when written again.
     """
 
     calibration: Calibration
     frames: FrameNames = field(default_factory=FrameNames)
     check_point: CheckPoint | None = None
     provenance: Provenance = field(default_factory=Provenance)
+    more: tuple[tuple[str, str], ...] = ()
 
 
 def choose_check_point(calibration: Calibration) -> CheckPoint | None:

@@ -20,7 +20,7 @@ from calib_core.interchange.calibration_file import (
 )
 from calib_core.interchange.camera_document import camera_document, camera_of
 from calib_core.interchange.json_text import json_text
-from calib_core.interchange.strict_json import parse_document
+from calib_core.interchange.strict_json import json_object, parse_document
 from calib_core.measurements import ReflectorClick, TimeNs, Unpaired, time_from_parts, time_parts
 from calib_core.results import Calibration, Caution, CheckPoint, Metrics, PairResult
 
@@ -30,6 +30,7 @@ __all__ = [
     "calibration_text",
     "read_calibration",
     "transform_of",
+    "unknown_results",
     "write_calibration",
 ]
 
@@ -93,7 +94,8 @@ def write_calibration(file: CalibrationFile) -> str:
         provenance=_provenance_document(file.provenance),
     )
     content = msgspec.to_builtins(document)
-    return json_text({key: content[key] for key in _KEY_ORDER})
+    known = {key: content[key] for key in _KEY_ORDER}
+    return json_text(known | {key: msgspec.json.decode(value) for key, value in file.more})
 
 
 _KEY_ORDER = (
@@ -118,7 +120,14 @@ def read_calibration(text: str, source: str = "calibration") -> CalibrationFile:
                 f"{source}: radar_from_camera: is not the inverse of camera_from_radar; "
                 "cocalib check tells which is wrong: correct it or remove radar_from_camera"
             )
-    return calibration_file_of(document, camera_from_radar, source=source)
+    file = calibration_file_of(document, camera_from_radar, source=source)
+    return dataclasses.replace(file, more=unknown_results(text, source=source))
+
+
+def unknown_results(text: str, *, source: str) -> tuple[tuple[str, str], ...]:
+    """Return the keys of a calibration-1 file that this version does not know, each with its JSON text."""
+    content = json_object(text, source=source)
+    return tuple((key, msgspec.json.encode(content[key]).decode()) for key in content if key not in _KEY_ORDER)
 
 
 def calibration_file_of(

@@ -21,7 +21,7 @@ __all__ = ["FRAMES", "Finding", "Source", "check_sources"]
 
 FRAMES = frozenset(
     {"base", "body", "camera", "child", "ego", "kit", "lidar", "link", "map", "optical", "parent"}
-    | {"radar", "reflector", "sensor", "source", "target", "vehicle", "world"}
+    | {"radar", "reflector", "rig", "sensor", "source", "target", "vehicle", "world"}
 )
 GENERIC_FRAMES = frozenset({"child", "parent", "sensor", "source", "target"})
 """Roles that any frame may play when it is passed to a function."""

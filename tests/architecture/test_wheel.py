@@ -65,6 +65,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_wheel_carries_the_page_and_the_sample(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {"app/static/index.html", "app/sample_data/rooftop/radar.bag", "app/sample_data/rooftop/camera.bag"} <= names
+    assert "calib_core/interchange/published/calibration-1.schema.json" in names
     assert {"app/py.typed", "calib_core/py.typed"} <= names
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"app", "calib_core"}
     assert not any("__pycache__" in name or "/tests/" in name for name in names)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from calib_core.calibrate import calibrate_pairs
+from calib_core.errors import InputError
 from calib_core.interchange import (
     calibration_text,
     check,
@@ -61,3 +62,17 @@ def test_solved_pairs_become_a_file_that_passes_its_check(truth, method):
     assert [pair["id"] for pair in content["pairs"] if pair["excluded"]] == ["p3"]
     assert content["check_point"]["radar_m"] == [round(value, 3) for value in content["check_point"]["radar_m"]]
     assert check(read_any(export(read_calibration(text), "tf2").data)).ok
+
+
+def test_results_of_a_later_version_are_kept_and_settings_are_not(project_root: Path):
+    document = json.loads((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+    document["observability"] = {"yaw": 0.25, "words": ["weak", None]}
+    text = write_calibration(read_calibration(json.dumps(document)))
+    assert json.loads(text)["observability"] == document["observability"]
+    assert write_calibration(read_calibration(text)) == text
+    found = read_any(text).file
+    assert found is not None
+    assert json.loads(write_calibration(found))["observability"] == document["observability"]
+    document["options"]["noise"]["sigma_pixels"] = 1
+    with pytest.raises(InputError, match="unknown key"):
+        read_calibration(json.dumps(document))
