@@ -17,7 +17,7 @@ def test_an_address_of_another_machine_is_refused() -> None:
 
 
 def test_a_name_that_does_not_exist_is_refused() -> None:
-    with pytest.raises(AddressError, match="--host not.a.host.invalid: cannot be served from"):
+    with pytest.raises(AddressError, match=r"--host not\.a\.host\.invalid: cannot be served from"):
         require_address("not.a.host.invalid", 8080)
 
 
