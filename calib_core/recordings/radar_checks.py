@@ -9,7 +9,7 @@ from calib_core.results import Caution
 
 __all__ = ["about_claims"]
 
-_SAMPLED_MESSAGES = 24
+_SAMPLED_SCANS = 12
 _FEW = 5
 _MIN_ANGLE_RAD = 0.02
 _MIRROR = "--radar-axes forward,right,up"
@@ -25,7 +25,7 @@ def about_claims(radar: RadarStream | None) -> list[Caution]:
         hint = f"if the calibration comes out mirrored, try {_MIRROR}; degrees or radians can be added"
         cautions.append(Caution("radar-convention-assumed", f"{name} ({plan.decoder}): {plan.assumed}", hint))
     if any(plan.claimed):
-        cautions.extend(_contradictions(name, plan, radar.claims(_SAMPLED_MESSAGES)))
+        cautions.extend(_contradictions(name, plan, radar.claims(_SAMPLED_SCANS)))
     return cautions
 
 

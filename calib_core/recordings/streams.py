@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from calib_core.arrays import Points3, TimesNs, frozen_array
-from calib_core.errors import MessageError
+from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.recordings.images import EncodedImage, ImageLayout
 from calib_core.recordings.radar_clouds import CloudLayout
@@ -23,6 +23,7 @@ __all__ = ["ImageStream", "RadarStream", "join_scans"]
 _BLOCK_SCANS = 128
 _USUAL_CLOUD_BYTES = 4096
 _LONGEST_TOGETHER = 1 << 17
+_CLAIMS_OF_A_SCAN = 16
 _CACHED_RETURNS = 1_000_000
 
 
@@ -57,7 +58,7 @@ class RadarStream:
         """Read the numbers that tell scans apart; of messages with longer strings than the first, from the whole message."""
         frame, point = layout.numbers(heads)
         for row in np.flatnonzero(layout.misfits(heads)).tolist():
-            with contextlib.suppress(MessageError):  # told when the scan itself is read
+            with contextlib.suppress(RecordingError):  # told when the scan itself is read
                 message = layout.message(self.topic.payload(row))
                 for numbers, name in ((frame, layout.frame_number), (point, layout.point_number)):
                     if numbers is not None and name:
@@ -107,18 +108,19 @@ class RadarStream:
         return self._decoded(np.unique(places.astype(np.int64)))
 
     def claims(self, count: int) -> Returns:
-        """Decode at most count messages' own ranges and angles beside the positions, in the message's own axes."""
+        """Decode of at most count scans the messages' own ranges and angles beside the positions, in the message's own axes."""
         layout = self.layout.with_plan(replace(self.layout.plan, claiming=True, axes=None))
-        mine = np.flatnonzero(self.topic.part == self.topic.part[0]) if len(self.topic) else np.zeros(0, np.int64)
+        places = np.unique(np.linspace(0, len(self.times_ns) - 1, min(count, len(self.times_ns))).astype(np.int64))
+        first, last = self._first[places], np.minimum(self._last[places], self._first[places] + _CLAIMS_OF_A_SCAN)
+        rows = np.concatenate([np.zeros(0, np.int64), *(np.arange(a, b) for a, b in zip(first, last, strict=True))])
+        rows = rows[self.topic.part[rows] == self.topic.part[0]] if len(rows) else rows
         if isinstance(layout, PointLayout):
-            rows = mine[np.unique(np.linspace(0, len(mine) - 1, min(16 * count, len(mine))).astype(np.int64))]
             heads = self.topic.heads(rows, layout.dtype.itemsize)
             whole = (heads.lengths >= layout.dtype.itemsize) & ~layout.misfits(heads.rows)
             return layout.returns_of_rows(heads.rows[whole])
-        rows = mine[np.unique(np.linspace(0, len(mine) - 1, min(count, len(mine))).astype(np.int64))]
         found = []
         for row in rows.tolist():
-            with contextlib.suppress(MessageError):  # told when the scan itself is read
+            with contextlib.suppress(RecordingError):  # told when the scan itself is read
                 found.append(layout.returns(self.topic.payload(row)))
         return _joined(found)
 
