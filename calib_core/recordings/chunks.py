@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.recordings.compression import refuse_bomb, unpack, unpack_what_is_there
 from calib_core.recordings.files import FileBytes
-from calib_core.recordings.gathering import gather_heads
+from calib_core.recordings.gathering import gather_far, gather_heads
 from calib_core.recordings.index_cache import cache_of
 from calib_core.recordings.kept_indexes import KeptIndex, heads_from, index_from, keep_heads, keep_index
 from calib_core.recordings.sources import Channel, Heads, MessageIndex
@@ -23,6 +24,8 @@ from calib_core.results import Caution
 __all__ = ["CACHE_BYTES", "MAX_MESSAGE_BYTES", "Chunk", "ChunkedSource"]
 
 CACHE_BYTES = 64 * 2**20
+_FEW_MESSAGES = 64
+_FAR_BYTES = 4096
 MAX_MESSAGE_BYTES = 1 << 28
 """No message of a sensor is larger; one that claims to be is damaged or made to harm."""
 
@@ -224,6 +227,24 @@ class ChunkedSource:
         """Read the first bytes of many messages, in the order of the index."""
         found = heads_from(self._kept, index, size)
         if found is None:
-            found = gather_heads(self, index, size)
+            places = self._far_places(index, size)
+            found = (
+                gather_far(self, self.file, index, places, size)
+                if places is not None
+                else gather_heads(self, index, size)
+            )
             keep_heads(self._kept, index, size, found)
         return found
+
+    def _far_places(self, index: MessageIndex, size: int) -> TimesNs | None:
+        """Return where in the file messages lie that are stored as they are, far from one another; None for others."""
+        if len(index) < _FEW_MESSAGES:
+            return None
+        used = np.unique(index.chunk)
+        if any(self.chunks[number].packed for number in used.tolist()):
+            return None
+        starts = np.zeros(len(self.chunks), dtype=np.int64)
+        starts[used] = [self.chunks[number].position for number in used.tolist()]
+        places: TimesNs = starts[index.chunk] + index.offset
+        far = np.diff(np.sort(places)) > self.lead_bytes + size + _FAR_BYTES
+        return places if np.count_nonzero(far) > 0.5 * len(places) else None

@@ -8,15 +8,18 @@ from typing import Protocol
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
+from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
+from calib_core.recordings.files import FileBytes
 from calib_core.recordings.sources import Heads, MessageIndex
 
-__all__ = ["ChunkAccess", "gather_heads"]
+__all__ = ["ChunkAccess", "gather_far", "gather_heads"]
 
 _NEAR_BYTES = 4096
 _RUN_MESSAGES = 4096
 _THREADS = 4
 _FEW_CHUNKS = 32
+_AHEAD = 256
 
 
 class ChunkAccess(Protocol):
@@ -64,6 +67,37 @@ def gather_heads(source: ChunkAccess, index: MessageIndex, size: int) -> Heads:
     with ThreadPoolExecutor(_THREADS) as pool:
         faults = [fault for fault in pool.map(gather.chunks, batches) if fault]
     return Heads(gather.rows, gather.lengths, faults[0] if faults else "")
+
+
+def gather_far(source: ChunkAccess, file: FileBytes, index: MessageIndex, places: TimesNs, size: int) -> Heads:
+    """Read the first bytes of messages that are stored as they are and lie far apart: one small read for each.
+
+    Args:
+        source: the chunked file.
+        file: its bytes.
+        index: the messages.
+        places: (n,) where their records begin in the file.
+        size: how many bytes of each message.
+    """
+    width = source.lead_bytes + size
+    order = np.argsort(places)
+    read: list[bytes] = []
+    for first in range(0, len(order), _AHEAD):
+        wanted = places[order[first : first + _AHEAD]].tolist()
+        file.expect(wanted, width)
+        read.extend(file.up_to(place, width).ljust(width, b"\0") for place in wanted)
+    gathered = np.zeros((len(order), width), dtype=np.uint8)
+    gathered[order] = np.frombuffer(b"".join(read), dtype=np.uint8).reshape(-1, width)
+    usual, lengths = source.usual(gathered[:, : source.lead_bytes])
+    gather = _Gather(source, index, size, keep=False)
+    gather.rows, gather.lengths = gathered[:, source.lead_bytes :], lengths
+    rooms = np.array([source.room(chunk) for chunk in range(int(index.chunk.max()) + 1)])[index.chunk]
+    past = index.offset + source.lead_bytes + lengths > rooms
+    lengths[past] = -1
+    faults = ["a chunk ends before its messages do"] if (past & usual).any() else []
+    for row in np.flatnonzero(~usual).tolist():
+        faults.append(gather.single(int(index.chunk[row]), int(index.offset[row]), row))
+    return Heads(gather.rows, gather.lengths, next((fault for fault in faults if fault), ""))
 
 
 def _groups(chunk: np.ndarray) -> list[np.ndarray]:
@@ -128,10 +162,10 @@ class _Gather:
         self.rows[order] = gathered[:, lead:]
         fault = f"chunk {chunk} ends before its messages do" if (past & usual).any() else ""
         for place in np.flatnonzero(~usual).tolist():
-            fault = self._single(chunk, int(offsets[place]), int(order[place])) or fault
+            fault = self.single(chunk, int(offsets[place]), int(order[place])) or fault
         return fault
 
-    def _single(self, chunk: int, offset: int, row: int) -> str:
+    def single(self, chunk: int, offset: int, row: int) -> str:
         """Read the head of a message whose record is laid out in another way; return why it cannot be read."""
         try:
             start, length = self.source.locate(chunk, offset)
