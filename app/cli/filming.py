@@ -17,7 +17,7 @@ class Video:
     """Write the camera's frames into a video, each at its recorded time; recorded JPEG is not encoded again."""
 
     recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")]
-    """One or more .bag, .mcap, .db3 files or bag folders; several together are one recording."""
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
     out: Path
     """Video to write: .mp4 or .mov (times to a microsecond), or .mkv (to a millisecond)."""
     topics: Annotated[RecordingOptions, tyro.conf.arg(name="")] = field(default_factory=RecordingOptions)

@@ -17,7 +17,7 @@ class Info:
     """Say what a recording holds: files, topics, types, rates, stamps, overlap, camera, warnings."""
 
     recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")]
-    """One or more .bag, .mcap, .db3 files or bag folders; several together are one recording."""
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
     json: bool = False
     """Print the same as JSON on stdout."""
     topics: Topics = field(default_factory=RecordingOptions)

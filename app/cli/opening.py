@@ -63,7 +63,7 @@ class Open:
     """Calibrate your own recording in the browser."""
 
     recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")]
-    """One or more .bag, .mcap, .db3 files or bag folders; several together are one recording."""
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
     camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     calibration: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None

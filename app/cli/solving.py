@@ -32,7 +32,7 @@ class Solve:
     """
 
     recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")] = ()
-    """One or more .bag, .mcap, .db3 files or bag folders; several together are one recording."""
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
     clicks: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Clicks in this recording (cocalib/clicks-1 JSON)."""
     pairs: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
