@@ -114,6 +114,14 @@ export async function place(u, v) {
   if (here?.id) select(here.id);
 }
 
+/** Put a click where the reflector is expected; else in the middle of what is seen, for the arrows to move. */
+export function placeByKey() {
+  if (!state.shown || state.shown.index !== state.cursor || state.playing || clickIn(state.cursor)) return;
+  const guess = state.overlay?.index === state.shown.index ? state.overlay.guesses[0] : undefined;
+  const [u, v] = guess ?? toImage(viewport.width / 2, viewport.height / 2);
+  return place(...clamped(u, v));
+}
+
 /** @param {import("./messages.js").ClickRow} click @param {number} u @param {number} v */
 function dragMark(click, u, v) {
   draft(stampKey(click.image_time), ...clamped(u, v));

@@ -17,16 +17,17 @@ const EMPTY = [
   ["inliers", "pairs that agree"],
 ];
 /** Cautions that the person has opened stay open. @type {Set<string>} */
-const openCodes = new Set();
+const openCodes = new Set(["unsolvable"]);
 export const poseTable = make("table", "", []);
 const poseHead = make("div", "pose-head", "");
 const apartTable = make("table", "", []);
 const apart = make("div", "apart", []);
 const adviceLine = make("p", "advice", "");
+const axesLine = make("p", "advice axes", "Along and about the radar's axes: x forward, y left, z up. All angles 0: the camera looks along x.");
 let cautionText = "";
 
 export function startFigures() {
-  const pose = make("div", "pose", [poseTable, adviceLine]);
+  const pose = make("div", "pose", [poseTable, axesLine, adviceLine]);
   posePage.append(poseHead, apart, pose);
   on(["view", "recording"], draw);
 }
@@ -40,7 +41,8 @@ function draw() {
   poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Appears with the first calibration.")])]));
   adviceLine.textContent = view.advice?.words ?? "";
   drawReference(view);
-  drawCautions([...(state.recording?.cautions ?? []), ...view.cautions]);
+  const failure = view.stage === "unsolvable" ? [{ code: "unsolvable", message: view.status, hint: view.hint }] : [];
+  drawCautions([...failure, ...(state.recording?.cautions ?? []), ...view.cautions]);
 }
 
 /** Where the pose comes from while it is a file's, and how far the solved one lies from it. @param {import("./messages.js").View} view */

@@ -1,6 +1,7 @@
 // @ts-check
 /** Keys, mouse and marks on one sheet. */
 
+import { ink } from "./colours.js";
 import { KEYS } from "./keys.js";
 import { make } from "./notices.js";
 
@@ -14,12 +15,15 @@ const MOUSE = [
 ];
 /** @type {[string, string][]} */
 const MARKS = [
-  ["M8 1v5M8 10v5M1 8h5M10 8h5", "click"],
-  ["M8 3a5 5 0 1 0 .01 0z", "reprojection of its radar position"],
-  ["M2 13 13 3", "residual"],
-  ["M6.5 1h3v5.5H15v3H9.5V15h-3V9.5H1v-3h5.5z", "click that was left out"],
-  ["M8 3a5 5 0 1 0 .01 0z|2.5 2.5", "predicted reflector"],
-  ["M8 5.5a2.5 2.5 0 1 0 .01 0z|fill", "radar return that stands still"],
+  ["M8 1v5M8 10v5M1 8h5M10 8h5", "cross: your click; small and coloured, the click of another frame"],
+  ["M6.5 1h3v5.5H15v3H9.5V15h-3V9.5H1v-3h5.5z", "hollow cross: a click that is left out"],
+  ["M8 3a5 5 0 1 0 .01 0z", "ring: where the calibration puts its radar position"],
+  ["M2 13 13 3", "line between them: the residual"],
+  ["M1 8a7 4 0 1 0 14 0a7 4 0 1 0-14 0z||ring", "ellipse: 95 % of the clicks of good pairs lie in it"],
+  ["M8 3a5 5 0 1 0 .01 0z|2.5 2.5|guess", "dashed circle: the reflector is expected here"],
+  ["M1 8 8 4.5 15 8 8 11.5z|2.5 2.5|guess", "dashed diamond (ring in 3D): best place for another placement"],
+  ["M8 5.5a2.5 2.5 0 1 0 .01 0z|fill|still", "dot: radar return that stands still"],
+  ["M8 4.5 12 11.5H4z|fill|moving", "triangle: radar return that moves"],
 ];
 
 export function toggleHelp() {
@@ -59,16 +63,17 @@ function note() {
 /** @param {string} name */
 const key = (name) => make("span", "key", name);
 
-/** @param {string} spec path, and after a bar: dashes or "fill" */
+/** @param {string} spec path|dashes or "fill"|colour of the mark */
 function drawing(spec) {
-  const [path, style] = spec.split("|");
+  const [path, style, colour] = spec.split("|");
+  const stroke = ink[/** @type {keyof typeof ink} */ (colour)] ?? "currentColor";
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   svg.setAttribute("viewBox", "0 0 16 16");
   svg.setAttribute("aria-hidden", "true");
   const shape = document.createElementNS("http://www.w3.org/2000/svg", "path");
   shape.setAttribute("d", path);
-  shape.setAttribute("fill", style === "fill" ? "currentColor" : "none");
-  shape.setAttribute("stroke", "currentColor");
+  shape.setAttribute("fill", style === "fill" ? stroke : "none");
+  shape.setAttribute("stroke", stroke);
   shape.setAttribute("stroke-width", "1.5");
   if (style && style !== "fill") shape.setAttribute("stroke-dasharray", style);
   svg.append(shape);

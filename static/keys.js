@@ -1,14 +1,15 @@
 // @ts-check
 /** One key, one deed; the same when the hand is in the 3D view. */
 
-import { flushNudge, nudgeBy, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
+import { comeTo } from "./arriving.js";
+import { flushNudge, nudgeBy, placeByKey, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
 import { openExport } from "./exporting.js";
 import { toggleHelp } from "./help.js";
 import { toggleLayer } from "./layers.js";
 import { nextWorst } from "./pairs.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
-import { state } from "./state.js";
+import { isClicked, placementAt, state } from "./state.js";
 
 /** Keys with what they do, in the order of the help. @type {{keys: string[], does: string}[]} */
 export const KEYS = [
@@ -17,6 +18,7 @@ export const KEYS = [
   { keys: ["Shift", "←", "→"], does: "ten frames" },
   { keys: ["N", "P"], does: "next, previous placement" },
   { keys: ["J"], does: "next worst residual" },
+  { keys: ["Enter"], does: "place a mark where the reflector is expected, else in the middle" },
   { keys: ["Alt", "arrows"], does: "move the mark by 0.1 px" },
   { keys: ["Alt", "Shift", "arrows"], does: "move the mark by 1 px" },
   { keys: ["X"], does: "leave the pair out, or take it in again" },
@@ -47,6 +49,7 @@ const PLAIN = {
   2: () => toggleLayer("others"),
   3: () => toggleLayer("ellipses"),
   4: () => toggleLayer("predictions"),
+  Enter: placeByKey,
   Delete: removeSelected,
   Backspace: removeSelected,
   Home: () => goTo(0),
@@ -108,9 +111,9 @@ function arrow(event) {
 /** Go to the next placement, or the one before. @param {1|-1} direction */
 export function placement(direction) {
   flushNudge();
-  pause();
-  const frames = state.placements.map((found) => found.frame);
+  const done = placementAt(state.cursor);
+  const frames = state.placements.filter((found) => found !== done || !isClicked(found)).map((found) => found.frame);
   const ahead = direction > 0 ? frames.filter((frame) => frame > state.cursor) : frames.filter((frame) => frame < state.cursor).reverse();
   const next = ahead.length ? ahead[0] : direction > 0 ? frames[0] : frames[frames.length - 1];
-  if (next !== undefined) goTo(next);
+  if (next !== undefined) comeTo(next);
 }

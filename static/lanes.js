@@ -46,7 +46,7 @@ function drawRuler(pen, width, height, toX, span) {
     pen.fillRect(Math.round(x), lanes.ruler - 3, 1, height - lanes.ruler + 3);
     pen.fillStyle = themeColour("faint");
     const text = step < 1 ? (tick * step).toFixed(Math.ceil(-Math.log10(step))) : String(Math.round(tick * step));
-    if (x > 10 && x < width - 12) pen.fillText(tick === 0 ? "0 s" : text, x, 8);
+    if (x > 10 && x < width - 12) pen.fillText(tick === 0 ? "0 s" : text, x, 6.5);
   }
 }
 
@@ -125,11 +125,11 @@ function head(pen, clickState, x, y, size) {
 /** @param {Ink} pen @param {number} height @param {number} x */
 function drawNow(pen, height, x) {
   pen.fillStyle = themeColour("ink");
-  pen.fillRect(Math.round(x), lanes.ruler - 4, 1, height);
+  pen.fillRect(Math.round(x), lanes.ruler, 1, height);
   pen.beginPath();
-  pen.moveTo(x - 4.5, lanes.ruler - 8);
-  pen.lineTo(x + 5.5, lanes.ruler - 8);
-  pen.lineTo(x + 0.5, lanes.ruler - 1);
+  pen.moveTo(x - 4.5, lanes.ruler - 4);
+  pen.lineTo(x + 5.5, lanes.ruler - 4);
+  pen.lineTo(x + 0.5, lanes.ruler + 3);
   pen.closePath();
   pen.fill();
 }

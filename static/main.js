@@ -1,6 +1,7 @@
 // @ts-check
 /** The page: wires the parts together and gives the server's messages to those who draw them. */
 
+import { startArriving } from "./arriving.js";
 import { startClicking, turnBack } from "./clicking.js";
 import { setFormats, startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
@@ -108,6 +109,7 @@ startScatter();
 startOptions();
 startExporting();
 startGuide();
+startArriving();
 listen(window);
 press("undo", () => turnBack("undo"));
 press("redo", () => turnBack("redo"));

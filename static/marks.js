@@ -5,11 +5,16 @@
  */
 
 import { ink, residualColour } from "./colours.js";
-import { toDevice, viewport } from "./geometry.js";
+import { toCss, toDevice, viewport, zoom } from "./geometry.js";
 import { clicks, state } from "./state.js";
 
 /** @typedef {CanvasRenderingContext2D} Ink */
 /** @typedef {import("./messages.js").ClickRow} Click */
+
+/** Nearer than this to a mark, the hand is at the reflector [CSS px]. */
+const CLOSE = 36;
+/** From this many screen px per image px on, one looks at the reflector. */
+const CLOSE_ZOOM = 2;
 
 /** Draw all marks of the frame on screen. @param {Ink} pen */
 export function drawMarks(pen) {
@@ -93,29 +98,44 @@ function drawOther(pen, click) {
 /** The click of this frame with all that belongs to it. @param {Ink} pen @param {Click} click */
 function drawClick(pen, click) {
   const [x, y] = toDevice(click.u_px, click.v_px);
-  if (click.projected_px) drawReprojection(pen, click, x, y);
+  const calm = looksClosely(click);
+  if (click.projected_px) drawReprojection(pen, click, x, y, calm);
   const hollow = click.state === "excluded";
-  const arm = 13 * viewport.ratio;
-  const gap = 3 * viewport.ratio;
+  const arm = (calm ? 22 : 13) * viewport.ratio;
+  const gap = (calm ? 10 : 3) * viewport.ratio;
+  if (calm) pen.globalAlpha = 0.9;
   if (hollow) outlined(pen, ink.click, 1.2, () => hollowCross(pen, x, y, arm, gap));
-  else outlined(pen, ink.click, 1.6, () => cross(pen, x, y, arm, gap));
+  else outlined(pen, ink.click, calm ? 1.2 : 1.6, () => cross(pen, x, y, arm, gap), [], calm ? 1.4 : 2);
+  pen.globalAlpha = 1;
 }
 
-/** @param {Ink} pen @param {Click} click @param {number} x @param {number} y */
-function drawReprojection(pen, click, x, y) {
+/** Whether the eye is on the reflector itself: then the marks leave it free. @param {Click} click */
+function looksClosely(click) {
+  if (!viewport.fitted && zoom() >= CLOSE_ZOOM) return true;
+  if (!state.hover) return false;
+  const [x, y] = toCss(state.hover.u, state.hover.v);
+  const [cx, cy] = toCss(click.u_px, click.v_px);
+  return Math.hypot(x - cx, y - cy) < CLOSE;
+}
+
+/** @param {Ink} pen @param {Click} click @param {number} x @param {number} y @param {boolean} calm */
+function drawReprojection(pen, click, x, y, calm) {
   const [ring, limit] = [/** @type {[number, number]} */ (click.projected_px), state.view?.residual_limit_px ?? null];
   const [px, py] = toDevice(ring[0], ring[1]);
   const colour = residualColour(click.residual_px, limit);
   if (state.layers.ellipses && click.ellipse) {
     const { semi_major_px: major, semi_minor_px: minor, angle_rad: angle } = click.ellipse;
+    const ellipse = () => pen.ellipse(px, py, major * viewport.scale, minor * viewport.scale, angle, 0, 2 * Math.PI);
     pen.beginPath();
-    pen.ellipse(px, py, major * viewport.scale, minor * viewport.scale, angle, 0, 2 * Math.PI);
+    ellipse();
     pen.fillStyle = "rgb(255 255 255 / 7%)";
-    pen.fill();
-    outlined(pen, ink.ring, 1, () => pen.ellipse(px, py, major * viewport.scale, minor * viewport.scale, angle, 0, 2 * Math.PI));
+    if (!calm) pen.fill();
+    pen.globalAlpha = calm ? 0.6 : 1;
+    outlined(pen, ink.ring, 1, ellipse, [], calm ? 1 : 2);
+    pen.globalAlpha = 1;
   }
   const length = Math.hypot(px - x, py - y);
-  const radius = 7 * viewport.ratio;
+  const radius = (calm ? 12 : 7) * viewport.ratio;
   if (length > radius) {
     const end = (length - radius) / length;
     outlined(pen, colour, 2, () => {
@@ -123,18 +143,18 @@ function drawReprojection(pen, click, x, y) {
       pen.lineTo(x + (px - x) * end, y + (py - y) * end);
     });
   }
-  outlined(pen, colour, 2, () => pen.arc(px, py, radius, 0, 2 * Math.PI));
+  outlined(pen, colour, calm ? 1.2 : 2, () => pen.arc(px, py, radius, 0, 2 * Math.PI), [], calm ? 1 : 2);
 }
 
 /**
  * Stroke a path with a dark edge below it, so that it shows on any picture.
- * @param {Ink} pen @param {string} colour @param {number} width CSS px @param {() => void} path @param {number[]} [dashes]
+ * @param {Ink} pen @param {string} colour @param {number} width CSS px @param {() => void} path @param {number[]} [dashes] @param {number} [edge] CSS px
  */
-function outlined(pen, colour, width, path, dashes = []) {
+function outlined(pen, colour, width, path, dashes = [], edge = 2) {
   pen.setLineDash(dashes);
   pen.beginPath();
   path();
-  pen.lineWidth = (width + 2) * viewport.ratio;
+  pen.lineWidth = (width + edge) * viewport.ratio;
   pen.strokeStyle = ink.edge;
   pen.stroke();
   pen.lineWidth = width * viewport.ratio;

@@ -8,11 +8,12 @@ const TOAST_MS = 9000;
 const TIP_MS = 280;
 let tipTimer = 0;
 
-/** Say in words what went wrong and what to do. @param {string} message @param {string} [hint] */
-export function toast(message, hint = "") {
+/** Say in words what went wrong and what to do. @param {string} message @param {string} [hint] @param {string} [about] what `settled` takes it away by */
+export function toast(message, hint = "", about = "") {
   const text = toasts.querySelector(".toast span")?.textContent;
   if (text === message) return;
   const box = make("div", "toast", [make("span", "", message), hint ? make("small", "", hint) : ""]);
+  box.dataset.about = about;
   const close = make("button", "", "×");
   close.setAttribute("aria-label", "Close");
   close.onclick = () => box.remove();
@@ -20,6 +21,11 @@ export function toast(message, hint = "") {
   toasts.append(box);
   while (toasts.children.length > 3) toasts.firstElementChild?.remove();
   setTimeout(() => box.remove(), TOAST_MS);
+}
+
+/** What went wrong is right again: take away the words about it. @param {string} about */
+export function settled(about) {
+  for (const box of /** @type {NodeListOf<HTMLElement>} */ (toasts.querySelectorAll(".toast"))) if (box.dataset.about === about) box.remove();
 }
 
 /** @param {string} text "" takes it away */

@@ -1,25 +1,38 @@
 // @ts-check
 /** The options, drawn from the server's own description of them: the few that matter first, all others below. */
 
-import { make, toast } from "./notices.js";
+import { make, settled, toast } from "./notices.js";
 import { send } from "./socket.js";
 import { on, state } from "./state.js";
 
 /** @typedef {import("./messages.js").OptionDescription} Field */
 const page = /** @type {HTMLElement} */ (document.getElementById("page-options"));
 /** The options that most people come for. */
-const FIRST = ["locating.window_s", "noise.sigma_px", "gating.max_range_m", "solving.camera_position"];
+const FIRST = [
+  "locating.window_s", "noise.sigma_px", "gating.max_range_m", "solving.camera_position",
+  "paper.ransac_threshold_px", "paper.window_s", "paper.max_range_m",
+];
+/** What a method does not look at. @type {Record<string, (path: string) => boolean>} */
+const IDLE = {
+  default: (path) => path.startsWith("paper."),
+  paper: (path) => /^(noise|solving|gating)\./.test(path) || (path.startsWith("locating.") && path !== "locating.max_time_gap_s"),
+};
 /** Names that say more than the option's own. @type {Record<string, string>} */
 const LABELS = {
   "locating.window_s": "Radar window around a click",
   "noise.sigma_px": "Uncertainty of a click",
   "gating.max_range_m": "Farthest return",
+  "solving.camera_position": "Camera position by tape",
+  "paper.ransac_threshold_px": "RANSAC threshold",
+  "paper.window_s": "Radar window around a click",
+  "paper.max_range_m": "Farthest return",
+  method: "Method",
 };
 /** @type {Record<string, string>} */
-const METHODS = { default: "Robust", paper: "Paper" };
+const METHODS = { default: "Default", paper: "Paper" };
 /** @type {Record<string, string>} */
 const METHOD_HINTS = {
-  default: "Robust estimator: finds wrong pairs, weighs radar and click noise, says how sure it is.",
+  default: "The default method: robust, finds wrong pairs, weighs radar and click noise, says how sure it is.",
   paper: "Algorithm 1 of the paper, line by line: average, RANSAC, Levenberg-Marquardt.",
 };
 /** @type {Map<string, (value: any) => void>} */
@@ -48,7 +61,7 @@ function build() {
     if (!others.length) continue;
     const title = make("div", "group", group.name);
     title.dataset.hint = group.hint;
-    rest.append(title, ...others.map(control));
+    rest.append(make("div", "part", [title, ...others.map(control)]));
   }
   more.append(rest);
   box.append(more);
@@ -68,7 +81,10 @@ function segmented(field) {
   writers.set(field.path, (value) => {
     for (const button of buttons) button.setAttribute("aria-pressed", String(button.dataset.method === value));
   });
-  return row(field, make("span", "segmented", buttons), "Method");
+  const group = make("span", "segmented", buttons);
+  group.setAttribute("role", "group");
+  group.setAttribute("aria-label", labelOf(field));
+  return row(field, group);
 }
 
 /** @param {Field} field */
@@ -76,7 +92,8 @@ function control(field) {
   if (field.kind === "camera-position") return cameraPosition(field);
   if (field.kind === "choice") return choice(field);
   if (field.kind === "yes-no") return yesNo(field);
-  const input = number(field.low, field.high, field.label);
+  const input = number(field.low, field.high);
+  input.id = idOf(field);
   input.onchange = () => change(field.path, field.kind === "integer" ? Math.round(Number(input.value)) : Number(input.value));
   writers.set(field.path, (value) => write(input, value));
   return row(field, make("span", "control", [input, make("span", "unit", field.unit)]));
@@ -85,7 +102,7 @@ function control(field) {
 /** @param {Field} field */
 function choice(field) {
   const list = make("select", "", field.choices.map((name) => make("option", "", name)));
-  list.setAttribute("aria-label", field.label);
+  list.id = idOf(field);
   list.onchange = () => change(field.path, list.value);
   writers.set(field.path, (value) => (list.value = value));
   return row(field, make("span", "control", [list]));
@@ -95,7 +112,7 @@ function choice(field) {
 function yesNo(field) {
   const input = make("input", "", []);
   input.type = "checkbox";
-  input.setAttribute("aria-label", field.label);
+  input.id = idOf(field);
   input.onchange = () => change(field.path, input.checked);
   writers.set(field.path, (value) => (input.checked = value));
   return row(field, make("span", "control", [input]));
@@ -105,16 +122,18 @@ function yesNo(field) {
 function cameraPosition(field) {
   const wanted = make("input", "", []);
   wanted.type = "checkbox";
-  wanted.id = "camera-position";
-  wanted.setAttribute("aria-label", "Camera position measured by tape");
+  wanted.id = idOf(field);
   const names = ["forward", "left", "up"];
-  const inputs = names.map((name) => number(-100, 100, `camera ${name} of the radar`));
+  const inputs = names.map(() => number(-100, 100));
   inputs.forEach((input, index) => {
-    input.placeholder = names[index];
     input.dataset.hint = `Camera's distance ${names[index]} of the radar [m]`;
   });
-  const sure = number(0.0001, 10, "standard deviation of the position");
-  const numbers = make("span", "control triple", [...inputs, make("span", "", "±"), sure, make("span", "unit", "m")]);
+  const sure = number(0.0001, 10);
+  sure.dataset.hint = "Standard deviation of each of the three distances [m]";
+  const named = [...inputs, sure].map((input, index) => make("label", "", [make("span", "", names[index] ?? "± sigma"), input]));
+  const numbers = make("span", "control triple", [...named, make("span", "unit", "m")]);
+  numbers.setAttribute("role", "group");
+  numbers.setAttribute("aria-label", "Camera seen from the radar");
   const told = () => {
     const entered = [...inputs, sure].every((input) => input.value !== "");
     if (entered) change(field.path, { position_m: inputs.map((input) => Number(input.value)), sigma_m: Number(sure.value) });
@@ -128,24 +147,27 @@ function cameraPosition(field) {
   };
   for (const input of [...inputs, sure]) input.onchange = told;
   writers.set(field.path, (value) => {
-    if (value === null && numbers.contains(document.activeElement)) return; // the tape is being read
+    const entered = inputs.every((input) => input.value !== "");
+    if (value === null && wanted.checked && (!entered || numbers.contains(document.activeElement))) return; // the tape is being read
     wanted.checked = value !== null;
-    inputs.forEach((input, index) => write(input, value?.position_m[index] ?? ""));
-    write(sure, value?.sigma_m ?? "");
     numbers.hidden = value === null;
+    if (value === null) return; // what was entered waits until it is wanted again
+    inputs.forEach((input, index) => write(input, value.position_m[index]));
+    write(sure, value.sigma_m);
   });
-  const head = row(field, make("span", "control", [wanted]), "Camera position by tape");
-  return make("div", "", [head, numbers]);
+  const head = row(field, make("span", "control", [wanted]));
+  const box = make("div", "position", [head, numbers]);
+  box.dataset.field = field.path;
+  return box;
 }
 
-/** @param {number|null} low @param {number|null} high @param {string} label */
-function number(low, high, label) {
+/** @param {number|null} low @param {number|null} high */
+function number(low, high) {
   const input = make("input", "", []);
   input.type = "number";
   input.step = "any";
   if (low !== null) input.min = String(low);
   if (high !== null) input.max = String(high);
-  input.setAttribute("aria-label", label);
   return input;
 }
 
@@ -154,13 +176,22 @@ function write(input, value) {
   if (document.activeElement !== input) input.value = value === null || value === undefined ? "" : String(value);
 }
 
-/** @param {Field} field @param {HTMLElement} content @param {string} [label] */
-function row(field, content, label = LABELS[field.path] ?? sentence(field.label)) {
-  const line = make("div", "field", [make("span", "", label), content]);
-  line.dataset.hint = `${label}\n${field.hint}`;
-  line.dataset.path = field.path;
+/** @param {Field} field @param {HTMLElement} content */
+function row(field, content) {
+  const target = content.querySelector(`#${idOf(field)}`);
+  const name = make(target ? "label" : "span", "name", labelOf(field));
+  if (name instanceof HTMLLabelElement) name.htmlFor = idOf(field);
+  const line = make("div", "field", [name, content]);
+  line.dataset.hint = `${labelOf(field)}\n${field.hint}`;
+  line.dataset.path = line.dataset.field = field.path;
   return line;
 }
+
+/** @param {Field} field */
+const labelOf = (field) => LABELS[field.path] ?? sentence(field.label);
+
+/** @param {Field} field */
+const idOf = (field) => `option-${field.path.replaceAll(".", "-")}`;
 
 /** @param {string} text */
 const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
@@ -169,6 +200,7 @@ const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 function fill() {
   const options = /** @type {Record<string, any>|undefined} */ (state.view?.options);
   if (!options) return;
+  showFieldsOf(options.method);
   for (const [path, set] of writers) {
     const value = path.split(".").reduce((tree, name) => tree?.[name], /** @type {any} */ (options));
     set(value);
@@ -178,14 +210,26 @@ function fill() {
   }
 }
 
+/** Show the fields that count for a method. @param {string} method */
+function showFieldsOf(method) {
+  for (const line of /** @type {NodeListOf<HTMLElement>} */ (page.querySelectorAll("[data-field]"))) line.hidden = IDLE[method]?.(line.dataset.field ?? "") ?? false;
+  for (const part of /** @type {NodeListOf<HTMLElement>} */ (page.querySelectorAll(".part"))) part.hidden = !part.querySelector("[data-field]:not([hidden])");
+}
+
+/** Words of the server with the option's label in place of its name. @param {string} words */
+function inLabels(words) {
+  const fields = (state.recording?.option_groups ?? []).flatMap((group) => group.options).filter((field) => field.path.includes("."));
+  return fields.reduce((text, field) => text.replace(new RegExp(`(option )?\\b${field.path.replaceAll(".", "\\.")}(\\.\\w+)?\\b`, "g"), labelOf(field)), words);
+}
+
 /** @param {string} path @param {any} value */
 async function change(path, value) {
   if (typeof value === "number" && !Number.isFinite(value)) return fill();
   const [name, ...groups] = path.split(".").reverse();
   const options = groups.reduce((tree, group) => ({ [group]: tree }), /** @type {Record<string, any>} */ ({ [name]: value }));
   const refusal = await send({ type: "options_changed", options });
-  if (!refusal) return;
-  toast(refusal, "The option is back at its last value.");
+  if (!refusal) return settled(path);
+  toast(inLabels(refusal), "The option is back at its last value.", path);
   /** @type {HTMLElement|null} */ (document.activeElement)?.blur();
   fill();
 }

@@ -1,12 +1,12 @@
 // @ts-check
-/** The table of pairs: by time or by residual, one line per click; press a line to go there, X leaves it out. */
+/** The table of pairs: by time or by residual, one line per click; press a line to go there, its tick leaves it out. */
 
+import { comeTo } from "./arriving.js";
 import { residualColour } from "./colours.js";
 import { toggleExcluded } from "./clicking.js";
 import { make } from "./notices.js";
-import { goTo, pause } from "./player.js";
 import { drawSteps } from "./steps.js";
-import { clicks, on, select, state } from "./state.js";
+import { clicks, on, rangeApart, select, state } from "./state.js";
 
 /** @typedef {import("./messages.js").ClickRow} Click */
 const page = /** @type {HTMLElement} */ (document.getElementById("page-pairs"));
@@ -15,10 +15,11 @@ const count = /** @type {HTMLElement} */ (document.getElementById("pair-count"))
 const sorting = { key: "frame", descending: false };
 /** @type {{key: "frame"|"residual_px"|"range_m"|null, label: string, hint: string}[]} */
 const COLUMNS = [
+  { key: null, label: "Click", hint: "" },
   { key: "frame", label: "Time", hint: "Time of the frame from the first one. Press to sort." },
   { key: "range_m", label: "Range", hint: "Distance of the reflector from the radar. Press to sort." },
   { key: "residual_px", label: "Residual", hint: "Distance between the click and the reprojection of its radar position. Press to sort." },
-  { key: null, label: "", hint: "" },
+  { key: null, label: "Use", hint: "" },
 ];
 let drawn = "";
 
@@ -36,16 +37,16 @@ export function sorted() {
 /** The click that the walk has come to. @type {string|null} */
 let walkedTo = null;
 
-/** Go to the largest residual; then, as long as one walks on, to the next smaller one. */
+/** Go to the pair that does not agree, else to the largest residual; then, as long as one walks on, to the next smaller one. */
 export function nextWorst() {
   const ranked = clicks().filter((click) => click.residual_px !== null && click.state !== "excluded");
-  ranked.sort((a, b) => Number(b.residual_px) - Number(a.residual_px));
+  const doubt = (/** @type {Click} */ click) => Number(click.state === "outlier");
+  ranked.sort((a, b) => doubt(b) - doubt(a) || Number(b.residual_px) - Number(a.residual_px));
   if (!ranked.length) return;
   const at = walkedTo === state.selected ? ranked.findIndex((click) => click.id === walkedTo) : -1;
   const next = ranked[(at + 1) % ranked.length];
   walkedTo = next.id;
-  pause();
-  goTo(next.frame);
+  comeTo(next.frame);
   select(next.id);
 }
 
@@ -59,8 +60,10 @@ function draw() {
   const head = make("thead", "", [make("tr", "", COLUMNS.map(heading))]);
   const table = make("table", "pairs", [head, make("tbody", "", rows.map(line))]);
   const top = page.scrollTop;
+  const held = document.activeElement?.matches("[data-act]") ? idOf(document.activeElement) : undefined;
   page.replaceChildren(...(state.view?.has_calibration ? [table] : [table, drawSteps()]));
   page.scrollTop = top;
+  if (held) /** @type {HTMLElement|null} */ (page.querySelector(`[data-id="${held}"] [data-act]`))?.focus({ preventScroll: true });
   page.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" });
 }
 
@@ -68,6 +71,7 @@ function draw() {
 function heading(column) {
   const cell = make("th", "", []);
   cell.scope = "col";
+  if (!column.key) cell.textContent = column.label;
   if (!column.key) return cell;
   const button = make("button", "", column.label);
   button.dataset.sort = column.key;
@@ -84,16 +88,19 @@ function line(click) {
   const bar = make("b", "", "");
   bar.style.width = `${Math.min(100, (100 * (click.residual_px ?? 0)) / (1.5 * (limit ?? 20)))}%`;
   bar.style.background = colour;
-  const residual = click.residual_px === null ? word(click) : digits(click.residual_px);
-  const act = make("button", "act", "X");
+  const residual = click.residual_px === null ? word(click) : `${digits(click.residual_px)} px`;
   const excluded = click.state === "excluded";
-  act.setAttribute("aria-label", excluded ? `Take ${click.id} in again` : `Leave ${click.id} out`);
-  act.dataset.hint = excluded ? "Take this pair in again (X)" : "Leave this pair out of the solve (X)";
+  const act = make("input", "act", []);
+  act.type = "checkbox";
+  act.checked = !excluded;
+  act.setAttribute("aria-label", `Use ${click.id} in the solve`);
+  act.dataset.hint = excluded ? "Left out of the solve; press to use it again (X)" : "Used in the solve; press to leave it out (X)";
   act.dataset.act = "exclude";
-  const time = make("span", "name", [glyph(click.state, colour), `${(state.seconds[click.frame] ?? 0).toFixed(2)} s`]);
+  const range = click.range_m === null ? "–" : `${click.range_m.toFixed(1)} m`;
   const row = make("tr", `row ${click.state}`, [
-    make("td", "", [time]),
-    make("td", "", click.range_m === null ? "–" : `${click.range_m.toFixed(1)} m`),
+    make("td", "", [make("span", "name", [glyph(click.state, colour), click.id])]),
+    make("td", "", `${(state.seconds[click.frame] ?? 0).toFixed(2)} s`),
+    make("td", rangeApart(click) ? "apart-range" : "", rangeApart(click) ? [make("span", "mark", "!"), range] : range),
     make("td", "bar", [make("span", "meter", [make("i", "", [bar]), make("span", "", residual)])]),
     make("td", "", [act]),
   ]);
@@ -114,6 +121,7 @@ function explain(click) {
   const lines = [`${click.id}: click at ${click.u_px.toFixed(1)}, ${click.v_px.toFixed(1)} px`];
   if (click.projected_px) lines.push(`reprojected at ${click.projected_px.map((value) => value.toFixed(1)).join(", ")} px`);
   if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${click.azimuth_deg?.toFixed(1)}° left, ${click.elevation_deg?.toFixed(1)}° up`);
+  if (rangeApart(click)) lines.push(`${rangeApart(click)}: the wrong target, or the reflector was carried on. Look at the frame, or leave the pair out.`);
   if (click.note) lines.push(click.note);
   return lines.join("\n");
 }
@@ -136,6 +144,9 @@ function glyph(clickState, colour) {
   return svg;
 }
 
+/** The click whose line an element lies in. @param {Element} element */
+const idOf = (element) => /** @type {HTMLElement|null} */ (element.closest("[data-id]"))?.dataset.id;
+
 /** @param {MouseEvent} event */
 function pressed(event) {
   const target = /** @type {Element} */ (event.target);
@@ -145,11 +156,13 @@ function pressed(event) {
     sorting.key = /** @type {typeof sorting.key} */ (key);
     return draw();
   }
-  const id = /** @type {HTMLElement|null} */ (target.closest("[data-id]"))?.dataset.id;
+  const id = idOf(target);
   const click = clicks().find((row) => row.id === id && id !== "");
   if (!click) return;
   select(click.id);
-  if (target.closest("[data-act]")) return void toggleExcluded();
-  pause();
-  goTo(click.frame);
+  if (target.closest("[data-act]")) {
+    event.preventDefault(); // the tick follows the server's word
+    return void toggleExcluded();
+  }
+  comeTo(click.frame);
 }

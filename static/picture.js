@@ -106,11 +106,3 @@ export function zoomBy(factor, x = viewport.width / 2, y = viewport.height / 2) 
   redraw();
   emit("box");
 }
-
-/** Bring an image point into the box if it is outside. @param {number} u @param {number} v */
-export function reveal(u, v) {
-  const [x, y] = geometry.toCss(u, v);
-  if (x > 24 && y > 24 && x < viewport.width - 24 && y < viewport.height - 24) return;
-  geometry.lookAt(u, v);
-  redraw();
-}

@@ -97,6 +97,16 @@ export function isClicked(placement) {
   });
 }
 
+/** A range this far from the placement's is another target [m]; the reflector's own returns scatter by a few decimetres. */
+const APART_M = 0.75;
+
+/** Says when the radar position taken for a click is not the one that the timeline shows; "" when it is. @param {Click} click */
+export function rangeApart(click) {
+  const placement = placementAt(click.frame);
+  if (!placement || click.range_m === null || Math.abs(click.range_m - placement.range_m) < APART_M) return "";
+  return `This pair uses ${click.range_m.toFixed(1)} m; the placement here is at ${placement.range_m.toFixed(1)} m`;
+}
+
 /** Change the selection. @param {string|null} id */
 export function select(id) {
   if (state.selected === id) return;

@@ -1,9 +1,11 @@
 // @ts-check
 /** The lines around: recording, clock, buttons, status, progress, the pixel under the hand. */
 
-import { icon } from "./notices.js";
+import { icon, make } from "./notices.js";
 import { toDevice, viewport, zoom } from "./geometry.js";
+import { fit } from "./picture.js";
 import { on, state } from "./state.js";
+import { nextWords } from "./steps.js";
 
 /** @param {string} id */
 const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
@@ -12,7 +14,8 @@ const REACH = 8;
 
 export function startStatus() {
   on(["recording"], drawRecording);
-  on(["view", "connection", "progress"], drawStatus);
+  on(["view", "connection", "progress", "placements"], drawStatus);
+  get("zoom").onclick = fit;
   on(["cursor", "shown", "recording"], drawClock);
   on(["playing"], drawPlay);
   on(["hover", "shown", "box"], drawReadout);
@@ -22,7 +25,9 @@ function drawRecording() {
   const recording = state.recording;
   if (!recording) return;
   get("recording-name").textContent = recording.name;
-  get("recording-topics").textContent = [`radar ${recording.radar_topic}`, `camera ${recording.image_topic}`, `${recording.width_px} × ${recording.height_px}`].join("   ");
+  const facts = [["radar", recording.radar_topic], ["camera", recording.image_topic], ["picture", `${recording.width_px} × ${recording.height_px} px`]];
+  get("recording-topics").replaceChildren(...facts.map(([name, value]) => make("span", "fact", [make("small", "", name), value])));
+  get("recording-topics").dataset.hint = facts.map(([name, value]) => `${name}: ${value}`).join("\n");
   get("status-right").textContent = `cocalib ${recording.version}`;
   get("status-right").dataset.hint = `Every click is kept at once in\n${recording.session.folder}`;
 }
@@ -31,8 +36,10 @@ function drawStatus() {
   const view = state.view;
   get("connection").classList.toggle("off", !state.connected);
   get("connection").dataset.hint = state.connected ? "Connected. Every click is kept on disk at once." : "Not connected.";
-  const words = view ? [view.status, view.hint].filter(Boolean).join("  ·  ") : "Opening the recording…";
-  get("status-text").textContent = words;
+  get("connection").dataset.stage = view?.stage ?? "collecting";
+  const words = view ? [view.status, nextWords()].filter(Boolean) : ["Opening the recording…"];
+  get("status-text").textContent = words.join("  ·  ");
+  get("status-text").dataset.hint = [...words, view?.stage === "unsolvable" ? view.hint : ""].filter(Boolean).join("\n");
   const undo = /** @type {HTMLButtonElement} */ (get("undo"));
   const redo = /** @type {HTMLButtonElement} */ (get("redo"));
   undo.disabled = !view?.can_undo;
@@ -61,7 +68,11 @@ function drawPlay() {
 
 function drawReadout() {
   const point = state.hover;
-  const parts = [`${Math.round(zoom() * 100)} %`];
+  const percent = `${Math.round(zoom() * 100)} %`;
+  get("zoom").hidden = !state.shown;
+  get("zoom").replaceChildren(percent, ...(viewport.fitted ? [] : [make("kbd", "", "F"), "fit"]));
+  get("zoom").setAttribute("aria-label", `${percent}: fit the picture`);
+  const parts = [];
   if (point && !state.playing) parts.push(`u ${point.u.toFixed(1)}  v ${point.v.toFixed(1)}`);
   const near = point ? nearReturn(point) : null;
   if (near) parts.push(near);

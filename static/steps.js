@@ -1,15 +1,19 @@
 // @ts-check
-/** What to do next: three steps while there is no calibration, and one line on the frame that points at the reflector. */
+/** What to do next: three steps while there is no calibration, one line on the frame, and the same words in the status. */
 
 import { make } from "./notices.js";
-import { clickIn, clicks, isClicked, on, placementAt, state } from "./state.js";
+import { clickIn, clicks, isClicked, on, placementAt, rangeApart, state } from "./state.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 /** Fewer pairs than this give no pose; the server says so too. */
 const FEWEST = 4;
+/** What is clicked: a corner reflector returns the wave as if from there. */
+const CENTRE = "the inner corner, where its three sheets meet";
+
+/** Words with keys between them. @typedef {(string|{key: string})[]} Words */
 
 export function startGuide() {
-  on(["shown", "view", "placements", "playing"], drawGuide);
+  on(["shown", "view", "placements", "playing", "overlay"], drawGuide);
 }
 
 /** Three steps to the first calibration. */
@@ -20,7 +24,7 @@ export function drawSteps() {
   const now = count === 0 ? 0 : count < FEWEST ? 1 : 2;
   const steps = [
     ["Go to a placement", [key("N"), found ? ` jumps to the next of ${found} that the radar has found.` : ` ${searching}`]],
-    ["Click the reflector's centre", ["Wheel zooms at the cursor; ", key("Alt"), "+arrows move the mark by 0.1 px."]],
+    ["Click the reflector's centre", [`That is ${CENTRE}. Wheel zooms at the cursor; `, key("Alt"), "+arrows move the mark by 0.1 px."]],
     [`Do so for ${FEWEST} placements or more`, [count ? `${count} done. ` : "", "Near and far, left and right: the pose appears by itself and gets surer with each."]],
   ];
   const items = steps.map(([title, text], index) =>
@@ -39,19 +43,57 @@ function drawGuide() {
   guide.hidden = !words;
   if (!words) return;
   guide.classList.toggle("act", words.act);
-  guide.replaceChildren(...words.text);
+  guide.replaceChildren(...words.text.map((word) => (typeof word === "string" ? word : key(word.key))));
 }
 
-/** @param {number} index @returns {{text: (string|Node)[], act: boolean}|null} */
+/** @param {number} index @returns {{text: Words, act: boolean}|null} */
 function advice(index) {
   const placement = placementAt(index);
-  if (clickIn(index)) return null;
+  const here = clickIn(index);
+  if (here) return afterClick(here);
   if (placement && !isClicked(placement)) {
     const number = state.placements.indexOf(placement) + 1;
-    return { text: [`Placement ${number} of ${state.placements.length}, ${placement.range_m.toFixed(1)} m away: click the reflector's centre`], act: true };
+    return { text: [`Placement ${number} of ${state.placements.length}, ${placement.range_m.toFixed(1)} m away: click the reflector's inner corner, where its three sheets meet`], act: true };
   }
-  if (state.placements.some((other) => !isClicked(other)) && clicks().length < FEWEST) {
-    return { text: ["Press ", key("N"), " for the next placement of the reflector"], act: false };
+  const next = nextDeed();
+  return next ? { text: next, act: false } : null;
+}
+
+/** What is the matter with the pair of this frame; otherwise what comes next. @param {import("./messages.js").ClickRow} click @returns {{text: Words, act: boolean}|null} */
+function afterClick(click) {
+  const apart = rangeApart(click);
+  if (apart) return { text: [`${apart}: correct the mark, or `, { key: "X" }, " leaves the pair out"], act: true };
+  if (click.state === "outlier") return { text: ["This pair does not agree with the others: correct the mark, or ", { key: "X" }, " leaves it out"], act: true };
+  if (click.state === "unpaired") return { text: ["The radar saw nothing here: click another frame of this placement, or go on with ", { key: "N" }], act: true };
+  const next = nextDeed();
+  return next ? { text: next, act: false } : null;
+}
+
+/** The next thing to do with the placements; null when there is nothing to say. @returns {Words|null} */
+export function nextDeed() {
+  const view = state.view;
+  if (view?.stage === "unsolvable") return null; // what to do stands in the orange box
+  const wrong = clicks().filter((click) => click.state === "outlier").length;
+  if (view?.stage === "solved" && wrong) {
+    const used = clicks().filter((click) => click.state === "inlier").length + wrong;
+    return [`${used - wrong} of ${used} pairs agree: `, { key: "J" }, wrong === 1 ? " shows the one that does not" : ` shows the ${wrong} that do not, one by one`];
   }
-  return null;
+  const left = state.placements.filter((placement) => !isClicked(placement)).length;
+  if (left) return [`${left} placement${left > 1 ? "s" : ""} left: `, { key: "N" }, " goes to the next"];
+  if (!state.placements.length || !view?.has_calibration || view.cautions.length) return null;
+  return ["Every placement is clicked: ", { key: "E" }, " exports the calibration"];
+}
+
+/** The same for the status line: after what the server says, where that leaves it open. @returns {string} */
+export function nextWords() {
+  const view = state.view;
+  if (!view || view.stage === "unsolvable" || view.stage === "solving") return "";
+  const lost = clicks().some((click) => click.state === "unpaired");
+  if (lost || (view.reference && !view.has_calibration)) return view.hint;
+  const deed = view.stage === "solved" || view.clicks.length ? nextDeed() : null;
+  if (!deed) return view.hint;
+  const words = deed.map((word) => (typeof word === "string" ? word : word.key)).join("");
+  if (view.stage !== "solved") return words;
+  const told = view.status.includes("pairs agree") ? words.replace(/^\d+ of \d+ pairs agree: /, "") : words;
+  return [told, view.cautions.length || words.startsWith("Every") ? view.hint : ""].filter(Boolean).join("  ·  ");
 }

@@ -116,7 +116,10 @@ def _next_step(calibration: Calibration) -> str:
 def _next_click(session: Session) -> str:
     unpaired = _unpaired(session)
     if not unpaired:
-        return "Step to a frame in which the reflector stands still, and click its centre."
+        return (
+            "Step to a frame in which the reflector stands still, and click its centre: "
+            "the inner corner, where its three sheets meet."
+        )
     count = "The click" if len(session.clicks) == 1 else f"{len(unpaired)} of {len(session.clicks)} clicks"
     return f"{count} found no radar position: {unpaired[0].reason}. {sentence(unpaired[0].hint)}"
 

@@ -14,6 +14,7 @@ from app.web.scene_shapes import (
     MOVING,
     STILL,
     ellipsoids,
+    next_place,
     nominal_camera_from_radar,
     range_numbers,
     range_rings,
@@ -44,6 +45,7 @@ _VIEWPOINTS = {
 }
 _RINGS_EVERY_M, _RINGS_UP_TO_M = 5.0, 30.0
 _LIT, _DIM, _ORANGE, _RINGS = (87, 182, 242), (112, 124, 136), (255, 180, 84), (84, 99, 115)
+_NEXT = (185, 227, 255)
 _NOWHERE = np.zeros((1, 3))
 _NO_LINE = np.zeros((1, 2, 3))
 
@@ -93,6 +95,8 @@ class TabScene:
         self._gap = _lines(scene, "/gap", 3.0, _ORANGE)
         self._ellipsoids = _lines(scene, "/ellipsoids", 1.0, (96, 118, 140))
         self._ellipsoid = _lines(scene, "/ellipsoid", 1.5, _ORANGE)
+        self._next = _lines(scene, "/next", 2.0, _NEXT)
+        self._next_name = scene.add_label("/next_name", "", visible=False, anchor="top-center", font_screen_scale=0.9)
         self._name = scene.add_label("/selected", "", visible=False, anchor="bottom-left", font_screen_scale=0.9)
         self._frustum = scene.add_camera_frustum(
             "/camera",
@@ -111,6 +115,7 @@ class TabScene:
             self._show_scan(sight)
             self._show_pose(sight)
             self._show_pairs(sight)
+            self._show_advice(sight)
             self._show_picture(sight)
         self._client.flush()
 
@@ -181,7 +186,19 @@ class TabScene:
         if chosen:
             point = chosen[0].point_radar_m
             self._name.position = tuple(point + np.array([0.0, 0.0, 0.15]))
-            self._name.text = f"{chosen[0].id}: {np.linalg.norm(point):.2f} m, {chosen[0].distance_px:.1f} px"
+            self._name.text = f"{chosen[0].id}: {np.linalg.norm(point):.2f} m, {_residual(chosen[0])}"
+
+    def _show_advice(self, sight: Sight) -> None:
+        """Ring the place where another placement pays most."""
+        advice = sight.view.advice
+        if advice is None or advice.may_stop:
+            self._next.visible = self._next_name.visible = False
+            return
+        place = np.array(advice.position_radar_m)
+        _fill_lines(self._next, next_place(place[None]))
+        self._next_name.position = tuple(place - np.array([0.0, 0.0, 0.3]))
+        self._next_name.text = f"next {advice.range_m:.1f} m"
+        self._next_name.visible = True
 
     def _show_picture(self, sight: Sight) -> None:
         picture = sight.picture
@@ -190,6 +207,10 @@ class TabScene:
         self._pictured = picture.index
         self._frustum._format = "jpeg"
         self._frustum._image_data = picture.data  # the compressed bytes as they are; the public property encodes again
+
+
+def _residual(pair: PairResult) -> str:
+    return f"{pair.distance_px:.1f} px" if np.isfinite(pair.distance_px) else "behind the camera"
 
 
 def _ground(scene: "viser.SceneApi") -> Any:

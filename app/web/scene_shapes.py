@@ -13,6 +13,7 @@ __all__ = [
     "MOVING",
     "STILL",
     "ellipsoids",
+    "next_place",
     "nominal_camera_from_radar",
     "range_numbers",
     "range_rings",
@@ -26,6 +27,7 @@ _RAMP_AT = np.array([0.0, 0.35, 0.6, 0.8, 1.0])
 _RAMP = np.array([[74, 170, 235], [143, 200, 226], [236, 214, 150], [240, 158, 66], [226, 82, 44]], dtype=np.float64)
 _CHI2_95_3D = 7.814727903251178  # 95 % quantile of chi-squared with 3 degrees of freedom
 _CIRCLE = 28
+_DASH_STEPS = 3
 _SEGMENTS = {  # strokes of a seven-segment digit: (right, up) of both ends, in units of its height
     "a": ((0.0, 1.0), (0.5, 1.0)),
     "b": ((0.5, 1.0), (0.5, 0.5)),
@@ -113,6 +115,23 @@ def ellipsoids(
         )
         segments.append(np.stack([circle[:, :-1], circle[:, 1:]], axis=2).reshape(-1, 2, 3))
     return np.concatenate(segments)
+
+
+def next_place(places_radar_m: Points3, *, radius_m: float = 0.5, dashes: int = 12) -> np.ndarray:
+    """Return a dashed level ring around each place, and a plumb line through it: segments (n, 2, 3).
+
+    Args:
+        places_radar_m: (m, 3).
+        radius_m: of the ring.
+        dashes: of the ring; the gaps are as long.
+    """
+    starts = 2.0 * np.pi / dashes * np.arange(dashes)
+    angles = starts[:, None] + np.linspace(0.0, np.pi / dashes, _DASH_STEPS + 1)
+    rim = radius_m * np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1)
+    ring = np.stack([rim[:, :-1], rim[:, 1:]], axis=2).reshape(-1, 2, 3)
+    plumb = np.array([[[0.0, 0.0, -radius_m / 2], [0.0, 0.0, radius_m / 2]]])
+    shape = np.concatenate([ring, plumb])
+    return (places_radar_m[:, None, None, :] + shape).reshape(-1, 2, 3)
 
 
 def nominal_camera_from_radar() -> RigidTransform:

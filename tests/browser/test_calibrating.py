@@ -156,29 +156,36 @@ def test_the_method_and_its_options_can_be_changed_and_taken_back(page: Driver, 
     page.page.fill('[data-path="noise.sigma_px"] input', "5000")
     page.page.press('[data-path="noise.sigma_px"] input', "Enter")
     page.until("document.querySelector('.toast')")
-    assert "out of range" in page.text(".toast")
+    assert "Uncertainty of a click: 5000 is out of range" in page.text(".toast")
     page.until("document.querySelector('[data-path=\"noise.sigma_px\"] input').value === '2'")
+    page.page.get_by_label("Uncertainty of a click").fill("3")
+    page.page.keyboard.press("Enter")
+    page.until("document.querySelector('.toast') === null")
 
 
 def test_a_camera_position_counts_once_it_is_entered_and_not_before(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 6)
     without = page.view
     page.page.click("#tab-options")
-    page.page.click("#camera-position")
+    page.page.get_by_label("Camera position by tape").check()
     assert page.view["options"]["solving"]["camera_position"] is None
     rotation, translation = (np.array(truth["camera_from_radar"][key]) for key in ("rotation", "translation_m"))
     for name, value in zip(("forward", "left", "up"), -rotation.T @ translation, strict=True):
-        page.page.fill(f'[aria-label="camera {name} of the radar"]', f"{value:.3f}")
+        page.page.get_by_label(name, exact=True).fill(f"{value:.3f}")
     page.page.keyboard.press("Enter")
     page.until("__cocalib.state.view.options.solving.camera_position !== null")
     page.settle()
     assert page.view["options"]["solving"]["camera_position"]["sigma_m"] == 0.01
     assert page.view["pose"] != without["pose"]
-    page.page.click("#camera-position")
+    page.page.locator("#option-solving-camera_position").uncheck()
     page.until("__cocalib.state.view.options.solving.camera_position === null")
     page.settle()
     assert page.view["pose"] == without["pose"]
-    assert page.page.is_hidden('[aria-label="camera up of the radar"]')
+    assert page.page.get_by_label("up", exact=True).is_hidden()
+    page.page.locator("#option-solving-camera_position").check()
+    page.until("__cocalib.state.view.options.solving.camera_position !== null")
+    page.settle()
+    assert page.page.get_by_label("left", exact=True).input_value() != ""
 
 
 def test_two_tabs_see_the_same(

@@ -3,6 +3,7 @@
 import contextlib
 import io
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,11 +11,12 @@ import numpy as np
 import pytest
 
 from app.session import History, RecordingFacts, Session
-from app.view import view
+from app.view import Advice, view
 from app.web.frames import Frame
 from app.web.scene import Sight, TabScene
 from app.web.scene_shapes import (
     ellipsoids,
+    next_place,
     nominal_camera_from_radar,
     range_numbers,
     range_rings,
@@ -100,7 +102,7 @@ class Drawn:
     def names(self) -> list[str]:
         return sorted(
             name
-            for name in ("/scan", "/window", "/chosen", "/rays", "/ray", "/gap", "/selected")
+            for name in ("/scan", "/window", "/chosen", "/rays", "/ray", "/gap", "/selected", "/next", "/next_name")
             if self.node(name).visible
         )
 
@@ -147,6 +149,26 @@ def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear(d
     assert drawn.node("/selected").text.startswith("c2: ")
     drawn.scene.show(sight(solved))
     assert "/selected" not in drawn.names()
+
+
+def test_the_advised_place_is_ringed_until_one_may_stop(drawn: Drawn) -> None:
+    seen = sight(calibration())
+    advice = Advice(10.0, 20.0, 5.0, 1.4, False, (4.0, 3.0, 0.0), "There.")
+    drawn.scene.show(replace(seen, view=replace(seen.view, advice=advice)))
+    assert {"/next", "/next_name"} <= set(drawn.names())
+    assert drawn.node("/next").points.reshape(-1, 3).mean(axis=0) == pytest.approx([4.0, 3.0, 0.0], abs=0.05)
+    assert drawn.node("/next_name").text == "next 5.0 m"
+    drawn.scene.show(replace(seen, view=replace(seen.view, advice=replace(advice, may_stop=True))))
+    assert not {"/next", "/next_name"} & set(drawn.names())
+
+
+def test_the_ring_of_the_next_place_is_level_and_half_gaps() -> None:
+    segments = next_place(np.array([[6.0, -2.0, 0.4]]), radius_m=0.5)
+    ring, plumb = segments[:-1], segments[-1]
+    assert np.linalg.norm(ring - [6.0, -2.0, 0.4], axis=2) == pytest.approx(0.5)
+    assert ring[..., 2] == pytest.approx(0.4)
+    assert np.linalg.norm(ring[:, 1] - ring[:, 0], axis=1).sum() == pytest.approx(np.pi * 0.5, rel=0.01)
+    assert plumb == pytest.approx(np.array([[6.0, -2.0, 0.15], [6.0, -2.0, 0.65]]))
 
 
 def test_after_an_undo_to_nothing_the_pairs_are_gone(drawn: Drawn) -> None:

@@ -1,0 +1,85 @@
+"""The page leads on: after a click, after a wrong one, after a jump while zoomed in, and without a mouse."""
+
+from typing import Any
+
+import pytest
+
+from tests.browser.driving import Driver
+
+pytestmark = pytest.mark.browser
+
+
+def test_a_wrong_click_is_named_and_found_by_j(page: Driver, truth: Any) -> None:
+    page.until("__cocalib.state.placementsKnown")
+    page.click_sample(truth, 9)
+    wrong = truth["placements"][9]
+    page.go_to(page.frame_at(wrong["best_image_time"]))
+    u, v = wrong["pixel_px"]
+    page.click(u + (200 if u < 480 else -200), v)
+    page.press("n")
+    page.until("__cocalib.state.view.clicks.filter((click) => click.state === 'outlier').length === 1")
+    assert "9 of 10 pairs agree" in page.text("#status-text")
+    assert "J shows the one that does not" in page.text("#status-text")
+    page.press("j")
+    page.until(f"__cocalib.state.shown.index === {page.frame_at(wrong['best_image_time'])}")
+    assert "X leaves" in page.text("#guide")
+
+
+def test_a_jump_shows_the_reflector_also_when_zoomed_in(page: Driver, truth: Any) -> None:
+    page.until("__cocalib.state.placementsKnown")
+    page.click_sample(truth, 2)
+    page.zoom_to(*truth["placements"][1]["pixel_px"], 4)
+    page.press("n")
+    page.until("__cocalib.viewport.fitted")
+    page.click_sample(truth, 8)
+    page.zoom_to(*truth["placements"][7]["pixel_px"], 4)
+    page.press("n")
+    page.until("__cocalib.state.shown.index === __cocalib.state.placements[8].frame")
+    page.until("__cocalib.state.overlay.index === __cocalib.state.shown.index")
+    assert page.value("__cocalib.zoom()") == pytest.approx(4, rel=0.05)
+    u, v = truth["placements"][8]["pixel_px"]
+    x, y = page.value(f"__cocalib.toCss({u}, {v})")
+    assert 0 < x < page.value("__cocalib.viewport.width")
+    assert 0 < y < page.value("__cocalib.viewport.height")
+    page.page.click("#zoom")
+    assert page.value("__cocalib.viewport.fitted")
+
+
+def test_a_placement_can_be_marked_without_a_mouse(page: Driver, truth: Any) -> None:
+    page.until("__cocalib.state.placementsKnown")
+    page.press("n")
+    page.until("__cocalib.state.shown.index === __cocalib.state.placements[0].frame")
+    page.press("Enter")
+    [first] = page.view["clicks"]
+    assert (first["u_px"], first["v_px"]) == pytest.approx((479.5, 299.5), abs=0.6)
+    page.press("Alt+Shift+ArrowRight", "Enter")
+    page.until("__cocalib.state.view.revision === 2")
+    [moved] = page.view["clicks"]
+    assert moved["u_px"] == pytest.approx(first["u_px"] + 1)
+    page.press("Delete")
+    page.click_sample(truth, 8)
+    page.press("n")
+    page.until("__cocalib.state.overlay.index === __cocalib.state.placements[8].frame")
+    guess = page.value("__cocalib.state.overlay.guesses[0]")
+    page.press("Enter")
+    assert len(page.view["clicks"]) == 9
+    last = page.view["clicks"][-1]
+    assert (last["u_px"], last["v_px"]) == pytest.approx(guess)
+
+
+def test_a_failure_of_the_papers_method_stands_in_the_caution_box(page: Driver, truth: Any) -> None:
+    page.click_sample(truth, 9)
+    page.page.click("#tab-options")
+    assert page.page.locator('[data-path="paper.ransac_threshold_px"]').is_hidden()
+    page.page.click('[data-method="paper"]')
+    page.until("__cocalib.state.view.method === 'paper'")
+    page.settle()
+    assert page.page.locator('[data-path="noise.sigma_px"]').is_hidden()
+    page.page.get_by_label("RANSAC threshold").fill("0.05")
+    page.page.keyboard.press("Enter")
+    page.until("__cocalib.state.view.stage === 'unsolvable'")
+    box = page.text('#cautions [data-code="unsolvable"]')
+    assert page.view["status"] in box
+    assert page.view["hint"] in box
+    assert page.text('[data-method="default"]').lower() in page.view["hint"]
+    assert page.page.get_attribute("#connection", "data-stage") == "unsolvable"
