@@ -120,7 +120,7 @@ press("step-forward", () => step(1));
 press("previous-placement", () => placement(-1));
 press("next-placement", () => placement(1));
 on(["cursor"], () => sessionStorage.setItem("cocalib-frame", String(state.cursor)));
-on(["selected"], tellCursor);
+on(["selected", "theme"], tellCursor);
 connect({
   message: (message) => readers[message.type]?.(message),
   frame: receiveFrame,

@@ -352,6 +352,7 @@ export interface CursorForm {
   index: number;
   playing?: boolean;
   selected?: string | null;
+  light?: boolean;
   request?: number;
 }
 

@@ -164,5 +164,5 @@ function selectHere(index) {
 
 /** Tell the server where this tab is: it answers with the overlay and moves the 3D view. */
 export function tellCursor() {
-  tell({ type: "cursor", index: state.cursor, playing: state.playing, selected: state.selected });
+  tell({ type: "cursor", index: state.cursor, playing: state.playing, selected: state.selected, light: document.documentElement.dataset.theme === "light" });
 }

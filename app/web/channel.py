@@ -56,11 +56,13 @@ class Cursor:
         index: of the frame.
         playing: frames follow one another quickly.
         selected: id of the selected click.
+        light: the page has its light theme on.
     """
 
     index: int = 0
     playing: bool = False
     selected: str | None = None
+    light: bool = False
 
 
 class Channel:
@@ -137,7 +139,7 @@ class Channel:
     def _move(self, command: CursorMoved) -> None:
         if not 0 <= command.index < len(self._hub.frames):
             return
-        self._cursor = Cursor(command.index, command.playing, command.selected)
+        self._cursor = Cursor(command.index, command.playing, command.selected, command.light)
         self.refresh()
 
     async def _send_frame(self, wanted: FrameWanted) -> None:
@@ -182,6 +184,7 @@ class Channel:
             picture=await self._thumbnail(cursor.index),
             camera=hub.camera,
             reference=hub.workspace.reference,
+            light=cursor.light,
         )
         await asyncio.get_running_loop().run_in_executor(hub.executor, self.scene.show, sight)
         if cursor.playing:

@@ -56,7 +56,7 @@ _VISER_STYLE = b"""<style>
 }
 html, body, #root, #root div { background-color: transparent !important; }
 html { background: #0d1014 !important; }
-html[data-theme="light"] { background: #202830 !important; }
+html[data-theme="light"] { background: #e4e8ed !important; }
 </style>
 </head>"""
 

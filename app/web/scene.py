@@ -11,8 +11,8 @@ from app.view import Reference, View, shown_calibration
 from app.web.frames import Frame
 from app.web.radar_sight import still_returns
 from app.web.scene_shapes import (
-    MOVING,
-    STILL,
+    DARK,
+    LIGHT,
     ellipsoids,
     next_place,
     nominal_camera_from_radar,
@@ -44,8 +44,7 @@ _VIEWPOINTS = {
     "side": ((7.0, -20.0, 4.0), (7.0, 0.0, 0.0)),
 }
 _RINGS_EVERY_M, _RINGS_UP_TO_M = 5.0, 30.0
-_LIT, _DIM, _ORANGE, _RINGS = (87, 182, 242), (112, 124, 136), (255, 180, 84), (84, 99, 115)
-_NEXT = (185, 227, 255)
+_DIM, _ORANGE = (112, 124, 136), (255, 180, 84)
 _NOWHERE = np.zeros((1, 3))
 _NO_LINE = np.zeros((1, 2, 3))
 
@@ -63,6 +62,7 @@ class Sight:
         picture: a thumbnail of the frame; None when it cannot be read.
         camera: the recording's intrinsics, for the time before a calibration.
         reference: a calibration to look at until there is one; None without one.
+        light: drawn on a light ground.
     """
 
     session: Session
@@ -73,6 +73,7 @@ class Sight:
     picture: Frame | None
     camera: Camera | None
     reference: Reference | None = None
+    light: bool = False
 
 
 class TabScene:
@@ -86,16 +87,17 @@ class TabScene:
         self._radar_from_camera = nominal_camera_from_radar().inverse()
         scene = client.scene
         scene.add_frame("/radar", axes_length=0.6, axes_radius=0.018, origin_radius=0.03)
-        self._grid = _ground(scene)
+        self._palette = DARK
+        self._grid, self._rings = _ground(scene)
         self._scan = _cloud(scene, "/scan", 0.12)
         self._window = _cloud(scene, "/window", 0.06)
         self._chosen = _cloud(scene, "/chosen", 0.24)
         self._rays = _lines(scene, "/rays", 1.0, (72, 110, 138))
-        self._ray = _lines(scene, "/ray", 2.0, (255, 255, 255))
+        self._ray = _lines(scene, "/ray", 2.0, DARK.ray)
         self._gap = _lines(scene, "/gap", 3.0, _ORANGE)
         self._ellipsoids = _lines(scene, "/ellipsoids", 1.0, (96, 118, 140))
         self._ellipsoid = _lines(scene, "/ellipsoid", 1.5, _ORANGE)
-        self._next = _lines(scene, "/next", 2.0, _NEXT)
+        self._next = _lines(scene, "/next", 2.0, DARK.next)
         self._next_name = scene.add_label("/next_name", "", visible=False, anchor="top-center", font_screen_scale=0.9)
         self._name = scene.add_label("/selected", "", visible=False, anchor="bottom-left", font_screen_scale=0.9)
         self._frustum = scene.add_camera_frustum(
@@ -112,6 +114,7 @@ class TabScene:
     def show(self, sight: Sight) -> None:
         """Show this."""
         with self._lock, self._client.atomic():
+            self._show_theme(sight)
             self._show_scan(sight)
             self._show_pose(sight)
             self._show_pairs(sight)
@@ -133,16 +136,29 @@ class TabScene:
             camera.up_direction = (1.0, 0.0, 0.0) if viewpoint == "above" else (0.0, 0.0, 1.0)
             camera.position, camera.look_at = stand, target
 
+    def _show_theme(self, sight: Sight) -> None:
+        """Paint what is drawn in one colour for the ground it is seen on."""
+        palette = LIGHT if sight.light else DARK
+        if palette is self._palette:
+            return
+        self._palette, self._posed = palette, self
+        for node, colour in ((self._ray, palette.ray), (self._next, palette.next)):
+            node.colors = np.array(colour, dtype=np.uint8)
+        for rings in self._rings:
+            rings.colors = np.array(palette.rings, dtype=np.uint8)
+        self._grid.cell_color = self._grid.section_color = palette.cells
+
     def _show_scan(self, sight: Sight) -> None:
         if sight.scan is None:
             self._scan.visible = False
             return
         still = still_returns(sight.scan, sight.session.options.gating)
-        colours = np.where(still[:, None], np.array(STILL), np.array(MOVING)).astype(np.uint8)
-        _fill_cloud(self._scan, sight.scan.points_radar_m, colours)
-        _fill_cloud(
-            self._window, sight.window, np.tile(np.array([[222, 232, 240]], dtype=np.uint8), (len(sight.window), 1))
+        colours = np.where(still[:, None], np.array(self._palette.still), np.array(self._palette.moving)).astype(
+            np.uint8
         )
+        _fill_cloud(self._scan, sight.scan.points_radar_m, colours)
+        window = np.tile(np.array([self._palette.window], dtype=np.uint8), (len(sight.window), 1))
+        _fill_cloud(self._window, sight.window, window)
 
     def _show_pose(self, sight: Sight) -> None:
         """Move the frustum, and the ground below the lowest chosen return; nothing moves while the answer stays."""
@@ -155,7 +171,7 @@ class TabScene:
         camera_from_radar = calibration.camera_from_radar if calibration else nominal_camera_from_radar()
         self._radar_from_camera = camera_from_radar.inverse()
         _place(self._frustum, self._radar_from_camera)
-        self._frustum.color = _LIT if isinstance(outcome, Calibration) else _DIM
+        self._frustum.color = self._palette.solved if isinstance(outcome, Calibration) else _DIM
         if camera is not None:
             self._frustum.fov = vertical_field_of_view_rad(camera)
             self._frustum.aspect = camera.width_px / camera.height_px
@@ -213,16 +229,18 @@ def _residual(pair: PairResult) -> str:
     return f"{pair.distance_px:.1f} px" if np.isfinite(pair.distance_px) else "behind the camera"
 
 
-def _ground(scene: "viser.SceneApi") -> Any:
-    """Add the grid with rings of equal range and their numbers; return the node that moves them all."""
+def _ground(scene: "viser.SceneApi") -> tuple[Any, list[Any]]:
+    """Add the grid with rings of equal range and their numbers; return the node that moves them all, and the rings."""
     grid = scene.add_grid(
-        "/ground", width=60.0, height=60.0, cell_size=1.0, section_size=5.0, cell_color=(40, 48, 57),
+        "/ground", width=60.0, height=60.0, cell_size=1.0, section_size=5.0, cell_color=DARK.cells,
         section_color=(52, 62, 73), cell_thickness=0.6, section_thickness=0.8, shadow_opacity=0.0, fade_distance=40.0,
     )  # fmt: skip
     extent = {"every_m": _RINGS_EVERY_M, "up_to_m": _RINGS_UP_TO_M}
-    for name, strokes in (("rings", range_rings(**extent)), ("numbers", range_numbers(**extent))):
-        scene.add_line_segments(f"/ground/{name}", strokes, _RINGS, thickness=1.2, thickness_units="screen")
-    return grid
+    rings = [
+        scene.add_line_segments(f"/ground/{name}", strokes, DARK.rings, thickness=1.2, thickness_units="screen")
+        for name, strokes in (("rings", range_rings(**extent)), ("numbers", range_numbers(**extent)))
+    ]
+    return grid, rings
 
 
 def _shells(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:

@@ -1,5 +1,8 @@
 """Shapes of the 3D view as arrays: rings, rays, ellipsoids, colours. All in the radar frame, all pure."""
 
+from dataclasses import dataclass
+from typing import TypeAlias
+
 import numpy as np
 
 from calib_core.arrays import Points3, Values
@@ -10,8 +13,9 @@ from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import Calibration, PairResult
 
 __all__ = [
-    "MOVING",
-    "STILL",
+    "DARK",
+    "LIGHT",
+    "Palette",
     "ellipsoids",
     "next_place",
     "nominal_camera_from_radar",
@@ -22,7 +26,43 @@ __all__ = [
     "vertical_field_of_view_rad",
 ]
 
-STILL, MOVING, GREY = (108, 199, 255), (255, 157, 92), (120, 132, 145)
+GREY = (120, 132, 145)
+Colour: TypeAlias = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Palette:
+    """Colours of the 3D view that depend on the ground they are seen on.
+
+    Attributes:
+        still: returns that can be the reflector.
+        moving: returns that cannot.
+        window: still returns around the selected click.
+        ray: the selected click's ray.
+        next: ring of the advised place.
+        solved: the camera with a calibration.
+        rings: of equal range.
+        cells: lines of the grid.
+    """
+
+    still: Colour
+    moving: Colour
+    window: Colour
+    ray: Colour
+    next: Colour
+    solved: Colour
+    rings: Colour
+    cells: Colour
+
+
+DARK = Palette(
+    still=(108, 199, 255), moving=(255, 157, 92), window=(222, 232, 240), ray=(255, 255, 255), next=(185, 227, 255),
+    solved=(87, 182, 242), rings=(84, 99, 115), cells=(40, 48, 57),
+)  # fmt: skip
+LIGHT = Palette(
+    still=(20, 120, 190), moving=(205, 85, 15), window=(70, 85, 100), ray=(20, 30, 40), next=(10, 90, 160),
+    solved=(10, 111, 179), rings=(140, 152, 165), cells=(200, 207, 215),
+)  # fmt: skip
 _RAMP_AT = np.array([0.0, 0.35, 0.6, 0.8, 1.0])
 _RAMP = np.array([[74, 170, 235], [143, 200, 226], [236, 214, 150], [240, 158, 66], [226, 82, 44]], dtype=np.float64)
 _CHI2_95_3D = 7.814727903251178  # 95 % quantile of chi-squared with 3 degrees of freedom

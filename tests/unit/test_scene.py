@@ -162,6 +162,19 @@ def test_the_advised_place_is_ringed_until_one_may_stop(drawn: Drawn) -> None:
     assert not {"/next", "/next_name"} & set(drawn.names())
 
 
+def test_in_the_light_theme_nothing_is_white_on_white(drawn: Drawn) -> None:
+    solved = calibration()
+    drawn.scene.show(sight(solved, selected="c2"))
+    dark = drawn.node("/camera").color
+    drawn.scene.show(replace(sight(solved, selected="c2"), light=True))
+    assert drawn.node("/camera").color != dark
+    for name in ("/ray", "/scan", "/window", "/ground/rings"):
+        assert np.asarray(drawn.node(name).colors).reshape(-1, 3).mean(axis=1).max() < 170
+    drawn.scene.show(sight(solved, selected="c2"))
+    assert drawn.node("/camera").color == dark
+    assert np.asarray(drawn.node("/ray").colors).min() == 255
+
+
 def test_the_ring_of_the_next_place_is_level_and_half_gaps() -> None:
     segments = next_place(np.array([[6.0, -2.0, 0.4]]), radius_m=0.5)
     ring, plumb = segments[:-1], segments[-1]

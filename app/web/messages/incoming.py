@@ -65,11 +65,13 @@ class CursorMoved:
         index: of the frame.
         playing: frames follow one another quickly.
         selected: id of the click that is selected; None without one.
+        light: the page has its light theme on, and the 3D view follows.
     """
 
     index: int
     playing: bool = False
     selected: str | None = None
+    light: bool = False
 
 
 Viewpoint: TypeAlias = Literal["behind", "above", "side", "camera"]
@@ -138,6 +140,7 @@ class CursorForm(_Form, frozen=True, tag="cursor"):
     index: FrameIndex
     playing: bool = False
     selected: Annotated[str, Meta(max_length=100)] | None = None
+    light: bool = False
 
 
 class ViewpointForm(_Form, frozen=True, tag="viewpoint"):
@@ -226,7 +229,7 @@ def _frame(form: FrameForm) -> Command:
 
 @_command.register
 def _cursor(form: CursorForm) -> Command:
-    return CursorMoved(form.index, form.playing, form.selected)
+    return CursorMoved(form.index, form.playing, form.selected, form.light)
 
 
 @_command.register
