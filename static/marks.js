@@ -138,8 +138,9 @@ function drawReprojection(pen, click, x, y, calm) {
   const radius = (calm ? 12 : 7) * viewport.ratio;
   if (length > radius) {
     const end = (length - radius) / length;
+    const start = Math.min(end, calm ? (10 * viewport.ratio) / length : 0);
     outlined(pen, colour, 2, () => {
-      pen.moveTo(x, y);
+      pen.moveTo(x + (px - x) * start, y + (py - y) * start);
       pen.lineTo(x + (px - x) * end, y + (py - y) * end);
     });
   }

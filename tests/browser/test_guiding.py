@@ -77,7 +77,9 @@ def test_a_failure_of_the_papers_method_stands_in_the_caution_box(page: Driver, 
     assert page.page.locator('[data-path="noise.sigma_px"]').is_hidden()
     page.page.get_by_label("RANSAC threshold").fill("0.05")
     page.page.keyboard.press("Enter")
-    page.until("__cocalib.state.view.stage === 'unsolvable'")
+    page.until("__cocalib.state.view.options.paper.ransac_threshold_px === 0.05")
+    page.settle()
+    assert page.view["stage"] == "unsolvable"
     box = page.text('#cautions [data-code="unsolvable"]')
     assert page.view["status"] in box
     assert page.view["hint"] in box
