@@ -9,6 +9,7 @@ from calib_core.arrays import Flags, Values
 from calib_core.camera import Camera
 from calib_core.consensus import Consensus, associate, find_consensus
 from calib_core.diagnostics import cautions_of
+from calib_core.doubting import doubts_of, widened_by_doubts
 from calib_core.evidence import Evidence, Linearised, evidence_of
 from calib_core.findings import Findings
 from calib_core.handedness import MIRRORED_GAIN, mirror_gain
@@ -97,6 +98,8 @@ def _solved(
     if not open_rad < _OPEN_ROTATION_RAD:
         return _no_shape(len(used))
     left_out = leave_one_out(refined, uncertainty.information)
+    doubts = doubts_of(evidence, refined, uncertainty.information)
+    uncertainty = widened_by_doubts(uncertainty, doubts)
     metrics = _metrics(evidence, refined, left_out)
     findings = Findings(
         ids=tuple(pair.id for pair in used),
@@ -104,6 +107,7 @@ def _solved(
         refined=refined,
         uncertainty=uncertainty,
         left_out=left_out,
+        doubts=doubts,
         inliers=_inliers(refined),
         alternatives=fit.found,
         mirror_gain=fit.mirror_gain,
@@ -180,6 +184,8 @@ def _inliers(refined: Refined) -> Flags:
 def _beyond_doubt(evidence: Evidence, refined: Refined) -> bool:
     """Tell whether pairs and a measured camera position agree so well that mirrored axes are out of the question."""
     agreeing = _inliers(refined).mean() >= _AGREEING_SHARE and float(refined.noise_scale.max()) < _PLAUSIBLE_SCALE
+    assumed = associate(evidence, refined.camera_from_radar)[1].squared.mean() / 2.0
+    agreeing = agreeing and float(assumed) < _PLAUSIBLE_SCALE**2
     prior_residual = evidence.belief.rows(refined.camera_from_radar)[0]
     return evidence.belief.measured and bool(agreeing) and float(np.linalg.norm(prior_residual)) < _NEAR_PRIOR
 

@@ -40,6 +40,7 @@ def cautions_of(findings: Findings) -> tuple[Caution, ...]:
         _weak_geometry,
         _same_places,
         _ambiguous_candidates,
+        _doubtful_pairs,
         _decisive_pair,
     )
     return tuple(caution for check in checks for caution in check(findings))
@@ -181,11 +182,24 @@ def _candidate_costs(f: Findings) -> np.ndarray:
     return -2.0 * log_odds_of(each, model, each.log_score[rows], 0.5)
 
 
+def _doubtful_pairs(f: Findings) -> list[Caution]:
+    return [
+        Caution(
+            "doubtful-pair",
+            f"without {f.ids[doubt.pair]} the camera moves {100 * doubt.camera_move_m:.0f} cm, and the other pairs predict it "
+            f"{doubt.standard_deviations:.1f} standard deviations from its click; the stated uncertainty allows for both",
+            f"look at the click of {f.ids[doubt.pair]}; correct it, exclude it, or add placements near it",
+        )
+        for doubt in f.doubts
+    ]
+
+
 def _decisive_pair(f: Findings) -> list[Caution]:
     if f.inliers.sum() < 6:
         return []
     worst = int(np.argmax(np.where(f.inliers, f.left_out.influence, 0.0)))
-    if f.left_out.influence[worst] < _DECISIVE_INFLUENCE:
+    doubted = any(doubt.pair == worst for doubt in f.doubts)
+    if doubted or f.left_out.influence[worst] < _DECISIVE_INFLUENCE:
         return []
     return [
         Caution(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from calib_core.arrays import Flags
 from calib_core.consensus import Consensus
+from calib_core.doubting import Doubt
 from calib_core.evidence import Evidence
 from calib_core.refining import Refined
 from calib_core.uncertainty import LeftOut, PoseUncertainty
@@ -22,6 +23,7 @@ class Findings:
         refined: the fit.
         uncertainty: of its pose.
         left_out: leave-one-out.
+        doubts: the pairs that the others contradict.
         inliers: (n,) which pairs took part.
         alternatives: where the other starts ended, the most likely first.
         mirror_gain: by how much mirrored radar axes explain the pairs better; negative: worse.
@@ -33,6 +35,7 @@ class Findings:
     refined: Refined
     uncertainty: PoseUncertainty
     left_out: LeftOut
+    doubts: Sequence[Doubt]
     inliers: Flags
     alternatives: Sequence[Consensus]
     mirror_gain: float

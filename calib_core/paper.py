@@ -25,6 +25,7 @@ from calib_core.measurements import (
 from calib_core.metrics import aed, distances, metrics_of
 from calib_core.opencv import PnPSolver, refine_lm, solve_pnp_ransac, spans_a_plane
 from calib_core.options import CalibrationOptions, PaperOptions
+from calib_core.paper_doubts import cautions_as_printed
 from calib_core.results import Calibration, PairResult
 
 __all__ = [
@@ -288,7 +289,15 @@ def _solved(
         metrics=metrics_of(distances_px[np.isfinite(distances_px)]),
         pairs=results,
         unpaired=unpaired,
-        cautions=(),
+        cautions=cautions_as_printed(
+            [pair.id for pair in used],
+            points_radar_m,
+            pixels_px,
+            camera,
+            camera_from_radar,
+            better.inliers,
+            options,
+        ),
         options=options,
         iterative_px=float("nan") if iterative is None else iterative.mean_error_px,
         sqpnp_px=float("nan") if sqpnp is None else sqpnp.mean_error_px,

@@ -5,10 +5,12 @@ Pose and true reflector positions mu are estimated together, by expectation-maxi
     sum_i w_i [ |z_i - pi(R p(mu_i) + t)|^2_C + |m_i - mu_i|^2_V ] + |c - c0|^2 / sigma_c^2,
 
 the mu_i eliminated exactly (equation (2) of `evidence`). Plain PnP takes the noisy m_i for the truth; its bias does not
-shrink with more pairs. w_i is the probability that pair i is no outlier (a click anywhere on the image is one).
+shrink with more pairs. w_i is the probability that pair i is no outlier: neither a click anywhere on the image nor a slip,
+which lies near where it should, but several times farther off than noise explains. Each pair is judged by what the others
+predict of it (`predicting`): judged by a fit and a noise level that it has bent itself, a wrong pair passes.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,16 +18,25 @@ from calib_core.arrays import Points3, TimesNs, Values
 from calib_core.consensus import Consensus, associate, log_odds_of, normal_equations
 from calib_core.evidence import Evidence, Linearised, linearise
 from calib_core.geometry import RigidTransform
+from calib_core.predicting import (
+    COMPONENTS,
+    PSEUDO_SHARED,
+    NoiseParts,
+    Predicted,
+    noise_parts,
+    predict,
+    shrunk_scales,
+)
 
 __all__ = ["Refined", "refine"]
 
 _MOST_ROUNDS = 80
 _ROUNDS_BEFORE_SCALES = 3
+_ROUNDS_PER_WEIGHING = 3  # weights settle long before noise scales do
 _STEP_TOLERANCE = 1e-8  # in standard deviations of the pose
 _PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # pseudo-counts of the inlier share
-_PSEUDO_REDUNDANCY = 6.0  # pseudo-degrees of freedom that pull each noise scale to what it leans on
-_PSEUDO_SHARED = 4.0
-_SCALE_LIMITS = (0.1, 12.0)
+_SLIP_SHARE = 0.01  # of the pairs that are no outliers anywhere on the image
+_SLIP_FACTOR = 5.0  # how many times noisier a slip is
 _LEAST_PAIRS_FOR_SCALES = 5.0
 _NEAR = 6.0  # standard deviations beyond which a pair says nothing about its own true position
 
@@ -64,6 +75,7 @@ class _State:
     rows: TimesNs
     scale: Values
     share: float
+    weights: Values = field(default_factory=lambda: np.zeros(0))
 
 
 def refine(evidence: Evidence, start: Consensus, *, estimate_scale: bool) -> Refined:
@@ -76,35 +88,60 @@ def refine(evidence: Evidence, start: Consensus, *, estimate_scale: bool) -> Ref
     """
     state = _State(start.camera_from_radar, None, np.zeros(0, dtype=np.int64), np.full(4, start.noise_scale), 0.8)
     state.rows = associate(evidence, state.pose)[0]
+    state.weights = _first_weights(evidence.scaled(state.scale), state)
     degrees = 0.0
     for round_ in range(_MOST_ROUNDS):
         noisy = evidence.scaled(state.scale)
-        model, weights = _expect(noisy, state)
-        step = _maximise(noisy, state, model, weights)
+        weigh = round_ <= _ROUNDS_BEFORE_SCALES or round_ % _ROUNDS_PER_WEIGHING == 0
+        model, parts = _expect(noisy, state, weigh=weigh, scaled=degrees > 0.0)
+        step = _maximise(noisy, state, model)
         moved = 0.0
-        if estimate_scale and round_ >= _ROUNDS_BEFORE_SCALES and weights.sum() >= _LEAST_PAIRS_FOR_SCALES:
+        if estimate_scale and round_ >= _ROUNDS_BEFORE_SCALES and state.weights.sum() >= _LEAST_PAIRS_FOR_SCALES:
             before = state.scale
-            state.scale, degrees = _variance_components(noisy, state, model, weights)
+            state.scale, degrees = _variance_components(noisy, state, model, parts)
             moved = float(np.abs(np.log(state.scale / before)).max())
-        if step < _STEP_TOLERANCE and moved < 1e-6 and round_ > _ROUNDS_BEFORE_SCALES:
+        if step < _STEP_TOLERANCE and moved < 1e-6 and weigh and round_ > _ROUNDS_BEFORE_SCALES:
             break
     noisy = evidence.scaled(state.scale)
-    model, weights = _expect(noisy, state)
-    return Refined(state.pose, state.rows, weights, noisy, model, state.scale, degrees, state.share)
+    model, _ = _expect(noisy, state, weigh=True, scaled=degrees > 0.0)
+    return Refined(state.pose, state.rows, state.weights, noisy, model, state.scale, degrees, state.share)
 
 
-def _expect(evidence: Evidence, state: _State) -> tuple[Linearised, Values]:
-    """Associate candidates and weigh pairs at the present pose (E-step)."""
+def _first_weights(evidence: Evidence, state: _State) -> Values:
+    """Weigh pairs by their plain residuals, there being no fit yet that could predict."""
+    odds = log_odds_of(evidence, _model(evidence, state), evidence.log_score[state.rows], state.share)
+    return _probability(odds)
+
+
+def _probability(odds: Values) -> Values:
+    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(odds, -500.0, 500.0))))
+
+
+def _expect(evidence: Evidence, state: _State, *, weigh: bool, scaled: bool) -> tuple[Linearised, NoiseParts]:
+    """Associate candidates and, if so told, weigh pairs at the present pose, each by the others (E-step)."""
     if not evidence.one_to_one:
         rows = associate(evidence, state.pose)[0]
         if state.polar is not None:
             state.polar = np.where((rows == state.rows)[:, None], state.polar, evidence.polar[rows])
         state.rows = rows
     model = _model(evidence, state)
-    odds = log_odds_of(evidence, model, evidence.log_score[state.rows], state.share)
-    weights = np.asarray(1.0 / (1.0 + np.exp(-np.clip(odds, -500.0, 500.0))))
-    state.share = float((weights.sum() + _PRIOR_INLIERS) / (len(weights) + _PRIOR_INLIERS + _PRIOR_OUTLIERS))
-    return model, weights
+    parts = noise_parts(evidence, model, evidence.sigma_polar[state.rows])
+    if not weigh:
+        return model, parts
+    predicted = predict(evidence, state.pose, model, state.weights, parts, state.scale if scaled else None)
+    state.weights = _probability(_log_odds(evidence, state, model, predicted))
+    inliers, count = state.weights.sum(), len(state.weights)
+    state.share = float((inliers + _PRIOR_INLIERS) / (count + _PRIOR_INLIERS + _PRIOR_OUTLIERS))
+    return model, parts
+
+
+def _log_odds(evidence: Evidence, state: _State, model: Linearised, predicted: Predicted) -> Values:
+    """Return log odds (n,) of an inlier against a slip or an outlier anywhere on the image."""
+    area_px2 = evidence.camera.width_px * evidence.camera.height_px
+    prior = np.log(state.share) - np.log1p(-state.share) + evidence.log_score[state.rows]
+    anywhere = -prior + 0.5 * model.log_determinant - np.log(area_px2)
+    slip = np.log(_SLIP_SHARE) - np.log1p(-_SLIP_SHARE) + predicted.log_density(_SLIP_FACTOR)
+    return np.asarray(predicted.log_density() - np.logaddexp(anywhere, slip))
 
 
 def _model(evidence: Evidence, state: _State) -> Linearised:
@@ -119,9 +156,9 @@ def _model(evidence: Evidence, state: _State) -> Linearised:
     )
 
 
-def _maximise(evidence: Evidence, state: _State, model: Linearised, weights: Values) -> float:
+def _maximise(evidence: Evidence, state: _State, model: Linearised) -> float:
     """Step pose and true positions (M-step); return the step's length in standard deviations."""
-    hessian, gradient = normal_equations(evidence, state.pose, model, weights)
+    hessian, gradient = normal_equations(evidence, state.pose, model, state.weights)
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
     step = np.linalg.solve(hessian / np.outer(scale, scale) + 1e-12 * np.eye(6), gradient / scale) / scale
     longest = max(float(np.linalg.norm(step[3:])) / 0.2, float(np.linalg.norm(step[:3])) / 1.0, 1.0)
@@ -136,32 +173,18 @@ def _maximise(evidence: Evidence, state: _State, model: Linearised, weights: Val
     return float(np.sqrt(max(step @ hessian @ step, 0.0)))
 
 
-def _variance_components(evidence: Evidence, state: _State, model: Linearised, weights: Values) -> tuple[Values, float]:
+def _variance_components(
+    evidence: Evidence, state: _State, model: Linearised, parts: NoiseParts
+) -> tuple[Values, float]:
     """Update the four noise scales from residuals and their redundancy numbers.
 
     With P = W^T (I - w J_pose H^-1 J_pose^T) W, component k with covariance Q_k of the residual has
     q_k = e^T S^-1 Q_k S^-1 e and redundancy r_k = tr(P Q_k); its variance changes by q_k / r_k.
     """
+    weights = state.weights
     hessian, _ = normal_equations(evidence, state.pose, model, weights)
-    jacobian = model.pose_jacobian
-    projector = np.eye(2) - weights[:, None, None] * (jacobian @ np.linalg.inv(hessian) @ np.swapaxes(jacobian, 1, 2))
-    click = model.whitening * evidence.sigma_px[:, None, None]  # W C^(1/2), (n, 2, 2)
-    radar = model.point_jacobian * evidence.sigma_polar[state.rows][:, None, :]  # W J V^(1/2), (n, 2, 3)
-    factors = [click, radar[:, :, 0:1], radar[:, :, 1:2], radar[:, :, 2:3]]
-    found, redundant = np.empty(4), np.empty(4)
-    for k, factor in enumerate(factors):
-        along = (np.swapaxes(factor, 1, 2) @ model.residual[:, :, None])[:, :, 0]
-        found[k] = weights @ (along**2).sum(axis=1)
-        redundant[k] = weights @ np.einsum("nia,nij,nja->n", factor, projector, factor)
-    return _shrunk(found * state.scale**2, np.maximum(redundant, 0.0)), float(redundant.sum()) + _PSEUDO_SHARED
-
-
-def _shrunk(squares: Values, redundant: Values) -> Values:
-    """Turn sums of squares, in assumed sigmas, into scales, each leaning on what is known better than itself.
-
-    The click leans on its assumed sigma; range, azimuth and elevation lean on the level they share, and that on 1.
-    """
-    shared = (squares[1:].sum() + _PSEUDO_SHARED) / (redundant[1:].sum() + _PSEUDO_SHARED)
-    towards = np.array([1.0, shared, shared, shared])
-    variance = (squares + _PSEUDO_REDUNDANCY * towards) / (redundant + _PSEUDO_REDUNDANCY)
-    return np.clip(np.sqrt(variance), *_SCALE_LIMITS)
+    taken = ((parts.pose_jacobian @ np.linalg.inv(hessian)) * parts.pose_jacobian).sum(axis=2)
+    redundant = weights @ ((parts.columns**2).sum(axis=1) - weights[:, None] * taken)
+    squares = (weights @ parts.along**2) @ COMPONENTS
+    redundant = np.maximum(redundant @ COMPONENTS, 0.0)
+    return shrunk_scales(squares * state.scale**2, redundant), float(redundant.sum()) + PSEUDO_SHARED
