@@ -81,7 +81,9 @@ def assemble(
     diagnoses = _diagnoses(stamped, (radar, images), clocks, options)
     cautions.extend(about_clocks(list(diagnoses.values())))
     camera, about_camera = recorded_camera(selection.camera_info, images)
-    cautions.extend([*about_camera, *about_radar(radar), *about_claims(radar), *about_images(images), *about_video(images)])
+    cautions.extend(
+        [*about_camera, *about_radar(radar), *about_claims(radar), *about_images(images), *about_video(images)]
+    )
     return Assembly(
         topics=tuple(_summary(topic, inventory, selection, stamps, diagnoses.get(topic.name)) for topic in topics),
         radar_topic=selection.radar.name if selection.radar else None,

@@ -174,11 +174,15 @@ def test_import_says_that_the_camera_is_missing(cocalib: Cocalib, calibration: P
 
 
 def test_export_poses_the_radar_in_the_kit(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
-    posed = cocalib("export", calibration, "--to", "autoware", "--parent-from-radar", *["1.5", "0", "0.25", "0", "0", "0", "1"])
+    posed = cocalib(
+        "export", calibration, "--to", "autoware", "--parent-from-radar", *["1.5", "0", "0.25", "0", "0", "0", "1"]
+    )
     assert "x: 1.5" in posed.out
     (tmp_path / "kit.yaml").write_text(posed.out)
     assert cocalib("check", tmp_path / "kit.yaml", "--against", calibration).code == 0
-    wrong = cocalib("export", calibration, "--to", "autoware", "--parent-from-radar", *["0", "0", "0", "0", "0", "0", "2"])
+    wrong = cocalib(
+        "export", calibration, "--to", "autoware", "--parent-from-radar", *["0", "0", "0", "0", "0", "0", "2"]
+    )
     assert wrong.code == 2
     assert "qw last" in wrong.err
 
