@@ -122,6 +122,8 @@ class Hub:
     def _take(self, view: View) -> None:
         self._view = view
         self.broadcast(view, "view")
+        if view.solving:
+            return  # overlay and 3D view show the last answer until the next one, and would only hold the solver up
         for tab in self.tabs:
             tab.refresh()
 

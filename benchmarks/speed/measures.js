@@ -22,18 +22,20 @@
   };
   window.__measures = {
     settled,
-    /** Move the mark of one click by a fraction of a pixel, as a person does by clicking again. */
+    /** Drag the mark of one click by a few pixels, as a person does who corrects it. */
     async click(number) {
       const click = state.view.clicks[number % state.view.clicks.length];
       goTo(click.frame);
       await until(() => state.shown.index === click.frame && solved());
       await new Promise((done) => setTimeout(done, 100));
       const box = canvas().getBoundingClientRect();
-      const [x, y] = toCss(click.u_px + (number % 2 ? 30 : -30), click.v_px);
+      const [x, y] = toCss(click.u_px, click.v_px);
+      const by = number % 2 ? 6 : -6;
       const revision = state.view.revision;
       press("pointerdown", box.left + x, box.top + y);
-      press("pointerup", box.left + x, box.top + y);
+      press("pointermove", box.left + x + by, box.top + y);
       const start = performance.now();
+      press("pointerup", box.left + x + by, box.top + y);
       await until(() => Math.abs(clickIn(click.frame).u_px - click.u_px) > 0.01);
       await painted();
       const mark = performance.now() - start;

@@ -80,7 +80,7 @@ def _clicking(opened: _Opened) -> Table:
         solved_ms.append(times["solved"])
     return Table(
         "Clicking",
-        f"The sample with its 20 pairs and the 3D view beside the picture; {_CLICKS} marks moved one after another, "
+        f"The sample with its 20 pairs and the 3D view beside the picture; {_CLICKS} marks dragged by 6 px one after another, "
         "from the pointer's release to the painted picture.",
         (
             _timed("click to mark", marks_ms, 80),
