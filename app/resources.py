@@ -1,6 +1,8 @@
-"""Where the installed program finds its own files, and whether it is installed alone."""
+"""Where the installed program finds its own files and keeps its state, and whether it is installed alone."""
 
 import importlib.metadata
+import os
+import sys
 from pathlib import Path
 
 from calib_core.errors import CalibrationError
@@ -10,6 +12,7 @@ __all__ = [
     "check_installation",
     "installed_app_owners",
     "sample_folder",
+    "state_folder",
     "static_folder",
     "version",
 ]
@@ -38,6 +41,11 @@ def sample_folder() -> Path:
         InstallationError: it is in neither place.
     """
     return _folder("sample_data")
+
+
+def state_folder() -> Path:
+    """Return the folder in which the program keeps its state for this user; it may not exist yet."""
+    return _system_state_folder() / _DISTRIBUTION
 
 
 def version() -> str:
@@ -75,3 +83,12 @@ def _folder(name: str) -> Path:
     raise InstallationError(
         f"the folder {name} is not in {_PACKAGE_FOLDER} nor beside it: install {_DISTRIBUTION} again"
     )
+
+
+def _system_state_folder() -> Path:
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Application Support"
+    stated = Path(os.environ.get("XDG_STATE_HOME") or "")
+    return stated if stated.is_absolute() else Path.home() / ".local" / "state"

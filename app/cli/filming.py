@@ -6,6 +6,7 @@ from typing import Annotated
 
 import tyro
 
+from app.cli.flags import Topics
 from app.cli.printing import progress_bar, seconds_text
 from calib_core.recordings import RecordingOptions
 
@@ -20,7 +21,7 @@ class Video:
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
     out: Path
     """Video to write: .mp4 or .mov (times to a microsecond), or .mkv (to a millisecond)."""
-    topics: Annotated[RecordingOptions, tyro.conf.arg(name="")] = field(default_factory=RecordingOptions)
+    topics: Topics = field(default_factory=RecordingOptions)
 
     def run(self) -> int:
         """Write the video; return the exit code."""

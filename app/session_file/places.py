@@ -1,11 +1,11 @@
 """Where a session lies: beside its recording when that folder can be written, else in the user's own state folder."""
 
 import hashlib
-import os
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+
+from app.resources import state_folder
 
 __all__ = ["recording_session_folder", "user_session_folder"]
 
@@ -35,16 +35,7 @@ def user_session_folder(name: str, *, key: str = "") -> Path:
         key: tells sessions of the same name apart, such as the recording's path.
     """
     distinct = f"-{hashlib.sha256(key.encode()).hexdigest()[:8]}" if key else ""
-    return _state_folder() / "cocalib" / "sessions" / f"{name}{distinct}{_SUFFIX}"
-
-
-def _state_folder() -> Path:
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support"
-    stated = Path(os.environ.get("XDG_STATE_HOME") or "")
-    return stated if stated.is_absolute() else Path.home() / ".local" / "state"
+    return state_folder() / "sessions" / f"{name}{distinct}{_SUFFIX}"
 
 
 def _is_writable(folder: Path) -> bool:

@@ -5,13 +5,11 @@ import contextlib
 import io
 import os
 import secrets
-import sys
 import threading
 import webbrowser
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import quote
 
@@ -20,7 +18,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from app.resources import static_folder
+from app.resources import state_folder, static_folder
 from app.solving import RecordingSource
 from app.web import guard as doors
 from app.web.channel import Channel
@@ -220,12 +218,7 @@ def _tab_of(server: "viser.ViserServer", client_id: int) -> str:
 
 def _cookie_key() -> bytes:
     """Return the secret that cookies are made from, kept in the user's folder so that a restart does not shut pages out."""
-    state = os.environ.get("LOCALAPPDATA" if sys.platform == "win32" else "XDG_STATE_HOME")
-    path = (
-        (Path(state) if state and Path(state).is_absolute() else Path.home() / ".local" / "state")
-        / "cocalib"
-        / "cookie.key"
-    )
+    path = state_folder() / "cookie.key"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with contextlib.suppress(FileExistsError):
