@@ -13,6 +13,7 @@ __all__ = [
     "FrameNames",
     "InputFile",
     "Provenance",
+    "UnknownResult",
     "choose_check_point",
 ]
 
@@ -106,19 +107,32 @@ class Provenance:
 class CalibrationFile:
     """The content of a calibration-1 file.
 
+@dataclass(frozen=True, slots=True)
+class UnknownResult:
+    """A result that a later version wrote and this one does not know.
+
+    Attributes:
+        place: the keys and list positions that lead to it, its own key last.
+        json_text: its value.
+    """
+
+    place: tuple[str | int, ...]
+    json_text: str
+
+
     Attributes:
         calibration: the pose, its covariance and what each pair says about it.
         frames: the names of the two frames.
         check_point: a radar point and the pixel it must come out at; None where a foreign file has none.
         provenance: where it comes from.
-        more: results that a later version wrote and this one does not know: key and JSON text; kept when written again.
+        unknown: results that a later version wrote and this one does not know; kept when written again.
     """
 
     calibration: Calibration
     frames: FrameNames = field(default_factory=FrameNames)
     check_point: CheckPoint | None = None
     provenance: Provenance = field(default_factory=Provenance)
-    more: tuple[tuple[str, str], ...] = ()
+    unknown: tuple[UnknownResult, ...] = ()
 
 
 def choose_check_point(calibration: Calibration) -> CheckPoint | None:

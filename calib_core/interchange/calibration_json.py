@@ -16,11 +16,13 @@ from calib_core.interchange.calibration_file import (
     FrameNames,
     InputFile,
     Provenance,
+    UnknownResult,
     choose_check_point,
 )
 from calib_core.interchange.camera_document import camera_document, camera_of
 from calib_core.interchange.json_text import json_text
 from calib_core.interchange.strict_json import json_object, parse_document
+from calib_core.interchange.unknown_results import unknown_results, with_unknown
 from calib_core.measurements import ReflectorClick, TimeNs, Unpaired, time_from_parts, time_parts
 from calib_core.results import Calibration, Caution, CheckPoint, Metrics, PairResult
 
@@ -28,9 +30,9 @@ __all__ = [
     "COVARIANCE_CONVENTION",
     "calibration_file_of",
     "calibration_text",
+    "kept_results",
     "read_calibration",
     "transform_of",
-    "unknown_results",
     "write_calibration",
 ]
 
@@ -94,8 +96,7 @@ def write_calibration(file: CalibrationFile) -> str:
         provenance=_provenance_document(file.provenance),
     )
     content = msgspec.to_builtins(document)
-    known = {key: content[key] for key in _KEY_ORDER}
-    return json_text(known | {key: msgspec.json.decode(value) for key, value in file.more})
+    return json_text(with_unknown({key: content[key] for key in _KEY_ORDER}, file.unknown))
 
 
 _KEY_ORDER = (
@@ -121,13 +122,12 @@ def read_calibration(text: str, source: str = "calibration") -> CalibrationFile:
                 "cocalib check tells which is wrong: correct it or remove radar_from_camera"
             )
     file = calibration_file_of(document, camera_from_radar, source=source)
-    return dataclasses.replace(file, more=unknown_results(text, source=source))
+    return dataclasses.replace(file, unknown=kept_results(text, source=source))
 
 
-def unknown_results(text: str, *, source: str) -> tuple[tuple[str, str], ...]:
-    """Return the keys of a calibration-1 file that this version does not know, each with its JSON text."""
-    content = json_object(text, source=source)
-    return tuple((key, msgspec.json.encode(content[key]).decode()) for key in content if key not in _KEY_ORDER)
+def kept_results(text: str, *, source: str) -> tuple[UnknownResult, ...]:
+    """Return what a calibration-1 file says beyond what this version knows."""
+    return unknown_results(json_object(text, source=source), documents.CalibrationDocument)
 
 
 def calibration_file_of(

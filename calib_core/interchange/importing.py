@@ -10,7 +10,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.archives import unpack
 from calib_core.interchange.array_formats import read_matlab, read_matrix, read_numpy
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.calibration_json import calibration_file_of, transform_of, unknown_results
+from calib_core.interchange.calibration_json import calibration_file_of, kept_results, transform_of
 from calib_core.interchange.colmap_format import read_colmap
 from calib_core.interchange.dataset_formats import read_kitti, read_nuscenes
 from calib_core.interchange.documents import CalibrationDocument, TransformDocument
@@ -173,7 +173,7 @@ def _read_ours(text: str, source: str) -> ImportedCalibration:
                 faults.append("radar_from_camera is not the inverse of camera_from_radar")
         except InputError:
             faults.append("radar_from_camera holds two rotations, or none")
-    file = replace(calibration_file_of(document, pose, source=source), more=unknown_results(text, source=source))
+    file = replace(calibration_file_of(document, pose, source=source), unknown=kept_results(text, source=source))
     base = imported(file)
     return ImportedCalibration(
         "json", base.pose, base.camera, base.frames, base.check_point, faults=tuple(faults), file=file

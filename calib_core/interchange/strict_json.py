@@ -13,7 +13,7 @@ import msgspec
 
 from calib_core.errors import InputError
 
-__all__ = ["checked", "json_object", "json_value", "parse_document"]
+__all__ = ["checked", "fields_of", "item_type", "json_object", "json_value", "parse_document"]
 
 Document = TypeVar("Document")
 
@@ -119,7 +119,7 @@ def _faults(value: Any, annotation: Any, place: str) -> Iterator[tuple[str, str]
     elif isinstance(value, str) and get_origin(annotation) is Literal and value not in get_args(annotation):
         yield place, _unfamiliar(f"unknown value {value!r}", value, list(get_args(annotation)), "it can be")
     elif isinstance(value, dict):
-        fields = _fields(annotation)
+        fields = fields_of(annotation)
         for key, item in value.items():
             inner = f"{place}.{key}" if place else key
             if fields is not None and key not in fields and _refuses_unknown(annotation):
@@ -127,7 +127,7 @@ def _faults(value: Any, annotation: Any, place: str) -> Iterator[tuple[str, str]
             yield from _faults(item, (fields or {}).get(key), inner)
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            yield from _faults(item, _item_type(annotation), f"{place}[{index}]")
+            yield from _faults(item, item_type(annotation), f"{place}[{index}]")
 
 
 def _unfamiliar(what: str, word: str, known: list[str], these: str) -> str:
@@ -141,7 +141,8 @@ def _variants(annotation: Any) -> list[Any]:
     return [annotation]
 
 
-def _fields(annotation: Any) -> dict[str, Any] | None:
+def fields_of(annotation: Any) -> dict[str, Any] | None:
+    """Return the keys of a type that stands for a JSON object, each with its own type; None for other types."""
     for part in _variants(annotation):
         if isinstance(part, type) and issubclass(part, msgspec.Struct):
             hints = get_type_hints(part)
@@ -161,7 +162,8 @@ def _refuses_unknown(annotation: Any) -> bool:
     )
 
 
-def _item_type(annotation: Any) -> Any:
+def item_type(annotation: Any) -> Any:
+    """Return the type of the items of a type that stands for a JSON list; None for other types."""
     for part in _variants(annotation):
         items = [item for item in get_args(part) if item is not Ellipsis]
         if get_origin(part) in (tuple, list) and items:

@@ -66,13 +66,53 @@ def test_solved_pairs_become_a_file_that_passes_its_check(truth, method):
 
 def test_results_of_a_later_version_are_kept_and_settings_are_not(project_root: Path):
     document = json.loads((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
-    document["observability"] = {"yaw": 0.25, "words": ["weak", None]}
+    value = {"yaw": 0.25, "words": ["weak", None, "\ud800"], "large": 10**30, "small": 1e-300}
+    for owner in _results(document):
+        owner["observability"] = value
     text = write_calibration(read_calibration(json.dumps(document)))
-    assert json.loads(text)["observability"] == document["observability"]
+    again = json.loads(text)
+    assert [owner["observability"] for owner in _results(again)] == [value] * len(_results(document))
     assert write_calibration(read_calibration(text)) == text
     found = read_any(text).file
     assert found is not None
-    assert json.loads(write_calibration(found))["observability"] == document["observability"]
+    assert write_calibration(found) == text
     document["options"]["noise"]["sigma_pixels"] = 1
     with pytest.raises(InputError, match="unknown key"):
         read_calibration(json.dumps(document))
+
+
+def _results(document: dict) -> list[dict]:
+    """Return every object of results: all of them but the settings."""
+    found, objects = [], [document]
+    while objects:
+        found.append(objects.pop())
+        for key, value in found[-1].items():
+            if key not in ("camera", "options", "observability") and key != "image_time":
+                objects += [item for item in (value if isinstance(value, list) else [value]) if isinstance(item, dict)]
+    return found
+
+
+def test_what_an_earlier_version_wrote_is_read_and_passes_its_check(project_root: Path):
+    text = (project_root / "tests/golden/calibration-1-earlier.json").read_text(encoding="utf-8")
+    earlier = json.loads(text)
+
+    file = read_calibration(text)
+
+    assert check(read_any(text)).ok
+    again = json.loads(write_calibration(file))
+    assert all(again[key] == earlier[key] for key in earlier if key != "provenance")
+    assert again["provenance"].items() >= earlier["provenance"].items()
+
+
+def test_a_file_of_the_required_keys_alone_is_read(project_root: Path):
+    whole = json.loads((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+    required = {key: whole[key] for key in ("schema", "camera_from_radar", "frames", "camera")}
+    required["camera_from_radar"] = {key: whole["camera_from_radar"][key] for key in ("rotation", "translation_m")}
+
+    file = read_calibration(json.dumps(required))
+
+    assert file.check_point is None
+    assert json.loads(write_calibration(file))["covariance"] is None
+    for missing in required:
+        with pytest.raises(InputError, match=f"{missing}: "):
+            read_calibration(json.dumps({key: value for key, value in required.items() if key != missing}))
