@@ -197,6 +197,8 @@ def test_two_tabs_see_the_same(
     other.go_to(page.value("__cocalib.state.cursor"))
     other.press("Delete")
     page.until("__cocalib.state.view.clicks.length === 1")
+    page.settle()
+    other.settle()
     assert page.view == other.view
 
 

@@ -59,7 +59,8 @@ def test_a_placement_can_be_marked_without_a_mouse(page: Driver, truth: Any) -> 
     page.press("Delete")
     page.click_sample(truth, 8)
     page.press("n")
-    page.until("__cocalib.state.overlay.index === __cocalib.state.placements[8].frame")
+    page.until("__cocalib.state.shown.index === __cocalib.state.placements[8].frame")
+    page.until("__cocalib.state.overlay.index === __cocalib.state.shown.index")
     guess = page.value("__cocalib.state.overlay.guesses[0]")
     page.press("Enter")
     assert len(page.view["clicks"]) == 9
