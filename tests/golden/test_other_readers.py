@@ -1,16 +1,21 @@
-"""Our files in the hands of readers that are not ours: pytransform3d, PyYAML, SciPy, OpenCV."""
+"""Our files in the hands of readers that are not ours: xacro, pytransform3d, pyquaternion, PyYAML, SciPy, OpenCV, COLMAP."""
 
+import io
 import json
 import shlex
+import zipfile
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+import xacro
 import yaml
+from pyquaternion import Quaternion
 from pytransform3d.rotations import check_matrix, matrix_from_quaternion
 from pytransform3d.transformations import transform_from
 from pytransform3d.urdf import UrdfTransformManager
+from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
 from calib_core.interchange import CalibrationFile, export, parent_pose, read_any, read_calibration
@@ -94,12 +99,75 @@ def test_pyyaml_and_opencv_read_the_camera_chain_and_the_file_storage(file, expe
     np.testing.assert_allclose(carried, expected_m, **CLOSE)
 
 
-def test_nuscenes_records_chain_through_the_ego_frame(file, expected_m):
+def test_xacro_takes_the_urdf_into_a_vehicle_and_pytransform3d_reads_what_comes_out(file, expected_m, tmp_path):
+    (tmp_path / "radar_camera.urdf").write_text(text_of(file, "urdf"), encoding="utf-8")
+    vehicle = f"""<robot name="vehicle" xmlns:xacro="http://www.ros.org/wiki/xacro">
+      <xacro:include filename="{tmp_path}/radar_camera.urdf"/>
+      <link name="base_link"/>
+      <joint name="mount" type="fixed"><parent link="base_link"/><child link="{file.frames.radar}"/>
+        <origin xyz="${{1.5 + 2}} 0 0.5" rpy="0 0 0.3"/></joint>
+    </robot>"""
+    (tmp_path / "vehicle.xacro").write_text(vehicle, encoding="utf-8")
+
+    manager = UrdfTransformManager()
+    manager.load_urdf(xacro.process_file(str(tmp_path / "vehicle.xacro")).toxml())
+
+    into_camera_from = manager.get_transform("base_link", file.frames.camera)
+    base_from_radar = transform_from(Rotation.from_euler("z", 0.3).as_matrix(), [3.5, 0, 0.5])
+    np.testing.assert_allclose((into_camera_from @ base_from_radar @ [*POINT_RADAR_M, 1.0])[:3], expected_m, **CLOSE)
+
+
+def test_nuscenes_records_carry_a_radar_point_into_the_image_as_the_devkit_does(file, expected_m):
+    """The devkit's documented steps: rotate and translate into the ego frame by the radar's record, undo the camera's."""
     ego_from_radar = parent_pose([3.4, 0.0, 0.5, 0.0, 0.0, np.sin(0.1), np.cos(0.1)])
     radar, camera = json.loads(export(file, "nuscenes", parent_from_radar=ego_from_radar).data)
-    point = matrix_from_quaternion(radar["rotation"]) @ POINT_RADAR_M + radar["translation"]
-    point = matrix_from_quaternion(camera["rotation"]).T @ (point - camera["translation"])
+    point = Quaternion(radar["rotation"]).rotation_matrix @ POINT_RADAR_M + np.array(radar["translation"])
+    point = Quaternion(camera["rotation"]).rotation_matrix.T @ (point - np.array(camera["translation"]))
     np.testing.assert_allclose(point, expected_m, **CLOSE)
+
+    pixel = np.array(camera["camera_intrinsic"]) @ point
+    undistorted, _ = cv2.projectPoints(
+        expected_m[None], np.zeros(3), np.zeros(3), file.calibration.camera.matrix_px, np.zeros(5)
+    )
+    np.testing.assert_allclose(pixel[:2] / pixel[2], undistorted.ravel(), **CLOSE)
+
+
+def test_foxglove_s_transform_is_the_pose_of_the_child_with_the_quaternion_s_parts_named(file, expected_m):
+    message = json.loads(text_of(file, "foxglove"))["FrameTransform"]
+    rotation = Quaternion(**message["rotation"]).rotation_matrix
+    pose = transform_from(rotation, [message["translation"][axis] for axis in "xyz"])
+    np.testing.assert_allclose(into_camera(pose), expected_m, **CLOSE)
+
+
+def test_kitti_is_read_by_key_and_by_the_number_of_the_line(file, expected_m):
+    """Some readers look for the keys; others, View-of-Delft's among them, count lines: P2 is the third, Tr the sixth."""
+    lines = text_of(file, "kitti").splitlines()
+    by_key = {key: np.array(numbers.split(), float) for key, numbers in (line.split(":", 1) for line in lines)}
+    by_line = [np.array(line.strip().split(" ")[1:], dtype=np.float32) for line in lines]
+
+    np.testing.assert_array_equal(by_line[2], by_key["P2"].astype(np.float32))
+    np.testing.assert_array_equal(by_line[5], by_key["Tr_velo_to_cam"].astype(np.float32))
+    rectified = by_key["R0_rect"].reshape(3, 3) @ by_key["Tr_velo_to_cam"].reshape(3, 4) @ [*POINT_RADAR_M, 1.0]
+    np.testing.assert_allclose(rectified, expected_m, **CLOSE)
+
+
+def test_scipy_and_numpy_load_the_arrays(file, expected_m):
+    mat = loadmat(io.BytesIO(export(file, "matlab").data), simplify_cells=True)
+    npz = np.load(io.BytesIO(export(file, "numpy").data), allow_pickle=False)
+    text = np.loadtxt(io.StringIO(text_of(file, "matrix")))
+    for matrix in (mat["camera_from_radar"]["A"], npz["camera_from_radar"], text):
+        np.testing.assert_allclose((matrix @ [*POINT_RADAR_M, 1.0])[:3], expected_m, **CLOSE)
+
+
+def test_colmap_reads_its_model_and_finds_the_check_point_half_a_pixel_on(file, tmp_path):
+    pycolmap = pytest.importorskip("pycolmap", reason="the dependency group 'bench' is not installed")
+    zipfile.ZipFile(io.BytesIO(export(file, "colmap").data)).extractall(tmp_path)
+    model = pycolmap.Reconstruction(str(tmp_path))
+    (image,), (camera,) = model.images.values(), model.cameras.values()
+    point_camera_m = image.cam_from_world() * file.check_point.radar_m
+    np.testing.assert_allclose(
+        camera.img_from_cam(point_camera_m[None])[0], file.check_point.pixel_px + 0.5, rtol=0, atol=1e-6
+    )
 
 
 def test_a_rig_is_read_as_its_other_readers_do(file, expected_m):
