@@ -18,6 +18,7 @@ from app.cli.opening import Demo, Open
 from app.cli.printing import refuse
 from app.cli.simulating import Simulate
 from app.cli.solving import Solve
+from app.cli.usage import read_command
 from calib_core.errors import CalibrationError
 
 __all__ = ["run"]
@@ -37,6 +38,16 @@ _Command = (
 )
 
 
+def _parse(arguments: Sequence[str]) -> Any:
+    return tyro.cli(
+        _Command,
+        prog="cocalib",
+        description=_DESCRIPTION,
+        args=list(arguments),
+        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff),
+    )
+
+
 def run(arguments: Sequence[str]) -> int:
     """Run one command.
 
@@ -52,13 +63,7 @@ def run(arguments: Sequence[str]) -> int:
         print(f"cocalib {version()}")
         return 0
     try:
-        command: Any = tyro.cli(
-            _Command,
-            prog="cocalib",
-            description=_DESCRIPTION,
-            args=list(arguments) or ["--help"],
-            config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff),
-        )
+        command = read_command(_parse, list(arguments) or ["--help"])
         return int(command.run())
     except CalibrationError as error:
         return refuse(str(error))

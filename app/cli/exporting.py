@@ -7,6 +7,7 @@ from typing import Annotated
 
 import tyro
 
+from app.cli.flags import File
 from app.cli.printing import read_text, write_whole
 from calib_core.errors import InputError
 
@@ -17,14 +18,17 @@ __all__ = ["Check", "Export"]
 class Export:
     """Write a calibration as another stack reads it; `--to list` names the formats."""
 
-    calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="CALIBRATION.json")] = ()
+    calibration: Annotated[
+        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="CALIBRATION.json", help_behavior_hint="")
+    ] = ()
     """A calibration that cocalib wrote (cocalib/calibration-1 JSON)."""
-    to: str = "list"
+    to: Annotated[str, tyro.conf.arg(metavar="FORMAT")] = "list"
     """The format: tf2, urdf, ...; "list" names them all."""
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    out: File = None
     """Where it goes, a file or a folder; without it, text goes to stdout."""
     parent_from_radar: Annotated[
-        tuple[float, float, float, float, float, float, float] | None, tyro.conf.arg(metavar="X Y Z QX QY QZ QW")
+        tuple[float, float, float, float, float, float, float] | None,
+        tyro.conf.arg(metavar="X Y Z QX QY QZ QW", help_behavior_hint=""),
     ] = None
     """Pose of the radar in the third frame of autoware (kit), driveworks (rig), nuscenes (ego): metres, quaternion, w last."""
 
@@ -59,11 +63,11 @@ class Export:
 class Check:
     """Read a calibration back, recompute its check point, and say what is wrong with it; or compare two."""
 
-    calibration: Annotated[Path, tyro.conf.Positional]
+    calibration: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CALIBRATION")]
     """A calibration in any format that export writes."""
-    against: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    against: File = None
     """Another one to compare with: in degrees, centimetres, and pixels at 5, 20 and 60 m."""
-    camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    camera: File = None
     """Intrinsics, where the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
 
     def run(self) -> int:

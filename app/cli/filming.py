@@ -1,14 +1,9 @@
 """`cocalib video`: the camera of a recording as a video file."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Annotated
 
-import tyro
-
-from app.cli.flags import Topics
+from app.cli.flags import NewFile, Recordings, TopicFlags, Topics
 from app.cli.printing import progress_bar, seconds_text
-from calib_core.recordings import RecordingOptions
 
 __all__ = ["Video"]
 
@@ -17,11 +12,11 @@ __all__ = ["Video"]
 class Video:
     """Write the camera's frames into a video, each at its recorded time; recorded JPEG is not encoded again."""
 
-    recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")]
+    recording: Recordings
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
-    out: Path
+    out: NewFile
     """Video to write: .mp4 or .mov (times to a microsecond), or .mkv (to a millisecond)."""
-    topics: Topics = field(default_factory=RecordingOptions)
+    topics: Topics = field(default_factory=TopicFlags)
 
     def run(self) -> int:
         """Write the video; return the exit code."""

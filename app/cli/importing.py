@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from app.cli.flags import File, NewFile
 from app.cli.printing import write_whole
 from calib_core.camera import Camera
 from calib_core.errors import InputError
@@ -24,9 +25,9 @@ class Import:
 
     calibration: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
     """A calibration in any format that export writes, whoever wrote it."""
-    out: Path
+    out: NewFile
     """Where the calibration-1 JSON goes."""
-    camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    camera: File = None
     """Intrinsics, where the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
 
     def run(self) -> int:

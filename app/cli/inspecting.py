@@ -1,13 +1,8 @@
 """`cocalib info`: what is in a recording."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Annotated
 
-import tyro
-
-from app.cli.flags import Topics
-from calib_core.recordings import RecordingOptions
+from app.cli.flags import Recordings, Switch, TopicFlags, Topics
 
 __all__ = ["Info"]
 
@@ -16,11 +11,11 @@ __all__ = ["Info"]
 class Info:
     """Say what a recording holds: files, topics, types, rates, stamps, overlap, camera, warnings."""
 
-    recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")]
+    recording: Recordings
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
-    json: bool = False
+    json: Switch = False
     """Print the same as JSON on stdout."""
-    topics: Topics = field(default_factory=RecordingOptions)
+    topics: Topics = field(default_factory=TopicFlags)
 
     def run(self) -> int:
         """Print the description; return the exit code."""

@@ -9,7 +9,17 @@ from typing import Annotated
 
 import tyro
 
-from app.cli.flags import CameraPosition, MeasuredCamera, Options, Topics
+from app.cli.flags import (
+    CameraPosition,
+    File,
+    Folder,
+    MeasuredCamera,
+    Options,
+    Recordings,
+    Switch,
+    TopicFlags,
+    Topics,
+)
 from app.cli.importing import camera_in, reference_from
 from app.cli.printing import read_text, required_camera
 from calib_core.camera import Camera
@@ -23,13 +33,13 @@ __all__ = ["Demo", "Open"]
 class ServingFlags:
     """Where the page is served."""
 
-    host: str = "127.0.0.1"
+    host: Annotated[str, tyro.conf.arg(metavar="ADDRESS")] = "127.0.0.1"
     """Address to bind; anything but loopback lets other machines in, who then need the token."""
     port: int = 8080
     """Port; the next free one when it is taken, and 0 takes any."""
-    token: str | None = None
+    token: Annotated[str | None, tyro.conf.arg(metavar="TOKEN", help_behavior_hint="")] = None
     """The token to ask for; without it, one is made and printed in the link."""
-    no_browser: bool = False
+    no_browser: Switch = False
     """Print the link and do not open a browser."""
 
 
@@ -37,9 +47,9 @@ class ServingFlags:
 class Demo:
     """Open the sample recording in the browser."""
 
-    session: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    session: Folder = None
     """Folder of the session; without it, one in your user folder, kept from run to run."""
-    fresh: bool = False
+    fresh: Switch = False
     """Begin without the clicks of the last time; they are kept beside."""
     serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
 
@@ -62,20 +72,20 @@ class Demo:
 class Open:
     """Calibrate your own recording in the browser."""
 
-    recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")]
+    recording: Recordings
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
-    camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    camera: File = None
     """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
-    calibration: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    calibration: File = None
     """A calibration to look at, in any format: shown until the clicks give one of their own, then compared with it."""
-    clicks: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    clicks: File = None
     """Clicks that a new session begins with (cocalib/clicks-1 JSON)."""
-    session: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    session: Folder = None
     """Folder of the session; without it, beside the recording where that can be written, else in your user folder."""
-    fresh: bool = False
+    fresh: Switch = False
     """Begin without the clicks of the last time; they are kept beside."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
-    topics: Topics = field(default_factory=RecordingOptions)
+    topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
     serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
 
@@ -103,7 +113,7 @@ def _serve(
     paths: Sequence[Path],
     *,
     session: Path,
-    fresh: bool,
+    fresh: Switch,
     serving: ServingFlags,
     name: str,
     camera_file: Path | None = None,

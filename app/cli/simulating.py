@@ -2,11 +2,14 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
-from app.cli.flags import Simulation
+import tyro
+
+from app.cli.flags import Simulation, SimulationFlags
 from app.cli.printing import progress_bar
 from calib_core.errors import InputError
-from calib_core.synthetic import Container, SimulationOptions
+from calib_core.synthetic import Container
 
 __all__ = ["Simulate"]
 
@@ -15,11 +18,11 @@ __all__ = ["Simulate"]
 class Simulate:
     """Record a scene that was never there: radar, camera, and the truth about both (truth.json)."""
 
-    out: Path
+    out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")]
     """Folder to write to; made when missing, and must be empty."""
     containers: tuple[Container, ...] = ("ros1",)
     """What to write: ros1 (radar.bag and camera.bag), mcap, db3."""
-    options: Simulation = field(default_factory=SimulationOptions)
+    options: Simulation = field(default_factory=SimulationFlags)
 
     def run(self) -> int:
         """Write the recording; return the exit code."""

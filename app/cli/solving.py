@@ -3,19 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
-import tyro
 
-from app.cli.flags import CameraPosition, MeasuredCamera, Options, Topics
+from app.cli.flags import CameraPosition, File, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from app.cli.printing import explain_unsolvable, read_text, required_camera, seconds_text, write_whole
 from app.view import summary_lines
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.recordings import RecordingOptions
 from calib_core.results import Calibration
 
 if TYPE_CHECKING:
@@ -31,18 +29,18 @@ class Solve:
     The same clicks give the same bytes as the page's download.
     """
 
-    recording: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RECORDING...")] = ()
+    recording: Recordings = ()
     """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
-    clicks: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON)."""
-    pairs: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    pairs: File = None
     """Pairs of radar positions and pixels (cocalib/pairs-1 JSON), instead of a recording."""
-    camera: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    camera: File = None
     """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    out: File = None
     """Where the calibration goes (cocalib/calibration-1 JSON); without it, to stdout."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
-    topics: Topics = field(default_factory=RecordingOptions)
+    topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
 
     def run(self) -> int:
