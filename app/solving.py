@@ -91,6 +91,10 @@ class RecordingSource(RadarSource, Protocol):
     @property
     def image_clock(self) -> str | None: ...  # noqa: D102
     @property
+    def radar_axes(self) -> str | None: ...  # noqa: D102
+    @property
+    def video_start(self) -> str | None: ...  # noqa: D102
+    @property
     def radar_frame(self) -> str: ...  # noqa: D102
     @property
     def camera_frame(self) -> str: ...  # noqa: D102
@@ -204,6 +208,8 @@ def calibration_text(calibration: Calibration, recording: RecordingSource) -> st
         camera_info_topic=recording.camera_info_topic,
         radar_clock=recording.radar_clock,
         image_clock=recording.image_clock,
+        radar_axes=recording.radar_axes,
+        video_start=recording.video_start,
         version=version(),
     )
     return interchange_text(calibration, _frame_names(recording), provenance)

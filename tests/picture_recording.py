@@ -33,6 +33,8 @@ class PictureRecording:
     camera_info_topic: str | None = None
     radar_clock: str | None = "header"
     image_clock: str | None = "header"
+    radar_axes: str | None = None
+    video_start: str | None = None
     radar_frame: str = "radar"
     camera_frame: str = "camera_optical"
     cautions: tuple[Any, ...] = ()

@@ -91,6 +91,8 @@ class Provenance:
         camera_info_topic: the topic of the intrinsics.
         radar_clock: "header" or "receive": which stamp times the radar.
         image_clock: the same for the images.
+        radar_axes: what a person said about the radar's axes and units, as --radar-axes has it.
+        video_start: when a video's first frame was taken, as --video-start has it.
         version: of this program.
     """
 
@@ -100,12 +102,10 @@ class Provenance:
     camera_info_topic: str | None = None
     radar_clock: str | None = None
     image_clock: str | None = None
+    radar_axes: str | None = None
+    video_start: str | None = None
     version: str | None = None
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CalibrationFile:
-    """The content of a calibration-1 file.
 
 @dataclass(frozen=True, slots=True)
 class UnknownResult:
@@ -119,6 +119,10 @@ class UnknownResult:
     place: tuple[str | int, ...]
     json_text: str
 
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CalibrationFile:
+    """The content of a calibration-1 file.
 
     Attributes:
         calibration: the pose, its covariance and what each pair says about it.

@@ -280,6 +280,8 @@ def _provenance_document(provenance: Provenance) -> documents.ProvenanceDocument
         inputs=[documents.InputDocument(f.name, f.size_bytes, f.sha256) for f in provenance.inputs],
         topics=documents.TopicsDocument(provenance.radar_topic, provenance.image_topic, provenance.camera_info_topic),
         clocks=documents.ClocksDocument(provenance.radar_clock, provenance.image_clock),
+        radar_axes=provenance.radar_axes,
+        video_start=provenance.video_start,
         version=provenance.version,
     )
 
@@ -292,5 +294,7 @@ def _provenance(document: documents.ProvenanceDocument) -> Provenance:
         camera_info_topic=document.topics.camera_info,
         radar_clock=document.clocks.radar,
         image_clock=document.clocks.image,
+        radar_axes=document.radar_axes,
+        video_start=document.video_start,
         version=document.version,
     )

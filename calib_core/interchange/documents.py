@@ -226,6 +226,8 @@ class ProvenanceDocument(Struct, frozen=True):
     inputs: list[InputDocument] = []
     topics: TopicsDocument = field(default_factory=TopicsDocument)
     clocks: ClocksDocument = field(default_factory=ClocksDocument)
+    radar_axes: str | None = None
+    video_start: str | None = None
     version: str | None = None
 
 

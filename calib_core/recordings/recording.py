@@ -21,6 +21,7 @@ from calib_core.recordings.plain_opening import files_behind, open_plain_sources
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.sources import Source
 from calib_core.recordings.topics import TopicSummary
+from calib_core.recordings.video_files import VIDEO_SUFFIXES
 from calib_core.results import Caution
 
 __all__ = ["InputFile", "Recording", "inspect_recording", "open_recording", "require_files"]
@@ -56,10 +57,13 @@ class Recording:
         radar_times: (k,) stamps of the scans, ascending.
     """
 
-    def __init__(self, paths: tuple[Path, ...], sources: tuple[Source, ...], assembly: Assembly) -> None:
+    def __init__(
+        self, paths: tuple[Path, ...], sources: tuple[Source, ...], assembly: Assembly, video_start: str | None = None
+    ) -> None:
         self.paths = paths
         self.sources = sources
         self._assembly = assembly
+        self._video_start = video_start
         self._closed = threading.Event()
         self._fingerprint: tuple[InputFile, ...] = ()
         self.topics: tuple[TopicSummary, ...] = assembly.topics
@@ -106,6 +110,13 @@ class Recording:
         """What a person said about the radar's axes and units, as --radar-axes has it; None for nothing."""
         axes = self._assembly.radar.layout.plan.axes if self._assembly.radar else None
         return axes.words if axes else None
+
+    @property
+    def video_start(self) -> str | None:
+        """When a video's first frame was taken, as --video-start has it; None where the images are from no video."""
+        videos = [source for source in self.sources if source.path.suffix.lower() in VIDEO_SUFFIXES]
+        used = any(channel.topic == self.image_topic for source in videos for channel in source.channels)
+        return self._video_start if used else None
 
     def _clock_of(self, name: str | None) -> str | None:
         return next((topic.clock for topic in self.topics if topic.name == name), None)
@@ -234,7 +245,7 @@ def open_recording(
     sources: tuple[Source, ...] = plain
     try:
         sources = (*(open_sources(others) if others else ()), *plain)
-        return Recording(chosen, sources, assemble(chosen, sources, options, require))
+        return Recording(chosen, sources, assemble(chosen, sources, options, require), options.video_start)
     except BaseException:
         for source in sources:
             source.close()

@@ -28,7 +28,7 @@ from calib_core.errors import InputError, OptionError, RecordingError
 from calib_core.interchange import camera_info_text, read_calibration, read_clicks
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, LocatingOptions
-from calib_core.recordings import Recording, open_recording
+from calib_core.recordings import Recording, RecordingOptions, open_recording
 from calib_core.results import Calibration
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
@@ -135,6 +135,14 @@ def test_the_text_says_what_went_in(sample: Path, recording: Recording, solved: 
     assert file.provenance.image_topic == recording.image_topic
     assert file.provenance.version == version()
     assert (file.frames.radar, file.frames.camera) == (recording.radar_frame, recording.camera_frame)
+
+
+def test_the_text_says_what_a_person_said_about_axes_and_video(sample: Path, solved: Calibration) -> None:
+    options = RecordingOptions(radar_axes="forward,right,up", video_start="1700000000")
+    with open_recording([sample / "camera.bag", sample / "radar.bag"], options) as recording:
+        provenance = json.loads(calibration_text(solved, recording))["provenance"]
+    assert provenance["radar_axes"] == "forward,right,up"
+    assert provenance["video_start"] is None, "the frames are from no video"
 
 
 class Renamed:

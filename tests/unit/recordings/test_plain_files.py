@@ -330,6 +330,7 @@ def test_a_video_with_its_start_is_a_camera(tmp_path, suffix, start) -> None:
     path = video(tmp_path / f"cam{suffix}")
     with open_recording(path, RecordingOptions(video_start=start), require=("image",)) as recording:
         assert recording.image_topic == "/cam/image"
+        assert recording.video_start == start
         times = recording.image_times - START_NS
         np.testing.assert_allclose(times, 250_000_000 + 50_000_000 * np.arange(90), atol=1000)
         for index in (11, 0, 5, 6, 3, 89, 70, 1, 88, 44, 45):
