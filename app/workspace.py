@@ -198,7 +198,7 @@ def recording_facts(recording: RecordingSource, name: str) -> RecordingFacts:
             f"{name}: has no frames to click in; give the recording of the camera too, or another --image-topic"
         )
     picture = recording.image_bytes(0)
-    return RecordingFacts(name, recording.image_times, picture.width_px, picture.height_px)
+    return RecordingFacts(name, recording.image_times, picture.width_px, picture.height_px, recording.radar_axes)
 
 
 def open_workspace(

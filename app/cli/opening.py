@@ -130,6 +130,7 @@ def _serve(
     from app.resources import check_installation
     from app.session import OptionsChanged
     from app.session_file import set_aside
+    from app.view import sentence
     from app.web.address import require_address, require_token
     from app.web.server import ServerOptions, serve
     from app.workspace import open_workspace
@@ -146,6 +147,8 @@ def _serve(
             print(f"The session of the last time is kept in {kept}")
         workspace = open_workspace(recording, camera=camera, session_folder=session, name=name, reference=reference)
         stack.callback(workspace.close)
+        for caution in workspace.restored.cautions:
+            print(f"{sentence(caution.message)} {sentence(caution.hint)}")
         if options is not None and options != CalibrationOptions():
             workspace.dispatch(OptionsChanged(options))
         if clicks_file is not None and workspace.restored.steps == 0:

@@ -42,12 +42,14 @@ class RecordingFacts:
         image_times: (m,) stamps of the frames [ns], ascending and unique.
         width_px: columns of a frame.
         height_px: rows of a frame.
+        radar_axes: what a person said about the radar's axes and units; None for nothing.
     """
 
     name: str
     image_times: TimesNs
     width_px: int
     height_px: int
+    radar_axes: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "image_times", frozen_array(self.image_times, (None,), dtype=np.int64))

@@ -25,6 +25,7 @@ class RecordingForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         height_px: rows of a frame.
         start: stamp of the first frame; None without frames.
         stamps_sha256: of all stamps, as little-endian 64-bit integers.
+        radar_axes: what a person said about the radar's axes; it may change from run to run.
     """
 
     name: str
@@ -33,6 +34,7 @@ class RecordingForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     height_px: int
     start: StampForm | None
     stamps_sha256: str
+    radar_axes: str | None = None
 
 
 def recording_form(facts: RecordingFacts) -> RecordingForm:
@@ -45,6 +47,7 @@ def recording_form(facts: RecordingFacts) -> RecordingForm:
         height_px=facts.height_px,
         start=StampForm.of(Stamp.of(TimeNs(int(times_ns[0])))) if len(times_ns) else None,
         stamps_sha256=hashlib.sha256(times_ns.astype("<i8").tobytes()).hexdigest(),
+        radar_axes=facts.radar_axes,
     )
 
 
@@ -55,7 +58,7 @@ def require_same_recording(kept: RecordingForm, facts: RecordingFacts, folder: P
         SessionFileError: frames, stamps or image size differ.
     """
     opened = recording_form(facts)
-    if msgspec.structs.replace(kept, name=opened.name) == opened:
+    if msgspec.structs.replace(kept, name=opened.name, radar_axes=opened.radar_axes) == opened:
         return
     raise SessionFileError(
         f"{folder}: the session is of {_described(kept)}, but what was opened is {_described(opened)}; "

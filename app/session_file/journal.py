@@ -41,12 +41,14 @@ class Replayed:
         steps: how many steps it holds.
         kept_bytes: its length up to the last line end.
         torn_bytes: what follows that: a step that was being written when the process died.
+        radar_axes: what a person said about the radar's axes when the journal was begun.
     """
 
     history: History
     steps: int
     kept_bytes: int
     torn_bytes: int
+    radar_axes: str | None
 
 
 def begin_journal(path: Path, facts: RecordingFacts, steps: Sequence[Step], cocalib: str) -> None:
@@ -76,11 +78,12 @@ def replay(path: Path, facts: RecordingFacts) -> Replayed:
     data = path.read_bytes()
     kept_bytes = data.rfind(b"\n") + 1
     head, *lines = data[:kept_bytes].split(b"\n")
-    require_same_recording(_head(head, path).recording, facts, path.parent)
+    recording = _head(head, path).recording
+    require_same_recording(recording, facts, path.parent)
     history = History()
     for number, line in enumerate(lines[:-1], start=1):
         history = _replayed(history, line, number, path, facts)
-    return Replayed(history, max(0, len(lines) - 1), kept_bytes, len(data) - kept_bytes)
+    return Replayed(history, max(0, len(lines) - 1), kept_bytes, len(data) - kept_bytes, recording.radar_axes)
 
 
 class Journal:

@@ -9,7 +9,8 @@ from app.session import History, RecordingFacts, Step
 from app.session_file.errors import SessionFileError
 from app.session_file.journal import Journal, begin_journal, replay
 from app.session_file.lock import FolderLock
-from app.session_file.snapshot import read_snapshot, write_snapshot
+from app.session_file.snapshot import read_snapshot, snapshot_axes, write_snapshot
+from calib_core.results import Caution
 
 __all__ = ["Restored", "SessionFile", "open_session_file", "set_aside"]
 
@@ -28,6 +29,7 @@ class Restored:
         steps: how many steps the journal held; 0 for a new session.
         torn_bytes: length of a half-written last line that was dropped; nobody had been told that it was kept.
         from_snapshot: the journal was missing, so the snapshot was taken.
+        cautions: what else a person must know before going on.
     """
 
     folder: Path
@@ -35,6 +37,7 @@ class Restored:
     steps: int = 0
     torn_bytes: int = 0
     from_snapshot: bool = False
+    cautions: tuple[Caution, ...] = ()
 
     @property
     def note(self) -> str:
@@ -68,15 +71,15 @@ class SessionFile:
         self._journal.append(step)
         self._history = history
         if self._journal.steps % _STEPS_PER_SNAPSHOT == 0:
-            self._write_snapshot()
+            self.keep_snapshot()
 
     def close(self) -> None:
         """Write the snapshot and let go of the folder."""
-        self._write_snapshot()
+        self.keep_snapshot()
         self._journal.close()
         self._lock.close()
 
-    def _write_snapshot(self) -> None:
+    def keep_snapshot(self) -> None:
         """Write the snapshot unless it is up to date; the journal holds everything, so a failure is only logged."""
         if self._snapshot_steps == self._journal.steps:
             return
@@ -112,7 +115,10 @@ def open_session_file(folder: Path, facts: RecordingFacts) -> SessionFile:
     except SessionFileError:
         lock.close()
         raise
-    return SessionFile(facts, lock, journal, restored)
+    opened = SessionFile(facts, lock, journal, restored)
+    if restored.cautions:
+        opened.keep_snapshot()  # so that the axes of now are known although the process may be killed
+    return opened
 
 
 def set_aside(folder: Path) -> Path | None:
@@ -143,6 +149,19 @@ def _opened(folder: Path, facts: RecordingFacts) -> tuple[Journal, Restored]:
     if not path.exists():
         begin_journal(path, facts, read_snapshot(snapshot, facts) if from_snapshot else (), version())
     replayed = replay(path, facts)
+    cautions = _about_axes(snapshot_axes(snapshot, replayed.radar_axes), facts.radar_axes) if replayed.steps else ()
     return Journal(path, replayed), Restored(
-        folder, replayed.history, replayed.steps, replayed.torn_bytes, from_snapshot
+        folder, replayed.history, replayed.steps, replayed.torn_bytes, from_snapshot, cautions
     )
+
+
+def _about_axes(before: str | None, now: str | None) -> tuple[Caution, ...]:
+    """Say that the radar is read otherwise than the last time; the clicks are pixels and stay right."""
+    if before == now:
+        return ()
+    was, is_now = (f"with --radar-axes {axes}" if axes else "without --radar-axes" for axes in (before, now))
+    message = (
+        f"the session was last open {was}, and is now open {is_now}: every click is solved anew with the axes of now"
+    )
+    again = f"start again with --radar-axes {before}" if before else "start again without --radar-axes"
+    return (Caution("other-axes", message, f"if that was not meant, {again}"),)

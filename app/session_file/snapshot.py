@@ -12,7 +12,7 @@ from app.session_file.forms import ClickForm, click_from_form, form_of_click
 from app.session_file.identity import SCHEMA, RecordingForm, recording_form, require_same_recording
 from app.whole_file import write_whole
 
-__all__ = ["read_snapshot", "write_snapshot"]
+__all__ = ["read_snapshot", "snapshot_axes", "write_snapshot"]
 
 
 class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -39,6 +39,19 @@ def write_snapshot(path: Path, session: Session, *, facts: RecordingFacts, steps
         clicks=tuple(form_of_click(click) for click in session.clicks),
     )
     write_whole(path, msgspec.json.format(msgspec.json.encode(snapshot), indent=1) + b"\n")
+
+
+def snapshot_axes(path: Path, otherwise: str | None) -> str | None:
+    """Return what was said about the radar's axes when the snapshot was written.
+
+    Args:
+        path: of the snapshot.
+        otherwise: the answer where there is no snapshot, or a damaged one, of which the journal has no need.
+    """
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=_Snapshot).recording.radar_axes
+    except (OSError, msgspec.DecodeError, UnicodeDecodeError):
+        return otherwise
 
 
 def read_snapshot(path: Path, facts: RecordingFacts) -> tuple[Step, ...]:

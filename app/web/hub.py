@@ -153,7 +153,8 @@ class Hub:
             start=Stamp.of(TimeNs(int(facts.image_times[0]))),
             radar=StampColumns.of(recording.radar_times),
             cautions=tuple(
-                CautionRow(row.code, sentence(row.message), sentence(row.hint)) for row in recording.cautions
+                CautionRow(row.code, sentence(row.message), sentence(row.hint))
+                for row in (*restored.cautions, *recording.cautions)
             ),
             session=SessionNote(str(restored.folder), len(restored.history.present.clicks), restored.note),
             version=version(),

@@ -258,6 +258,31 @@ def test_a_recording_that_was_renamed_is_still_the_same(tmp_path: Path) -> None:
     session_file.close()
 
 
+def test_other_radar_axes_than_the_last_time_are_told_and_harm_no_click(tmp_path: Path) -> None:
+    kept(tmp_path, STEPS[0])
+    turned = replace(FACTS, radar_axes="forward,right,up")
+    killed = open_session_file(tmp_path, turned)
+    (told,) = killed.restored.cautions
+    assert told.code == "other-axes"
+    assert "last open without --radar-axes, and is now open with --radar-axes forward,right,up" in told.message
+    assert len(killed.restored.history.present.clicks) == 1
+    killed._journal.close()  # as a kill leaves it: nothing is written on the way out
+    killed._lock.close()
+    again = open_session_file(tmp_path, turned)
+    assert again.restored.cautions == ()
+    again.close()
+    forgotten = open_session_file(tmp_path, FACTS)
+    assert "start again with --radar-axes forward,right,up" in forgotten.restored.cautions[0].hint
+    forgotten.close()
+
+
+def test_a_session_without_clicks_has_no_axes_to_tell_of(tmp_path: Path) -> None:
+    kept(tmp_path)
+    opened = open_session_file(tmp_path, replace(FACTS, radar_axes="degrees"))
+    assert opened.restored.cautions == ()
+    opened.close()
+
+
 def test_a_session_that_is_open_elsewhere_is_refused_with_the_process_named(tmp_path: Path) -> None:
     session_file = open_session_file(tmp_path, FACTS)
     with pytest.raises(SessionFileError, match=rf"is open already, in process {os.getpid()} on "):
