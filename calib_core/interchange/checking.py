@@ -19,6 +19,8 @@ _CLOSE_PX = 0.05
 _SAME_SENSORS_RAD = np.radians(10.0)
 _SAME_SENSORS_M = 0.5
 _CLEARLY_BETTER = 0.2
+_NO_COINCIDENCE = 1e-3
+_ROUNDING = 1e-4
 _FAR_M = 20.0
 _SIDEWAYS_RAD = np.radians(60.0)
 _FORWARD_RAD = np.radians(35.0)
@@ -187,6 +189,9 @@ def _by_other(pose: WrittenPose, other: RigidTransform) -> Finding:
     missed = miss(pose.camera_from_radar())
     angle, distance_m = _apart(pose.camera_from_radar(), other)
     before = f"{shown(np.degrees(angle))} deg and {shown(distance_m)} m from the other calibration"
+    exact = _explaining(pose, miss, _NO_COINCIDENCE * missed) if missed > _ROUNDING else None
+    if exact is not None:  # the same calibration but for a slip, however little the slip moves
+        return _explained(exact, before)
     suspicion = _explaining(pose, miss, min(1.0, _CLEARLY_BETTER * missed))
     if missed <= _CLEARLY_BETTER or (missed <= 1.0 and suspicion is None):
         return Finding("good", "agrees", f"agrees: {before}")

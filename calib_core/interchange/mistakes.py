@@ -12,6 +12,8 @@ from calib_core.interchange.imported import Direction, Form, WrittenPose
 
 __all__ = ["MISTAKES", "Mistake", "Suspicion", "suspicions"]
 
+_ROUNDED = 1.001
+
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
@@ -69,6 +71,12 @@ def _degrees(pose: WrittenPose) -> tuple[WrittenPose, ...]:
     return (dataclasses.replace(pose, rotation=np.radians(pose.rotation)),) if pose.form == "rpy" else ()
 
 
+def _radians(pose: WrittenPose) -> tuple[WrittenPose, ...]:
+    """Take small angles for radians that were converted once too often, or that stand where degrees are wanted."""
+    small = pose.form == "rpy" and np.abs(pose.rotation).max() <= np.radians(np.pi) * _ROUNDED
+    return (dataclasses.replace(pose, rotation=np.degrees(pose.rotation)),) if small else ()
+
+
 def _reverse_angles(pose: WrittenPose) -> tuple[WrittenPose, ...]:
     return (dataclasses.replace(pose, rotation=pose.rotation[::-1]),) if pose.form == "rpy" else ()
 
@@ -107,6 +115,12 @@ MISTAKES: tuple[Mistake, ...] = (
     ),
     Mistake(
         "degrees-for-radians", "the angles are in degrees, the format wants radians", "convert the angles", _degrees
+    ),
+    Mistake(
+        "radians-for-degrees",
+        "the angles are in radians where the format wants degrees, or were turned into radians twice",
+        "convert the angles",
+        _radians,
     ),
     Mistake(
         "angle-order",

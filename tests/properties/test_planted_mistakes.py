@@ -1,0 +1,192 @@
+"""Every mistake planted in every format that can hold it, at random poses: a check finds it and calls it by its name."""
+
+import dataclasses
+import json
+import re
+from collections.abc import Callable
+from itertools import takewhile
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
+from calib_core.interchange import FORMATS, CalibrationFile, FrameNames, WrittenPose, check, export, imported, read_any
+from calib_core.interchange.archives import pack, unpack
+from calib_core.interchange.calibration_file import choose_check_point
+from calib_core.interchange.mistakes import suspicions
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration, Metrics
+
+CAMERA = Camera(
+    "plumb_bob", 960, 600, np.array([[800.0, 0, 480], [0, 800, 300], [0, 0, 1]]), np.array([-0.1, 0.02, 0, 0])
+)
+LINK_FROM_OPTICAL = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+NO_COMMENT = {known.name for known in FORMATS if known.comment == "none"}
+ANGLE = re.compile(r"(roll: |pitch: |yaw: |--roll |--pitch |--yaw )(\S+)")
+
+
+@st.composite
+def poses(draw: st.DrawFn) -> RigidTransform:
+    """Return any orientation and a lever arm between a few centimetres and a few metres."""
+    quaternion = np.array([draw(st.floats(-1, 1)) for _ in range(4)])
+    assume(np.linalg.norm(quaternion) > 0.1)
+    position_m = np.array([draw(st.floats(-3, 3)) for _ in range(3)])
+    assume(np.linalg.norm(position_m) > 0.05)
+    return RigidTransform(Rotation.from_quat(quaternion / np.linalg.norm(quaternion)).as_matrix(), position_m)
+
+
+def file_of(pose: RigidTransform) -> CalibrationFile:
+    unknown = Metrics(np.nan, np.nan, np.nan, 0)
+    calibration = Calibration(pose, np.full((6, 6), np.nan), CAMERA, unknown, (), (), (), CalibrationOptions())
+    return CalibrationFile(calibration, FrameNames(), choose_check_point(calibration))
+
+
+def inverse(written: np.ndarray, _: WrittenPose) -> np.ndarray:
+    return np.linalg.inv(written)
+
+
+def transposed(written: np.ndarray, _: WrittenPose) -> np.ndarray:
+    wrong = written.copy()
+    wrong[:3, :3] = written[:3, :3].T
+    return wrong
+
+
+def reordered(written: np.ndarray, pose: WrittenPose) -> np.ndarray:
+    """Return what is read where w stands first and should stand last, or the other way round."""
+    shift = -1 if pose.form == "quaternion_wxyz" else 1
+    wrong = written.copy()
+    wrong[:3, :3] = Rotation.from_quat(np.roll(Rotation.from_matrix(written[:3, :3]).as_quat(), shift)).as_matrix()
+    return wrong
+
+
+def in_millimetres(written: np.ndarray, _: WrittenPose) -> np.ndarray:
+    wrong = written.copy()
+    wrong[:3, 3] *= 1000
+    return wrong
+
+
+def position_of_the_source(written: np.ndarray, _: WrittenPose) -> np.ndarray:
+    wrong = written.copy()
+    wrong[:3, 3] = -written[:3, :3].T @ written[:3, 3]
+    return wrong
+
+
+def other_axes(written: np.ndarray, pose: WrittenPose) -> np.ndarray:
+    change = LINK_FROM_OPTICAL if pose.axes == "optical" else np.linalg.inv(LINK_FROM_OPTICAL)
+    return change @ written if pose.direction == "camera_from_radar" else written @ np.linalg.inv(change)
+
+
+SLIPS: dict[str, Callable[[np.ndarray, WrittenPose], np.ndarray]] = {
+    "swapped-direction": inverse,
+    "transposed-rotation": transposed,
+    "quaternion-order": reordered,
+    "millimetres": in_millimetres,
+    "position-for-translation": position_of_the_source,
+    "optical-for-link": other_axes,
+}
+
+
+def with_words_of(right: bytes, wrong: bytes) -> bytes:
+    """Return the wrong file with the check point that the right one states."""
+    if right.startswith(b"PK"):
+        members = unpack(right, source="right")
+        return pack({name: with_words_of(members[name], data) for name, data in unpack(wrong, source="wrong").items()})
+    stated = re.search(rb"check point: .* px", right)
+    return re.sub(rb"check point: .* px", stated[0].replace(b"\\", b"\\\\"), wrong) if stated else wrong
+
+
+def planted(file: CalibrationFile, name: str, slip: Callable[[np.ndarray, WrittenPose], np.ndarray]) -> bytes:
+    """Return a file whose numbers went through a slip, while its words are those of the right one."""
+    right = export(file, name).data
+    pose = read_any(right).pose
+    numbers = slip(pose.as_written().as_matrix(), pose)
+    meant = WrittenPose("matrix", numbers[:3, :3], numbers[:3, 3], pose.direction, pose.axes).camera_from_radar()
+    calibration = dataclasses.replace(file.calibration, camera_from_radar=meant)
+    return with_words_of(right, export(dataclasses.replace(file, calibration=calibration), name).data)
+
+
+def found(data: bytes, file: CalibrationFile, name: str, *, by_other: bool) -> tuple[list[str], set[str]]:
+    """Return the errors that a check names, and every single slip that would explain the numbers exactly."""
+    wrong = read_any(data)
+    report = check(wrong, against=imported(file) if by_other else None)
+    right = file.calibration.camera_from_radar.as_matrix()
+    explaining = set()
+    for suspicion in takewhile(lambda one: len(one.mistakes) == 1, suspicions(wrong.pose)):
+        try:
+            undone = suspicion.pose.camera_from_radar().as_matrix()
+        except ValueError:
+            continue
+        if np.abs(undone - right).max() < 1e-6:
+            explaining.add(suspicion.mistakes[0].code)
+    return [finding.code for finding in report.findings if finding.level == "error"], explaining
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+@pytest.mark.parametrize("name", [known.name for known in FORMATS])
+@settings(max_examples=4, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
+@given(pose=poses())
+def test_a_planted_mistake_is_called_by_its_name_in_every_format(name, slip, pose):
+    file = file_of(pose)
+    data = planted(file, name, SLIPS[slip])
+    apart = read_any(data).camera_from_radar.as_matrix() - pose.as_matrix()
+    assume(np.abs(apart).max() > 0.01)
+
+    for by_other in {name in NO_COMMENT, True}:
+        named, explaining = found(data, file, name, by_other=by_other)
+
+        assert slip in explaining
+        assert named
+        assert set(named) <= explaining
+
+
+@pytest.mark.parametrize("name", ["urdf", "autoware", "tf2"])
+@pytest.mark.parametrize("slip", ["degrees-for-radians", "angle-order"])
+@settings(max_examples=10, deadline=None)
+@given(pose=poses())
+def test_wrong_angles_are_called_by_their_name(name, slip, pose):
+    file = file_of(pose)
+    text = export(file, name).data.decode()
+    if name == "tf2":
+        angles = Rotation.from_matrix(file.calibration.camera_from_radar.rotation.T).as_euler("xyz").tolist()
+        named = " ".join(f"--{key} {angle!r}" for key, angle in zip(("roll", "pitch", "yaw"), angles, strict=True))
+        text = re.sub(r"--qx .* \\", lambda _: f"{named} \\", text)
+
+    def slipped(angles: list[str]) -> list[str]:
+        return angles[::-1] if slip == "angle-order" else [repr(float(np.degrees(float(angle)))) for angle in angles]
+
+    if name == "urdf":
+        wrong = re.sub(r'rpy="([^"]+)"', lambda m: f'rpy="{" ".join(slipped(m[1].split()))}"', text, count=1)
+    else:
+        head, tail = text[: text.rindex("roll")], text[text.rindex("roll") :]
+        head, tail = head[:-2] if name == "tf2" else head, ("--" if name == "tf2" else "") + tail
+        replaced = iter(slipped([number for _, number in ANGLE.findall(tail)]))
+        wrong = head + ANGLE.sub(lambda m: m[1] + next(replaced), tail)
+    apart = read_any(wrong).camera_from_radar.as_matrix() - pose.as_matrix()
+    assume(np.abs(apart).max() > 0.01)
+
+    errors, explaining = found(wrong.encode(), file, name, by_other=False)
+
+    assert slip in explaining
+    assert errors
+    assert set(errors) <= explaining
+
+
+@settings(max_examples=20, deadline=None)
+@given(pose=poses())
+def test_radians_in_a_rig_that_wants_degrees_are_called_so(pose):
+    file = file_of(pose)
+    rig = json.loads(export(file, "driveworks").data)
+    written = rig["rig"]["sensors"][1]["nominalSensor2Rig_FLU"]
+    written["roll-pitch-yaw"] = np.radians(written["roll-pitch-yaw"]).tolist()
+    wrong = json.dumps(rig).encode()
+    assume(np.abs(read_any(wrong).camera_from_radar.as_matrix() - pose.as_matrix()).max() > 0.01)
+
+    errors, explaining = found(wrong, file, "driveworks", by_other=True)
+
+    assert "radians-for-degrees" in explaining
+    assert errors
+    assert set(errors) <= explaining
