@@ -4,7 +4,14 @@ from collections.abc import Iterable, Sequence
 
 from calib_core.recordings.calendar import span_text, utc
 from calib_core.recordings.recording import Recording
-from calib_core.recordings.summary import CameraSummary, RadarSummary, RecordingSummary, TopicReport, recording_summary
+from calib_core.recordings.summary import (
+    CameraSummary,
+    RadarSummary,
+    RecordingSummary,
+    Stamp,
+    TopicReport,
+    recording_summary,
+)
 
 __all__ = ["describe", "summary_text"]
 
@@ -44,12 +51,21 @@ def _labelled(label: str, lines: Iterable[str]) -> list[str]:
 def _times(summary: RecordingSummary) -> list[str]:
     if summary.start is None or summary.end is None:
         return _labelled("time", ["no messages"])
-    lines = [f"{utc(summary.start.time)} to {utc(summary.end.time)}, {duration_text(summary.duration_s)}"]
+    lines = [
+        f"{utc(summary.start.time)} to {utc(summary.end.time)}, {duration_text(summary.duration_s)}",
+        f"{_seconds(summary.start)} to {_seconds(summary.end)} s since 1970",
+    ]
     counts = [topic.count for topic in summary.topics]
-    lines.append(f"{sum(counts)} messages in {len(counts)} topic{'s' if len(counts) != 1 else ''}")
+    lines.append(
+        f"{sum(counts)} message{'s' if sum(counts) != 1 else ''} in {len(counts)} topic{'s' if len(counts) != 1 else ''}"
+    )
     if summary.overlap_s is not None:
         lines.append(f"radar and camera share {duration_text(summary.overlap_s)}")
     return _labelled("time", lines)
+
+
+def _seconds(stamp: Stamp) -> str:
+    return f"{stamp.sec}.{stamp.nanosec // 1_000_000:03d}"
 
 
 def _topic_table(topics: Sequence[TopicReport]) -> list[str]:
@@ -160,6 +176,8 @@ def size_text(size_bytes: int) -> str:
 
 def duration_text(seconds: float) -> str:
     """Write a duration: seconds, from two minutes on with minutes before them."""
+    if seconds < 1:
+        return f"{seconds:.3f} s"
     if seconds < 120:
         return f"{seconds:.1f} s"
     minutes, rest = divmod(seconds, 60)

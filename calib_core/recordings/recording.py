@@ -164,6 +164,24 @@ class Recording:
         return self._assembly.images.picture(index)
 
     def _check(self, index: int) -> None:
+    def recorded_format(self, index: int) -> str:
+        """Return what a frame was recorded as, for people: "jpeg", "png", "raw bgr8", "h264 video", "video file".
+
+        Args:
+            index: into image_times.
+
+        Raises:
+            MessageError: the frame cannot be read.
+            IndexError: there is no such frame.
+        """
+        self._check(index)
+        images = self._assembly.images
+        assert images is not None
+        if self.video_start is not None:
+            return "video file"
+        row = int(images.row[index])
+        return images.layouts[int(images.topic.part[row])].recorded_as(images.topic.payload(row))
+
         self._check_open()
         if not 0 <= index < len(self.image_times):
             raise IndexError(f"frame {index} of {len(self.image_times)}")

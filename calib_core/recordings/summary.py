@@ -106,7 +106,7 @@ class CameraSummary:
         frames: how many images.
         rate_hz: images per second; None with fewer than two.
         longest_gap_s: longest time between images [s].
-        format: how the page gets them: "jpeg" or "png"; None where the first cannot be read.
+        format: as recorded: "jpeg", "png", "raw bgr8", "h264 video"; None where the first cannot be read.
         width_px: of the first image.
         height_px: likewise.
         camera_info_topic: where the intrinsics are from; None where there are none.
@@ -227,9 +227,9 @@ def _camera(recording: Recording) -> CameraSummary | None:
     if recording.image_topic is None or not len(recording.image_times):
         return None
     try:
-        image = recording.image_bytes(0)
+        image, kind = recording.image_bytes(0), recording.recorded_format(0)
     except RecordingError:
-        image = None
+        image, kind = None, None
     camera = recording.camera()
     rhythm = Rhythm.of(recording.image_times)
     return CameraSummary(
@@ -238,7 +238,7 @@ def _camera(recording: Recording) -> CameraSummary | None:
         frames=len(recording.image_times),
         rate_hz=rhythm.rate_hz,
         longest_gap_s=rhythm.longest_gap_s,
-        format=image.format if image else None,
+        format=kind,
         width_px=image.width_px if image else None,
         height_px=image.height_px if image else None,
         camera_info_topic=recording.camera_info_topic,

@@ -2,7 +2,9 @@
 
 import json
 
+import cv2
 import msgspec
+import numpy as np
 import pytest
 
 from calib_core.measurements import NS_PER_S
@@ -25,6 +27,7 @@ def test_the_text_names_files_times_topics_radar_camera_and_cautions(ros1, write
         == f"""\
 files     recording.bag  {size}  ROS 1 bag, lz4
 time      2023-11-14 22:13:20.030 UTC to 2023-11-14 22:13:21.950 UTC, 1.9 s
+          1700000000.030 to 1700000001.950 s since 1970
           61 messages in 4 topics
           radar and camera share 1.9 s
 
@@ -73,6 +76,20 @@ def test_the_summary_survives_json(ros, write, plain, jpeg):
     assert plain_values["start"] == {"sec": 1_700_000_000, "nanosec": 0}
     assert plain_values["radar"]["returns_per_scan"] == [3, 4.0, 5]
     assert plain_values["camera"]["matrix_px"][0][0] == 500.0
+
+
+@pytest.mark.parametrize("encoding", ["bgr8", "bayer_rggb8", "mono8"])
+def test_raw_pixels_are_called_by_their_encoding(ros, write, encoding):
+    pixels = np.zeros((48, 64 * (3 if encoding == "bgr8" else 1)), dtype=np.uint8)
+    message = ros.image(START_NS, pixels, encoding, width=64)
+    with inspect_recording(write(ros, [("/camera/image_raw", START_NS, message)])) as recording:
+        assert f"64 x 48 px, raw {encoding}" in describe(recording)
+
+
+def test_a_png_is_called_one_whatever_its_message_says(ros, write):
+    png = cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes()
+    with inspect_recording(write(ros, [("/camera/image", START_NS, ros.compressed(START_NS, png))])) as recording:
+        assert "64 x 48 px, png" in describe(recording)
 
 
 def test_what_cannot_be_read_is_explained(ros1, write):
