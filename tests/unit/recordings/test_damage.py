@@ -1,8 +1,14 @@
 """Files that were cut, damaged, never closed or made to harm."""
 
+import os
 import random
+import shutil
 import sqlite3
 import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -97,26 +103,63 @@ def test_one_damaged_chunk_costs_its_own_messages_and_is_said(container, ros1, r
         assert recording.image_bytes(len(recording.image_times) - 1).data == jpeg
 
 
-def test_messages_in_a_write_ahead_log_are_not_passed_over(ros2, write, plain, jpeg, tmp_path):
-    """What a killed recorder leaves: a database whose last rows are still in the -wal file."""
-    import shutil
-
-    path = write(ros2, plain(ros2, jpeg), "db3")
+def crashed(write, ros2, rows, folder) -> Path:
+    """Leave what a killed recorder leaves: a database whose rows are still in the -wal file."""
+    path = write(ros2, rows, "db3")
     with sqlite3.connect(path) as database:
-        rows = database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id").fetchall()
+        found = database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id").fetchall()
         database.execute("DELETE FROM messages")
     database.execute("PRAGMA journal_mode=WAL")
     database.execute("PRAGMA wal_autocheckpoint=0")
     with database:
-        database.executemany("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", rows)
-    crashed = tmp_path / "crashed"
-    crashed.mkdir()
+        database.executemany("INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)", found)
+    folder.mkdir()
     for suffix in ("", "-wal"):
-        shutil.copy(f"{path}{suffix}", crashed / f"left.db3{suffix}")
+        shutil.copy(f"{path}{suffix}", folder / f"left.db3{suffix}")
     database.close()
-    assert (crashed / "left.db3-wal").stat().st_size > 1000
-    with open_recording(crashed / "left.db3") as recording:
+    assert (folder / "left.db3-wal").stat().st_size > 1000
+    return folder / "left.db3"
+
+
+@contextmanager
+def only_readable(folder: Path) -> Iterator[None]:
+    """Take the right to write into a folder away, also from root: by becoming nobody for a while."""
+    root = os.geteuid() == 0
+    folder.chmod(0o555)
+    if root:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        if root:
+            os.seteuid(0)
+        folder.chmod(0o755)
+
+
+def test_messages_in_a_write_ahead_log_are_not_passed_over(ros2, write, plain, jpeg, tmp_path):
+    with open_recording(crashed(write, ros2, plain(ros2, jpeg), tmp_path / "crashed")) as recording:
         assert len(recording.image_times) == len(recording.radar_times) == 20
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="rights of folders are those of POSIX")
+def test_a_write_ahead_log_is_read_where_nothing_can_be_written(ros2, write, plain, jpeg):
+    with TemporaryDirectory() as name:
+        Path(name).chmod(0o755)
+        path = crashed(write, ros2, plain(ros2, jpeg), Path(name) / "crashed")
+        before = {file.name: file.read_bytes() for file in path.parent.iterdir()}
+        with open_recording(path):
+            pass  # loads every module, which nobody may not be allowed to read
+        for file in set(path.parent.iterdir()) - {path.parent / each for each in before}:
+            file.unlink()
+        with only_readable(path.parent):
+            with pytest.raises(PermissionError):
+                (path.parent / "new").touch()
+            with open_recording(path) as recording:
+                assert len(recording.image_times) == len(recording.radar_times) == 20
+                assert len(recording.image_bytes(19).data) == len(jpeg)
+                (file,) = recording.fingerprint()
+                assert file.name == "left.db3"
+        assert {file.name: file.read_bytes() for file in path.parent.iterdir()} == before
 
 
 def test_a_database_of_something_else_is_refused(tmp_path):
