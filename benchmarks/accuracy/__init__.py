@@ -1,1 +1,1 @@
-"""How accurate is the estimator, against its peers and against the bound no estimator can beat?"""
+"""How accurate is the estimator, against its peers and against the bound no estimator can beat? `make bench-accuracy`."""

@@ -1,82 +1,68 @@
-"""`python -m benchmarks.accuracy [--quick] [--trials N]`: run the comparison and write docs/accuracy.md."""
+"""`python -m benchmarks.accuracy`: measure what is not kept yet, and write docs/accuracy.md."""
 
 import argparse
-import importlib.util
+import os
 import sys
 from pathlib import Path
 
-from benchmarks.accuracy.cases import CASES, QUICK_CASES, Case
-from benchmarks.accuracy.methods import METHODS
-from benchmarks.accuracy.scores import Score, score_case
+from benchmarks.accuracy import advice, clutter, coverage, efficiency, many, mirrored, real, smooth
+from benchmarks.accuracy.keeping import Keeper, digest_of_sources
+from benchmarks.accuracy.page import page
+from benchmarks.accuracy.rows import Kept, Row, Section
+from benchmarks.accuracy.running import kept_figures, run
 
-_PAGE = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
-_OURS_ONLY_PAIRS = 200
+__all__ = ["TABLES", "main", "sections"]
+
+_ROOT = Path(__file__).resolve().parents[2]
+TABLES: dict[str, tuple[Row, ...]] = {
+    "real": real.ROWS,
+    "mirrored": mirrored.ROWS,
+    "clutter": clutter.ROWS,
+    "smooth": smooth.ROWS,
+    "many": many.ROWS,
+    "advice": advice.ROWS,
+    "coverage": coverage.ROWS,
+    "peers": efficiency.PEER_ROWS,
+    "efficiency": efficiency.ROWS,
+}
+"""The rows by the name for --only, in the order they are measured: the longest table comes last."""
+
+
+def sections(kept: Kept) -> tuple[Section, ...]:
+    """Compose the answers, in the page's order."""
+    return (
+        efficiency.section(kept),
+        efficiency.peer_section(kept),
+        coverage.section(kept),
+        clutter.section(kept),
+        smooth.section(kept),
+        many.section(kept),
+        real.section(kept),
+        mirrored.section(kept),
+        advice.section(kept),
+    )
 
 
 def main() -> int:
-    """Run all cases and write the page; --quick prints a few and writes nothing."""
+    """Measure the accuracy and write it down. An interrupted run goes on where it stopped, if the code is the same."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=main.__doc__)
-    parser.add_argument("--quick", action="store_true", help="a few cases, 40 trials, printed only")
-    parser.add_argument("--trials", type=int, default=None, help="trials per case (default 200; 40 with --quick)")
+    parser.add_argument(
+        "--only", action="append", choices=sorted(TABLES), help="measure this table only; may be repeated"
+    )
+    parser.add_argument("--trials", type=int, default=None, help="at most so many trials per row")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: one per processor)")
+    parser.add_argument("--scratch", type=Path, default=_ROOT / "build" / "accuracy", help="where raw figures are kept")
+    parser.add_argument("--page", type=Path, default=_ROOT / "docs" / "accuracy.md", help="the page that is written")
+    parser.add_argument("--write-only", action="store_true", help="write the page from what is kept, measure nothing")
     arguments = parser.parse_args()
-    cases = QUICK_CASES if arguments.quick else CASES
-    count = arguments.trials or (40 if arguments.quick else 200)
-    methods = [name for name in METHODS if name != "PoseLib" or importlib.util.find_spec("poselib")]
-    text = _page(cases, methods, count)
-    if arguments.quick:
-        sys.stdout.write(text)
-    else:
-        _PAGE.write_text(text, encoding="utf-8")
+    keeper = Keeper(arguments.scratch / digest_of_sources())
+    rows = [row for name in TABLES if not arguments.only or name in arguments.only for row in TABLES[name]]
+    if not arguments.write_only:
+        run(rows, keeper, jobs=arguments.jobs, most=arguments.trials)
+    everything = [row for several in TABLES.values() for row in several]
+    kept = kept_figures(everything, keeper, most=arguments.trials)
+    arguments.page.write_text(page(sections(kept)), encoding="utf-8")
     return 0
-
-
-def _page(cases: tuple[Case, ...], methods: list[str], count: int) -> str:
-    lines = [
-        "# Accuracy",
-        "",
-        "Written by `python -m benchmarks.accuracy`; do not edit.",
-        "",
-        f"{count} trials per row, simulated, the same seeds for every method. A cell shows the RMSE of the rotation and, after "
-        "the stroke, of the camera position, both over the Cramer-Rao bound of an estimator that is told which pairs are right: "
-        "1.00 is as good as can be. `f` is the share of trials without a pose or with a rotation beyond six times the bound; "
-        "`c` the share of trials whose truth lies inside the stated 95 % ellipsoid (ours only). Two standard errors of an "
-        f"RMSE are about {2 / (6 * count) ** 0.5:.0%}.",
-        "Wrong pairs are half ghosts, a quarter misclicks and a quarter pairs of another placement. Pixel thresholds of the "
-        "others are set to three sigmas of the residual, which a user cannot know; ours has none. Peers cannot use a "
-        "tape-measured camera position; rows marked `free` give ours none either.",
-        "",
-        "| noise | pairs | wrong | known | bound | " + " | ".join(methods) + " |",
-        "|---" * (5 + len(methods)) + "|",
-    ]
-    for case in cases:
-        used = ["ours", *methods[1:]] if case.pairs <= _OURS_ONLY_PAIRS else ["ours", "SQPnP + LM"]
-        trials = count if case.pairs <= _OURS_ONLY_PAIRS else min(count, 40)
-        scores = score_case(case, used, trials)
-        lines.append(_row(case, methods, scores))
-        sys.stderr.write(lines[-1] + "\n")
-    return "\n".join(lines) + "\n"
-
-
-def _row(case: Case, methods: list[str], scores: dict[str, Score]) -> str:
-    ours = scores["ours"]
-    known = "free" if case.ruler_m is None else f"camera +- {100 * case.ruler_m:.0f} cm"
-    where = case.noise + (", aisle" if case.aisle else "") + (f", {case.decoys} decoys" if case.decoys else "")
-    where += "" if case.told == 1.0 else f", told {case.told:.2g} x"
-    cells = [_cell(scores[name]) if name in scores else "-" for name in methods]
-    bound = f"{ours.bound_deg:.2f} deg, {ours.bound_cm:.1f} cm"
-    return f"| {where} | {case.pairs} | {case.outlier_share:.0%} | {known} | {bound} | " + " | ".join(cells) + " |"
-
-
-def _cell(score: Score) -> str:
-    if score.failed == 1.0:
-        return "f 100 %"
-    failed = f" f {100 * score.failed:.0f} %" if score.failed else ""
-    covered = f" c {100 * score.coverage:.0f} %" if score.coverage == score.coverage else ""
-    return f"{_ratio(score.rotation)} / {_ratio(score.position)}{failed}{covered}"
-
-
-def _ratio(value: float) -> str:
-    return f"{value:.2f}" if value < 10 else f"{value:.0f}"
 
 
 if __name__ == "__main__":

@@ -1,105 +1,135 @@
-"""What is simulated: noise, number of pairs, share of wrong pairs, and what is known of the camera position."""
+"""Pairs with known truth: noise, number of pairs, share of wrong pairs, what the estimator is told, and the bound."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import product
+from typing import Literal
 
 import numpy as np
 
 from calib_core.evidence import CameraBelief
+from calib_core.locating import candidate_at
+from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.radar import covariance_from_sigma_polar
-from calib_core.synthetic import AISLE, FIELD, NOISE_PROFILES, RigOptions, SimulatedPairs, simulate_pairs
-from calib_core.synthetic.pairs import NoiseName
+from calib_core.synthetic import AISLE, FIELD, NOISE_PROFILES, RigOptions, SimulatedPairs, random_rig, simulate_pairs
+from calib_core.synthetic.pairs import NoiseName, study_camera
 from calib_core.uncertainty import pose_jacobian
 
-__all__ = ["CASES", "QUICK_CASES", "Case", "bound", "options_of", "trials"]
+__all__ = ["Bound", "Case", "bound_of", "draw", "options_of", "tape_measured"]
+
+_CROWD = 200  # pairs beyond which placements need not keep apart
+_BLOCK = 50
+_NOT_GIVEN = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One row of the table."""
+    """What is drawn, and what an estimator is told of it."""
 
     noise: NoiseName
     pairs: int
-    outlier_share: float
-    ruler_m: float | None = 0.01
-    """Sigma of the tape-measured camera position; None: not measured."""
-    aisle: bool = False
-    decoys: int = 0
+    outlier_share: float = 0.0
+    tape_m: float | None = 0.01
+    """Sigma of the tape-measured camera position [m]; None: not measured."""
+    scene: Literal["field", "aisle"] = "field"
     told: float = 1.0
-    """The radar sigmas the estimator is told, over the true ones."""
+    """The radar sigmas the estimator is told, over the true ones; 0: it is told none, for radar and clicks."""
+
+    @property
+    def key(self) -> str:
+        """A file name."""
+        known = "free" if self.tape_m is None else "tape"
+        return f"{self.scene}-{self.noise}-{self.pairs}-{self.outlier_share:.0%}-{known}-{self.told:.2f}".replace(
+            "%", "pc"
+        )
 
 
-_TAPE: tuple[NoiseName, ...] = ("ti", "ti_fine", "imaging")
-_FREE: tuple[NoiseName, ...] = ("ti", "imaging")
-_AISLE: tuple[NoiseName, ...] = ("ti_aisle", "imaging")
-
-CASES = (
-    *(Case(noise, n, share) for noise, n, share in product(_TAPE, (10, 20, 40), (0.0, 0.1, 0.3, 0.5))),
-    *(Case(noise, n, share, ruler_m=None) for noise, n, share in product(_FREE, (20, 40), (0.0, 0.1, 0.3))),
-    *(Case(noise, n, share, aisle=True) for noise, n, share in product(_AISLE, (10, 20), (0.0, 0.3))),
-    *(Case("ti", n, 0.1, told=told) for told, n in product((1 / 1.7, 1.7), (10, 20, 40))),
-    Case("ti", 20, 0.3, decoys=3),
-    Case("ti_aisle", 1000, 0.1, ruler_m=None),
-)
-QUICK_CASES = (
-    Case("ti", 10, 0.3),
-    Case("ti", 20, 0.1),
-    Case("imaging", 20, 0.3),
-    Case("ti", 20, 0.3, ruler_m=None),
-)
+def tape_measured(sigma_m: float | None) -> SolvingOptions:
+    """Return solving options with the rig's nominal camera position, measured this well."""
+    return SolvingOptions(
+        camera_position=None if sigma_m is None else CameraPositionPrior(RigOptions().camera_offset_m, sigma_m)
+    )
 
 
 def options_of(case: Case) -> CalibrationOptions:
-    """Return what our estimator is told."""
-    position = None
-    if case.ruler_m is not None:
-        position = CameraPositionPrior(RigOptions().camera_offset_m, case.ruler_m)
-    return CalibrationOptions(noise=NoiseOptions(), solving=SolvingOptions(camera_position=position))
+    """Return what our estimator is told beside the pairs."""
+    return CalibrationOptions(noise=NoiseOptions(), solving=tape_measured(case.tape_m))
 
 
-def trials(case: Case, count: int) -> Iterator[SimulatedPairs]:
-    """Draw the trials of a case; the seeds are the same for every method and every case."""
-    layout = AISLE if case.aisle else FIELD
-    if case.pairs > 200:
-        layout = replace(layout, separation_m=0.0)
-    for trial in range(count):
+def draw(case: Case, trial: int) -> SimulatedPairs:
+    """Draw one trial. Seeds depend on the trial only: every method sees the same pairs, with or without a tape measure."""
+    rng = np.random.default_rng([2023, trial])
+    layout = AISLE if case.scene == "aisle" else FIELD
+    if case.pairs > _CROWD:
+        simulated = _crowd(case, rng)
+    else:
         simulated = simulate_pairs(
-            case.pairs,
-            rng=np.random.default_rng([2023, trial]),
-            noise=case.noise,
-            outlier_share=case.outlier_share,
-            layout=layout,
-            decoys=case.decoys,
+            case.pairs, rng=rng, noise=case.noise, outlier_share=case.outlier_share, layout=layout
         )
-        yield _told(simulated, case.told)
-
-
-def _told(simulated: SimulatedPairs, factor: float) -> SimulatedPairs:
-    if factor == 1.0:
-        return simulated
-    pairs = tuple(
-        replace(pair, candidates=tuple(replace(one, sigma_polar=one.sigma_polar * factor) for one in pair.candidates))
-        for pair in simulated.pairs
+    return (
+        simulated if case.told == 1.0 else replace(simulated, pairs=tuple(_told(p, case.told) for p in simulated.pairs))
     )
-    return replace(simulated, pairs=pairs)
 
 
-def bound(simulated: SimulatedPairs, case: Case) -> np.ndarray:
-    """Return the Cramer-Rao bound (6, 6) on (camera position [m], rotation [rad]), told which pairs are right.
+def _crowd(case: Case, rng: np.random.Generator) -> SimulatedPairs:
+    """Draw many pairs of one rig, block by block."""
+    rig = random_rig(rng, camera=study_camera())
+    blocks = [
+        simulate_pairs(_BLOCK, rng=rng, noise=case.noise, outlier_share=case.outlier_share, rig=rig)
+        for _ in range(case.pairs // _BLOCK)
+    ]
+    pairs = [replace(pair, id=f"b{i}{pair.id}") for i, block in enumerate(blocks) for pair in block.pairs]
+    return SimulatedPairs(
+        rig,
+        tuple(pairs),
+        np.concatenate([block.points_radar_m for block in blocks]),
+        np.concatenate([block.pixels_px for block in blocks]),
+        np.concatenate([block.outlier for block in blocks]),
+        tuple(place for block in blocks for place in block.true_candidate),
+    )
+
+
+def _told(pair: Pair, factor: float) -> Pair:
+    if factor == _NOT_GIVEN:
+        candidates = tuple(candidate_at(one.position_radar_m, NoiseOptions()) for one in pair.candidates)
+        return replace(pair, candidates=candidates, sigma_px=None)
+    return replace(
+        pair, candidates=tuple(replace(one, sigma_polar=one.sigma_polar * factor) for one in pair.candidates)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """The Cramer-Rao bound as standard deviations: rotation (total angle) and camera position (distance)."""
+
+    rotation_rad: float
+    position_m: float
+
+
+def bound_of(
+    simulated: SimulatedPairs, noise: NoiseName, tape_m: float | None, *, points_radar_m: np.ndarray | None = None
+) -> Bound:
+    """Return the bound of an estimator that is told which pairs are right.
 
     The information of a right pair is J^T S^-1 J at its true position, S = C + J V J^T.
+
+    Args:
+        simulated: truth and pairs.
+        noise: the true noise.
+        tape_m: sigma of the measured camera position [m]; None: not measured.
+        points_radar_m: (n, 3) true positions; None takes those of the right pairs.
     """
-    profile = NOISE_PROFILES[case.noise]
-    pose, points = simulated.camera_from_radar, simulated.points_radar_m[~simulated.outlier]
+    profile, pose = NOISE_PROFILES[noise], simulated.camera_from_radar
+    points = simulated.points_radar_m[~simulated.outlier] if points_radar_m is None else points_radar_m
     jacobian = pose_jacobian(simulated.camera, pose, points)
     d_point = simulated.camera.project_with_jacobian(pose @ points)[1] @ pose.rotation
     radar = covariance_from_sigma_polar(points, np.tile(profile.sigma_polar, (len(points), 1)))
-    noise = d_point @ radar @ np.swapaxes(d_point, 1, 2) + profile.sigma_px**2 * np.eye(2)
-    information = (np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(noise, jacobian)).sum(axis=0)
-    ruler = CameraBelief(np.zeros(3), case.ruler_m or 1.0, measured=True).rows(pose)[1]
-    if case.ruler_m is not None:
-        information = information + ruler.T @ ruler
-    to_centre = np.vstack([ruler * (case.ruler_m or 1.0), np.eye(6)[3:]])
-    return np.asarray(to_centre @ np.linalg.inv(information) @ to_centre.T)
+    spread = d_point @ radar @ np.swapaxes(d_point, 1, 2) + profile.sigma_px**2 * np.eye(2)
+    information = (np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(spread, jacobian)).sum(axis=0)
+    to_centre = CameraBelief(np.zeros(3), 1.0, measured=True).rows(pose)[1]  # d centre / d (dt, dtheta), sigma 1 m
+    if tape_m is not None:
+        information = information + to_centre.T @ to_centre / tape_m**2
+    covariance = np.linalg.inv(information)
+    return Bound(
+        rotation_rad=float(np.sqrt(np.trace(covariance[3:, 3:]))),
+        position_m=float(np.sqrt(np.trace(to_centre @ covariance @ to_centre.T))),
+    )

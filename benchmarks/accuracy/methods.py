@@ -1,7 +1,8 @@
 """The estimators that are compared. Every one gets the same pairs; pixel thresholds are given their best value as a gift."""
 
+import importlib.util
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,67 +11,63 @@ from benchmarks.accuracy.cases import Case, options_of
 from calib_core.calibrate import calibrate_pairs
 from calib_core.geometry import RigidTransform
 from calib_core.opencv import refine_lm, solve_pnp
+from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedPairs
+from calib_core.synthetic import NOISE_PROFILES, SimulatedPairs
 
-__all__ = ["METHODS", "Estimate", "Method", "best_threshold_px"]
+__all__ = ["PEERS", "Method", "as_printed", "available", "best_threshold_px", "solve_ours", "sqpnp_lm"]
 
-Method = Callable[[SimulatedPairs, Case], "Estimate | None"]
+Method = Callable[[SimulatedPairs, Case], "RigidTransform | None"]
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Estimate:
-    """A pose, with its covariance where the method has one."""
-
-    camera_from_radar: RigidTransform
-    calibration: Calibration | None = None
+_ITERATIONS = 2000
+_DEFAULT_PX = 8.0  # OpenCV's
 
 
-def best_threshold_px(case: Case) -> float:
+def best_threshold_px(case: Case, camera_focal_px: float) -> float:
     """Return three sigmas of the residual, known to the simulation only."""
-    return 14.0 if case.noise == "imaging" else 30.0 if case.noise == "ti_fine" else 53.0
+    profile = NOISE_PROFILES[case.noise]
+    angles_px = camera_focal_px * profile.sigma_polar[1:]
+    return float(3.0 * np.sqrt((angles_px**2).mean() + profile.sigma_px**2))
 
 
-def ours(simulated: SimulatedPairs, case: Case) -> Estimate | None:
+def solve_ours(simulated: SimulatedPairs, case: Case) -> Calibration | None:
     """Run the default method."""
     outcome = calibrate_pairs(simulated.pairs, simulated.camera, options_of(case))
-    return Estimate(outcome.camera_from_radar, outcome) if isinstance(outcome, Calibration) else None
+    return outcome if isinstance(outcome, Calibration) else None
 
 
-def algorithm_1(simulated: SimulatedPairs, case: Case) -> Estimate | None:
-    """Run Algorithm 1 as printed, OpenCV's default threshold of 8 px."""
-    return _as_printed(simulated, case, 8.0)
+def as_printed(simulated: SimulatedPairs, threshold_px: float) -> RigidTransform | None:
+    """Run Algorithm 1 from its RANSAC on."""
+    options = CalibrationOptions(method="paper")
+    paper = replace(options.paper, ransac_threshold_px=threshold_px, ransac_iterations=_ITERATIONS)
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, replace(options, paper=paper))
+    return outcome.camera_from_radar if isinstance(outcome, Calibration) else None
 
 
-def algorithm_1_tuned(simulated: SimulatedPairs, case: Case) -> Estimate | None:
-    """Run Algorithm 1 with the best threshold."""
-    return _as_printed(simulated, case, best_threshold_px(case))
+def _algorithm_1(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
+    return as_printed(simulated, _DEFAULT_PX)
 
 
-def _as_printed(simulated: SimulatedPairs, case: Case, threshold_px: float) -> Estimate | None:
-    options = options_of(case)
-    paper = replace(options.paper, ransac_threshold_px=threshold_px, ransac_iterations=2000)
-    outcome = calibrate_pairs(simulated.pairs, simulated.camera, replace(options, method="paper", paper=paper))
-    return Estimate(outcome.camera_from_radar) if isinstance(outcome, Calibration) else None
+def _algorithm_1_tuned(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
+    return as_printed(simulated, _gift_px(simulated, case))
 
 
-def sqpnp_lm(simulated: SimulatedPairs, case: Case) -> Estimate | None:
+def sqpnp_lm(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
     """Run SQPnP, then Levenberg-Marquardt, on all pairs."""
     points, pixels = _arrays(simulated)
     pose = solve_pnp(points, pixels, simulated.camera, "sqpnp")
-    refined = None if pose is None else refine_lm(points, pixels, simulated.camera, pose)
-    return None if refined is None else Estimate(refined)
+    return None if pose is None else refine_lm(points, pixels, simulated.camera, pose)
 
 
-def magsac_lm(simulated: SimulatedPairs, case: Case) -> Estimate | None:
+def _magsac_lm(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
     """Run OpenCV's USAC MAGSAC, then Levenberg-Marquardt on its inliers."""
     import cv2
 
     points, pixels = _arrays(simulated)
     camera = simulated.camera
     parameters = cv2.UsacParams()
-    parameters.threshold = best_threshold_px(case)
-    parameters.maxIterations = 2000
+    parameters.threshold = _gift_px(simulated, case)
+    parameters.maxIterations = _ITERATIONS
     parameters.sampler = cv2.SAMPLING_UNIFORM
     parameters.score = cv2.SCORE_METHOD_MAGSAC
     parameters.loMethod = cv2.LOCAL_OPTIM_SIGMA
@@ -82,42 +79,76 @@ def magsac_lm(simulated: SimulatedPairs, case: Case) -> Estimate | None:
         return None
     if not found or rows is None or len(rows) < 4 or not np.isfinite(turn).all():
         return None
-    pose = RigidTransform(cv2.Rodrigues(turn)[0], shift.ravel())
     kept = np.asarray(rows).ravel()
-    refined = refine_lm(points[kept], pixels[kept], camera, pose)
-    return None if refined is None else Estimate(refined)
+    pose = RigidTransform(cv2.Rodrigues(turn)[0], shift.ravel())
+    return refine_lm(points[kept], pixels[kept], camera, pose)
 
 
-def poselib(simulated: SimulatedPairs, case: Case) -> Estimate | None:
-    """Run PoseLib's LO-RANSAC with its own refinement (only where it is installed)."""
-    import poselib as library  # type: ignore[import-not-found, unused-ignore]
+def _poselib(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
+    """Run PoseLib's LO-RANSAC with its own refinement."""
+    import poselib as library
 
     points, pixels = _arrays(simulated)
     pose, _ = library.estimate_absolute_pose(
-        pixels, points, _colmap_camera(simulated), {"max_reproj_error": best_threshold_px(case)}, {}
+        pixels, points, _colmap_camera(simulated), {"max_reproj_error": _gift_px(simulated, case)}, {}
     )
-    return Estimate(RigidTransform(np.asarray(pose.R), np.asarray(pose.t)))
+    return _finite(np.asarray(pose.R), np.asarray(pose.t))
 
 
-def _colmap_camera(simulated: SimulatedPairs) -> dict[str, Any]:
+def _pycolmap(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
+    """Run COLMAP's LO-RANSAC with its own refinement."""
+    import pycolmap as library
+
+    points, pixels = _arrays(simulated)
+    options = library.AbsolutePoseEstimationOptions()
+    options.ransac.max_error = _gift_px(simulated, case)
+    options.ransac.max_num_trials = _ITERATIONS
+    options.ransac.random_seed = 0
+    found = library.estimate_and_refine_absolute_pose(
+        pixels + 0.5, points, library.Camera(_colmap_camera(simulated, half_px=0.5)), options
+    )
+    if found is None:
+        return None
+    pose = np.asarray(found["cam_from_world"].matrix())
+    return _finite(pose[:, :3], pose[:, 3])
+
+
+def _finite(rotation: np.ndarray, translation_m: np.ndarray) -> RigidTransform | None:
+    if not (np.isfinite(rotation).all() and np.isfinite(translation_m).all()):
+        return None
+    u, _, vt = np.linalg.svd(rotation)
+    return RigidTransform(u @ vt, translation_m)
+
+
+def _colmap_camera(simulated: SimulatedPairs, *, half_px: float = 0.0) -> dict[str, Any]:
+    """Describe the camera as COLMAP does, whose pixel centres lie at half pixels."""
     matrix, distortion = simulated.camera.matrix_px, np.zeros(4)
     distortion[: min(4, len(simulated.camera.distortion))] = simulated.camera.distortion[:4]
-    parameters = [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *distortion]
+    parameters = [matrix[0, 0], matrix[1, 1], matrix[0, 2] + half_px, matrix[1, 2] + half_px, *distortion]
     size = {"width": simulated.camera.width_px, "height": simulated.camera.height_px}
     return {"model": "OPENCV", **size, "params": [float(value) for value in parameters]}
 
 
 def _arrays(simulated: SimulatedPairs) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions and pixels; of several candidates the most plausible one."""
     points = np.array([pair.candidates[0].position_radar_m for pair in simulated.pairs])
     return points, np.array([pair.pixel_px for pair in simulated.pairs])
 
 
-METHODS: dict[str, Method] = {
-    "ours": ours,
-    "Algorithm 1": algorithm_1,
-    "Algorithm 1, tuned": algorithm_1_tuned,
+def _gift_px(simulated: SimulatedPairs, case: Case) -> float:
+    return best_threshold_px(case, float(simulated.camera.matrix_px[0, 0]))
+
+
+PEERS: dict[str, Method] = {
+    "Algorithm 1, 8 px": _algorithm_1,
+    "Algorithm 1, tuned": _algorithm_1_tuned,
     "SQPnP + LM": sqpnp_lm,
-    "MAGSAC + LM": magsac_lm,
-    "PoseLib": poselib,
+    "MAGSAC + LM": _magsac_lm,
+    "PoseLib": _poselib,
+    "pycolmap": _pycolmap,
 }
+_MODULES = {"PoseLib": "poselib", "pycolmap": "pycolmap"}
+
+
+def available(name: str) -> bool:
+    """Tell whether a peer's library is installed."""
+    return name not in _MODULES or importlib.util.find_spec(_MODULES[name]) is not None

@@ -1,0 +1,100 @@
+"""Raw figures of many trials become ratios and shares with their two standard errors, and verdicts."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.accuracy.rows import Claim, Figures
+
+__all__ = [
+    "MET",
+    "MISSED",
+    "UNDECIDED",
+    "Measured",
+    "at_least",
+    "at_most",
+    "column",
+    "ratio",
+    "share",
+    "summed_up",
+    "within",
+    "worst",
+]
+
+MET, UNDECIDED, MISSED = "met", "met within error", "**missed**"
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A figure and two standard errors of it."""
+
+    value: float
+    error: float
+
+    def __str__(self) -> str:
+        if not np.isfinite(self.value):
+            return "-"
+        if self.value >= 10.0:
+            return f"{self.value:.0f}"
+        return f"{self.value:.2f} ± {self.error:.2f}" if self.error < 1.0 else f"{self.value:.1f}"
+
+
+def column(trials: Sequence[Figures], name: str) -> np.ndarray:
+    """Return one figure of every trial; NaN where there is none."""
+    return np.array([np.nan if (value := trial.get(name)) is None else value for trial in trials], dtype=np.float64)
+
+
+def ratio(errors: np.ndarray, bounds: np.ndarray) -> Measured:
+    """Return the RMSE over the root mean square of the bound, of the trials with a pose.
+
+    The standard error is that of a ratio of means: e^2 - q^2 b^2 has mean 0 at the true ratio q.
+    """
+    used = np.isfinite(errors)
+    if used.sum() < 2:
+        return Measured(float("nan"), float("nan"))
+    squares, limits = errors[used] ** 2, bounds[used] ** 2
+    value = float(np.sqrt(squares.mean() / limits.mean()))
+    spread = float(np.std(squares - value**2 * limits, ddof=1) / np.sqrt(used.sum()) / limits.mean())
+    return Measured(value, spread / max(value, 1e-12))  # d sqrt(x) = dx / (2 sqrt(x)), twice
+
+
+def share(flags: np.ndarray) -> Measured:
+    """Return a share in percent, of what is not NaN; its error by Wilson's middle, so that 0 of n has one too."""
+    used = flags[np.isfinite(flags)]
+    if not len(used):
+        return Measured(float("nan"), float("nan"))
+    smoothed = (used.sum() + 2.0) / (len(used) + 4.0)
+    return Measured(float(100.0 * used.mean()), float(200.0 * np.sqrt(smoothed * (1.0 - smoothed) / len(used))))
+
+
+def at_most(measured: Measured, limit: float) -> str:
+    """Judge: above the limit by less than two standard errors is no miss, but said."""
+    if measured.value <= limit:
+        return MET
+    return UNDECIDED if measured.value - measured.error <= limit else MISSED
+
+
+def at_least(measured: Measured, limit: float) -> str:
+    """Judge the other way round."""
+    return at_most(Measured(-measured.value, measured.error), -limit)
+
+
+def within(measured: Measured, low: float, high: float) -> str:
+    """Judge a figure that must lie between two limits."""
+    return worst([at_least(measured, low), at_most(measured, high)])
+
+
+def worst(verdicts: Iterable[str]) -> str:
+    """Return the worst of some verdicts."""
+    order = (MET, UNDECIDED, MISSED)
+    return max(verdicts, key=order.index, default="not run")
+
+
+def summed_up(aim: str, verdicts: Sequence[str], what: str) -> Claim:
+    """Turn the verdicts of rows into one claim."""
+    if not verdicts:
+        return Claim(aim, "not run", "not run")
+    counts = [(name, verdicts.count(name)) for name in (MET, UNDECIDED, MISSED) if verdicts.count(name)]
+    rows = ", ".join(f"{count} {name.strip('*')}" for name, count in counts)
+    return Claim(aim, f"{what}; {len(verdicts)} rows: {rows}", worst(verdicts))

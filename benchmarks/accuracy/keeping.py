@@ -1,0 +1,56 @@
+"""Where the raw figures of trials are kept, so that an interrupted run goes on where it stopped."""
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.accuracy.rows import Figures
+
+__all__ = ["Keeper", "digest_of_sources"]
+
+_ROOT = Path(__file__).resolve().parents[2]
+_WRITING_ONLY = {"__main__.py", "figures.py", "keeping.py", "page.py", "running.py"}
+
+
+def digest_of_sources() -> str:
+    """Return a short digest of everything that figures depend on: figures of another version are never mixed in."""
+    content = hashlib.sha256()
+    files = [*(_ROOT / "calib_core").glob("*.py"), *(_ROOT / "calib_core" / "synthetic").glob("*.py")]
+    files += [path for path in Path(__file__).parent.glob("*.py") if path.name not in _WRITING_ONLY]
+    for path in sorted(files):
+        content.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return content.hexdigest()[:12]
+
+
+@dataclass(frozen=True, slots=True)
+class Keeper:
+    """A folder with one file of JSON lines per row."""
+
+    folder: Path
+
+    def read(self, key: str) -> dict[int, Figures]:
+        """Return the kept figures by the trial's number; a last line cut short by an interruption does not count."""
+        path = self._path(key)
+        kept: dict[int, Figures] = {}
+        for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else ():
+            try:
+                trial = json.loads(line)
+            except json.JSONDecodeError:
+                continue
+            kept[trial["trial"]] = trial["figures"]
+        return kept
+
+    def add(self, key: str, trials: Iterable[tuple[int, Figures]]) -> None:
+        """Append the figures of some trials."""
+        path = self._path(key)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lines = [json.dumps({"trial": trial, "figures": figures}) + "\n" for trial, figures in trials]
+        with path.open("a", encoding="utf-8") as stream:
+            if stream.tell() and not path.read_bytes().endswith(b"\n"):
+                stream.write("\n")
+            stream.write("".join(lines))
+
+    def _path(self, key: str) -> Path:
+        return self.folder / f"{key}.jsonl"

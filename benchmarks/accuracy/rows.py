@@ -1,0 +1,68 @@
+"""What a table is made of: rows that are measured trial by trial, and what is written about them."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+__all__ = ["Claim", "Figures", "Kept", "Part", "Row", "Section"]
+
+Figures = dict[str, float | None]
+"""The raw figures of one trial by name, as they are kept on disk; None where there is none (no pose)."""
+
+Kept = Mapping[str, Sequence[Figures]]
+"""The figures of each row's trials, in order of the trial's number, by the row's key."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One row.
+
+    Attributes:
+        key: unique; a file name.
+        trials: how many are wanted.
+        measure: from the trial's number to its figures; a module's function or a partial of one, so that processes can share it.
+    """
+
+    key: str
+    trials: int
+    measure: Callable[[int], Figures]
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """An aim, what was measured, and whether it was met."""
+
+    aim: str
+    measured: str
+    verdict: str
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A table.
+
+    Attributes:
+        title: above it; may be empty.
+        head: of the columns.
+        cells: row by row.
+    """
+
+    title: str
+    head: tuple[str, ...]
+    cells: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """One question and its answer.
+
+    Attributes:
+        title: the question.
+        text: how it was measured.
+        parts: the tables.
+        claims: the aims.
+    """
+
+    title: str
+    text: str
+    parts: tuple[Part, ...]
+    claims: tuple[Claim, ...]

@@ -1,0 +1,94 @@
+"""Measure rows trial by trial over several processes. Neither their number nor an interruption changes a figure."""
+
+import os
+import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+
+from benchmarks.accuracy.keeping import Keeper
+from benchmarks.accuracy.rows import Figures, Kept, Row
+
+__all__ = ["kept_figures", "run"]
+
+_CHUNK = 10
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+_Measured = list[tuple[int, Figures]]
+
+
+def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = None) -> None:
+    """Measure what is not kept yet.
+
+    Args:
+        rows: in the order they are to be measured.
+        keeper: of the figures.
+        jobs: processes, one BLAS thread each; 1 measures in this process.
+        most: trials per row at most.
+    """
+    chunks = [(row, chunk) for row in rows for chunk in _missing(row, keeper, most)]
+    progress = _Progress(sum(len(chunk) for _, chunk in chunks))
+    if jobs == 1:
+        for row, chunk in chunks:
+            keeper.add(row.key, _measure(row, chunk))
+            progress.tell(row.key, len(chunk))
+        return
+    os.environ.update(dict.fromkeys(_THREADS, "1"))  # before the children load NumPy
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_one_thread) as pool:
+        running: dict[Future[_Measured], Row] = {pool.submit(_measure, row, chunk): row for row, chunk in chunks}
+        try:
+            for done in as_completed(running):
+                row, measured = running[done], done.result()
+                keeper.add(row.key, measured)
+                progress.tell(row.key, len(measured))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def kept_figures(rows: Sequence[Row], keeper: Keeper, *, most: int | None = None) -> Kept:
+    """Read the kept figures, in order of the trial's number and none beyond the wanted ones."""
+    kept = {}
+    for row in rows:
+        trials = keeper.read(row.key)
+        kept[row.key] = tuple(trials[trial] for trial in sorted(trials) if trial < _wanted(row, most))
+    return kept
+
+
+def _wanted(row: Row, most: int | None) -> int:
+    return row.trials if most is None else min(row.trials, most)
+
+
+def _missing(row: Row, keeper: Keeper, most: int | None) -> list[list[int]]:
+    kept = keeper.read(row.key)
+    missing = [trial for trial in range(_wanted(row, most)) if trial not in kept]
+    return [missing[i : i + _CHUNK] for i in range(0, len(missing), _CHUNK)]
+
+
+def _measure(row: Row, trials: list[int]) -> _Measured:
+    return [(trial, row.measure(trial)) for trial in trials]
+
+
+def _one_thread() -> None:
+    import cv2
+
+    cv2.setNumThreads(1)
+
+
+class _Progress:
+    """Tells on the error stream how far it is, twice a minute."""
+
+    def __init__(self, total: int) -> None:
+        self._total, self._done, self._start_s = total, 0, time.monotonic()
+        self._told_s = 0.0
+
+    def tell(self, key: str, count: int) -> None:
+        self._done += count
+        now_s = time.monotonic()
+        if now_s - self._told_s < 30.0 and self._done < self._total:
+            return
+        self._told_s = now_s
+        left_min = (now_s - self._start_s) * (self._total - self._done) / self._done / 60.0
+        sys.stderr.write(f"{self._done}/{self._total} trials, about {left_min:.0f} min left ({key})\n")
+        sys.stderr.flush()
