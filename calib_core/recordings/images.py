@@ -89,6 +89,18 @@ class ImageLayout:
             return None
         return packet_of(self._message(payload))
 
+    def recorded_as(self, payload: bytes) -> str:
+        """Return what a message holds, for people: "jpeg", "png", "raw bgr8", "h264 video".
+
+        Raises:
+            MessageError: the message cannot be read.
+        """
+        message = self._message(payload)
+        if not self.compressed:
+            return f"raw {message.text('encoding')}"
+        packet = packet_of(message)
+        return f"{packet.codec} video" if packet else self._file(message).format
+
     def size_px(self, payload: bytes) -> tuple[int, int]:
         """Return width and height without decoding the picture.
 
@@ -102,18 +114,6 @@ class ImageLayout:
         try:
             pixels = raw_pixels(message)
         except MessageError as error:
-    def recorded_as(self, payload: bytes) -> str:
-        """Return what a message holds, for people: "jpeg", "png", "raw bgr8", "h264 video".
-
-        Raises:
-            MessageError: the message cannot be read.
-        """
-        message = self._message(payload)
-        if not self.compressed:
-            return f"raw {message.text('encoding')}"
-        packet = packet_of(message)
-        return f"{packet.codec} video" if packet else self._file(message).format
-
             raise self._refused(str(error)) from error
         return pixels.shape[1], pixels.shape[0]
 

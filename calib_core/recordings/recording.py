@@ -163,7 +163,6 @@ class Recording:
         assert self._assembly.images is not None
         return self._assembly.images.picture(index)
 
-    def _check(self, index: int) -> None:
     def recorded_format(self, index: int) -> str:
         """Return what a frame was recorded as, for people: "jpeg", "png", "raw bgr8", "h264 video", "video file".
 
@@ -182,6 +181,7 @@ class Recording:
         row = int(images.row[index])
         return images.layouts[int(images.topic.part[row])].recorded_as(images.topic.payload(row))
 
+    def _check(self, index: int) -> None:
         self._check_open()
         if not 0 <= index < len(self.image_times):
             raise IndexError(f"frame {index} of {len(self.image_times)}")
