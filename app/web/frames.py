@@ -70,6 +70,7 @@ class FrameStore:
         self._kept: OrderedDict[tuple[int, Size], Frame] = OrderedDict()
         self._kept_bytes = 0
         self._coming: dict[tuple[int, Size], asyncio.Task[Frame]] = {}
+        self._closed = False
 
     def __len__(self) -> int:
         return self._count
@@ -83,8 +84,10 @@ class FrameStore:
         """Return a frame, from memory or made in the executor.
 
         Raises:
-            IndexError: there is no such frame.
+            IndexError: there is no such frame, or the store is closed.
         """
+        if self._closed:
+            raise IndexError("the server is stopping")
         if not 0 <= index < self._count:
             raise IndexError(f"frame {index} of {self._count}")
         key = (index, size)
@@ -99,17 +102,20 @@ class FrameStore:
 
     def prefetch(self, index: int, size: Size, step: int, *, ahead: int = 3) -> None:
         """Start on the next frames in the direction of play."""
-        for next_index in range(index + step, index + step * (ahead + 1), step) if step else ():
+        for next_index in range(index + step, index + step * (ahead + 1), step) if step and not self._closed else ():
             key: tuple[int, Size] = (next_index, size)
             if 0 <= next_index < self._count and key not in self._kept and key not in self._coming:
                 task = asyncio.get_running_loop().create_task(self._make(key))
                 task.add_done_callback(_retrieve)
                 self._coming[key] = task
 
-    def close(self) -> None:
-        """Drop what is on its way. Called on the event loop."""
-        for task in self._coming.values():
+    async def close(self) -> None:
+        """Drop what is on its way and begin nothing more, so that the event loop can end."""
+        self._closed = True
+        coming = list(self._coming.values())
+        for task in coming:
             task.cancel()
+        await asyncio.gather(*coming, return_exceptions=True)
 
     async def _make(self, key: tuple[int, Size]) -> Frame:
         index, size = key

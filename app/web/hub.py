@@ -97,7 +97,7 @@ class Hub:
         self._end_subscription()
         if self._searching is not None:
             self._searching.cancel()
-        self.frames.close()
+        await self.frames.close()
 
     @property
     def view(self) -> View:

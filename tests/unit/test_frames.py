@@ -175,3 +175,22 @@ def test_a_broken_frame_is_an_error_to_who_asks_and_only_then(executor: ThreadPo
 def test_there_is_no_frame_outside_the_recording(executor: ThreadPoolExecutor, index: int) -> None:
     with pytest.raises(IndexError):
         asyncio.run(FrameStore(Pictures(64, 48), 10, executor).get(index))
+
+
+def test_a_closed_store_leaves_nothing_on_its_way_and_begins_nothing(executor: ThreadPoolExecutor) -> None:
+    pictures = Pictures(64, 48)
+    pictures.may_read.clear()
+
+    async def ask() -> None:
+        store = FrameStore(pictures, 10, executor)
+        store.prefetch(1, "full", 1, ahead=3)
+        await asyncio.sleep(0)
+        pictures.may_read.set()
+        await store.close()
+        store.prefetch(5, "full", 1, ahead=2)
+        with pytest.raises(IndexError, match="stopping"):
+            await store.get(5)
+        assert asyncio.all_tasks() == {asyncio.current_task()}
+
+    asyncio.run(ask())
+    assert 6 not in pictures.read
