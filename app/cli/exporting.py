@@ -61,7 +61,7 @@ class Export:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Read a calibration back, recompute its check point, and say what is wrong with it; or compare two."""
+    """Read a calibration back and say what is wrong with it, or compare two; exit code 1: wrong, 3: looks wrong, nothing can tell."""
 
     calibration: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CALIBRATION")]
     """A calibration in any format that export writes."""
@@ -69,13 +69,16 @@ class Check:
     """Another one to compare with: in degrees, centimetres, and pixels at 5, 20 and 60 m."""
     camera: File = None
     """Intrinsics, where the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    pairs: File = None
+    """Pairs to hold it against: pairs-1, or a calibration-1 file whose pairs are taken."""
 
     def run(self) -> int:
-        """Print the findings; return 0 when all is well, 1 when something is wrong."""
-        from calib_core.interchange import check, read_any_file, read_camera_file
+        """Print the findings; return 0 when nothing is wrong, 1 when something is, 3 when it looks wrong and cannot be told."""
+        from calib_core.interchange import check, read_any_file, read_camera_file, read_pair_evidence_file
 
         other = read_any_file(self.against) if self.against else None
         camera = read_camera_file(self.camera) if self.camera else None
-        report = check(read_any_file(self.calibration), against=other, camera=camera)
+        pairs = read_pair_evidence_file(self.pairs) if self.pairs else None
+        report = check(read_any_file(self.calibration), against=other, camera=camera, pairs=pairs)
         print("\n".join(report.lines()))
-        return 0 if report.ok else 1
+        return {"wrong": 1, "doubtful": 3}.get(report.verdict, 0)

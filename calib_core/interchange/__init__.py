@@ -10,13 +10,15 @@ from calib_core.interchange.calibration_file import (
 )
 from calib_core.interchange.calibration_json import calibration_text, read_calibration, write_calibration
 from calib_core.interchange.cameras import camera_info_text, read_camera, read_camera_file
-from calib_core.interchange.checking import CheckReport, Finding, check
+from calib_core.interchange.checking import CheckReport, Verdict, check
 from calib_core.interchange.clicks import read_clicks, write_clicks
 from calib_core.interchange.comparing import Comparison, PixelDifference, compare
 from calib_core.interchange.contents import contents_text
+from calib_core.interchange.explaining import Finding
 from calib_core.interchange.formats import FORMATS, ExportBytes, ExportText, Format, export, format_named
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.importing import imported, read_any, read_any_file
+from calib_core.interchange.pair_evidence import PairEvidence, read_pair_evidence, read_pair_evidence_file
 from calib_core.interchange.pairs import PairsFile, read_pairs, write_pairs
 from calib_core.interchange.parent_pose import parent_pose
 
@@ -32,10 +34,12 @@ __all__ = [
     "FrameNames",
     "ImportedCalibration",
     "InputFile",
+    "PairEvidence",
     "PairsFile",
     "PixelDifference",
     "Provenance",
     "StatedCheckPoint",
+    "Verdict",
     "WrittenPose",
     "adopt",
     "adopted_calibration",
@@ -55,6 +59,8 @@ __all__ = [
     "read_camera",
     "read_camera_file",
     "read_clicks",
+    "read_pair_evidence",
+    "read_pair_evidence_file",
     "read_pairs",
     "write_calibration",
     "write_clicks",

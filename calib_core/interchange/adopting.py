@@ -6,7 +6,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance, choose_check_point
 from calib_core.interchange.checking import check
-from calib_core.interchange.imported import ImportedCalibration
+from calib_core.interchange.imported import TRUTH_FORMAT, ImportedCalibration
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, Caution, Metrics
 
@@ -76,6 +76,10 @@ def _taken_over(found: ImportedCalibration, source: str) -> Caution:
 
 
 def _refuse_wrong(found: ImportedCalibration, source: str, camera: Camera | None) -> None:
+    if found.format == TRUTH_FORMAT:
+        raise InputError(
+            f"{source}: is what a simulation holds for true, no calibration; compare with it: cocalib check FILE --against"
+        )
     for finding in check(found, camera=camera).findings:
         if finding.level == "error":
             raise InputError(f"{source}: {finding.message}; {finding.hint}")

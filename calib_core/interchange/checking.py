@@ -1,6 +1,5 @@
 """Check a calibration file: does its check point come out, and if not, which slip explains it?"""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -9,11 +8,23 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.interchange.comparing import Comparison, compare, shown
+from calib_core.interchange.explaining import Finding, explained, explaining
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
-from calib_core.interchange.mistakes import Suspicion, suspicions
+from calib_core.interchange.mistakes import suspicions
+from calib_core.interchange.pair_evidence import PairEvidence, by_evidence
 
-__all__ = ["CheckReport", "Finding", "check"]
+__all__ = ["CheckReport", "Verdict", "check"]
 
+Verdict = Literal["right", "wrong", "doubtful", "unproven"]
+"""Proved by what is known; contradicted; implausible with nothing to prove it; plausible with nothing to prove it."""
+
+
+_SILENT = "check-point-unused"
+_PROOF = "prove it with --against FILE (a calibration you trust) or --pairs FILE (radar positions and pixels)"
+_SUMMARIES: dict[Verdict, tuple[str, ...]] = {
+    "doubtful": (f"DOUBTFUL: this looks wrong, and nothing in the file can tell; {_PROOF}",),
+    "unproven": (f"not proven: nothing contradicts this pose, and nothing in the file can prove it; {_PROOF}",),
+}
 _CLOSE = 1e-4
 _CLOSE_PX = 0.05
 _SAME_SENSORS_RAD = np.radians(10.0)
@@ -24,23 +35,6 @@ _ROUNDING = 1e-4
 _FAR_M = 20.0
 _SIDEWAYS_RAD = np.radians(60.0)
 _FORWARD_RAD = np.radians(35.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing a check found.
-
-    Attributes:
-        level: "good" (verified), "caution" (look at it) or "error" (the file is wrong).
-        code: one word for programs.
-        message: what was found, with figures.
-        hint: what to do about it; empty when nothing needs doing.
-    """
-
-    level: Literal["good", "caution", "error"]
-    code: str
-    message: str
-    hint: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +56,16 @@ class CheckReport:
         """Whether nothing is wrong; cautions do not count."""
         return all(finding.level != "error" for finding in self.findings)
 
+    @property
+    def verdict(self) -> Verdict:
+        """What the findings come to."""
+        levels = {finding.level for finding in self.findings}
+        if "error" in levels:
+            return "wrong"
+        if "good" in levels:
+            return "right"
+        return "doubtful" if any(finding.code != _SILENT for finding in self.findings) else "unproven"
+
     def lines(self) -> tuple[str, ...]:
         """Return the report as lines for people."""
         frames = self.imported.frames
@@ -73,30 +77,38 @@ class CheckReport:
             rows.append(f"{label}: {finding.message}" + (f"; {finding.hint}" if finding.hint else ""))
         if self.comparison is not None:
             rows += [f"against the other: {line}" for line in self.comparison.lines()]
-        return tuple(rows)
+        return (*rows, *_SUMMARIES.get(self.verdict, ()))
 
 
 def check(
-    imported: ImportedCalibration, *, against: ImportedCalibration | None = None, camera: Camera | None = None
+    imported: ImportedCalibration,
+    *,
+    against: ImportedCalibration | None = None,
+    camera: Camera | None = None,
+    pairs: PairEvidence | None = None,
 ) -> CheckReport:
-    """Check a calibration by its own check point, by another calibration, and by what is plausible.
+    """Check a calibration by its own check point, by another calibration, by pairs, and by what is plausible.
 
     Args:
         imported: what read_any returned.
         against: a calibration of the same sensors that is known to be right.
         camera: the intrinsics, where the file has none.
+        pairs: radar positions and where they were seen.
     """
     findings = [Finding("error", "contradiction", fault, "correct the one that is wrong") for fault in imported.faults]
-    camera = imported.camera or camera or (against.camera if against else None)
+    camera = imported.camera or camera or (against.camera if against else None) or (pairs.camera if pairs else None)
     stated = imported.check_point
     if stated is not None:
         findings.append(_by_check_point(imported.pose, stated, camera))
     if against is not None:
         findings.append(_by_other(imported.pose, against.camera_from_radar))
+    if pairs is not None:
+        findings.append(by_evidence(imported.pose, pairs))
     if imported.file is not None:
         findings += _by_its_pairs(imported)
-    if all(finding.code in ("contradiction", "check-point-unused") for finding in findings) or against is None:
-        findings += _by_plausibility(imported.pose, verified=any(finding.level == "good" for finding in findings))
+    held = [finding for finding in findings if finding.code not in ("contradiction", _SILENT)]
+    if not held or (against is None and not any(finding.level == "error" for finding in held)):
+        findings += _by_plausibility(imported.pose, verified=bool(held))
     comparison = compare(against, imported, camera=camera) if against is not None else None
     return CheckReport(imported, tuple(findings), comparison)
 
@@ -106,7 +118,7 @@ def _by_check_point(pose: WrittenPose, stated: StatedCheckPoint, camera: Camera 
     if stated.camera_m is None and camera is None:
         return Finding(
             "caution",
-            "check-point-unused",
+            _SILENT,
             f"the check point {shown} states a pixel, and there is no camera to compute it with",
             "check it with --against calibration.json, which has the camera",
         )
@@ -117,7 +129,7 @@ def _by_check_point(pose: WrittenPose, stated: StatedCheckPoint, camera: Camera 
     missed = miss(pose.camera_from_radar())
     if missed <= 1.0:
         return Finding("good", "check-point", f"the check point {shown} comes out where the file says")
-    suspicion = _explaining(pose, miss, 1.0)
+    suspicion = explaining(pose, miss, 1.0)
     came_out = _came_out(pose.camera_from_radar(), stated, camera)
     if suspicion is None:
         return Finding(
@@ -126,7 +138,7 @@ def _by_check_point(pose: WrittenPose, stated: StatedCheckPoint, camera: Camera 
             f"the check point {shown} {came_out}, and no single slip explains it",
             "the numbers were changed: export the file again",
         )
-    return _explained(suspicion, f"the check point {shown} {came_out}")
+    return explained(suspicion, f"the check point {shown} {came_out}")
 
 
 def _miss(candidate: RigidTransform, stated: StatedCheckPoint, camera: Camera | None) -> float:
@@ -151,30 +163,6 @@ def _came_out(candidate: RigidTransform, stated: StatedCheckPoint, camera: Camer
     return f"comes out at ({got}) m in the camera frame instead of ({want}) m"
 
 
-def _explaining(pose: WrittenPose, miss: Callable[[RigidTransform], float], limit: float) -> Suspicion | None:
-    """Return the fewest slips that bring the miss under the limit; of equally few, the best."""
-    best: tuple[int, float, Suspicion] | None = None
-    for suspicion in suspicions(pose):
-        try:
-            missed = miss(suspicion.pose.camera_from_radar())
-        except ValueError:
-            continue
-        rank = (len(suspicion.mistakes), missed)
-        if missed <= limit and (best is None or rank < best[:2]):
-            best = (*rank, suspicion)
-    return best[2] if best else None
-
-
-def _explained(suspicion: Suspicion, before: str) -> Finding:
-    mistakes = suspicion.mistakes
-    return Finding(
-        "error",
-        "+".join(mistake.code for mistake in mistakes),
-        f"{before}: " + ", and ".join(mistake.message for mistake in mistakes),
-        ", and ".join(mistake.hint for mistake in mistakes),
-    )
-
-
 def _apart(a: RigidTransform, b: RigidTransform) -> tuple[float, float]:
     return rotation_angle_rad(a.rotation @ b.rotation.T), float(np.linalg.norm(a.translation_m - b.translation_m))
 
@@ -189,14 +177,14 @@ def _by_other(pose: WrittenPose, other: RigidTransform) -> Finding:
     missed = miss(pose.camera_from_radar())
     angle, distance_m = _apart(pose.camera_from_radar(), other)
     before = f"{shown(np.degrees(angle))} deg and {shown(distance_m)} m from the other calibration"
-    exact = _explaining(pose, miss, _NO_COINCIDENCE * missed) if missed > _ROUNDING else None
+    exact = explaining(pose, miss, _NO_COINCIDENCE * missed) if missed > _ROUNDING else None
     if exact is not None:  # the same calibration but for a slip, however little the slip moves
-        return _explained(exact, before)
-    suspicion = _explaining(pose, miss, min(1.0, _CLEARLY_BETTER * missed))
+        return explained(exact, before)
+    suspicion = explaining(pose, miss, min(1.0, _CLEARLY_BETTER * missed))
     if missed <= _CLEARLY_BETTER or (missed <= 1.0 and suspicion is None):
         return Finding("good", "agrees", f"agrees: {before}")
     if suspicion is not None:
-        found = _explained(suspicion, before)
+        found = explained(suspicion, before)
         level: Literal["caution", "error"] = "error" if missed > 1.0 else "caution"
         return Finding(level, found.code, found.message, found.hint)
     return Finding(
@@ -239,7 +227,7 @@ def _by_plausibility(pose: WrittenPose, *, verified: bool) -> list[Finding]:
     off = _off_forward(camera_from_radar)
     if off > _SIDEWAYS_RAD and not verified:
         likely = [s for s in suspicions(pose) if len(s.mistakes) == 1 and _is_forward(s.pose)]
-        hint = "is that so? " + ("; or perhaps " + " or ".join(dict.fromkeys(s.mistakes[0].message for s in likely)))
+        hint = "is that so, or perhaps " + ", or ".join(dict.fromkeys(s.mistakes[0].message for s in likely)) + "?"
         message = f"the camera looks {np.degrees(off):.0f} deg away from the radar"
         findings.append(Finding("caution", "looks-elsewhere", message, hint if likely else "is that so?"))
     return findings

@@ -14,6 +14,7 @@ from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, matrix_from_rpy, nearest_rotation
 
 __all__ = [
+    "TRUTH_FORMAT",
     "Axes",
     "Direction",
     "Form",
@@ -27,6 +28,9 @@ __all__ = [
 Form = Literal["matrix", "quaternion_xyzw", "quaternion_wxyz", "rpy"]
 Direction = Literal["camera_from_radar", "radar_from_camera"]
 Axes = Literal["optical", "link"]
+
+TRUTH_FORMAT = "truth"
+"""What a simulation says is true: to compare with, never to calibrate from."""
 
 _FEW_DIGITS = 2e-3
 _LARGEST = 1e12

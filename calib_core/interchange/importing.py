@@ -11,22 +11,24 @@ from calib_core.interchange.archives import unpack
 from calib_core.interchange.array_formats import read_matlab, read_matrix, read_numpy
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.calibration_json import calibration_file_of, kept_results, transform_of
+from calib_core.interchange.camera_fields import find_cameras
 from calib_core.interchange.colmap_format import read_colmap
 from calib_core.interchange.dataset_formats import read_kitti, read_nuscenes
 from calib_core.interchange.documents import CalibrationDocument, TransformDocument
 from calib_core.interchange.driveworks_format import is_rig, read_driveworks
 from calib_core.interchange.foxglove_format import read_foxglove
-from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
+from calib_core.interchange.imported import TRUTH_FORMAT, ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.opencv_format import read_opencv
 from calib_core.interchange.opencv_xml import load_opencv_xml, parse_xml
 from calib_core.interchange.ros_formats import read_launch_python, read_launch_xml, read_tf2_command
-from calib_core.interchange.strict_json import json_value, parse_document
+from calib_core.interchange.strict_json import checked, json_value, parse_document
 from calib_core.interchange.urdf_format import read_urdf
 from calib_core.interchange.yaml_formats import read_autoware, read_kalibr, read_transform_stamped
 from calib_core.interchange.yaml_text import load_yaml
 
 __all__ = ["imported", "read_any", "read_any_file"]
 
+_TRUTH = "cocalib/truth-1"
 _MAX_BYTES = 256 * 1024 * 1024
 _KNOWN = (
     "known are calibration-1, static_transform_publisher in a command or launch file, URDF, Autoware, Apollo and "
@@ -122,6 +124,8 @@ def _read_json(text: str, source: str) -> ImportedCalibration:
         return read_nuscenes(content, source)
     if str(content.get("schema", "")).startswith("cocalib/calibration-"):
         return _read_ours(text, source)
+    if content.get("schema") == _TRUTH:
+        return _read_truth(content, source)
     if is_rig(content):
         return read_driveworks(content, source)
     if "FrameTransform" in content or "parent_frame_id" in content:
@@ -153,6 +157,20 @@ def _read_mapping(content: Any, text: str, source: str) -> ImportedCalibration:
             return read_autoware(content, text, source)
     found = ", ".join(map(str, list(content)[:12])) if isinstance(content, dict) else type(content).__name__
     raise InputError(f"{source}: no pose of a camera and a radar in it (found {found or 'nothing'}); {_KNOWN}")
+
+
+def _read_truth(content: dict[str, Any], source: str) -> ImportedCalibration:
+    """Read what is true about a simulated recording, to compare a calibration with."""
+    stated = checked(
+        content.get("camera_from_radar") or {}, TransformDocument, source=source, place="camera_from_radar"
+    )
+    pose = transform_of(stated, source=source, place="camera_from_radar")
+    cameras = find_cameras(content, source=source)
+    return ImportedCalibration(
+        TRUTH_FORMAT,
+        WrittenPose("matrix", pose.rotation, pose.translation_m, "camera_from_radar"),
+        camera=cameras[0].camera(image_size_px=None, source=source) if cameras else None,
+    )
 
 
 def _read_ours(text: str, source: str) -> ImportedCalibration:

@@ -187,6 +187,25 @@ def test_export_poses_the_radar_in_the_kit(cocalib: Cocalib, calibration: Path, 
     assert "qw last" in wrong.err
 
 
+def test_a_bare_matrix_that_looks_wrong_has_its_own_exit_code_until_pairs_tell(
+    cocalib: Cocalib, calibration: Path, tmp_path: Path
+) -> None:
+    matrix = np.eye(4)
+    matrix[:3, :3] = json.loads(calibration.read_text())["camera_from_radar"]["rotation"]
+    np.savetxt(tmp_path / "inverse.txt", np.linalg.inv(matrix))
+    np.savetxt(tmp_path / "right.txt", matrix)
+
+    doubtful = cocalib("check", tmp_path / "inverse.txt")
+    assert doubtful.code == 3
+    assert "DOUBTFUL" in doubtful.out
+    unproven = cocalib("check", tmp_path / "right.txt")
+    assert unproven.code == 0
+    assert "not proven" in unproven.out
+    told = cocalib("check", tmp_path / "inverse.txt", "--pairs", calibration)
+    assert told.code == 1
+    assert "the direction is swapped" in told.out
+
+
 def test_check_takes_the_camera_that_the_file_lacks(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
     cocalib("export", calibration, "--to", "matrix", "--out", tmp_path / "m.txt")
     compared = cocalib("check", tmp_path / "m.txt", "--against", tmp_path / "m.txt", "--camera", calibration)
