@@ -6,13 +6,13 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.arrays import TimesNs
+from calib_core.arrays import TimesNs, Values
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings.calendar import span_text
 from calib_core.recordings.clocks import Clock, Stamps, header_fault
 from calib_core.results import Caution
 
-__all__ = ["ClockDiagnosis", "about_clocks", "diagnose"]
+__all__ = ["ClockDiagnosis", "about_clocks", "between_islands", "diagnose"]
 
 _YEAR_2000_NS = 946_684_800 * NS_PER_S
 _GAP_PERIODS = 5.0
@@ -136,7 +136,10 @@ def diagnose(
     found = _with_rhythm(found, times_ns)
     if stamps.header_ns is None or not len(stamps.header_ns):
         return found
-    return _with_delay(_with_order(found, stamps.header_ns), stamps.header_ns, stamps.receive_ns)
+    found = _with_delay(_with_order(found, stamps.header_ns), stamps.header_ns, stamps.receive_ns)
+    if chosen == "header" and wish == "auto" and (found.jumps or found._drifts):
+        return replace(found, reason="the stamps are dates in order, although they do not keep step with receiving")
+    return found
 
 
 def _reason(stamps: Stamps, chosen: str, wish: Clock) -> str:
@@ -150,12 +153,17 @@ def _reason(stamps: Stamps, chosen: str, wish: Clock) -> str:
     return f"it {fault}" if fault else "its stamps and the other sensor's cannot be compared"
 
 
+def between_islands(steps_s: Values) -> np.ndarray:
+    """Tell which steps in time (n,) [s] are pauses that part the data into islands."""
+    return steps_s > max(_ISLAND_S, _GAP_PERIODS * float(np.median(steps_s)))
+
+
 def _with_rhythm(found: ClockDiagnosis, times_ns: TimesNs) -> ClockDiagnosis:
     if len(times_ns) < 2:
         return found
     steps_s = np.diff(times_ns) / NS_PER_S
     period_s = float(np.median(steps_s))
-    apart = steps_s > max(_ISLAND_S, _GAP_PERIODS * period_s)
+    apart = between_islands(steps_s)
     return replace(
         found,
         period_s=period_s,

@@ -44,6 +44,10 @@ def summary_text(summary: RecordingSummary) -> str:
     return "\n".join(line.rstrip() for line in lines)
 
 
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def _labelled(label: str, lines: Iterable[str]) -> list[str]:
     return [f"{label if not number else '':<9} {line}" for number, line in enumerate(lines)]
 
@@ -56,9 +60,7 @@ def _times(summary: RecordingSummary) -> list[str]:
         f"{_seconds(summary.start)} to {_seconds(summary.end)} s since 1970",
     ]
     counts = [topic.count for topic in summary.topics]
-    lines.append(
-        f"{sum(counts)} message{'s' if sum(counts) != 1 else ''} in {len(counts)} topic{'s' if len(counts) != 1 else ''}"
-    )
+    lines.append(f"{_counted(sum(counts), 'message')} in {_counted(len(counts), 'topic')}")
     if summary.overlap_s is not None:
         lines.append(f"radar and camera share {duration_text(summary.overlap_s)}")
     return _labelled("time", lines)
@@ -125,7 +127,7 @@ def _radar(radar: RadarSummary | None) -> list[str]:
     gap = "" if radar.longest_gap_s is None else f", longest gap {radar.longest_gap_s:.3f} s"
     sample = "" if radar.sampled_scans >= radar.scans else f", from {radar.sampled_scans} scans"
     return [
-        f"{radar.topic}, frame '{radar.frame}': {radar.scans} scans{rate}{gap}",
+        f"{radar.topic}, frame '{radar.frame}': {_counted(radar.scans, 'scan')}{rate}{gap}",
         f"returns per scan: {middle:.0f} ({low} to {high}{sample})",
         radar.layout,
     ]
@@ -139,7 +141,11 @@ def _camera(camera: CameraSummary | None) -> list[str]:
     size = "the first cannot be read"
     if camera.width_px is not None:
         size = f"{camera.width_px} x {camera.height_px} px, {camera.format}"
-    return [f"{camera.topic}, frame '{camera.frame}': {camera.frames} images{rate}{gap}", size, _intrinsics(camera)]
+    return [
+        f"{camera.topic}, frame '{camera.frame}': {_counted(camera.frames, 'image')}{rate}{gap}",
+        size,
+        _intrinsics(camera),
+    ]
 
 
 def _intrinsics(camera: CameraSummary) -> str:

@@ -120,6 +120,8 @@ class ColumnPlan:
         if self.polar:
             side = "left" if self.azimuth_sign > 0 else "right"
             words[0] += f" (azimuth positive to the {side}, {'degrees' if self.degrees else 'radians'})"
+        elif self.axes is None:
+            words[0] += " (forward, left, up)" if len(self.position) == 3 else " (forward, left)"
         speed = self.doppler or ", ".join(self.velocity)
         words.append(f"speed from {speed}" if speed else "no speed")
         words.append(f"amplitude from {self.amplitude}" if self.amplitude else "no amplitude")

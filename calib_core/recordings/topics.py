@@ -8,7 +8,7 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, TimeNs
-from calib_core.recordings.clock_diagnosis import ClockDiagnosis
+from calib_core.recordings.clock_diagnosis import ClockDiagnosis, between_islands
 from calib_core.recordings.decoding import Message, decode
 from calib_core.recordings.definitions import Definition, definition_of
 from calib_core.recordings.sources import Channel, Heads, MessageIndex, Source
@@ -34,7 +34,7 @@ class TopicSummary:
         problem: why it cannot be used although its kind is right; None where all is well.
         chosen: it is the radar, image or camera-info topic in use.
         layout: what is read from it, in a few words; "" for kinds that need none.
-        rate_hz: messages per second from first to last; None with fewer than two.
+        rate_hz: messages per second, pauses between islands left out; None with fewer than two.
         longest_gap_s: longest time between neighbours [s]; None with fewer than two.
         jitter_s: median deviation of that time from its median [s]; None with fewer than two.
         clocks: what is known about its two clocks; None where its messages were not looked into.
@@ -61,7 +61,7 @@ class Rhythm:
     """How regularly something comes; None each with fewer than two stamps.
 
     Attributes:
-        rate_hz: per second, from first to last.
+        rate_hz: per second, pauses that part the data into islands left out.
         longest_gap_s: longest time between neighbours [s].
         jitter_s: median deviation of that time from its median [s].
     """
@@ -76,9 +76,10 @@ class Rhythm:
         if len(times_ns) < 2:
             return cls()
         steps_s = np.diff(np.sort(times_ns)) / NS_PER_S
-        span_s = float(steps_s.sum())
+        near_s = steps_s[~between_islands(steps_s)]
+        span_s = float(near_s.sum())
         return cls(
-            rate_hz=len(steps_s) / span_s if span_s > 0 else None,
+            rate_hz=len(near_s) / span_s if span_s > 0 else None,
             longest_gap_s=float(steps_s.max()),
             jitter_s=float(np.median(np.abs(steps_s - np.median(steps_s)))),
         )

@@ -9,6 +9,7 @@ from calib_core.measurements import NS_PER_S
 from calib_core.recordings import describe, inspect_recording, open_recording, recording_summary
 from calib_core.recordings.clock_diagnosis import about_clocks, diagnose
 from calib_core.recordings.clocks import Stamps
+from calib_core.recordings.topics import Rhythm
 
 START_NS = 1_700_000_000 * NS_PER_S
 MS = 1_000_000
@@ -62,6 +63,7 @@ def test_islands_and_gaps_of_data_are_counted():
     found = look(times, times + 20 * MS)
     assert found.islands == 3
     assert found.covered_s == pytest.approx(199.7, abs=0.01)
+    assert Rhythm.of(times).rate_hz == pytest.approx(10.0), "nothing happens between islands, which is no slower rate"
     assert "3 stretches of data, 3.3 minutes in all" in found.remarks
     (caution,) = about_clocks([found])
     assert caution.code == "islands"
@@ -76,6 +78,7 @@ def test_the_reason_for_the_clock_is_given():
     assert look(SOUND_NS, chosen="receive", wish="receive").reason == "asked for with --clock receive"
     assert "cannot be compared" in look(SOUND_NS, chosen="receive").reason
     assert "both sensors have the same clock" in look(SOUND_NS - START_NS).reason
+    assert "do not keep step with receiving" in look(changed(np.s_[1000:], 5 * NS_PER_S)).reason
 
 
 def test_a_driver_that_stamps_every_return_is_named_so():

@@ -43,7 +43,7 @@ clocks    /camera/image/compressed: stamps of measurement, because the stamps ar
             received 0.0 ms after the stamp (± 0.0 ms)
 radar     /radar/points, frame 'radar': 20 scans at 10.0 Hz, longest gap 0.100 s
           returns per scan: 4 (4 to 4)
-          position from x, y, z; speed from velocity; amplitude from snr
+          position from x, y, z (forward, left, up); speed from velocity; amplitude from snr
 camera    /camera/image/compressed, frame 'camera': 20 images at 10.0 Hz, longest gap 0.100 s
           64 x 48 px, jpeg
           plumb_bob from /camera/camera_info: fx 500.00 fy 510.00 cx 319.50 cy 239.50 px; \
