@@ -61,7 +61,7 @@ class Export:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Read a calibration back and say what is wrong with it, or compare two; exit code 1: wrong, 3: looks wrong, nothing can tell."""
+    """Read a calibration back, say what is wrong with it, or compare two. Exit code 1: wrong; 3: looks wrong, not proven."""
 
     calibration: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CALIBRATION")]
     """A calibration in any format that export writes."""

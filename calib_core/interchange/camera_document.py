@@ -6,7 +6,21 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.documents import CameraDocument
 
-__all__ = ["camera_document", "camera_of"]
+__all__ = ["camera_document", "camera_of", "refuse_skew"]
+
+
+def refuse_skew(camera: Camera, whose: str) -> None:
+    """Refuse a camera whose pixel axes are not at right angles, for a format whose readers would leave that out.
+
+    Args:
+        camera: what is to be written.
+        whose: whose model it is, to stand before "no skew", for example "COLMAP's models have".
+
+    Raises:
+        InputError: it has skew.
+    """
+    if camera.matrix_px[0, 1] != 0.0:
+        raise InputError(f"{whose} no skew, this camera has; export with --to json, matlab or numpy instead")
 
 
 def camera_document(camera: Camera) -> CameraDocument:

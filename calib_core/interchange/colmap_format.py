@@ -7,6 +7,7 @@ from calib_core.errors import InputError
 from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.interchange.archives import pack, unpack
 from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.camera_document import refuse_skew
 from calib_core.interchange.camera_fields import floats
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.statement import hash_comment, stated_check_point, stated_frames, statement
@@ -45,8 +46,7 @@ def write_colmap(file: CalibrationFile) -> bytes:
 
 def _colmap_camera(camera: Camera) -> tuple[str, list[float]]:
     k, d = camera.matrix_px, camera.distortion.tolist()
-    if k[0, 1] != 0.0:
-        raise InputError("COLMAP's models have no skew, this camera has; export with --to opencv instead")
+    refuse_skew(camera, "COLMAP's models have")
     pinhole = [k[0, 0], k[1, 1], k[0, 2] + _HALF_PIXEL, k[1, 2] + _HALF_PIXEL]
     if camera.model == "pinhole":
         return "PINHOLE", pinhole

@@ -35,7 +35,7 @@ def write_driveworks_in_rig(file: CalibrationFile, rig_from_radar: RigidTransfor
     rig_from_link = rig_from_radar @ file.calibration.camera_from_radar.inverse() @ LINK_FROM_OPTICAL.inverse()
     sensors = [
         _sensor(file.frames.radar, "radar.virtual", rig_from_radar),
-        _sensor(file.frames.camera, "camera.virtual", rig_from_link),
+        _sensor(file.frames.camera_link, "camera.virtual", rig_from_link),
     ]
     return json_text({"rig": {"sensors": sensors}, "version": 7})
 

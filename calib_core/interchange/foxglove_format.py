@@ -8,6 +8,7 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.camera_document import refuse_skew
 from calib_core.interchange.camera_fields import find_cameras, floats
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.json_text import json_text
@@ -23,7 +24,12 @@ _LENSES = {"pinhole": "plumb_bob", "equidistant": "kannala_brandt"}
 
 
 def write_foxglove(file: CalibrationFile) -> str:
-    """Write one object with both messages, to publish as they are."""
+    """Write one object with both messages, to publish as they are.
+
+    Raises:
+        InputError: the camera has skew, for which CameraCalibration has no place.
+    """
+    refuse_skew(file.calibration.camera, "Foxglove's CameraCalibration has")
     radar_from_camera = file.calibration.camera_from_radar.inverse()
     quaternion = quaternion_xyzw_from_matrix(radar_from_camera.rotation) + 0.0
     transform = {

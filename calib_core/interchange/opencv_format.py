@@ -8,6 +8,7 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.geometry import rotation_log
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
+from calib_core.interchange.camera_document import refuse_skew
 from calib_core.interchange.camera_fields import find_cameras, floats
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.statement import hash_comment, stated_check_point, stated_frames, statement
@@ -17,9 +18,14 @@ __all__ = ["read_opencv", "write_opencv"]
 
 
 def write_opencv(file: CalibrationFile) -> str:
-    """Write a file that cv::FileStorage of OpenCV 3, 4 and 5 reads."""
+    """Write a file that cv::FileStorage of OpenCV 3, 4 and 5 reads.
+
+    Raises:
+        InputError: the camera has skew, which OpenCV's projectPoints leaves out without a word.
+    """
     calibration = file.calibration
     camera, pose = calibration.camera, calibration.camera_from_radar
+    refuse_skew(camera, "OpenCV's camera models have")
     distortion = camera.distortion if len(camera.distortion) else np.zeros(5)
     model = "plumb_bob" if camera.model == "pinhole" else camera.model
     meaning = "R and T carry radar points into the camera (as projectPoints and stereoCalibrate use them); rvec is R's"

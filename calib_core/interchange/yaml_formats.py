@@ -9,6 +9,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.camera_document import refuse_skew
 from calib_core.interchange.camera_fields import find_cameras, floats
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, quaternion_xyzw_from_matrix, rpy_from_matrix
@@ -173,8 +174,7 @@ def write_kalibr(file: CalibrationFile) -> str:
 
 def _kalibr_lens(camera: Camera) -> tuple[str, list[float]]:
     distortion = camera.distortion.tolist()
-    if camera.matrix_px[0, 1] != 0.0:
-        raise InputError("Kalibr's pinhole model has no skew, this camera has; export with --to opencv instead")
+    refuse_skew(camera, "Kalibr's pinhole model has")
     if camera.model == "rational_polynomial" or (camera.model == "plumb_bob" and any(distortion[4:])):
         held = "k3" if camera.model == "plumb_bob" else "k3 to k6"
         raise InputError(

@@ -1,6 +1,7 @@
 """A check finds the slip that made a right calibration into a wrong file, and names it."""
 
 import dataclasses
+import io
 import json
 import os
 import re
@@ -156,6 +157,30 @@ def test_a_mirrored_axis_is_refused_in_words(file):
 
     with pytest.raises(InputError, match=r"left-handed.*axis is mirrored"):
         read_any(text.replace(first_row, mirrored))
+
+
+@pytest.mark.parametrize("name", ["json", "kalibr", "opencv", "kitti", "matrix", "numpy", "matlab"])
+def test_a_left_handed_rotation_is_refused_in_every_format_of_matrices(file, name):
+    first_row = file.calibration.camera_from_radar.rotation[0]
+    if name in ("numpy", "matlab"):
+        data = export(file, name).data
+        for number in first_row.tolist():
+            data = data.replace(np.float64(number).tobytes(), np.float64(-number).tobytes())
+        if name == "numpy":
+            arrays = dict(np.load(io.BytesIO(export(file, name).data)))
+            arrays["camera_from_radar"][0] *= -1
+            buffer = io.BytesIO()
+            np.savez(buffer, **arrays)
+            data = buffer.getvalue()
+    else:
+        head, start, body = text_of(file, name).partition(repr(float(first_row[0])))
+        for number in first_row.tolist():
+            body = (start + body).replace(repr(number), repr(-number), 1)
+            start = ""
+        data = (head + body).encode()
+
+    with pytest.raises(InputError, match=r"file: .*left-handed.*an axis is mirrored"):
+        read_any(data, "file")
 
 
 def test_numbers_changed_without_a_known_slip_are_called_so(file):
@@ -323,6 +348,12 @@ def test_formats_that_cannot_hold_the_lens_say_so(file):
         (with_k3, "kalibr", "Kalibr's radtan model has no k3, which this camera uses"),
         (skewed, "kalibr", "Kalibr's pinhole model has no skew"),
         (skewed, "colmap", "COLMAP's models have no skew"),
+        (
+            skewed,
+            "opencv",
+            "OpenCV's camera models have no skew, this camera has; export with --to json, matlab or numpy",
+        ),
+        (skewed, "foxglove", "Foxglove's CameraCalibration has no skew"),
     ]
     for camera, name, words in cases:
         other = dataclasses.replace(file, calibration=dataclasses.replace(file.calibration, camera=camera))
