@@ -150,6 +150,14 @@ export interface StampColumns {
   nanosec: number[];
 }
 
+/** How the radar or the camera of the recording is read. */
+export interface SensorNote {
+  name: string;
+  topic: string;
+  clock: string;
+  about: string[];
+}
+
 /** Where the session is kept and what was found there. */
 export interface SessionNote {
   folder: string;
@@ -189,6 +197,7 @@ export interface RecordingNote {
   start: Stamp;
   radar: StampColumns;
   cautions: CautionRow[];
+  sensors: SensorNote[];
   session: SessionNote;
   version: string;
   option_groups: OptionGroup[];

@@ -25,11 +25,24 @@ function drawRecording() {
   const recording = state.recording;
   if (!recording) return;
   get("recording-name").textContent = recording.name;
-  const facts = [["radar", recording.radar_topic], ["camera", recording.image_topic], ["picture", `${recording.width_px} × ${recording.height_px} px`]];
-  get("recording-topics").replaceChildren(...facts.map(([name, value]) => make("span", "fact", [make("small", "", name), value])));
-  get("recording-topics").dataset.hint = facts.map(([name, value]) => `${name}: ${value}`).join("\n");
+  const picture = `${recording.width_px} × ${recording.height_px} px`;
+  get("recording-topics").replaceChildren(...recording.sensors.map(sensorFact), fact("picture", picture, `Every frame has ${picture}.`));
   get("status-right").textContent = `cocalib ${recording.version}`;
   get("status-right").dataset.hint = `Every click is kept at once in\n${recording.session.folder}`;
+}
+
+/** @param {string} name @param {string} value @param {string} hint */
+function fact(name, value, hint) {
+  const made = make("span", "fact", [make("small", "", name), value]);
+  made.dataset.hint = hint;
+  return made;
+}
+
+/** A topic; times of receiving stand out, since the driver's delay is in them. @param {import("./messages.js").SensorNote} sensor */
+function sensorFact(sensor) {
+  const made = fact(sensor.name, sensor.topic, [`${sensor.name}: ${sensor.topic}`, ...sensor.about].join("\n"));
+  if (sensor.clock === "receive") made.append(make("small", "by-receiving", "time of receiving"));
+  return made;
 }
 
 function drawStatus() {

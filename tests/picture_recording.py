@@ -37,6 +37,7 @@ class PictureRecording:
     video_start: str | None = None
     radar_frame: str = "radar"
     camera_frame: str = "camera_optical"
+    topics: tuple[Any, ...] = ()
     cautions: tuple[Any, ...] = ()
     paths: tuple[Path, ...] = ()
     radar_times: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))

@@ -17,6 +17,7 @@ from app.web.messages import (
     Placements,
     Progress,
     RecordingNote,
+    SensorNote,
     SessionNote,
     StampColumns,
     encode,
@@ -29,6 +30,7 @@ from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
 from calib_core.measurements import RadarScans, TimeNs
+from calib_core.recordings import TopicSummary, clock_lines
 from calib_core.results import Caution
 
 __all__ = ["Hub", "PageRecording", "Tab"]
@@ -46,6 +48,8 @@ class PageRecording(Protocol):
     def radar_topic(self) -> str | None: ...  # noqa: D102
     @property
     def image_topic(self) -> str | None: ...  # noqa: D102
+    @property
+    def topics(self) -> Sequence[TopicSummary]: ...  # noqa: D102
     @property
     def cautions(self) -> Sequence[Caution]: ...  # noqa: D102
     @property
@@ -156,9 +160,23 @@ class Hub:
                 CautionRow(row.code, sentence(row.message), sentence(row.hint))
                 for row in (*restored.cautions, *recording.cautions)
             ),
+            sensors=(
+                _sensor("radar", recording.radar_topic, recording.topics),
+                _sensor("camera", recording.image_topic, recording.topics),
+            ),
             session=SessionNote(str(restored.folder), len(restored.history.present.clicks), restored.note),
             version=version(),
         )
+
+
+def _sensor(name: str, chosen: str | None, topics: Sequence[TopicSummary]) -> SensorNote:
+    """Say how a sensor is read."""
+    topic = next((topic for topic in topics if topic.name == chosen), None)
+    if topic is None:
+        return SensorNote(name, chosen or "none")
+    clocks = () if topic.clocks is None else clock_lines(topic.clocks)
+    about = tuple(line for line in (topic.layout, *clocks) if line)
+    return SensorNote(name, topic.name, topic.clock if topic.clocks else "", about)
 
 
 def _soon(loop: asyncio.AbstractEventLoop, call: "partial[None]") -> None:

@@ -1,7 +1,8 @@
 """Recordings: ROS 1 and ROS 2 files in, radar scans, images and intrinsics out. Only here are containers known."""
 
+from calib_core.recordings.beginning import first_picture
 from calib_core.recordings.clock_diagnosis import ClockDiagnosis
-from calib_core.recordings.describing import describe
+from calib_core.recordings.describing import clock_lines, describe
 from calib_core.recordings.images import EncodedImage
 from calib_core.recordings.recording import InputFile, Recording, inspect_recording, open_recording, require_files
 from calib_core.recordings.selection import RecordingOptions
@@ -18,7 +19,9 @@ __all__ = [
     "RecordingSummary",
     "TopicSummary",
     "WrittenVideo",
+    "clock_lines",
     "describe",
+    "first_picture",
     "inspect_recording",
     "open_recording",
     "recording_summary",

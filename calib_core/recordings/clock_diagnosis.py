@@ -144,7 +144,7 @@ def diagnose(
 
 def _reason(stamps: Stamps, chosen: str, wish: Clock) -> str:
     if wish != "auto":
-        return f"asked for with --clock {wish}"
+        return f"it was asked for with --clock {wish}"
     fault = header_fault(stamps)
     if chosen == "header":
         return (

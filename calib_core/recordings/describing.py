@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from calib_core.recordings.calendar import span_text, utc
+from calib_core.recordings.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.summary import (
     CameraSummary,
@@ -13,7 +14,7 @@ from calib_core.recordings.summary import (
     recording_summary,
 )
 
-__all__ = ["describe", "summary_text"]
+__all__ = ["clock_lines", "describe", "summary_text"]
 
 _USE = {"radar": "radar", "image": "camera", "camera-info": "intrinsics"}
 
@@ -98,19 +99,21 @@ def _clocks(topics: Sequence[TopicReport]) -> list[str]:
     """Say, topic by topic, which clock is used, why, and what is known about both."""
     lines = []
     for topic in topics:
-        if (found := topic.clocks) is None:
-            continue
-        used = {"header": "stamps of measurement", "receive": "times of receiving"}[found.chosen]
-        lines.append(f"{topic.name}: {used}, because {found.reason}")
-        about = []
-        if found.delay_s is not None:
-            about.append(
-                f"received {_delay_text(found.delay_s)} the stamp (± {(found.delay_jitter_s or 0) * 1e3:.1f} ms)"
-            )
-        about.extend(found.remarks)
-        if about:
-            lines.append(f"  {'; '.join(about)}")
+        if topic.clocks is not None:
+            first, *others = clock_lines(topic.clocks)
+            lines.append(f"{topic.name}: {first}")
+            lines.extend(f"  {line}" for line in others)
     return lines
+
+
+def clock_lines(found: ClockDiagnosis) -> tuple[str, ...]:
+    """Say which clock a topic goes by and why; in a second line, where there is something, what is known about both."""
+    used = {"header": "stamps of measurement", "receive": "times of receiving"}[found.chosen]
+    about = []
+    if found.delay_s is not None:
+        about.append(f"received {_delay_text(found.delay_s)} the stamp (± {(found.delay_jitter_s or 0) * 1e3:.1f} ms)")
+    about.extend(found.remarks)
+    return (f"{used}, because {found.reason}", *(["; ".join(about)] if about else []))
 
 
 def _delay_text(delay_s: float) -> str:

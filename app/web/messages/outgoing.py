@@ -25,6 +25,7 @@ __all__ = [
     "Problem",
     "Progress",
     "RecordingNote",
+    "SensorNote",
     "SessionNote",
     "StampColumns",
     "encode",
@@ -66,6 +67,23 @@ class SessionNote:
 
 
 @dataclass(frozen=True, slots=True)
+class SensorNote:
+    """How the radar or the camera of the recording is read.
+
+    Attributes:
+        name: "radar" or "camera".
+        topic: its topic; "none" where there is none.
+        clock: what its times are by: "header" or "receive"; "" where that is not known.
+        about: what is read, which clock was chosen and why, and what is odd about it, line by line.
+    """
+
+    name: str
+    topic: str
+    clock: str = ""
+    about: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class RecordingNote:
     """The recording, told once to each page.
 
@@ -79,6 +97,7 @@ class RecordingNote:
         start: the stamp of the first frame.
         radar: the stamp of every radar scan.
         cautions: what is odd about the recording.
+        sensors: how the radar and the camera are read.
         session: where the work is kept.
         version: of the program.
         option_groups: how to draw the options; their values are in the view.
@@ -93,6 +112,7 @@ class RecordingNote:
     start: Stamp
     radar: StampColumns
     cautions: tuple[CautionRow, ...]
+    sensors: tuple[SensorNote, ...]
     session: SessionNote
     version: str
     option_groups: tuple[OptionGroup, ...] = field(default_factory=option_groups)

@@ -75,7 +75,7 @@ def test_islands_and_gaps_of_data_are_counted():
 def test_the_reason_for_the_clock_is_given():
     assert look(np.zeros(2000), chosen="receive").reason == "it has stamps that are all zero (2000 messages)"
     assert look(None, chosen="receive", times_ns=RECEIVE_NS).reason == "it carries no stamps"
-    assert look(SOUND_NS, chosen="receive", wish="receive").reason == "asked for with --clock receive"
+    assert look(SOUND_NS, chosen="receive", wish="receive").reason == "it was asked for with --clock receive"
     assert "cannot be compared" in look(SOUND_NS, chosen="receive").reason
     assert "both sensors have the same clock" in look(SOUND_NS - START_NS).reason
     assert "do not keep step with receiving" in look(changed(np.s_[1000:], 5 * NS_PER_S)).reason

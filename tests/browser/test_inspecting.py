@@ -1,0 +1,47 @@
+"""What the page says about the recording itself: how each sensor is read, by which clock and why, and what is odd."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.web.server import ServerOptions, start
+from app.workspace import open_workspace
+from calib_core.recordings import RecordingOptions, open_recording
+from tests.browser.driving import Driver
+
+pytestmark = pytest.mark.browser
+
+
+def test_clocks_axes_and_cautions_of_the_recording_are_on_the_page(
+    open_page: Callable[..., Driver], project_root: Path, tmp_path: Path
+) -> None:
+    folder = project_root / "sample_data" / "rooftop"
+    cut = tmp_path / "radar.bag"
+    whole = (folder / "radar.bag").read_bytes()
+    cut.write_bytes(whole[: len(whole) * 2 // 3])
+    options = RecordingOptions(clock="receive", radar_axes="forward,left,up")
+    with open_recording([cut, folder / "camera.bag"], options) as recording:
+        camera = recording.camera()
+        workspace = open_workspace(recording, camera=camera, session_folder=tmp_path / "s", name="cut")
+        running = start(workspace, recording, ServerOptions(port=0, token="test"))
+        try:
+            page = open_page(running.url)
+            facts = page.page.locator("#recording-topics .fact")
+            assert "time of receiving" in facts.nth(0).inner_text()
+            facts.nth(0).hover()
+            page.until("document.body.innerText.includes('because it was asked for with --clock receive')")
+            page.until("document.body.innerText.includes('axes as told: x forward, y left, z up')")
+            page.until("document.body.innerText.includes('after the stamp')")
+            box = page.text('#cautions [data-code="not-closed"]')
+            assert "whole messages were found by reading all of it" in box
+        finally:
+            running.close()
+            workspace.close()
+
+
+def test_a_recording_without_fault_stays_silent(page: Driver) -> None:
+    assert "time of receiving" not in page.text("#recording-topics")
+    assert page.page.locator("#cautions *").count() == 0
+    page.page.locator("#recording-topics .fact").nth(1).hover()
+    page.until("document.body.innerText.includes('because the stamps are sound')")
