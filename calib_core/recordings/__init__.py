@@ -1,6 +1,5 @@
 """Recordings: ROS 1 and ROS 2 files in, radar scans, images and intrinsics out. Only here are containers known."""
 
-from calib_core.recordings.beginning import first_picture
 from calib_core.recordings.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.describing import clock_lines, describe
 from calib_core.recordings.images import EncodedImage
@@ -21,7 +20,6 @@ __all__ = [
     "WrittenVideo",
     "clock_lines",
     "describe",
-    "first_picture",
     "inspect_recording",
     "open_recording",
     "recording_summary",
