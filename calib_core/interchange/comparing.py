@@ -45,6 +45,7 @@ class Comparison:
         pixels: at 5, 20 and 60 m; empty without a camera.
         chi2: squared distance in units of the covariances, 6 degrees of freedom; NaN where neither is known.
         p_value: chance of a chi2 this large if the two were independent and right; NaN where chi2 is.
+        covariances: how many of the two are known.
     """
 
     rotation_deg: float
@@ -54,6 +55,7 @@ class Comparison:
     pixels: tuple[PixelDifference, ...]
     chi2: float
     p_value: float
+    covariances: int
 
     def lines(self) -> tuple[str, ...]:
         """Return the comparison as lines for people."""
@@ -68,6 +70,8 @@ class Comparison:
             rows.append(
                 f"together: chi2 {shown(self.chi2)} for 6 degrees of freedom (p = {self.p_value:.2g} if the two are independent)"
             )
+        if self.covariances == 1:
+            rows.append("the uncertainty of one of the two is not known; the standard deviations are the other's alone")
         return tuple(rows)
 
 
@@ -90,7 +94,8 @@ def compare(a: ImportedCalibration, b: ImportedCalibration, *, camera: Camera | 
     """
     a_pose, b_pose = a.camera_from_radar, b.camera_from_radar
     error = b_pose.error_from(a_pose)
-    covariance = _summed_covariance(a, b)
+    known = _known_covariances(a, b)
+    covariance = np.sum(known, axis=0) if known else np.full((6, 6), np.nan)
     a_position_m, b_position_m = a_pose.inverse().translation_m, b_pose.inverse().translation_m
     position_jacobian = -a_pose.rotation.T @ np.hstack([np.eye(3), skew(a_pose.translation_m)])
     moved_m = b_position_m - a_position_m
@@ -104,16 +109,16 @@ def compare(a: ImportedCalibration, b: ImportedCalibration, *, camera: Camera | 
         pixels=tuple(_pixels(a, b, camera, distance_m, covariance) for distance_m in DISTANCES_M) if camera else (),
         chi2=chi2,
         p_value=p_value,
+        covariances=len(known),
     )
 
 
-def _summed_covariance(a: ImportedCalibration, b: ImportedCalibration) -> Matrix66:
-    known = [
+def _known_covariances(a: ImportedCalibration, b: ImportedCalibration) -> list[Matrix66]:
+    return [
         side.file.calibration.covariance
         for side in (a, b)
         if side.file is not None and np.isfinite(side.file.calibration.covariance).all()
     ]
-    return np.sum(known, axis=0) if known else np.full((6, 6), np.nan)
 
 
 def _sigma_along(direction: np.ndarray, covariance: np.ndarray) -> float:

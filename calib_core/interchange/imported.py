@@ -22,6 +22,8 @@ __all__ = [
     "Roles",
     "StatedCheckPoint",
     "WrittenPose",
+    "looks_like_camera",
+    "looks_like_radar",
     "posed_between",
 ]
 
@@ -191,9 +193,9 @@ def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
     if stated is not None and stated.radar in (parent, child):
         radar, camera = stated.radar, child if parent == stated.radar else parent
     else:
-        radar_first = not (_looks_like_radar(child) and not _looks_like_radar(parent))
+        radar_first = not (looks_like_radar(child) and not looks_like_radar(parent))
         radar, camera = (parent, child) if radar_first else (child, parent)
-        if not (_looks_like_radar(radar) and not _looks_like_radar(camera)):
+        if not (looks_like_radar(radar) and not looks_like_radar(camera)):
             notes.append(f"no word says which frame is the radar's; took {radar!r} for it")
     if stated is not None and camera in (stated.camera, stated.camera_link):
         axes: Axes = "optical" if camera == stated.camera else "link"
@@ -208,5 +210,11 @@ def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
     return Roles(direction, axes, frames, tuple(notes))
 
 
-def _looks_like_radar(name: str) -> bool:
+def looks_like_camera(name: str) -> bool:
+    """Tell whether a frame's name is one that people give to cameras."""
+    return bool(_CAMERA_NAME.search(name))
+
+
+def looks_like_radar(name: str) -> bool:
+    """Tell whether a frame's name is one that people give to radars."""
     return bool(_RADAR_NAME.search(name)) and not _CAMERA_NAME.search(name)

@@ -9,7 +9,13 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.camera_fields import floats
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
+from calib_core.interchange.imported import (
+    ImportedCalibration,
+    WrittenPose,
+    looks_like_camera,
+    looks_like_radar,
+    posed_between,
+)
 from calib_core.interchange.opencv_xml import parse_xml
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, OPTICAL_RPY_RAD, matrix_from_rpy, rpy_from_matrix
 from calib_core.interchange.statement import stated_check_point, stated_frames, statement, xml_comment
@@ -91,8 +97,7 @@ def _is_between(joint: Element, stated: FrameNames | None) -> bool:
     names = _ends(joint)
     if stated is not None:
         return stated.radar in names
-    radars = ["radar" in name.lower() for name in names]
-    return radars[0] != radars[1] or (any(radars) and "cam" in " ".join(names).lower())
+    return any(map(looks_like_radar, names)) and any(map(looks_like_camera, names))
 
 
 def _origin(joint: Element, *, source: str) -> tuple[tuple[float, ...], tuple[float, ...]]:

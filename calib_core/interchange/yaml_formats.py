@@ -11,7 +11,13 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.camera_document import refuse_skew
 from calib_core.interchange.camera_fields import find_cameras, floats
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
+from calib_core.interchange.imported import (
+    ImportedCalibration,
+    WrittenPose,
+    looks_like_camera,
+    looks_like_radar,
+    posed_between,
+)
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, quaternion_xyzw_from_matrix, rpy_from_matrix
 from calib_core.interchange.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.yaml_text import number_text, numbers_text, quoted
@@ -66,8 +72,8 @@ def read_autoware(content: Mapping[str, Any], text: str, source: str) -> Importe
     kit_name, kit = next(((str(key), value) for key, value in content.items() if _is_kit(value)), ("", {}))
     stated = stated_frames(text)
     kit = {str(name): entry for name, entry in kit.items() if isinstance(entry, Mapping)}
-    radars = [name for name in kit if (stated.radar == name if stated else "radar" in name.lower())]
-    cameras = [name for name in kit if name not in radars and (stated or "cam" in name.lower())]
+    radars = [name for name in kit if (stated.radar == name if stated else looks_like_radar(name))]
+    cameras = [name for name in kit if name not in radars and (stated or looks_like_camera(name))]
     if len(radars) != 1 or len(cameras) != 1:
         raise InputError(
             f"{source}: {kit_name}: holds {len(radars)} radars and {len(cameras)} cameras by name; keep one of each"

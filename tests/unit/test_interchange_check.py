@@ -412,3 +412,26 @@ def test_the_shell_gets_a_strange_frame_name_as_one_word(file, tmp_path):
     assert words[words.index("--frame-id") + 1] == strange.radar
     assert words[words.index("--child-frame-id") + 1] == strange.camera
     assert not (tmp_path / "was_run").exists()
+
+
+def test_a_comparison_says_whose_uncertainty_it_counts(file):
+    both = compare(imported(file), imported(file))
+    one = compare(imported(file), read_any(text_of(file, "tf2")))
+    none = compare(read_any(text_of(file, "tf2")), read_any(text_of(file, "tf2")))
+
+    assert (both.covariances, one.covariances, none.covariances) == (2, 1, 0)
+    assert both.rotation_sigma_deg == pytest.approx(np.sqrt(2) * one.rotation_sigma_deg)
+    assert "the other's alone" in one.lines()[-1]
+    assert not any("alone" in line or "standard deviation" in line for line in (*both.lines()[3:], *none.lines()))
+
+
+@pytest.mark.parametrize(
+    ("radar", "camera"), [("ti_mmwave_0", "camera_optical_frame"), ("front_ars540", "rgb_optical")]
+)
+@pytest.mark.parametrize("name", ["autoware", "urdf", "tf2", "apollo"])
+def test_sensors_are_told_by_the_names_people_give_them_where_no_words_do(file, name, radar, camera):
+    text = text_of(dataclasses.replace(file, frames=FrameNames(radar, camera)), name)
+    bare = re.sub(r"<!--.*?-->", "", without_comments(text), flags=re.DOTALL)
+
+    assert "check point" not in bare
+    assert check(read_any(bare.lstrip()), against=imported(file)).verdict == "right"
