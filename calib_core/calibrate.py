@@ -10,10 +10,11 @@ from calib_core.camera import Camera
 from calib_core.consensus import Consensus, associate, find_consensus
 from calib_core.diagnostics import cautions_of
 from calib_core.doubting import doubts_of, widened_by_doubts
-from calib_core.evidence import Evidence, Linearised, evidence_of
+from calib_core.evidence import Evidence, evidence_of
 from calib_core.findings import Findings
 from calib_core.handedness import MIRRORED_GAIN, mirror_gain
 from calib_core.initial_pose import starting_poses
+from calib_core.linearising import Linearised
 from calib_core.measurements import Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.metrics import distances, metrics_of
 from calib_core.options import CalibrationOptions

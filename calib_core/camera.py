@@ -69,19 +69,24 @@ class Camera:
 
     def project_with_jacobian(self, points_camera_m: Points3) -> tuple[Points2, np.ndarray]:
         """Project points and differentiate: pixels (n, 2) and d pixel / d point (n, 2, 3) [px/m]."""
-        points = np.asarray(points_camera_m, dtype=np.float64)
+        pixels, d_point = self.project_planes(np.ascontiguousarray(np.asarray(points_camera_m, dtype=np.float64).T))
+        return np.ascontiguousarray(pixels.T), np.ascontiguousarray(d_point.T)
+
+    def project_planes(self, points_camera_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Project and differentiate points given as planes, one row per coordinate: NumPy is quick along long rows.
+
+        Args:
+            points_camera_m: (..., 3, n), the leading axes those of any batch.
+
+        Returns:
+            Pixels (..., 2, n) and d pixel / d point (..., 3, 2, n): first the coordinate, then the pixel's row.
+        """
         if self.model == "equidistant":
-            plane, d_plane = _equidistant(points, self.distortion)
+            plane, d_plane = _equidistant(points_camera_m, self.distortion)
         else:
-            z = np.where(points[:, 2] > 0, points[:, 2], np.nan)
-            ideal = points[:, :2] / z[:, None]
-            d_ideal = np.zeros((len(points), 2, 3))
-            d_ideal[:, 0, 0] = d_ideal[:, 1, 1] = 1.0 / z
-            d_ideal[:, :, 2] = -ideal / z[:, None]
-            plane, d_distorted = _brown_conrady(ideal, _padded(self.distortion))
-            d_plane = d_distorted @ d_ideal
+            plane, d_plane = _through_lens(points_camera_m, _padded(self.distortion))
         linear = self.matrix_px[:2, :2]
-        return plane @ linear.T + self.matrix_px[:2, 2], linear @ d_plane
+        return linear @ plane + self.matrix_px[:2, 2:], linear @ d_plane
 
     def rays(self, pixels_px: Points2) -> Points3:
         """Return the unit direction (n, 3) in the camera frame that each pixel sees; NaN where the lens model has none."""
@@ -124,54 +129,68 @@ class Camera:
         )
 
 
-def _padded(distortion: Values) -> Values:
-    padded = np.zeros(8)
-    padded[: len(distortion)] = distortion
-    return padded
+def _padded(distortion: Values) -> list[float]:
+    return [*distortion.tolist(), *[0.0] * (8 - len(distortion))]
 
 
-def _brown_conrady(ideal: Points2, k: Values) -> tuple[Points2, np.ndarray]:
-    """Distort ideal image-plane points by the rational Brown-Conrady model: points (n, 2) and Jacobian (n, 2, 2)."""
+def _through_lens(points: np.ndarray, k: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Project points (..., 3, n) in front of the camera to the image plane (..., 2, n), with the Jacobian (..., 3, 2, n)."""
+    depth = points[..., 2, :]
+    inverse_z = 1.0 / np.where(depth > 0, depth, np.nan)
+    x, y = points[..., 0, :] * inverse_z, points[..., 1, :] * inverse_z
+    (distorted_x, distorted_y), (xx, xy, yy) = _brown_conrady(x, y, k)
+    plane = np.stack([distorted_x, distorted_y], axis=-2)
+    jacobian = np.empty((*points.shape[:-1], 2, points.shape[-1]))
+    jacobian[..., 0, 0, :] = xx * inverse_z
+    jacobian[..., 0, 1, :] = jacobian[..., 1, 0, :] = xy * inverse_z
+    jacobian[..., 1, 1, :] = yy * inverse_z
+    along_x, along_y = jacobian[..., 0, :, :], jacobian[..., 1, :, :]
+    jacobian[..., 2, :, :] = -(along_x * x[..., None, :] + along_y * y[..., None, :])
+    return plane, jacobian
+
+
+def _brown_conrady(x: Values, y: Values, k: list[float]) -> tuple[tuple[Values, Values], tuple[Values, Values, Values]]:
+    """Distort ideal image-plane points by the rational Brown-Conrady model.
+
+    Returns:
+        The distorted x and y, and the entries xx, xy = yx and yy of the Jacobian, which is symmetric.
+    """
     k1, k2, p1, p2, k3, k4, k5, k6 = k
-    x, y = ideal[:, 0], ideal[:, 1]
-    r2 = x * x + y * y
-    top = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    bottom = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6))
-    radial = top / bottom
-    d_top = k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2)
-    d_bottom = k4 + r2 * (2.0 * k5 + 3.0 * k6 * r2)
-    d_radial = (d_top - radial * d_bottom) / bottom  # d radial / d r2
-    distorted = np.stack(
-        [
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        ],
-        axis=1,
-    )
-    jacobian = np.empty((len(ideal), 2, 2))
-    jacobian[:, 0, 0] = radial + 2.0 * x * x * d_radial + 2.0 * p1 * y + 6.0 * p2 * x
-    jacobian[:, 1, 1] = radial + 2.0 * y * y * d_radial + 6.0 * p1 * y + 2.0 * p2 * x
-    jacobian[:, 0, 1] = jacobian[:, 1, 0] = 2.0 * x * y * d_radial + 2.0 * p1 * x + 2.0 * p2 * y
-    return distorted, jacobian
+    x2, y2, xy = x * x, y * y, x * y
+    r2 = x2 + y2
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    d_radial = k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2)  # d radial / d r2
+    if k4 or k5 or k6:
+        bottom = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        radial = radial / bottom
+        d_radial = (d_radial - radial * (k4 + r2 * (2.0 * k5 + 3.0 * k6 * r2))) / bottom
+    distorted_x = x * radial + 2.0 * p1 * xy + p2 * (r2 + 2.0 * x2)
+    distorted_y = y * radial + p1 * (r2 + 2.0 * y2) + 2.0 * p2 * xy
+    d_xx = radial + 2.0 * x2 * d_radial + 2.0 * p1 * y + 6.0 * p2 * x
+    d_yy = radial + 2.0 * y2 * d_radial + 6.0 * p1 * y + 2.0 * p2 * x
+    d_xy = 2.0 * xy * d_radial + 2.0 * p1 * x + 2.0 * p2 * y
+    return (distorted_x, distorted_y), (d_xx, d_xy, d_yy)
 
 
-def _undistorted(plane: Points2, k: Values) -> Points2:
+def _undistorted(plane: Points2, k: list[float]) -> Points2:
     """Invert the Brown-Conrady model by Newton's method; NaN where it does not come back to the pixel."""
-    ideal = plane.copy()
+    wanted_x, wanted_y = plane.T.copy()
+    x, y = wanted_x, wanted_y
     with np.errstate(all="ignore"):
         for _ in range(_NEWTON_STEPS):
-            distorted, jacobian = _brown_conrady(ideal, k)
-            error = distorted - plane
-            determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
-            step_x = (jacobian[:, 1, 1] * error[:, 0] - jacobian[:, 0, 1] * error[:, 1]) / determinant
-            step_y = (jacobian[:, 0, 0] * error[:, 1] - jacobian[:, 1, 0] * error[:, 0]) / determinant
-            step = np.stack([step_x, step_y], axis=1)
-            length = np.linalg.norm(step, axis=1, keepdims=True)
-            ideal = ideal - step * np.minimum(1.0, 0.5 / np.where(length > 0, length, 1.0))
-            if np.nanmax(np.abs(step), initial=0.0) < _NEWTON_TOLERANCE:
+            (distorted_x, distorted_y), (d_xx, d_xy, d_yy) = _brown_conrady(x, y, k)
+            error_x, error_y = distorted_x - wanted_x, distorted_y - wanted_y
+            determinant = d_xx * d_yy - d_xy * d_xy
+            step_x = (d_yy * error_x - d_xy * error_y) / determinant
+            step_y = (d_xx * error_y - d_xy * error_x) / determinant
+            length = np.hypot(step_x, step_y)
+            held = np.minimum(1.0, 0.5 / np.where(length > 0, length, 1.0))
+            x, y = x - step_x * held, y - step_y * held
+            if np.fmax.reduce(length, initial=0.0) < _NEWTON_TOLERANCE:  # NaN does not count
                 break
-        distorted, _ = _brown_conrady(ideal, k)
-        missed = ~(np.linalg.norm(distorted - plane, axis=1) < 1e-9)
+        (distorted_x, distorted_y), _ = _brown_conrady(x, y, k)
+        missed = ~(np.hypot(distorted_x - wanted_x, distorted_y - wanted_y) < 1e-9)
+    ideal = np.stack([x, y], axis=1)
     ideal[missed] = np.nan
     return ideal
 
@@ -185,9 +204,9 @@ def _equidistant_angle(theta: Values, k: Values) -> tuple[Values, Values]:
     return distorted, slope
 
 
-def _equidistant(points: Points3, k: Values) -> tuple[Points2, np.ndarray]:
-    """Project by OpenCV's fisheye model: image-plane points (n, 2) and Jacobian (n, 2, 3)."""
-    x, y, z = points.T
+def _equidistant(points: np.ndarray, k: Values) -> tuple[np.ndarray, np.ndarray]:
+    """Project points (..., 3, n) by OpenCV's fisheye model: image plane (..., 2, n) and Jacobian (..., 3, 2, n)."""
+    x, y, z = points[..., 0, :], points[..., 1, :], points[..., 2, :]
     a = np.hypot(x, y)
     n2 = a * a + z * z
     theta = np.arctan2(a, z)
@@ -200,13 +219,13 @@ def _equidistant(points: Points3, k: Values) -> tuple[Points2, np.ndarray]:
     d_scale_a = np.where(on_axis, 0.0, (slope * z / safe_n2 - scale) / safe_a)
     d_scale_z = -slope / safe_n2
     cos_a, sin_a = np.where(on_axis, 0.0, x / safe_a), np.where(on_axis, 0.0, y / safe_a)
-    jacobian = np.empty((len(points), 2, 3))
+    jacobian = np.empty((*points.shape[:-1], 2, points.shape[-1]))
     for row, component in enumerate((x, y)):
-        jacobian[:, row, 0] = component * d_scale_a * cos_a
-        jacobian[:, row, 1] = component * d_scale_a * sin_a
-        jacobian[:, row, row] += scale
-        jacobian[:, row, 2] = component * d_scale_z
-    return np.stack([scale * x, scale * y], axis=1), jacobian
+        jacobian[..., 0, row, :] = component * d_scale_a * cos_a
+        jacobian[..., 1, row, :] = component * d_scale_a * sin_a
+        jacobian[..., row, row, :] += scale
+        jacobian[..., 2, row, :] = component * d_scale_z
+    return np.stack([scale * x, scale * y], axis=-2), jacobian
 
 
 def _equidistant_rays(plane: Points2, k: Values) -> Points3:

@@ -1,15 +1,4 @@
-"""What the pairs say, as arrays, and the linear model that every solver stage shares.
-
-A pair is a pixel z with covariance C = sigma_px^2 I, and a measured polar position m = (range, azimuth, elevation) with
-covariance V = diag(sigma_polar^2). With pi the projection and p(mu) the Cartesian position of polar mu, the model is
-
-    z = pi(R p(mu) + t) + noise(C),    m = mu + noise(V).                                                  (1)
-
-Linearised at a true position mu, with J = d pi / d mu and e = z - pi(R p(mu) + t) - J (m - mu), the unknown positions
-drop out (the Schur complement of the joint problem):
-
-    e ~ N(0, S),    S = C + J V J^T.                                                                       (2)
-"""
+"""What the pairs say, as arrays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,14 +8,14 @@ import numpy as np
 from calib_core.arrays import Matrix33, Points2, Points3, TimesNs, Values, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, skew
+from calib_core.linearising import Measured
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions
-from calib_core.radar import cartesian_from_polar, cartesian_jacobian, polar_from_cartesian
+from calib_core.radar import polar_from_cartesian
 
-__all__ = ["CameraBelief", "Evidence", "Linearised", "evidence_of", "linearise", "with_respect_to_pose"]
+__all__ = ["CameraBelief", "Evidence", "evidence_of"]
 
 _FLAT_SIGMA_RAD = np.deg2rad(10.0)  # elevation of a radar that always reports 0: unknown, not zero
-_FAR = 1e6  # whitened residual of a position the camera cannot see
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,14 +47,31 @@ class CameraBelief:
         jacobian = np.concatenate([-rotation.T, -rotation.T @ skew(translation_m)], axis=1)
         return away_m / sigma_m, jacobian / sigma_m
 
+    def information(self, rotations: np.ndarray, translations_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return J^T J (..., 6, 6) and J^T residual (..., 6) of `rows` at poses (..., 3, 3) and (..., 3).
+
+        In camera axes the residual is -(R c0 + t) and its Jacobian (I, [t]x): the same up to a rotation, which both forget.
+        """
+        missed = -(rotations @ self.position_m + translations_m)
+        variance = self.sigma_m**2
+        if not self.measured:
+            variance = variance + (missed**2).sum(axis=-1)[..., None]
+        x, y, z = translations_m[..., 0], translations_m[..., 1], translations_m[..., 2]
+        jacobian = np.zeros((*translations_m.shape, 6))
+        jacobian[..., 0, 0] = jacobian[..., 1, 1] = jacobian[..., 2, 2] = 1.0
+        jacobian[..., 0, 4], jacobian[..., 0, 5], jacobian[..., 1, 5] = -z, y, -x
+        jacobian[..., 1, 3], jacobian[..., 2, 3], jacobian[..., 2, 4] = z, -y, x
+        turned = np.swapaxes(jacobian, -1, -2)
+        gradient = (turned @ missed[..., None])[..., 0] / variance
+        return (turned @ jacobian) / np.asarray(variance)[..., None], gradient
+
     def freed(self) -> "CameraBelief":
         """Return the same position as a guess only, a metre or more wide."""
         return replace(self, sigma_m=max(self.sigma_m, 1.0), measured=False)
 
-    def cost(self, camera_from_radar: RigidTransform) -> float:
-        """Return twice the negative log-probability of a pose's camera centre, up to a constant."""
-        away_m = self.position_m + camera_from_radar.rotation.T @ camera_from_radar.translation_m
-        return float(away_m @ away_m) / self.sigma_m**2
+    def costs(self, rotations: np.ndarray, translations_m: np.ndarray) -> Values:
+        """Return twice the negative log-probability of each pose's camera centre (s,), up to a constant."""
+        return np.asarray(((rotations @ self.position_m + translations_m) ** 2).sum(axis=-1) / self.sigma_m**2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,7 +113,7 @@ class Evidence:
 
     def some(self, pairs: TimesNs) -> "Evidence":
         """Keep the pairs of the given indices, with their candidates."""
-        rows = np.concatenate([np.arange(self.first[i], self.first[i + 1]) for i in pairs])
+        rows = pairs if self.one_to_one else np.concatenate([np.arange(*self.first[i : i + 2]) for i in pairs])
         return replace(
             self,
             pixels_px=self.pixels_px[pairs],
@@ -116,6 +122,12 @@ class Evidence:
             polar=self.polar[rows],
             sigma_polar=self.sigma_polar[rows],
             log_score=self.log_score[rows],
+        )
+
+    def measured(self, rows: TimesNs) -> Measured:
+        """Take one candidate row per pair (n,), as planes."""
+        return Measured(
+            self.pixels_px.T.copy(), self.sigma_px, self.polar[rows].T.copy(), self.sigma_polar[rows].T.copy()
         )
 
     def candidates_apart(self) -> "Evidence":
@@ -162,103 +174,3 @@ def _belief(options: CalibrationOptions) -> CameraBelief:
     if measured is None:
         return CameraBelief(np.zeros(3), options.solving.nominal_camera_distance_m, measured=False)
     return CameraBelief(np.array(measured.position_m), measured.sigma_m, measured=True)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Linearised:
-    """Equation (2) at one pose, whitened by W with W S W^T = I, so that plain least squares is maximum likelihood.
-
-    Attributes:
-        residual: (n, 2) W e.
-        pose_jacobian: (n, 2, 6) W d pixel / d (dt, dtheta).
-        point_jacobian: (n, 2, 3) W d pixel / d polar.
-        log_determinant: (n,) of S.
-        whitening: (n, 2, 2) W.
-    """
-
-    residual: Points2
-    pose_jacobian: np.ndarray
-    point_jacobian: np.ndarray
-    log_determinant: Values
-    whitening: np.ndarray
-
-    @property
-    def squared(self) -> Values:
-        """Squared Mahalanobis distance of each residual: (n,)."""
-        return np.asarray(self.residual[:, 0] ** 2 + self.residual[:, 1] ** 2)
-
-
-def linearise(
-    camera_from_radar: RigidTransform,
-    camera: Camera,
-    *,
-    pixels_px: Points2,
-    sigma_px: Values,
-    polar: Points3,
-    sigma_polar: Points3,
-    at_polar: Points3 | None = None,
-) -> Linearised:
-    """Linearise and whiten the projection of measured positions about a pose.
-
-    Args:
-        camera_from_radar: the pose.
-        camera: the intrinsics.
-        pixels_px: (n, 2) clicks.
-        sigma_px: (n,).
-        polar: (n, 3) measured range [m], azimuth, elevation [rad].
-        sigma_polar: (n, 3).
-        at_polar: (n, 3) the true positions mu to linearise at; None takes the measured ones.
-    """
-    mu = polar if at_polar is None else at_polar
-    turned_m = cartesian_from_polar(mu) @ camera_from_radar.rotation.T
-    projected_px, d_point = camera.project_with_jacobian(turned_m + camera_from_radar.translation_m)
-    point_jacobian = d_point @ (camera_from_radar.rotation @ cartesian_jacobian(mu))
-    residual_px = pixels_px - projected_px
-    if at_polar is not None:
-        residual_px = residual_px - (point_jacobian @ (polar - mu)[:, :, None])[:, :, 0]
-    whitening, log_determinant = _whitening(point_jacobian, sigma_px, sigma_polar)
-    residual = (whitening @ residual_px[:, :, None])[:, :, 0]
-    pose_jacobian = with_respect_to_pose(d_point, turned_m)
-    unseen = ~np.isfinite(residual).all(axis=1)
-    return Linearised(
-        residual=np.where(unseen[:, None], _FAR, residual),
-        pose_jacobian=_cleared(whitening @ pose_jacobian, unseen),
-        point_jacobian=_cleared(whitening @ point_jacobian, unseen),
-        log_determinant=np.where(unseen, 0.0, log_determinant),
-        whitening=_cleared(whitening, unseen),
-    )
-
-
-def with_respect_to_pose(d_point: np.ndarray, turned_m: Points3) -> np.ndarray:
-    """Turn d pixel / d camera point (n, 2, 3) into d pixel / d (dt, dtheta) (n, 2, 6).
-
-    With R = Exp(dtheta) R_hat, d (R p) / d theta = -[R p]x; a row j times -[q]x is the cross product q x j.
-
-    Args:
-        d_point: (n, 2, 3) [px/m].
-        turned_m: (n, 3) R p, the points in camera axes before the translation.
-    """
-    x, y, z = turned_m[:, 0, None], turned_m[:, 1, None], turned_m[:, 2, None]
-    a, b, c = d_point[:, :, 0], d_point[:, :, 1], d_point[:, :, 2]
-    return np.stack([a, b, c, y * c - z * b, z * a - x * c, x * b - y * a], axis=2)
-
-
-def _cleared(rows: np.ndarray, unseen: np.ndarray) -> np.ndarray:
-    return np.where(unseen[:, None, None], 0.0, rows) if unseen.any() else rows
-
-
-def _whitening(point_jacobian: np.ndarray, sigma_px: Values, sigma_polar: Points3) -> tuple[np.ndarray, Values]:
-    """Return W with W S W^T = I for S = C + J V J^T by the Cholesky factor of the 2 x 2, and log det S."""
-    noisy = point_jacobian * sigma_polar[:, None, :]
-    click = sigma_px**2
-    uu = (noisy[:, 0] ** 2).sum(axis=1) + click
-    uv = (noisy[:, 0] * noisy[:, 1]).sum(axis=1)
-    vv = (noisy[:, 1] ** 2).sum(axis=1) + click
-    a = np.sqrt(uu)
-    b = uv / a
-    c = np.sqrt(vv - b * b)
-    whitening = np.zeros((len(uu), 2, 2))
-    whitening[:, 0, 0] = 1.0 / a
-    whitening[:, 1, 0] = -b / (a * c)
-    whitening[:, 1, 1] = 1.0 / c
-    return whitening, 2.0 * (np.log(a) + np.log(c))

@@ -38,6 +38,20 @@ def rotation_exp(rotation_vector_rad: Vector3) -> Matrix33:
     return np.eye(3) + np.sin(angle) / angle * K + (1.0 - np.cos(angle)) / angle**2 * K @ K
 
 
+def rotations_exp(rotation_vectors_rad: np.ndarray) -> np.ndarray:
+    """Turn rotation vectors (n, 3) into matrices (n, 3, 3), as `rotation_exp` does one."""
+    angles = np.linalg.norm(rotation_vectors_rad, axis=1)[:, None, None]
+    small = angles < _SMALL_ANGLE_RAD
+    safe = np.where(small, 1.0, angles)
+    x, y, z = rotation_vectors_rad.T
+    K = np.zeros((len(rotation_vectors_rad), 3, 3))
+    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -z, y, -x
+    K[:, 1, 0], K[:, 2, 0], K[:, 2, 1] = z, -y, x
+    first = np.where(small, 1.0, np.sin(safe) / safe)
+    second = np.where(small, 0.5, (1.0 - np.cos(safe)) / safe**2)
+    return np.asarray(np.eye(3) + first * K + second * (K @ K))
+
+
 def rotation_log(rotation: Matrix33) -> Vector3:
     """Turn a rotation matrix into its rotation vector [rad], of length 0 to pi.
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points2, Points3
 from calib_core.camera import Camera
-from calib_core.evidence import linearise
 from calib_core.geometry import RigidTransform
+from calib_core.linearising import linearise
 from calib_core.options import CalibrationOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Caution

@@ -13,6 +13,7 @@ __all__ = [
     "covariance_from_sigma_polar",
     "direction_cosines",
     "polar_from_cartesian",
+    "position_planes",
 ]
 
 
@@ -24,6 +25,23 @@ def cartesian_from_polar(polar: Points3) -> Points3:
     return np.stack(
         [across * np.cos(azimuth_rad), across * np.sin(azimuth_rad), range_m * np.sin(elevation_rad)], axis=-1
     )
+
+
+def position_planes(polar: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Turn polar planes (3, n) into positions (3, n) [m] and d position / d polar (3, 3, n), position first.
+
+    The same as `cartesian_from_polar` and `cartesian_jacobian`, laid out for speed: one row per coordinate.
+    """
+    range_m = polar[0]
+    (cos_azimuth, cos_elevation), (sin_azimuth, sin_elevation) = np.cos(polar[1:]), np.sin(polar[1:])
+    direction = np.array([cos_elevation * cos_azimuth, cos_elevation * sin_azimuth, sin_elevation])
+    position = range_m * direction
+    jacobian = np.zeros((3, 3, polar.shape[1]))
+    jacobian[:, 0] = direction
+    jacobian[0, 1], jacobian[1, 1] = -position[1], position[0]
+    jacobian[0, 2], jacobian[1, 2] = -position[2] * cos_azimuth, -position[2] * sin_azimuth
+    jacobian[2, 2] = range_m * cos_elevation
+    return position, jacobian
 
 
 def polar_from_cartesian(points_radar_m: Points3) -> Points3:

@@ -14,15 +14,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from calib_core.arrays import Points3, TimesNs, Values
+from calib_core.arrays import Matrix66, TimesNs, Values
 from calib_core.consensus import Consensus, associate, log_odds_of, normal_equations
-from calib_core.evidence import Evidence, Linearised, linearise
+from calib_core.evidence import Evidence
 from calib_core.geometry import RigidTransform
+from calib_core.linearising import Linearised, Measured
 from calib_core.predicting import (
     COMPONENTS,
     PSEUDO_SHARED,
     NoiseParts,
     Predicted,
+    Symmetric,
     noise_parts,
     predict,
     shrunk_scales,
@@ -71,8 +73,11 @@ class _State:
     """Where the rounds stand; lives only inside `refine`."""
 
     pose: RigidTransform
-    polar: Points3 | None
+    polar: np.ndarray | None
+    """(3, n) true positions"""
     rows: TimesNs
+    measured: Measured
+    """of those rows, with the noise of the round"""
     scale: Values
     share: float
     weights: Values = field(default_factory=lambda: np.zeros(0))
@@ -86,19 +91,21 @@ def refine(evidence: Evidence, start: Consensus, *, estimate_scale: bool) -> Ref
         start: where graduated non-convexity ended.
         estimate_scale: estimate variance components once there are enough pairs.
     """
-    state = _State(start.camera_from_radar, None, np.zeros(0, dtype=np.int64), np.full(4, start.noise_scale), 0.8)
-    state.rows = associate(evidence, state.pose)[0]
-    state.weights = _first_weights(evidence.scaled(state.scale), state)
+    rows = associate(evidence, start.camera_from_radar)[0]
+    scale = np.full(4, start.noise_scale)
+    noisy = evidence.scaled(scale)
+    state = _State(start.camera_from_radar, None, rows, noisy.measured(rows), scale, 0.8)
+    state.weights = _first_weights(noisy, state)
     degrees = 0.0
     for round_ in range(_MOST_ROUNDS):
         noisy = evidence.scaled(state.scale)
         weigh = round_ <= _ROUNDS_BEFORE_SCALES or round_ % _ROUNDS_PER_WEIGHING == 0
         model, parts = _expect(noisy, state, weigh=weigh, scaled=degrees > 0.0)
-        step = _maximise(noisy, state, model)
+        step, hessian = _maximise(noisy, state, model)
         moved = 0.0
         if estimate_scale and round_ >= _ROUNDS_BEFORE_SCALES and state.weights.sum() >= _LEAST_PAIRS_FOR_SCALES:
             before = state.scale
-            state.scale, degrees = _variance_components(noisy, state, model, parts)
+            state.scale, degrees = _variance_components(state, model, parts, hessian)
             moved = float(np.abs(np.log(state.scale / before)).max())
         if step < _STEP_TOLERANCE and moved < 1e-6 and weigh and round_ > _ROUNDS_BEFORE_SCALES:
             break
@@ -122,8 +129,9 @@ def _expect(evidence: Evidence, state: _State, *, weigh: bool, scaled: bool) -> 
     if not evidence.one_to_one:
         rows = associate(evidence, state.pose)[0]
         if state.polar is not None:
-            state.polar = np.where((rows == state.rows)[:, None], state.polar, evidence.polar[rows])
+            state.polar = np.where(rows == state.rows, state.polar, evidence.polar[rows].T)
         state.rows = rows
+    state.measured = evidence.measured(state.rows)
     model = _model(evidence, state)
     parts = noise_parts(evidence, model, evidence.sigma_polar[state.rows])
     if not weigh:
@@ -145,19 +153,12 @@ def _log_odds(evidence: Evidence, state: _State, model: Linearised, predicted: P
 
 
 def _model(evidence: Evidence, state: _State) -> Linearised:
-    return linearise(
-        state.pose,
-        evidence.camera,
-        pixels_px=evidence.pixels_px,
-        sigma_px=evidence.sigma_px,
-        polar=evidence.polar[state.rows],
-        sigma_polar=evidence.sigma_polar[state.rows],
-        at_polar=state.polar,
-    )
+    pose = state.pose
+    return state.measured.linearised(evidence.camera, pose.rotation, pose.translation_m, state.polar)
 
 
-def _maximise(evidence: Evidence, state: _State, model: Linearised) -> float:
-    """Step pose and true positions (M-step); return the step's length in standard deviations."""
+def _maximise(evidence: Evidence, state: _State, model: Linearised) -> tuple[float, Matrix66]:
+    """Step pose and true positions (M-step); return the step's length in standard deviations, and the Hessian."""
     hessian, gradient = normal_equations(evidence, state.pose, model, state.weights)
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
     step = np.linalg.solve(hessian / np.outer(scale, scale) + 1e-12 * np.eye(6), gradient / scale) / scale
@@ -165,26 +166,26 @@ def _maximise(evidence: Evidence, state: _State, model: Linearised) -> float:
     step = step / longest
     state.pose = state.pose.perturbed(step)
     # mu = m + V J^T S^-1 (e - J_pose step), from the eliminated equations
-    left = model.residual - (model.pose_jacobian @ step)
-    pull = (np.swapaxes(model.point_jacobian, 1, 2) @ left[:, :, None])[:, :, 0]
-    polar = evidence.polar[state.rows]
-    near = (left[:, 0] ** 2 + left[:, 1] ** 2) < _NEAR**2
-    state.polar = np.where(near[:, None], polar + evidence.sigma_polar[state.rows] ** 2 * pull, polar)
-    return float(np.sqrt(max(step @ hessian @ step, 0.0)))
+    left = model.planes[0] - (step @ model.planes[1:7].reshape(6, -1)).reshape(2, -1)
+    pull = (model.planes[7:] * left).sum(axis=1)
+    near = left[0] ** 2 + left[1] ** 2 < _NEAR**2
+    polar = state.measured.polar
+    state.polar = np.where(near, polar + state.measured.sigma_polar**2 * pull, polar)
+    return float(np.sqrt(max(step @ hessian @ step, 0.0))), hessian
 
 
 def _variance_components(
-    evidence: Evidence, state: _State, model: Linearised, parts: NoiseParts
+    state: _State, model: Linearised, parts: NoiseParts, hessian: Matrix66
 ) -> tuple[Values, float]:
     """Update the four noise scales from residuals and their redundancy numbers.
 
     With P = W^T (I - w J_pose H^-1 J_pose^T) W, component k with covariance Q_k of the residual has
     q_k = e^T S^-1 Q_k S^-1 e and redundancy r_k = tr(P Q_k); its variance changes by q_k / r_k.
     """
-    weights = state.weights
-    hessian, _ = normal_equations(evidence, state.pose, model, weights)
-    taken = ((parts.pose_jacobian @ np.linalg.inv(hessian)) * parts.pose_jacobian).sum(axis=2)
-    redundant = weights @ ((parts.columns**2).sum(axis=1) - weights[:, None] * taken)
-    squares = (weights @ parts.along**2) @ COMPONENTS
+    weights, jacobian = state.weights, model.planes[1:7]
+    back = (np.linalg.inv(hessian) @ jacobian.reshape(6, -1)).reshape(jacobian.shape)
+    taken = parts.squared_lengths(Symmetric.between(jacobian, back))
+    redundant = ((parts.planes**2).sum(axis=1) - weights * taken) @ weights
+    squares = (parts.along**2 @ weights) @ COMPONENTS
     redundant = np.maximum(redundant @ COMPONENTS, 0.0)
     return shrunk_scales(squares * state.scale**2, redundant), float(redundant.sum()) + PSEUDO_SHARED

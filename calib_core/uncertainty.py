@@ -8,8 +8,8 @@ from calib_core.angle_errors import pose_spread
 from calib_core.arrays import Matrix66, Points2, Points3, Values
 from calib_core.camera import Camera
 from calib_core.consensus import normal_equations
-from calib_core.evidence import with_respect_to_pose
 from calib_core.geometry import RigidTransform
+from calib_core.linearising import with_respect_to_pose
 from calib_core.radar import cartesian_from_polar
 from calib_core.refining import Refined
 from calib_core.results import Calibration
