@@ -216,7 +216,7 @@ function show(content, name, isBinary) {
 }
 
 function parentFields() {
-  const label = make("span", "", "Pose of the radar in the kit or ego frame");
+  const label = make("span", "", "Pose of the radar in the kit, rig or ego frame");
   label.dataset.hint = "parent_from_radar: position in metres, rotation as a quaternion in the order x y z w. As it stands, the radar is the origin.";
   const fields = PARENT.map((name, index) => {
     const field = make("input", "", []);

@@ -21,11 +21,12 @@ const COLOURS = ["var(--axis-x)", "var(--axis-y)", "var(--axis-z)"];
  */
 export function frameDrawing(preview) {
   const svg = shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "frames", role: "img" });
-  const inFile = preview.carries === "radar_from_camera" ? "The file states the pose of the camera in the radar." : "";
+  const body = preview.axes === "link";
+  const inFile = preview.carries === "radar_from_camera" ? `The file states the pose of the camera${body ? "'s body frame" : ""} in the radar.` : "";
   svg.append(said(`Points are carried from ${preview.radar_frame} to ${preview.camera_frame}: p_camera = R p_radar + t. ${inFile}`));
   svg.append(arrow(RADAR, CAMERA, 0, "carry"), label(136, 70, "R, t", "equation"), label(WIDTH / 2, 176, "p_camera = R p_radar + t", "equation"));
   if (preview.carries === "radar_from_camera") {
-    svg.append(arrow(CAMERA, RADAR, 13, "stated"), label(WIDTH / 2, 196, "⇠ in this file: the pose of the camera", "stated"));
+    svg.append(arrow(CAMERA, RADAR, 13, "stated"), label(WIDTH / 2, 196, `⇠ in this file: the pose of ${body ? "its body frame (x forward)" : "the camera"}`, "stated"));
   } else svg.append(label(WIDTH / 2, 196, "in this file: the same R and t", "stated"));
   const unit = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
   axes(svg, RADAR, unit);

@@ -12,6 +12,7 @@ from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange import (
     FORMATS,
     CalibrationFile,
+    CheckReport,
     ExportBytes,
     ExportText,
     check,
@@ -56,6 +57,7 @@ class ExportPreview:
         numbers: what the file's numbers are.
         notes: what a person must know who uses it.
         carries: which way the pose in the file carries points, as it is read back.
+        axes: of the camera frame whose pose the file states: optical, or its body frame.
         check: what `cocalib check` says about the file.
         check_is_good: whether it found nothing wrong.
         radar_frame: name of the radar's frame.
@@ -74,6 +76,7 @@ class ExportPreview:
     numbers: str
     notes: tuple[str, ...]
     carries: Literal["camera_from_radar", "radar_from_camera"]
+    axes: Literal["optical", "link"]
     check: str
     check_is_good: bool
     radar_frame: str
@@ -147,9 +150,8 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         numbers=sentence(format_named(key).numbers),
         notes=tuple(sentence(note) for note in written.notes),
         carries=report.imported.pose.direction,
-        check=f"Read back: {report.findings[0].message}."
-        if report.findings
-        else "Read back; it states no check point.",
+        axes=report.imported.pose.axes,
+        check=_read_back(report),
         check_is_good=report.ok,
         radar_frame=file.frames.radar,
         camera_frame=file.frames.camera,
@@ -158,6 +160,12 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         quaternion_xyzw=(*wxyz[1:], wxyz[0]),
         cautions=tuple(CautionRow(row.code, sentence(row.message), sentence(row.hint)) for row in cautions),
     )
+
+
+def _read_back(report: CheckReport) -> str:
+    """Say in one line what reading the file back has shown."""
+    first = report.findings[0]
+    return "Read back: the pose is the one solved." if first.code == "agrees" else f"Read back: {first.message}."
 
 
 def _slug(name: str) -> str:

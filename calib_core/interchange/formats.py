@@ -97,7 +97,7 @@ class ExportBytes:
     notes: tuple[str, ...] = ()
 
 
-_POSE_ONLY = ("carries the pose only: keep your camera_info, or export the camera with --to opencv",)
+_POSE_ONLY = ("carries the pose only: keep your camera_info, or export opencv too, which carries the camera",)
 _KIT = (
     "poses are in sensor_kit_base_link; the radar is put at the kit's origin (parent_from_radar places it elsewhere)",
     *_POSE_ONLY,

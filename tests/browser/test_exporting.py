@@ -73,6 +73,8 @@ def test_the_drawing_says_which_way_the_numbers_of_the_file_go(solved: Driver) -
         choose(solved, name)
         expect(solved.page.locator(f"{DIALOG} .frames .equation").last).to_have_text("p_camera = R p_radar + t")
         expect(solved.page.locator(f"{DIALOG} .frames g.stated")).to_have_count(stated)
+        said = solved.page.locator(f"{DIALOG} .frames text.stated")
+        expect(said).to_contain_text({"urdf": "its body frame", "tf2": "the camera"}.get(name, "the same R and t"))
     assert "quaternion_xyzw" in solved.text(f"{DIALOG} .pose-numbers")
 
 
