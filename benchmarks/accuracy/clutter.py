@@ -56,7 +56,7 @@ class Scene:
 
 
 SCENES = (
-    Scene("field, one weak object", objects=1, rcs_dbsm=(2.0, 2.0)),
+    Scene("field, 4 weak objects", objects=4, rcs_dbsm=(4.0, 5.0)),
     Scene("field, 3 objects", objects=3, rcs_dbsm=(3.0, 9.0)),
     Scene("field, 3 objects and a person", objects=3, rcs_dbsm=(3.0, 9.0), person=True, strays=0.1),
     Scene("field, 6 objects stronger than the reflector", objects=6, rcs_dbsm=(14.0, 22.0)),

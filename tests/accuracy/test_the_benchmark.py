@@ -1,0 +1,95 @@
+"""The benchmark itself: it goes on where it stopped, does not depend on processes, and writes what it found."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.accuracy.__main__ import TABLES, sections
+from benchmarks.accuracy.cases import Case, bound_of, draw
+from benchmarks.accuracy.efficiency import failed, measure_ours
+from benchmarks.accuracy.figures import MET, MISSED, UNDECIDED, Measured, at_most, ratio, share, within
+from benchmarks.accuracy.keeping import Keeper
+from benchmarks.accuracy.page import page
+from benchmarks.accuracy.rows import Figures, Row
+from benchmarks.accuracy.running import kept_figures, run
+
+CASE = Case("ti", 10, 0.1)
+
+
+def row(trials: int = 11) -> Row:
+    return Row(f"ours-{CASE.key}", trials, partial(measure_ours, CASE))
+
+
+def never(trial: int) -> Figures:
+    raise AssertionError(f"trial {trial} has been measured already")
+
+
+def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    keeper = Keeper(tmp_path)
+    run([row()], keeper, jobs=1, most=3)
+    path = tmp_path / f"{row().key}.jsonl"
+    path.write_text(path.read_text() + '{"trial": 3, "fig')  # killed in the middle of a line
+    assert len(kept_figures([row()], keeper)[row().key]) == 3
+    run([row()], keeper, jobs=1, most=5)
+    again = kept_figures([row()], keeper)[row().key]
+    assert again == tuple(measure_ours(CASE, trial) for trial in range(5))
+    run([Row(row().key, 5, never)], keeper, jobs=1)
+
+
+def test_processes_do_not_change_a_figure(tmp_path: Path) -> None:
+    run([row()], Keeper(tmp_path), jobs=2)
+    assert kept_figures([row()], Keeper(tmp_path))[row().key] == tuple(measure_ours(CASE, trial) for trial in range(11))
+
+
+def test_every_row_has_a_key_of_its_own_that_is_a_file_name() -> None:
+    keys = [row.key for rows in TABLES.values() for row in rows]
+    assert len(set(keys)) == len(keys)
+    assert all(key.replace("-", "").replace("_", "").replace(".", "").isalnum() for key in keys)
+
+
+def test_the_page_names_met_and_missed_aims() -> None:
+    good = {"rotation_rad": 0.01, "position_m": 0.01, "bound_rad": 0.01, "bound_m": 0.01, "inside": 1.0}
+    bad = good | {"rotation_rad": 0.02}
+    for figures, verdict in ((good, MET), (bad, MISSED)):
+        text = page(sections({row().key: [figures, figures, figures]}))
+        line = next(line for line in text.splitlines() if line.startswith("| ti | 10 | 10% | 3 |"))
+        assert verdict in line
+        assert "RMSE of the rotation at most 1.05 times the bound" in text
+    assert "Not run." in text
+
+
+def test_a_figure_above_its_limit_is_missed_only_when_that_is_significant() -> None:
+    verdicts = [at_most(Measured(value, 0.04), 1.05) for value in (1.04, 1.07, 1.12)]
+    assert verdicts == [MET, UNDECIDED, MISSED]
+    assert within(Measured(99.0, 1.0), 93.0, 97.0) == MISSED
+
+
+def test_two_standard_errors_are_what_repetition_shows() -> None:
+    rng = np.random.default_rng(1)
+    measured = [
+        ratio(np.linalg.norm(rng.standard_normal((200, 3)), axis=1), np.full(200, np.sqrt(3.0))) for _ in range(300)
+    ]
+    values = np.array([one.value for one in measured])
+    assert values.mean() == pytest.approx(1.0, abs=0.01)
+    assert np.mean([one.error for one in measured]) == pytest.approx(2.0 * values.std(), rel=0.15)
+    assert share(np.ones(100)).error > 1.0  # all of 100 is not certainty
+
+
+def test_a_trial_without_a_pose_is_a_failure() -> None:
+    good: Figures = {"rotation_rad": 0.01, "position_m": 0.01, "bound_rad": 0.01, "bound_m": 0.01}
+    trials = [good, good | {"rotation_rad": None, "position_m": None}, good | {"position_m": 0.07}]
+    assert failed(trials).tolist() == [False, True, True]
+
+
+def test_the_bound_shrinks_with_the_root_of_the_number_and_by_a_measured_position() -> None:
+    free, tape = Case("imaging", 40, tape_m=None), Case("imaging", 40)
+    simulated = draw(free, 0)
+    once = bound_of(simulated, "imaging", None)
+    points = np.concatenate([simulated.points_radar_m] * 4)
+    four_times = bound_of(simulated, "imaging", None, points_radar_m=points)
+    assert four_times.rotation_rad == pytest.approx(once.rotation_rad / 2.0)
+    assert four_times.position_m == pytest.approx(once.position_m / 2.0)
+    measured = bound_of(simulated, "imaging", tape.tape_m)
+    assert measured.position_m < min(once.position_m, 0.01 * np.sqrt(3.0))
