@@ -63,8 +63,10 @@ class Message:
     def numbers(self, name: str, count: int) -> Values:
         """Return an array of so many numbers."""
         value = self.array(name)
-        fits = len(value) == count and value.dtype.names is None
-        return value.astype(np.float64) if fits else self._refuse(name, f"{count} numbers")
+        if len(value) != count or value.dtype.names is not None:
+            self._refuse(name, f"{count} numbers")
+        with np.errstate(invalid="ignore"):  # damaged bytes may hold signalling NaN
+            return value.astype(np.float64)
 
     def messages(self, name: str) -> "list[Message]":
         """Return a list of messages that are not of fixed size; empty for an empty list of any."""
@@ -94,7 +96,8 @@ class Message:
         """Return one number, or one fixed array, of each message in a list: (n,) or (n, k); path is dotted."""
         value = self._field(name)
         if isinstance(value, np.ndarray) and path in (value.dtype.names or ()):
-            return value[path].astype(np.float64)
+            with np.errstate(invalid="ignore"):  # damaged bytes may hold signalling NaN
+                return value[path].astype(np.float64)
         if not isinstance(value, list):
             self._refuse(name, f"a list with {path}")
         return np.array([_at(element, path.split(".")) for element in value], dtype=np.float64)
@@ -132,10 +135,14 @@ def decode(definition: Definition, payload: bytes) -> Message:
     try:
         return reader.message(definition.type)
     except (struct.error, ValueError, UnicodeDecodeError) as error:
-        raise MessageError(
-            f"a {definition.type} message of {len(payload)} bytes does not fit its definition ({error}); "
-            "it is damaged, or the recording carries another version's definition"
-        ) from error
+        raise _misfit(definition, payload, error) from error
+
+
+def _misfit(definition: Definition, payload: bytes, error: Exception) -> MessageError:
+    return MessageError(
+        f"a {definition.type} message of {len(payload)} bytes does not fit its definition ({error}); "
+        "it is damaged, or the recording carries another version's definition"
+    )
 
 
 class _Reader:
@@ -219,7 +226,17 @@ def fixed_part(definition: Definition, payload: bytes) -> tuple[np.dtype[Any], t
     """Lay out the numbers after the header, up to the first array of varying length, as they lie in this message.
 
     Messages whose strings are as long as the pins say all have this layout.
+
+    Raises:
+        MessageError: the bytes do not fit the definition.
     """
+    try:
+        return _fixed_part(definition, payload)
+    except (struct.error, ValueError) as error:
+        raise _misfit(definition, payload, error) from error
+
+
+def _fixed_part(definition: Definition, payload: bytes) -> tuple[np.dtype[Any], tuple[Pin, ...]]:
     reader = _Reader(payload, payload_byte_order(payload, definition), definition)
     first, *rest = definition.fields
     reader.value(first)

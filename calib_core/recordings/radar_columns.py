@@ -194,16 +194,16 @@ def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Retur
 
     Args:
         plan: which columns to use.
-        column: gives a column by the driver's name.
+        column: gives a column by the driver's name, of any number type; it is not changed.
     """
-    with np.errstate(invalid="ignore"):  # damaged bytes may hold signalling NaN
+    with np.errstate(all="ignore"):  # damaged bytes may hold signalling NaN, and figures whose squares overflow
         return _returns(plan, column)
 
 
 def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     position = _position(plan, column)
     n = len(position)
-    amplitude = column(plan.amplitude) if plan.amplitude else np.full(n, np.nan)
+    amplitude = _floats(column(plan.amplitude)) if plan.amplitude else unknown(n)
     doppler = _doppler(plan, column, position)
     for flag in plan.spoils_doppler:
         doppler = np.where(np.asarray(column(flag)) != 0, np.nan, doppler)

@@ -1,6 +1,7 @@
 """Every container opens, gives the same values, and refuses in words."""
 
 import shutil
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -237,6 +238,21 @@ def test_a_damaged_definition_of_another_topic_harms_nothing(ros1, write, plain,
         (topic,) = [topic for topic in recording.topics if topic.name == "/odd"]
         assert topic.problem is not None
         assert "a line that is no field: 'float32 $alue'" in topic.problem
+        assert len(recording.radar_scans()) == 20
+
+
+def test_a_damaged_message_of_another_topic_harms_nothing(ros, write, plain, jpeg):
+    ros.define("log_msgs/msg/Line", "Header header\nstring text\nfloat32 level\n")
+    line = ros.new("log_msgs/msg/Line", header=ros.header(START_NS), text="all is well", level=1.0)
+    path = write(ros, [*plain(ros, jpeg), ("/log", START_NS, line)], "bag" if ros.generation == 1 else "db3")
+    raw = path.read_bytes()
+    length = struct.pack("<I", len("all is well") + ros.generation - 1)
+    place = raw.index(length + b"all is well")
+    path.write_bytes(raw[:place] + b"\xff\xff\xff\x7f" + raw[place + 4 :])
+    with open_recording(path) as recording:
+        (topic,) = [topic for topic in recording.topics if topic.name == "/log"]
+        assert topic.problem is not None
+        assert "does not fit its definition (a string of 2147483647 characters runs past the end)" in topic.problem
         assert len(recording.radar_scans()) == 20
 
 

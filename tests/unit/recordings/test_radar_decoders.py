@@ -1,5 +1,7 @@
 """Every layout of the registry, read from bytes built from its real definition; contradictions; axes that a person tells."""
 
+import contextlib
+import random
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -7,11 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calib_core.errors import OptionError
+from calib_core.errors import MessageError, OptionError
 from calib_core.recordings import RecordingOptions, describe, open_recording
+from calib_core.recordings.opening import open_sources
 from calib_core.recordings.radar_axes import parse_radar_axes
 from calib_core.recordings.radar_decoders import DECODERS
+from calib_core.recordings.radar_layouts import recognise
 from calib_core.recordings.radar_table import radar_formats
+from calib_core.recordings.topics import join_topics
 from tests.unit.recordings.radar_samples import CLOUDS, OTHERS, START_NS, sample
 
 NAMES = [decoder.name for decoder in DECODERS]
@@ -42,6 +47,41 @@ def test_a_layout_is_recognised_and_read(name: str, ros: Any, write: Callable[..
     sigma = np.full((len(expected.points), 3), np.nan) if expected.sigma is None else expected.sigma
     np.testing.assert_allclose(scans.sigma_polar, sigma, rtol=1e-6)
     assert sorted(codes) == sorted(expected.cautions)
+
+
+def damaged(payload: bytes, rng: random.Random) -> bytes:
+    """Overwrite, remove or cut off a few bytes; counts of billions are among them."""
+    raw = bytearray(payload)
+    for _ in range(rng.choice([1, 1, 2, 4])):
+        place = rng.randrange(max(1, len(raw)))
+        kind = rng.random()
+        if kind < 0.7:
+            raw[place : place + 4] = rng.choice(
+                [b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\0\0", rng.randbytes(4)]
+            )
+        elif kind < 0.9:
+            del raw[place : place + rng.randrange(1, 9)]
+        else:
+            del raw[place:]
+    return bytes(raw)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_damaged_messages_of_any_layout_give_values_or_one_clear_error(name: str, ros: Any, write: Any) -> None:
+    path = write(ros, [("/radar", START_NS, sample(ros, name).messages[0])])
+    (source,) = open_sources([path])
+    (topic,), _ = join_topics([source])
+    definition, payload = topic.definition(), topic.payload(0)
+    source.close()
+    layout = recognise(definition, payload)
+    rng = random.Random(name)
+    for _ in range(60):
+        worse = damaged(payload, rng)
+        with contextlib.suppress(MessageError):
+            recognise(definition, worse)
+        with contextlib.suppress(MessageError):
+            assert layout is not None
+            layout.returns(worse)
 
 
 # -- contradictions
