@@ -71,7 +71,8 @@ def test_the_tests_run_on_the_runtime_pins(project_root: Path) -> None:
         }
 
     runtime, dev = pins("runtime.txt"), pins("dev.txt")
-    everywhere = {name: dev.get(name, dev.get(name.split()[0])) for name in runtime}  # dev may need it on more platforms
+    # dev may need a pin on more platforms than the program does
+    everywhere = {name: dev.get(name, dev.get(name.split()[0])) for name in runtime}
     assert everywhere == runtime
 
 
