@@ -194,7 +194,7 @@ def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Retur
 
     Args:
         plan: which columns to use.
-        column: gives a column by the driver's name, of any number type; it is not changed.
+        column: gives a column by the driver's name.
     """
     with np.errstate(all="ignore"):  # damaged bytes may hold signalling NaN, and figures whose squares overflow
         return _returns(plan, column)
@@ -203,7 +203,7 @@ def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Retur
 def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     position = _position(plan, column)
     n = len(position)
-    amplitude = _floats(column(plan.amplitude)) if plan.amplitude else unknown(n)
+    amplitude = column(plan.amplitude) if plan.amplitude else np.full(n, np.nan)
     doppler = _doppler(plan, column, position)
     for flag in plan.spoils_doppler:
         doppler = np.where(np.asarray(column(flag)) != 0, np.nan, doppler)
