@@ -32,7 +32,9 @@ TimesNs: TypeAlias = Int64[np.ndarray, "n"]
 
 
 def frozen_array(values: Any, shape: tuple[int | None, ...], *, dtype: Any = np.float64) -> Any:
-    """Copy values into a read-only, contiguous array and check its shape.
+    """Make values a read-only, contiguous array and check its shape.
+
+    They are copied, unless they are such an array already, or a part of one: nobody can change it.
 
     Args:
         values: anything NumPy can make an array of.
@@ -42,7 +44,7 @@ def frozen_array(values: Any, shape: tuple[int | None, ...], *, dtype: Any = np.
     Raises:
         ValueError: the shape is another one.
     """
-    array = np.array(values, dtype=dtype, order="C")
+    array = np.array(values, dtype=dtype, order="C", copy=None if _is_frozen(values) else True)
     if array.size == 0 and len(shape) == 2 and array.ndim == 1:
         array = array.reshape(0, shape[1] or 0)
     fits = array.ndim == len(shape) and all(want in (None, have) for want, have in zip(shape, array.shape, strict=True))
@@ -51,3 +53,13 @@ def frozen_array(values: Any, shape: tuple[int | None, ...], *, dtype: Any = np.
         raise ValueError(f"expected an array of {wanted}, got {' x '.join(map(str, array.shape)) or 'a single number'}")
     array.setflags(write=False)
     return array
+
+
+def _is_frozen(values: Any) -> bool:
+    """Tell whether nobody can write to an array: neither through it nor through what it is a part of."""
+    array = values
+    while isinstance(array, np.ndarray):
+        if array.flags.writeable:
+            return False
+        array = array.base
+    return array is None and values is not None

@@ -1,5 +1,6 @@
 """Recordings: ROS 1 and ROS 2 files in, radar scans, images and intrinsics out. Only here are containers known."""
 
+from calib_core.recordings.beginning import first_picture
 from calib_core.recordings.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.describing import clock_lines, describe
 from calib_core.recordings.images import EncodedImage
@@ -20,6 +21,7 @@ __all__ = [
     "WrittenVideo",
     "clock_lines",
     "describe",
+    "first_picture",
     "inspect_recording",
     "open_recording",
     "recording_summary",

@@ -5,9 +5,12 @@ chunks stored as they are, only the bytes asked for are read.
 """
 
 import threading
+import zlib
 from collections import OrderedDict
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -21,11 +24,16 @@ from calib_core.recordings.kept_indexes import KeptIndex, heads_from, index_from
 from calib_core.recordings.sources import Channel, Heads, MessageIndex
 from calib_core.results import Caution
 
-__all__ = ["CACHE_BYTES", "MAX_MESSAGE_BYTES", "Chunk", "ChunkedSource"]
+__all__ = ["CACHE_BYTES", "FIRST_CHUNKS", "MAX_MESSAGE_BYTES", "ChannelFilter", "Chunk", "ChunkedSource"]
 
+ChannelFilter: TypeAlias = Callable[[Channel], bool]
 CACHE_BYTES = 64 * 2**20
+FIRST_CHUNKS = 64
+"""Where the beginning of a file is enough, so many chunks are looked at, and as many more until all that is wanted is in them."""
+
 _FEW_MESSAGES = 64
 _FAR_BYTES = 4096
+_MAX_CHECKED_BYTES = 1 << 24
 MAX_MESSAGE_BYTES = 1 << 28
 """No message of a sensor is larger; one that claims to be is damaged or made to harm."""
 
@@ -53,25 +61,33 @@ class Chunk:
 
 
 class ChunkedSource:
-    """Read messages out of chunks. A subclass opens the file and knows how a message record begins."""
+    """Read messages out of chunks. A subclass opens the file and knows how a message record begins.
+
+    Args:
+        file: the file.
+        whole: all of it is looked into; what is found out about a part is not kept in the cache.
+    """
 
     format_name = "chunked file"
     lead_bytes = 0
     """How many bytes of a record come before the message, in the usual case."""
 
-    def __init__(self, file: FileBytes) -> None:
+    def __init__(self, file: FileBytes, *, whole: bool = True) -> None:
         self.file = file
         self.chunks: list[Chunk] = []
         self.channels: tuple[Channel, ...] = ()
         self.cautions: tuple[Caution, ...] = file.cautions
         self.indexes: dict[int, MessageIndex] = {}
+        self.counts: Mapping[int, int] = {}
+        """How many messages each channel has, as far as the file says so."""
         self.recovered = False
         """The file was not closed; its chunks may be cut off."""
         self._cache: OrderedDict[int, bytes] = OrderedDict()
         self._cache_bytes = 0
         self._damaged_chunks: dict[int, str] = {}
+        self._checked: dict[int, bool] = {}
         self._lock = threading.Lock()
-        self._kept = cache_of(file)
+        self._kept = cache_of(file) if whole else None
 
     def restore(self) -> bool:
         """Take what opening finds out from the cache; False where it is not there."""
@@ -141,8 +157,49 @@ class ChunkedSource:
             self._cache.clear()
             self._cache_bytes = 0
 
+    @property
+    def later_cautions(self) -> tuple[Caution, ...]:
+        """Chunks found since that are not as they were written."""
+        with self._lock:
+            bad = sorted(chunk for chunk, sound in self._checked.items() if not sound)
+        if not bad:
+            return ()
+        inside = sum(int(np.isin(index.chunk, bad).sum()) for index in self.indexes.values())
+        return (
+            Caution(
+                "checksum",
+                f"{self.path.name}: {len(bad)} of its chunks read so far, with {inside} messages, do not have the checksum "
+                f"they were written with; the first is at byte {self.chunks[bad[0]].position}. Their messages are used as "
+                "they are, and may be wrong",
+                "copy the file again from its source; until then do not trust clicks and scans of that time",
+            ),
+        )
+
+    def checksum(self, chunk: int) -> int:
+        """Return the CRC-32 that a chunk's unpacked bytes should have; 0 where the file has none."""
+        return 0
+
+    def _check(self, chunk: int, data: bytes) -> None:
+        """Compare a whole unpacked chunk with its checksum, and note how it came out."""
+        wanted = self.checksum(chunk)
+        sound = wanted == 0 or zlib.crc32(data) == wanted
+        with self._lock:
+            self._checked[chunk] = sound
+
+    def _check_stored(self, chunk: int) -> None:
+        """Check a chunk that is stored as it is, once; those too large to be read beside a message are passed over."""
+        where = self.chunks[chunk]
+        if where.packed or self.recovered or chunk in self._checked:
+            return
+        if where.stored_bytes > _MAX_CHECKED_BYTES or self.checksum(chunk) == 0:
+            with self._lock:
+                self._checked[chunk] = True
+            return
+        self._check(chunk, self.file.up_to(where.position, where.stored_bytes))
+
     def read(self, chunk: int, offset: int) -> bytes:
         """Read one message whole."""
+        self._check_stored(chunk)
         try:
             start, length = self.locate(chunk, offset)
         except RecordingError as error:
@@ -202,11 +259,13 @@ class ChunkedSource:
         if self.recovered:
             return unpack_what_is_there(data, where.compression, where.size_bytes)
         try:
-            return unpack(data, where.compression, where.size_bytes, where=place)
+            whole = unpack(data, where.compression, where.size_bytes, where=place)
         except RecordingError as error:
             with self._lock:
                 self._damaged_chunks[chunk] = str(error)
             return unpack_what_is_there(data, where.compression, where.size_bytes)
+        self._check(chunk, whole)
+        return whole
 
     def fault_of(self, chunk: int) -> str:
         """Say what is wrong with a chunk that was unpacked; "" where nothing is."""

@@ -44,6 +44,8 @@ class FileBytes:
         self._folder = folder
         try:
             self._file = self.stored.open("rb", buffering=0)
+            if hasattr(os, "posix_fadvise"):  # what is read next is told by expect, not guessed
+                os.posix_fadvise(self._file.fileno(), 0, 0, os.POSIX_FADV_RANDOM)
             self.size_bytes = os.fstat(self._file.fileno()).st_size
         except OSError as error:
             raise RecordingError(
@@ -71,11 +73,11 @@ class FileBytes:
                 f"{self.path}: reading at byte {offset} failed: {error}; is it still there?"
             ) from error
 
-    def expect(self, places: Sequence[int], size: int) -> None:
-        """Tell the system which small pieces are read next, so that a slow disk gets them all at once."""
+    def expect(self, places: Sequence[tuple[int, int]]) -> None:
+        """Tell the system which small pieces, from here to there, are read next: a slow disk gets them all at once."""
         if hasattr(os, "posix_fadvise"):
-            for place in places:
-                os.posix_fadvise(self._file.fileno(), place, size, os.POSIX_FADV_WILLNEED)
+            for begin, end in places:
+                os.posix_fadvise(self._file.fileno(), begin, end - begin, os.POSIX_FADV_WILLNEED)
 
     def at(self, offset: int, size: int) -> bytes:
         """Read exactly size bytes from offset.

@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
 
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
@@ -84,7 +83,7 @@ def gather_far(source: ChunkAccess, file: FileBytes, index: MessageIndex, places
     read: list[bytes] = []
     for first in range(0, len(order), _AHEAD):
         wanted = places[order[first : first + _AHEAD]].tolist()
-        file.expect(wanted, width)
+        file.expect([(place, place + width) for place in wanted])
         read.extend(file.up_to(place, width).ljust(width, b"\0") for place in wanted)
     gathered = np.zeros((len(order), width), dtype=np.uint8)
     gathered[order] = np.frombuffer(b"".join(read), dtype=np.uint8).reshape(-1, width)
@@ -98,6 +97,19 @@ def gather_far(source: ChunkAccess, file: FileBytes, index: MessageIndex, places
     for row in np.flatnonzero(~usual).tolist():
         faults.append(gather.single(int(index.chunk[row]), int(index.offset[row]), row))
     return Heads(gather.rows, gather.lengths, next((fault for fault in faults if fault), ""))
+
+
+def _taken(data: bytes, places: np.ndarray, width: int) -> np.ndarray:
+    """Copy so many bytes from each place, as (n,) items of that size: NumPy moves each in one go."""
+    windows: np.ndarray = np.ndarray((len(data) - width + 1,), np.dtype(f"V{width}"), data, 0, (1,))
+    return windows[places]
+
+
+def _as_slice(rows: np.ndarray) -> "np.ndarray | slice":
+    """Return rows as a slice where they follow one another: writing to them is faster."""
+    first, last = int(rows[0]), int(rows[-1])
+    together = last - first + 1 == len(rows) and bool((np.diff(rows) == 1).all())
+    return slice(first, last + 1) if together else rows
 
 
 def _groups(chunk: np.ndarray) -> list[np.ndarray]:
@@ -152,14 +164,12 @@ class _Gather:
         offsets = self.index.offset[order]
         base, end = int(offsets[0]), int(offsets[-1]) + lead + self.size
         data = self.source.piece(chunk, base, end - base) if whole is None else whole[base:end]
-        buffer = np.frombuffer(data.ljust(end - base, b"\0"), dtype=np.uint8)
-        windows = as_strided(buffer, (end - base - lead - self.size + 1, lead + self.size), (1, 1), writeable=False)
-        gathered = windows[offsets - base]
-        usual, lengths = self.source.usual(gathered[:, :lead])
+        data = data.ljust(end - base, b"\0")
+        usual, lengths = self.source.usual(_taken(data, offsets - base, lead).view(np.uint8).reshape(-1, lead))
         past = offsets + lead + lengths > room
         lengths[past] = -1
         self.lengths[order] = lengths
-        self.rows[order] = gathered[:, lead:]
+        self.rows.view(f"V{self.size}")[_as_slice(order), 0] = _taken(data, offsets - base + lead, self.size)
         fault = f"chunk {chunk} ends before its messages do" if (past & usual).any() else ""
         for place in np.flatnonzero(~usual).tolist():
             fault = self.single(chunk, int(offsets[place]), int(order[place])) or fault

@@ -12,7 +12,15 @@ from calib_core.recordings.jpeg import JPEG_MAGIC, PNG_MAGIC, mended_jpeg, png_s
 from calib_core.recordings.packets import Packet, packet_of, require_codec
 from calib_core.recordings.raw_pixels import READABLE, check_size, converted_pixels, raw_pixels, stretched
 
-__all__ = ["EncodedImage", "ImageLayout", "encoded_pixels", "is_compressed_image", "is_packet", "is_raw_image"]
+__all__ = [
+    "EncodedImage",
+    "ImageLayout",
+    "encoded_pixels",
+    "is_compressed_image",
+    "is_packet",
+    "is_picture",
+    "is_raw_image",
+]
 
 _RAW_NAMES = frozenset({"height", "width", "encoding", "step", "data"})
 _COMPRESSED_NAMES = frozenset({"format", "data"})
@@ -50,6 +58,11 @@ def is_compressed_image(definition: Definition) -> bool:
 def is_packet(definition: Definition) -> bool:
     """Tell whether a message is laid out as the packets of ffmpeg_image_transport: one frame of a video."""
     return definition.names >= _PACKET_NAMES and not is_raw_image(definition)
+
+
+def is_picture(definition: Definition) -> bool:
+    """Tell whether a message is laid out as any of them."""
+    return is_raw_image(definition) or is_compressed_image(definition) or is_packet(definition)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,12 +1,13 @@
 """MCAP files: the index from the summary; walked over where there is none."""
 
 import struct
+import zlib
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.chunks import Chunk, ChunkedSource
+from calib_core.recordings.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource
 from calib_core.recordings.files import FileStretch, MemoryStretch
 from calib_core.recordings.mcap_records import (
     CHUNK_INDEX,
@@ -18,8 +19,11 @@ from calib_core.recordings.mcap_records import (
     MESSAGE_INDEX,
     RECORD,
     STATISTICS,
+    ChunkInfo,
     Declarations,
-    string_at,
+    chunk_info,
+    crc_position,
+    statistics,
     walk,
 )
 from calib_core.recordings.mcap_recovery import scan_mcap
@@ -34,20 +38,27 @@ __all__ = ["MAGIC", "McapSource"]
 
 _INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
 _TAIL_BYTES = 37
-_MAX_INDEX_BYTES = 1 << 26
+_PIECE_BYTES = 1 << 20
 
 
 class McapSource(ChunkedSource):
-    """One MCAP file. Opening reads its summary and one block of message indexes per chunk."""
+    """One MCAP file. Opening reads its summary and one block of message indexes per chunk.
+
+    Args:
+        file: the file.
+        first_of: read only the chunks with which these channels begin, and refuse a file without an index; None reads all.
+    """
 
     format_name = "MCAP"
     lead_bytes = RECORD.size + MESSAGE_HEAD.size
 
-    def __init__(self, file: "FileBytes") -> None:
-        super().__init__(file)
+    def __init__(self, file: "FileBytes", *, first_of: ChannelFilter | None = None) -> None:
+        super().__init__(file, whole=first_of is None)
         self._found: dict[int, list[np.ndarray]] = {}
         self._counted = 0
-        if not self.restore():
+        if first_of is not None:
+            self._read_beginning(first_of)
+        elif not self.restore():
             self._open()
             self.keep()
 
@@ -84,7 +95,36 @@ class McapSource(ChunkedSource):
 
     def _read_summary(self, start: int) -> bool:
         """Read the summary and the message indexes; False where the file has to be walked over to know its messages."""
-        infos: list[bytes] = []
+        if not self._summary_is_sound(start):
+            raise self._damaged(start)
+        infos = self._read_chunk_infos(start)
+        self.file.expect([info.index_place for info in infos])
+        for info in infos:
+            self._read_chunk_index(info)
+        known = {channel.id for channel in self.channels}
+        count = sum(len(part) for parts in self._found.values() for part in parts)
+        complete = all(info.index_bytes > 0 for info in infos)
+        return bool(infos) and complete and known >= self._found.keys() and count >= self._counted
+
+    def _read_beginning(self, first_of: ChannelFilter) -> None:
+        """Read the indexes of the chunks with which some channels begin.
+
+        Raises:
+            RecordingError: the file has no index that says so.
+        """
+        start = self._summary_start()
+        if not start:
+            raise self._damaged(self.size_bytes - _TAIL_BYTES)
+        earliest = sorted(self._read_chunk_infos(start, first_of), key=lambda info: info.start_ns)
+        wanted = [channel.id for channel in self.channels if first_of(channel)]
+        firsts = [next((info for info in earliest if number in info.channels), None) for number in wanted]
+        for info in {info.position: info for info in firsts if info is not None}.values():
+            self._read_chunk_index(info)
+        self._note_indexes()
+
+    def _read_chunk_infos(self, start: int, first_of: ChannelFilter | None = None) -> list[ChunkInfo]:
+        """Read the summary: channels, statistics, and what it says about chunks; all, or until some channels are found."""
+        infos: list[ChunkInfo] = []
         declared = Declarations()
         stretch = FileStretch(self.file, start, self.size_bytes - _TAIL_BYTES - start)
         end = 0
@@ -92,42 +132,44 @@ class McapSource(ChunkedSource):
             end = place + size
             body = stretch.up_to(place, size) if size <= MAX_RECORD_BYTES else b""
             if kind == CHUNK_INDEX:
-                infos.append(body)
+                info = chunk_info(body)
+                if info is None or not info.inside(self.size_bytes):
+                    raise self._damaged(start + place)
+                infos.append(info)
+                if first_of is not None and len(infos) % FIRST_CHUNKS == 0 and _shows(infos, declared, first_of):
+                    break
             elif kind == STATISTICS:
-                self._counted = int.from_bytes(body[:8], "little")
+                self._counted, self.counts = statistics(body)
             elif not declared.note(kind, body):
                 raise self._damaged(start + place)
-        if end != stretch.size:
-            raise self._damaged(start + end)
+        else:
+            if end != stretch.size:
+                raise self._damaged(start + end)
         self.channels = declared.channels
-        complete = all([self._read_chunk_index(body) for body in infos])
-        known = {channel.id for channel in self.channels}
-        count = sum(len(part) for parts in self._found.values() for part in parts)
-        return bool(infos) and complete and known >= self._found.keys() and count >= self._counted
+        return infos
 
-    def _read_chunk_index(self, body: bytes) -> bool:
-        """Read one chunk's place and the message indexes that follow the chunk; False where there are none."""
-        try:
-            _, _, start, length, map_bytes = struct.unpack_from("<QQQQI", body)
-            index_bytes = struct.unpack_from("<Q", body, 36 + map_bytes)[0]
-            compression, place = string_at(body, 44 + map_bytes)
-            stored, size = struct.unpack_from("<QQ", body, place)
-        except struct.error:
-            raise self._damaged(self.size_bytes - _TAIL_BYTES) from None
+    def _summary_is_sound(self, start: int) -> bool:
+        """Compare the summary, up to the footer's last fields, with the checksum in the footer; 0 there means none."""
+        end = self.size_bytes - len(MAGIC) - 4
+        wanted = int.from_bytes(self.file.up_to(end, 4), "little")
+        found = 0
+        for place in range(start, end if wanted else start, _PIECE_BYTES):
+            found = zlib.crc32(self.file.up_to(place, min(_PIECE_BYTES, end - place)), found)
+        return found == wanted
+
+    def _read_chunk_index(self, info: ChunkInfo) -> None:
+        """Note one chunk, and read the message indexes that follow it."""
         number = len(self.chunks)
-        position = start + RECORD.size + 32 + len(compression) + 8
-        if position + stored > self.size_bytes or index_bytes > _MAX_INDEX_BYTES:
-            raise self._damaged(start)
-        self.chunks.append(Chunk(position, stored, size, compression))
-        block = MemoryStretch(self.file.at(start + length, index_bytes))
+        self.chunks.append(Chunk(info.data_position, info.stored_bytes, info.size_bytes, info.compression))
+        first_byte, last_byte = info.index_place
+        block = MemoryStretch(self.file.at(first_byte, last_byte - first_byte))
         end = 0
-        for kind, first, length_ in walk(block):
-            end = first + length_
+        for kind, first, length in walk(block):
+            end = first + length
             if kind == MESSAGE_INDEX:
-                self._read_message_index(number, block.data[first:end], start + length + first)
+                self._read_message_index(number, block.data[first:end], first_byte + first)
         if end != block.size:
-            raise self._damaged(start + length + end)
-        return index_bytes > 0
+            raise self._damaged(first_byte + end)
 
     def _read_message_index(self, chunk: int, record: bytes, position: int) -> None:
         channel, size = struct.unpack_from("<HI", record.ljust(6, b"\xff"))
@@ -182,6 +224,11 @@ class McapSource(ChunkedSource):
 
     # -- reading
 
+    def checksum(self, chunk: int) -> int:
+        """Return the CRC-32 of a chunk's unpacked records; 0 where the file has none."""
+        where = self.chunks[chunk]
+        return int.from_bytes(self.file.up_to(crc_position(where.position, where.compression), 4), "little")
+
     def locate(self, chunk: int, offset: int) -> tuple[int, int]:
         """Return where the message itself begins, and its length."""
         head = self.piece(chunk, offset, RECORD.size)
@@ -197,3 +244,9 @@ class McapSource(ChunkedSource):
         """Recognise message records; all of them are alike."""
         sizes = np.ascontiguousarray(rows[:, 1:9]).view("<i8")[:, 0] - MESSAGE_HEAD.size
         return (rows[:, 0] == MESSAGE) & (sizes >= 0) & (sizes <= MAX_RECORD_BYTES), sizes
+
+
+def _shows(infos: list[ChunkInfo], declared: Declarations, first_of: ChannelFilter) -> bool:
+    """Tell whether some channels are known, and in the chunks seen so far."""
+    wanted = {channel.id for channel in declared.channels if first_of(channel)}
+    return bool(wanted) and wanted <= {number for info in infos for number in info.channels}

@@ -1,6 +1,7 @@
 """MCAP files without a usable index: walked from the beginning, every whole message found, what is lost counted."""
 
 import re
+import zlib
 from dataclasses import dataclass, field
 
 from calib_core.errors import RecordingError
@@ -160,7 +161,12 @@ def _unpacked(file: FileBytes, position: int, stored: int, head: ChunkHead, foun
         return b""
     data = file.up_to(position, stored)
     try:
-        return unpack(data, head.compression, head.unpacked_bytes, where=where)
+        whole = unpack(data, head.compression, head.unpacked_bytes, where=where)
     except RecordingError as error:
         found.damaged_chunks, found.fault = found.damaged_chunks + 1, found.fault or str(error)
+    else:
+        if head.checksum and zlib.crc32(whole) != head.checksum:
+            found.damaged_chunks += 1
+            found.fault = found.fault or f"{where}: its bytes do not have the checksum they were written with"
+        return whole
     return unpack_what_is_there(data, head.compression, head.unpacked_bytes)

@@ -1,25 +1,27 @@
 """From paths to open files: folders expanded, contents told by their first bytes."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeAlias
 
 from calib_core.errors import RecordingError
 from calib_core.recordings import mcap, sqlite_bag
+from calib_core.recordings.chunks import ChannelFilter
 from calib_core.recordings.files import FileBytes
 from calib_core.recordings.rosbag1 import Rosbag1Source
 from calib_core.recordings.sources import Source
 from calib_core.recordings.whole_files import packing_of, unpacked_file
 from calib_core.results import Caution
 
-__all__ = ["open_sources"]
+__all__ = ["open_beginnings", "open_sources"]
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _MORE_SUFFIXES = (".active", ".zstd", ".zst", ".gz", ".bz2", ".lz4")
 _METADATA = "metadata.yaml"
 _MAX_METADATA_BYTES = 1 << 24
+_FIRST_ROWS = 500
 _KINDS = "ROS 1 .bag, ROS 2 .mcap and .db3 files and their folders can be opened"
 _PACKED_MESSAGES = re.compile(r"^\s*compression_mode:\s*['\"]?message", re.IGNORECASE | re.MULTILINE)
 _PACKED = {b"PK\x03\x04": ("zip", "unzip"), b"\xfd7zXZ": ("xz", "unxz")}
@@ -74,6 +76,43 @@ def open_sources(paths: Sequence[Path]) -> tuple[Source, ...]:
         raise
     sources[0].cautions = (*sources[0].cautions, *map(_left_out, refused))
     return tuple(sources)
+
+
+def open_beginnings(paths: Sequence[Path], first_of: ChannelFilter) -> Iterator[Source]:
+    """Open recording files one after another, each only as far as its beginning; the caller closes each.
+
+    Files packed as a whole are passed over, and what is no recording of ROS.
+
+    Args:
+        paths: as for open_sources.
+        first_of: the channels whose beginnings are wanted.
+
+    Raises:
+        RecordingError: a file is damaged, or has no index.
+    """
+    for path in paths:
+        for found in _files(path):
+            file = FileBytes(found.path)
+            try:
+                source = _beginning(file, first_of, packed=found.packed)
+            except RecordingError:
+                file.close()
+                raise
+            if source is None:
+                file.close()
+            else:
+                yield source
+
+
+def _beginning(file: FileBytes, first_of: ChannelFilter, *, packed: bool) -> "_AnySource | None":
+    head = file.up_to(0, 16)
+    if head.startswith(b"#ROSBAG V"):
+        return Rosbag1Source(file, first_of=first_of)
+    if head.startswith(mcap.MAGIC):
+        return mcap.McapSource(file, first_of=first_of)
+    if head == sqlite_bag.MAGIC:
+        return sqlite_bag.SqliteSource(file, packed=packed, first_rows=_FIRST_ROWS)
+    return None
 
 
 def _open_or_refusal(found: _Found) -> "_AnySource | RecordingError":

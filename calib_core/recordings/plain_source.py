@@ -1,6 +1,6 @@
 """A recording that is no ROS container: times in a list, messages made when they are asked for."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,6 +59,16 @@ class PlainSource:
     def channels(self) -> tuple[Channel, ...]:
         """The topic."""
         return (self.channel,)
+
+    @property
+    def counts(self) -> Mapping[int, int]:
+        """How many messages there are."""
+        return {self.channel.id: len(self.times_ns)}
+
+    @property
+    def later_cautions(self) -> tuple[Caution, ...]:
+        """Nothing: what cannot be read is told message by message."""
+        return ()
 
     def index(self, channel_id: int) -> MessageIndex:
         """Tell where the messages lie: row by row."""

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from calib_core.recordings.decoding import decode
 from calib_core.recordings.definitions import PRIMITIVES, Definition
 from calib_core.recordings.radar_columns import ColumnPlan, Returns, no_returns, returns_from
@@ -53,7 +51,7 @@ class ArrayLayout:
         count = message.whole(self.count_field) if self.count_field else None
         if count == 0:
             return no_returns()
-        return returns_from(self.plan, lambda name: message.array(name)[:count].astype(np.float64))
+        return returns_from(self.plan, lambda name: message.array(name)[:count])
 
     def with_plan(self, plan: ColumnPlan) -> "ArrayLayout":
         """Read by another plan."""

@@ -112,13 +112,10 @@ class CloudLayout:
             numbers = np.ascontiguousarray(rows[:, start : start + 8]).view("<u4").astype(np.int64)
             sizes = np.ascontiguousarray(rows[:, end + 4 : end + 8]).view("<u4")[:, 0].astype(np.int64)
             width, step = numbers[:, 1], shape.dtype.itemsize
-            alike = (rows[:, start + 8 : end] == np.frombuffer(block, np.uint8)).all() and (numbers[:, 0] == 1).all()
-            same_frame = (rows[:, 12:16] == rows[0, 12:16]).all()
+            alike = rows[:, start + 8 : end].tobytes() == block * len(rows) and (numbers[:, 0] == 1).all()
+            same_frame = rows[:, 12:16].tobytes() == rows[0, 12:16].tobytes() * len(rows)
             if alike and same_frame and (width * step <= sizes).all() and (end + 8 + sizes <= lengths).all():
-                most = int(width.max())
-                body = rows[:, end + 8 : end + 8 + most * step].reshape(len(rows), most, step)
-                points = np.ascontiguousarray(body[np.arange(most) < width[:, None]]).view(shape.dtype)
-                return _returns(points.reshape(-1), shape.plan), width
+                return _returns(_points_of_rows(rows, end + 8, width, shape.dtype), shape.plan), width
         return None
 
     def with_plan(self, plan: ColumnPlan) -> "CloudLayout":
@@ -178,6 +175,25 @@ def _point_dtype(message: Message, order: str) -> np.dtype[Any]:
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": step})
 
 
+def _points_of_rows(rows: np.ndarray, start: int, width: np.ndarray, dtype: np.dtype[Any]) -> np.ndarray:
+    """Return the points of many clouds: (n, width) in place where all clouds are of one size, else behind one another.
+
+    Args:
+        rows: (n, size) whole messages.
+        start: where in a row the points begin.
+        width: (n,) how many points each has.
+        dtype: of a point.
+    """
+    if (width == width[0]).all():
+        return np.ndarray((len(rows), int(width[0])), dtype, rows, start, (rows.strides[0], dtype.itemsize))
+    ends = np.cumsum(width)
+    points = np.empty(int(ends[-1]), dtype=dtype)
+    raw = points.view(np.uint8)
+    for row, size, end in zip(rows, (width * dtype.itemsize).tolist(), (ends * dtype.itemsize).tolist(), strict=True):
+        raw[end - size : end] = row[start : start + size]
+    return points
+
+
 def _points(data: np.ndarray, dtype: np.dtype[Any], height: int, width: int, row_step: int) -> np.ndarray:
     """View the bytes as points, rows that are padded included."""
     count, used = height * width, width * dtype.itemsize
@@ -194,9 +210,9 @@ def _points(data: np.ndarray, dtype: np.dtype[Any], height: int, width: int, row
 
 
 def _returns(points: np.ndarray, plan: ColumnPlan) -> Returns:
-    if not len(points):
+    if not points.size:
         return no_returns()
-    return returns_from(plan, lambda name: points[name].astype(np.float64))
+    return returns_from(plan, lambda name: points[name].reshape(-1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

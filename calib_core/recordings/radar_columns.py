@@ -11,7 +11,7 @@ from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.recordings.radar_axes import RadarAxes
 from calib_core.recordings.radar_noise import full_covariance, sigma_polar_from_covariance
 
-__all__ = ["ColumnPlan", "Returns", "no_returns", "plan_columns", "returns_from"]
+__all__ = ["ColumnPlan", "Returns", "no_returns", "plan_columns", "returns_from", "unknown"]
 
 _POSITION_PREFIXES = ("", "position", "poseposition", "poseposeposition", "pos", "point")
 _RANGES = ("range", "r", "distance", "dist", "rangem", "targetrange")
@@ -39,7 +39,7 @@ _INVALID_DOPPLER = ("invalidrangerate", "invaliddoppler", "invalidvelocity")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Returns:
-    """The returns of one scan as columns; the meaning is that of RadarScan.
+    """The returns of one scan as columns; the meaning is that of RadarScan. Columns of NaN alone may be read-only.
 
     Attributes:
         claimed_polar: range, azimuth and elevation as the message has them, NaN for what it has not; only where asked for.
@@ -142,6 +142,20 @@ def _plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
+_UNKNOWN = np.full(3 << 16, np.nan)
+_UNKNOWN.setflags(write=False)
+
+
+def unknown(n: int, columns: int = 0) -> np.ndarray:
+    """Return (n,) or (n, columns) NaN that cannot be written to: all of them share their memory."""
+    size = n * max(1, columns)
+    values = _UNKNOWN[:size]
+    if len(values) < size:
+        values = np.full(size, np.nan)
+        values.setflags(write=False)
+    return values.reshape(n, columns) if columns else values
+
+
 def plan_columns(names: Iterable[str]) -> ColumnPlan | None:
     """Recognise the columns of a radar by their names; None where there is no position.
 
@@ -194,7 +208,7 @@ def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Retur
 
     Args:
         plan: which columns to use.
-        column: gives a column by the driver's name.
+        column: gives a column by the driver's name, of any number type; it is not changed.
     """
     with np.errstate(all="ignore"):  # damaged bytes may hold signalling NaN, and figures whose squares overflow
         return _returns(plan, column)
@@ -203,7 +217,7 @@ def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Retur
 def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     position = _position(plan, column)
     n = len(position)
-    amplitude = column(plan.amplitude) if plan.amplitude else np.full(n, np.nan)
+    amplitude = _floats(column(plan.amplitude)) if plan.amplitude else unknown(n)
     doppler = _doppler(plan, column, position)
     for flag in plan.spoils_doppler:
         doppler = np.where(np.asarray(column(flag)) != 0, np.nan, doppler)
@@ -213,16 +227,24 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
         position[np.asarray(column(flag)) == 0] = np.nan
     if plan.axes:
         position = position @ plan.axes.matrix.T
+    if plan.amplitude_scale != 1.0:
+        amplitude = amplitude * plan.amplitude_scale
     claimed = _columns(plan.claimed, column, n) if plan.claiming else None
-    return Returns(position, doppler, amplitude * plan.amplitude_scale, _sigma(plan, column, position), claimed)
+    return Returns(position, doppler, amplitude, _sigma(plan, column, position), claimed)
+
+
+def _floats(values: np.ndarray) -> Values:
+    """Copy a column into contiguous numbers."""
+    return np.array(values, dtype=np.float64, order="C")
 
 
 def _position(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Points3:
     """Return positions in the message's own axes; angles taken as positive to the left and upwards."""
-    parts = [np.asarray(column(name), dtype=np.float64) for name in plan.position]
-    if len(parts) == 2:
-        parts.append(np.zeros_like(parts[0]))
-    position = np.stack(parts, axis=1)
+    parts = [column(name) for name in plan.position]
+    position = np.empty((len(parts[0]), 3))
+    for axis, part in enumerate(parts):
+        position[:, axis] = part
+    position[:, len(parts) :] = 0.0
     if not plan.polar:
         return position
     if plan.degrees:
@@ -236,6 +258,8 @@ def _sigma(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Poin
     if plan.covariance is not None:
         covariance = full_covariance(np.asarray(column(plan.covariance), dtype=np.float64))
         return sigma_polar_from_covariance(position, turn @ covariance @ turn.T)
+    if not any(plan.sigma):
+        return unknown(len(position), 3)
     sigma = _columns(plan.sigma, column, len(position))
     if plan.degrees:
         sigma[:, 1:] = np.radians(sigma[:, 1:])
@@ -245,15 +269,19 @@ def _sigma(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Poin
 
 
 def _columns(names: Iterable[str | None], column: Callable[[str], np.ndarray], n: int) -> Points3:
-    return np.stack([np.full(n, np.nan) if name is None else column(name) for name in names], axis=1).astype(np.float64)
+    found = np.full((n, 3), np.nan)
+    for place, name in enumerate(names):
+        if name is not None:
+            found[:, place] = column(name)
+    return found
 
 
 def _doppler(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Points3) -> Values:
     if plan.doppler:
-        return np.asarray(column(plan.doppler), dtype=np.float64)
+        return _floats(column(plan.doppler))
     if not plan.velocity:
-        return np.full(len(position), np.nan)
+        return unknown(len(position))
     range_m = polar_from_cartesian(position)[:, 0]
     with np.errstate(invalid="ignore", divide="ignore"):
-        along = sum(column(name) * position[:, axis] for axis, name in enumerate(plan.velocity))
+        along = sum(_floats(column(name)) * position[:, axis] for axis, name in enumerate(plan.velocity))
         return np.asarray(along / range_m, dtype=np.float64)

@@ -126,7 +126,7 @@ class PointLayout:
     def returns_of_rows(self, rows: np.ndarray) -> Returns:
         """Read many returns from the first bytes (n, dtype.itemsize) of their messages."""
         points = self.view(rows)
-        return _known_snr(returns_from(self.plan, lambda name: points[name].astype(np.float64)))
+        return _known_snr(returns_from(self.plan, lambda name: points[name]))
 
     def returns(self, payload: bytes) -> Returns:
         """Read the return of one whole message, whatever its strings.
@@ -183,7 +183,9 @@ class PointLayout:
 
 def _known_snr(found: Returns) -> Returns:
     """Leave out intensities of zero: the stock driver never fills them in."""
-    return replace(found, snr_db=np.where(found.snr_db == 0.0, np.nan, found.snr_db))
+    if found.snr_db.flags.writeable:
+        found.snr_db[found.snr_db == 0.0] = np.nan
+    return found
 
 
 def first_of_scans(

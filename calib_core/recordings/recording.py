@@ -2,7 +2,7 @@
 
 import hashlib
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -123,17 +123,18 @@ class Recording:
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
-        """What a person must know; messages found unreadable so far are counted in."""
+        """What a person must know; messages found unreadable and damage found so far are counted in."""
+        found = (*self._assembly.cautions, *(late for source in self.sources for late in source.later_cautions))
         radar = self._assembly.radar
         if radar is None or not radar.unreadable:
-            return self._assembly.cautions
+            return found
         row, why = next(iter(sorted(radar.unreadable.items())))
         unreadable = Caution(
             "unreadable-messages",
             f"{len(radar.unreadable)} radar messages could not be read and count as empty; the first is number {row}: {why}",
             "if they are many, copy the file again from its source",
         )
-        return (*self._assembly.cautions, unreadable)
+        return (*found, unreadable)
 
     def image_bytes(self, index: int) -> EncodedImage:
         """Return a frame as a file: the recorded JPEG or PNG, or raw pixels encoded as JPEG.
@@ -195,7 +196,7 @@ class Recording:
         return self._assembly.camera
 
     def radar_scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
-        """Decode the scans with start <= stamp <= end; all of them by default.
+        """Decode the scans with start <= stamp <= end; all of them by default, which takes memory without bounds.
 
         Args:
             start: None for the beginning.
@@ -203,6 +204,11 @@ class Recording:
         """
         self._check_open()
         return self._assembly.radar.scans(start, end) if self._assembly.radar else RadarScans()
+
+    def radar_windows(self) -> Iterator[RadarScans]:
+        """Decode all scans, a bounded number of returns at a time, in order of time: for looking at a whole recording."""
+        self._check_open()
+        return self._assembly.radar.windows() if self._assembly.radar else iter(())
 
     def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float) -> RadarScans:
         """Decode the scans within half_window_s [s] of any of the times, each scan once, in order of time."""

@@ -1,7 +1,7 @@
 """Which topics to use: asked for by name, or guessed; wrong choices are answered with what there is."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from calib_core.errors import MessageError, RecordingError
@@ -10,7 +10,7 @@ from calib_core.recordings.radar_lists import PointLayout
 from calib_core.recordings.topics import Topic, TopicKind
 from calib_core.recordings.usages import Usage
 
-__all__ = ["Inventory", "Need", "RecordingOptions", "Selection", "select"]
+__all__ = ["Inventory", "Need", "RecordingOptions", "Selection", "select", "select_image"]
 
 Need = Literal["radar", "image"]
 _WORDS = {"radar": "radar", "image": "camera image", "camera-info": "camera info"}
@@ -37,13 +37,26 @@ class RecordingOptions:
     """Times to go by: stamps in the messages, receive times, or auto: stamps unless they cannot be right."""
 
 
+def _no_counts() -> dict[str, int]:
+    return {}
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Inventory:
-    """All topics with what each can be used for, and the name of the whole for messages."""
+    """All topics with what each can be used for, and the name of the whole for messages.
+
+    Attributes:
+        counts: how many messages there are of topics that were read in part.
+    """
 
     name: str
     topics: tuple[Topic, ...]
     usages: Mapping[str, Usage]
+    counts: Mapping[str, int] = field(default_factory=_no_counts)
+
+    def count(self, topic: Topic) -> int:
+        """Return how many messages a topic has."""
+        return max(len(topic), self.counts.get(topic.name, 0))
 
     def of_kind(self, kind: TopicKind) -> list[Topic]:
         """Return the topics of a kind that can be read."""
@@ -77,14 +90,25 @@ def select(inventory: Inventory, options: RecordingOptions, require: Sequence[Ne
     radar = _chosen(inventory, "radar", options.radar_topic) or _best(
         inventory.of_kind("radar"), inventory, _radar_rank
     )
-    image = _chosen(inventory, "image", options.image_topic) or _best(
-        inventory.of_kind("image"), inventory, _image_rank
-    )
+    image = select_image(inventory, options.image_topic)
     for kind, topic in (("radar", radar), ("image", image)):
         if topic is None and kind in require:
             raise _missing(inventory, "radar" if kind == "radar" else "image")
     info = _chosen(inventory, "camera-info", options.camera_info_topic)
     return Selection(radar, image, info or _info_beside(image, inventory))
+
+
+def select_image(inventory: Inventory, wish: str | None) -> Topic | None:
+    """Choose the camera's topic; None where there is none.
+
+    Args:
+        inventory: what there is.
+        wish: the topic asked for; None to choose.
+
+    Raises:
+        RecordingError: the topic asked for is not there or cannot be used.
+    """
+    return _chosen(inventory, "image", wish) or _best(inventory.of_kind("image"), inventory, _image_rank)
 
 
 def _chosen(inventory: Inventory, kind: TopicKind, name: str | None) -> Topic | None:
@@ -150,12 +174,12 @@ def _image_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
     layout = inventory.usages[topic.name].image
     assert layout is not None
     picture = not any(word in topic.name.lower() for word in _NOT_PICTURES)
-    return picture, _info_beside(topic, inventory) is not None, len(topic), layout.compressed
+    return picture, _info_beside(topic, inventory) is not None, inventory.count(topic), layout.compressed
 
 
 def _info_beside(image: Topic | None, inventory: Inventory) -> Topic | None:
     """Return the camera info in the nearest namespace above the image topic; else the only one there is."""
-    infos = {topic.name: topic for topic in inventory.of_kind("camera-info") if len(topic)}
+    infos = {topic.name: topic for topic in inventory.of_kind("camera-info") if inventory.count(topic)}
     if image is None:
         return None
     parts = image.name.split("/")

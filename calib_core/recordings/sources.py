@@ -1,5 +1,6 @@
 """What every container offers: channels, an index of messages, and their bytes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
@@ -102,8 +103,18 @@ class Source(Protocol):
         ...
 
     @property
+    def counts(self) -> Mapping[int, int]:
+        """How many messages each channel has, as far as the file says so by itself."""
+        ...
+
+    @property
     def cautions(self) -> tuple[Caution, ...]:
         """What opening it brought to light."""
+        ...
+
+    @property
+    def later_cautions(self) -> tuple[Caution, ...]:
+        """What reading it has brought to light since."""
         ...
 
     def index(self, channel_id: int) -> MessageIndex:

@@ -2,6 +2,7 @@
 
 import sqlite3
 import threading
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,14 @@ from calib_core.recordings.compression import unpack_message
 from calib_core.recordings.index_cache import cache_of
 from calib_core.recordings.kept_indexes import heads_from, keep_heads
 from calib_core.recordings.sources import Channel, Heads, MessageIndex
-from calib_core.recordings.sqlite_recovery import FoundRows, about_rows, connect, damaged_database, scan_rows
+from calib_core.recordings.sqlite_recovery import (
+    FoundRows,
+    about_rows,
+    connect,
+    damaged_database,
+    first_rows,
+    scan_rows,
+)
 from calib_core.results import Caution
 
 if TYPE_CHECKING:
@@ -33,13 +41,15 @@ class SqliteSource:
     Args:
         file: the file; only its path and size are used, SQLite reads it by itself.
         packed: each message is a Zstandard frame of its own (compression_mode: MESSAGE in metadata.yaml).
+        first_rows: look only at so many rows, and refuse damaged ones; None looks at all.
     """
 
-    def __init__(self, file: "FileBytes", *, packed: bool = False) -> None:
+    def __init__(self, file: "FileBytes", *, packed: bool = False, first_rows: int | None = None) -> None:
         self.path, self.size_bytes = file.path, file.size_bytes
         self.cautions: tuple[Caution, ...] = file.cautions
         self._file = file
         self._packed = packed
+        self._first_rows = first_rows
         self._lock = threading.Lock()
         self._indexes: dict[int, MessageIndex] | None = None
         self._until_closed = ExitStack()
@@ -52,6 +62,16 @@ class SqliteSource:
         except RecordingError:
             self._until_closed.close()
             raise
+
+    @property
+    def counts(self) -> Mapping[int, int]:
+        """Nothing: a database says nowhere how many rows it has."""
+        return {}
+
+    @property
+    def later_cautions(self) -> tuple[Caution, ...]:
+        """Nothing: damage shows while it is opened, or in the messages themselves."""
+        return ()
 
     @property
     def container(self) -> str:
@@ -110,6 +130,8 @@ class SqliteSource:
 
     def _all_rows(self) -> FoundRows:
         """Return topic, time and number of every row, from the cache where they are there."""
+        if self._first_rows is not None:
+            return self._beginning(self._first_rows)
         kept = self._kept.get("rows") if self._kept is not None else None
         if kept is not None and kept.keys() == {"columns"} and kept["columns"].dtype == np.int64:
             return FoundRows(kept["columns"].reshape(-1, 3))
@@ -118,6 +140,13 @@ class SqliteSource:
         if self._kept is not None and not (found.fault or found.strange):
             self._kept.put("rows", {"columns": found.columns})
         return found
+
+    def _beginning(self, count: int) -> FoundRows:
+        try:
+            with self._lock:
+                return first_rows(self._connection, count)
+        except sqlite3.Error as error:
+            raise self._damaged(error) from error
 
     def _sorted(self, columns: np.ndarray) -> dict[int, MessageIndex]:
         topics = columns[:, 0]

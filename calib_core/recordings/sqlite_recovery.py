@@ -16,7 +16,7 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.files import FileBytes
 from calib_core.results import Caution
 
-__all__ = ["FoundRows", "about_rows", "connect", "damaged_database", "scan_rows"]
+__all__ = ["FoundRows", "about_rows", "connect", "damaged_database", "first_rows", "scan_rows"]
 
 _MAX_VALUE_BYTES = 1 << 28
 _BATCH_ROWS = 20_000
@@ -103,6 +103,18 @@ def damaged_database(path: Path, error: object) -> RecordingError:
         f"{path}: not a readable ROS 2 SQLite bag ({why}); if the recorder was killed, keep the -wal file "
         "beside it in a writable folder; otherwise copy the file again"
     )
+
+
+def first_rows(connection: sqlite3.Connection, count: int) -> FoundRows:
+    """Read topic, time and number of the first so many rows, and nothing behind them.
+
+    Raises:
+        sqlite3.Error: they are damaged.
+    """
+    batches, strange = _batches(
+        connection, "SELECT topic_id, timestamp, id FROM messages ORDER BY id LIMIT ?", (count,)
+    )
+    return FoundRows(_joined(batches), strange=strange)
 
 
 def scan_rows(connection: sqlite3.Connection, path: Path) -> FoundRows:

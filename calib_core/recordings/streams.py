@@ -3,7 +3,7 @@
 import contextlib
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,9 +22,14 @@ __all__ = ["ImageStream", "RadarStream", "join_scans"]
 
 _BLOCK_SCANS = 128
 _USUAL_CLOUD_BYTES = 4096
+_SMALLEST_CLOUD_BYTES = 256
 _LONGEST_TOGETHER = 1 << 17
 _CLAIMS_OF_A_SCAN = 16
 _CACHED_RETURNS = 1_000_000
+_WINDOW_RETURNS = 50_000
+_FIRST_WINDOW_SCANS = 16
+_MOST_WINDOW_SCANS = 2048
+_MOST_WINDOW_BYTES = 1 << 23
 
 
 class RadarStream:
@@ -102,6 +107,17 @@ class RadarStream:
                 self._blocks.popitem(last=False)
         return block
 
+    def windows(self) -> Iterator[RadarScans]:
+        """Decode all scans in order, about as many returns at a time; nothing of it is kept."""
+        first, count = 0, _FIRST_WINDOW_SCANS
+        while first < len(self.times_ns):
+            scans = self._decoded(np.arange(first, min(first + count, len(self.times_ns))))
+            yield scans
+            first += len(scans)
+            per_scan = max(1.0, len(scans.points_radar_m) / len(scans))
+            most = min(_MOST_WINDOW_SCANS, _MOST_WINDOW_BYTES // self._cloud_bytes)
+            count = max(1, min(int(_WINDOW_RETURNS / per_scan), most))
+
     def sample(self, count: int) -> RadarScans:
         """Decode at most count scans spread evenly over the recording."""
         places = np.linspace(0, len(self.times_ns) - 1, min(count, len(self.times_ns)))
@@ -140,9 +156,9 @@ class RadarStream:
         messages = self._first[scans]
         heads = self.topic.heads(messages, self._cloud_bytes)
         longest = int(heads.lengths.max())
-        if longest > self._cloud_bytes and longest <= _LONGEST_TOGETHER:
-            self._cloud_bytes = longest
+        if heads.rows.shape[1] < longest <= _LONGEST_TOGETHER:
             heads = self.topic.heads(messages, longest)
+        self._cloud_bytes = max(_SMALLEST_CLOUD_BYTES, min(longest + longest // 8, _LONGEST_TOGETHER))
         if longest > heads.rows.shape[1] or int(heads.lengths.min()) < 0:
             return None
         found = layout.returns_of_rows(heads.rows, heads.lengths)
@@ -173,7 +189,9 @@ class RadarStream:
         if short.any():
             returns.points_radar_m[short] = np.nan
             self._note_unreadable(dict.fromkeys(messages[short].tolist(), "the message is cut short"))
-        for row in np.flatnonzero(layout.misfits(heads.rows) & ~short).tolist():
+        misfits = np.flatnonzero(layout.misfits(heads.rows) & ~short).tolist()
+        returns = _joined([returns, no_returns()]) if misfits else returns  # a copy that can be written to
+        for row in misfits:
             self._reread(layout, int(messages[row]), row, returns)
         return _stacked(self.times_ns[scans], counts.tolist(), returns)
 
@@ -190,8 +208,8 @@ class RadarStream:
 
 
 def _joined(scans: Sequence[Returns]) -> Returns:
-    if not scans:
-        return no_returns()
+    if len(scans) < 2:
+        return scans[0] if scans else no_returns()
     return Returns(
         np.concatenate([scan.points_radar_m for scan in scans]),
         np.concatenate([scan.doppler_mps for scan in scans]),
@@ -207,6 +225,9 @@ def _joined_claims(scans: Sequence[Returns]) -> Points3 | None:
 
 
 def _stacked(times_ns: TimesNs, counts: Sequence[int], returns: Returns) -> RadarScans:
+    """Make scans of returns that nobody else has."""
+    for column in (returns.points_radar_m, returns.doppler_mps, returns.snr_db, returns.sigma_polar):
+        column.setflags(write=False)
     return RadarScans(
         times_ns=times_ns,
         first_return=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from calib_core.errors import MessageError, RecordingError
 from calib_core.recordings.camera_info import is_camera_info
 from calib_core.recordings.definitions import Definition
-from calib_core.recordings.images import ImageLayout, is_compressed_image, is_packet, is_raw_image
+from calib_core.recordings.images import ImageLayout, is_picture
 from calib_core.recordings.radar_axes import RadarAxes
 from calib_core.recordings.radar_layouts import RadarLayout, recognise
 from calib_core.recordings.topics import Topic, TopicKind
@@ -44,7 +44,7 @@ def usage_of(topic: Topic) -> Usage:
         return Usage("other", problem=str(error))
     if is_camera_info(definition):
         return Usage("camera-info")
-    pictures = is_raw_image(definition) or is_compressed_image(definition) or is_packet(definition)
+    pictures = is_picture(definition)
     usage = Usage("image" if pictures else "other", problem="no messages")
     for row in sorted({0, len(topic) // 2, len(topic) - 1}) if len(topic) else ():
         try:

@@ -1,6 +1,7 @@
 """MCAP files written by the specification, with parts left out that other writers leave out."""
 
 import struct
+import zlib
 
 import lz4.frame
 
@@ -29,10 +30,12 @@ def declarations(ros, rows, encoding: str, schemas: bool) -> bytes:
     return declared
 
 
-def chunk_and_index(body, places, times, compression, start, message_index):
+def chunk_and_index(body, places, times, compression, start, message_index, checksums):
     """Return a chunk with its message indexes, and the record of it for the summary."""
     packed = lz4.frame.compress(body) if compression == "lz4" else body
-    head = struct.pack("<QQQI", min(times), max(times), len(body), 0) + text(compression)
+    head = struct.pack("<QQQI", min(times), max(times), len(body), zlib.crc32(body) if checksums else 0) + text(
+        compression
+    )
     chunk = record(6, head + struct.pack("<Q", len(packed)) + packed)
     indexes, offsets = b"", b""
     for number, entries in places.items() if message_index else ():
@@ -59,6 +62,7 @@ def mcap(
     schemas=True,
     statistics=None,
     chunk_rows=10**9,
+    checksums=False,
 ) -> bytes:
     """Write an MCAP, with the parts left out that a test asks for."""
     topics = sorted({topic for topic, _, _ in rows})
@@ -77,7 +81,7 @@ def mcap(
             out += body
             continue
         times = [at for _, at, _ in rows[first : first + chunk_rows]]
-        chunk, info = chunk_and_index(body, places, times, compression, len(out), message_index)
+        chunk, info = chunk_and_index(body, places, times, compression, len(out), message_index, checksums)
         out, infos = out + chunk, infos + (info if chunk_index else b"")
     out += record(15, bytes(4))
     summary_start = len(out) if summary else 0
@@ -85,4 +89,7 @@ def mcap(
         out += (declared if repeat_channels else b"") + infos
         if statistics is not None:
             out += record(11, struct.pack("<QHIIIIQQI", statistics, len(topics), len(topics), 0, 0, 1, 0, 0, 0))
-    return out + record(2, struct.pack("<QQI", summary_start, 0, 0)) + MAGIC
+    footer = record(2, struct.pack("<QQI", summary_start, 0, 0))
+    if checksums and summary:
+        footer = footer[:-4] + struct.pack("<I", zlib.crc32(out[summary_start:] + footer[:-4]))
+    return out + footer + MAGIC

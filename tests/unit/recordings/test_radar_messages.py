@@ -411,3 +411,24 @@ def test_big_endian_messages_are_read(ros2, write, cloud_points, monkeypatch, pl
     with open_recording(path, RecordingOptions(radar_topic="/ti_mmwave/radar_scan"), require=("radar",)) as recording:
         np.testing.assert_array_equal(recording.radar_scans().points_radar_m, positions)
         assert np.diff(recording.radar_scans().first_return).tolist() == [2, 3, 1]
+
+
+def test_windows_hold_every_scan_once_and_few_returns_each(ros, write, plain, jpeg, cloud_points):
+    at = [START_NS + i * 10**8 for i in range(80)]
+    rows = [("/radar/points", t, ros.cloud(t, cloud_points(1 + 2000 * (i % 40 == 7), i))) for i, t in enumerate(at)]
+    with open_recording(write(ros, rows), require=("radar",)) as recording:
+        whole, windows = recording.radar_scans(), list(recording.radar_windows())
+    assert len(windows) > 1
+    assert max(len(window) for window in windows) < 80
+    for name in ("times_ns", "points_radar_m", "doppler_mps", "snr_db", "sigma_polar"):
+        np.testing.assert_array_equal(np.concatenate([getattr(w, name) for w in windows]), getattr(whole, name))
+
+
+def test_scans_of_a_window_cannot_be_written_to(ros, write, plain, jpeg):
+    with open_recording(write(ros, plain(ros, jpeg))) as recording:
+        scans = recording.radar_scans(START_NS, START_NS + 10**9)
+    for name in ("times_ns", "points_radar_m", "doppler_mps", "snr_db", "sigma_polar"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(scans, name)[0] = 1
+        with pytest.raises(ValueError, match="cannot set WRITEABLE"):
+            getattr(scans, name)[:1].setflags(write=True)
