@@ -1,6 +1,6 @@
 """A recording made of given pictures and an empty radar: for tests of page and port that need other pictures than the sample."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -56,8 +56,8 @@ class PictureRecording:
             "pinhole", width_px, height_px, np.array([[500, 0, width_px / 2], [0, 500, height_px / 2], [0, 0, 1]])
         )
 
-    def radar_scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
-        return RadarScans()
+    def radar_windows(self) -> Iterator[RadarScans]:
+        return iter(())
 
     def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float) -> RadarScans:
         return RadarScans()

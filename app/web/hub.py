@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -59,7 +59,7 @@ class PageRecording(Protocol):
 
     def camera(self) -> Camera | None: ...  # noqa: D102
     def image_bytes(self, index: int, /) -> EncodedPicture: ...  # noqa: D102
-    def radar_scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans: ...  # noqa: D102
+    def radar_windows(self) -> Iterator[RadarScans]: ...  # noqa: D102
     def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans: ...  # noqa: D102
 
 
@@ -136,7 +136,7 @@ class Hub:
         options = self.workspace.session.options.gating
         try:
             self.survey = await asyncio.get_running_loop().run_in_executor(
-                self.executor, lambda: survey_of(self.recording.radar_scans(), self.recording.image_times, options)
+                self.executor, lambda: survey_of(self.recording.radar_windows(), self.recording.image_times, options)
             )
         except CalibrationError as error:
             _log.warning("the radar could not be searched for placements: %s", error)

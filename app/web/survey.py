@@ -1,19 +1,23 @@
 """What the radar alone tells about the whole recording: where the reflector stood still, and how much there was to see."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from app.web.messages import PlacementRow
 from calib_core.arrays import TimesNs
+from calib_core.gating import static_returns
 from calib_core.measurements import NS_PER_S, RadarScans
 from calib_core.options import GatingOptions
 from calib_core.placements import Placement, find_placements
+from calib_core.recordings.streams import join_scans
 
 __all__ = ["Activity", "Survey", "placements_at", "survey_of"]
 
 _MOST_SLICES = 800
+_MOST_STATIC_RETURNS = 1_000_000
+"""In one stretch: more than an hour of 25 static returns in each of 10 scans a second; searching it takes some 200 MB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,21 +48,36 @@ class Survey:
     activity: Activity
 
 
-def survey_of(scans: RadarScans, image_times: TimesNs, options: GatingOptions) -> Survey:
+def survey_of(windows: Iterable[RadarScans], image_times: TimesNs, options: GatingOptions) -> Survey:
     """Survey a whole recording.
 
+    Memory stays bounded: of each window only the static returns are kept, and a recording with more of them than fit is
+    searched one stretch after another.
+
     Args:
-        scans: all of them.
+        windows: all scans, in order of time.
         image_times: (m,) stamps of the frames [ns], ascending.
         options: which returns can be the reflector.
     """
+    activity = _ActivitySum(image_times)
     seen = [
         (placement, row)
-        for placement in find_placements(scans, options)
+        for stretch in _stretches(map(activity.note, windows), options)
+        for placement in find_placements(stretch, options)
         if (row := _row(placement, image_times)) is not None
     ]
-    placements, rows = tuple(pair[0] for pair in seen), tuple(pair[1] for pair in seen)
-    return Survey(placements, rows, _activity(scans, image_times))
+    return Survey(tuple(pair[0] for pair in seen), tuple(pair[1] for pair in seen), activity.total())
+
+
+def _stretches(windows: Iterable[RadarScans], options: GatingOptions) -> Iterator[RadarScans]:
+    """Yield the static returns of a recording; in several pieces where they are too many."""
+    pieces: list[RadarScans] = []
+    for window in windows:
+        pieces.append(static_returns(window, options))
+        if sum(len(piece.points_radar_m) for piece in pieces) > _MOST_STATIC_RETURNS:
+            yield join_scans(pieces)
+            pieces = []
+    yield join_scans(pieces)
 
 
 def _row(placement: Placement, image_times: TimesNs) -> PlacementRow | None:
@@ -78,15 +97,32 @@ def _row(placement: Placement, image_times: TimesNs) -> PlacementRow | None:
     )
 
 
-def _activity(scans: RadarScans, image_times: TimesNs) -> Activity:
-    length_s = max((int(image_times[-1]) - int(image_times[0])) / NS_PER_S, 1e-3)
-    slices = max(1, min(_MOST_SLICES, int(length_s / 0.25)))
-    step_s = length_s / slices
-    place = ((scans.times_ns - image_times[0]) / NS_PER_S // step_s).astype(np.int64)
-    inside = (place >= 0) & (place < slices)
-    returns = np.bincount(place[inside], weights=np.diff(scans.first_return)[inside], minlength=slices)
-    count = np.bincount(place[inside], minlength=slices)
-    return Activity(step_s, tuple(np.round(returns / np.maximum(count, 1), 2).tolist()))
+class _ActivitySum:
+    """Adds up scans and returns by slices of time.
+
+    Args:
+        image_times: (m,) stamps of the frames [ns], ascending.
+    """
+
+    def __init__(self, image_times: TimesNs) -> None:
+        length_s = max((int(image_times[-1]) - int(image_times[0])) / NS_PER_S, 1e-3)
+        self._slices = max(1, min(_MOST_SLICES, int(length_s / 0.25)))
+        self._step_s = length_s / self._slices
+        self._origin = image_times[0]
+        self._returns, self._scans = np.zeros(self._slices), np.zeros(self._slices, dtype=np.int64)
+
+    def note(self, scans: RadarScans) -> RadarScans:
+        """Add some scans; return them."""
+        place = ((scans.times_ns - self._origin) / NS_PER_S // self._step_s).astype(np.int64)
+        inside = (place >= 0) & (place < self._slices)
+        counts = np.diff(scans.first_return)[inside]
+        self._returns += np.bincount(place[inside], weights=counts, minlength=self._slices)
+        self._scans += np.bincount(place[inside], minlength=self._slices)
+        return scans
+
+    def total(self) -> Activity:
+        """Return the mean number of returns per scan in each slice."""
+        return Activity(self._step_s, tuple(np.round(self._returns / np.maximum(self._scans, 1), 2).tolist()))
 
 
 def placements_at(survey: Survey | None, time: int) -> Sequence[Placement]:

@@ -125,7 +125,7 @@ def recorded() -> RadarScans:
 
 def test_the_survey_finds_the_reflector_and_a_frame_to_click_in() -> None:
     image_times = (np.arange(0, 10, 0.7) * 1e9).astype(np.int64)
-    survey = survey_of(recorded(), image_times, GatingOptions())
+    survey = survey_of([recorded()], image_times, GatingOptions())
     [row] = survey.rows
     assert row.range_m == pytest.approx(np.sqrt(36 + 1 + 0.09), abs=0.05)
     assert row.start_s == pytest.approx(3, abs=0.3)
@@ -138,7 +138,7 @@ def test_the_survey_finds_the_reflector_and_a_frame_to_click_in() -> None:
 
 def test_the_activity_counts_returns_per_scan() -> None:
     image_times = np.array([0, int(10e9)], dtype=np.int64)
-    activity = survey_of(recorded(), image_times, GatingOptions()).activity
+    activity = survey_of([recorded()], image_times, GatingOptions()).activity
     in_the_middle = activity.returns[int(5 / activity.step_s)]
     assert activity.returns[0] == 1
     assert in_the_middle == 2
@@ -147,7 +147,25 @@ def test_the_activity_counts_returns_per_scan() -> None:
 
 def test_a_placement_that_no_frame_shows_is_not_offered() -> None:
     image_times = np.array([0, int(9.9e9)], dtype=np.int64)
-    assert survey_of(recorded(), image_times, GatingOptions()).rows == ()
+    assert survey_of([recorded()], image_times, GatingOptions()).rows == ()
+
+
+def test_a_survey_in_windows_and_in_stretches_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    image_times = (np.arange(0, 10, 0.7) * 1e9).astype(np.int64)
+    whole, scans = survey_of([recorded()], image_times, GatingOptions()), recorded()
+    windows = [scans.between(TimeNs(int(s * 1e9)), TimeNs(int((s + 1) * 1e9) - 1)) for s in range(10)]
+    assert survey_of(windows, image_times, GatingOptions()).rows == whole.rows
+    assert survey_of(windows, image_times, GatingOptions()).activity == whole.activity
+    monkeypatch.setattr("app.web.survey._MOST_STATIC_RETURNS", 128)  # 9 s of 10
+    in_stretches = survey_of(windows, image_times, GatingOptions())
+    assert [row.frame for row in in_stretches.rows] == [row.frame for row in whole.rows]
+    assert in_stretches.activity == whole.activity
+
+
+def test_a_survey_of_no_radar_is_empty() -> None:
+    survey = survey_of([], np.array([0, int(1e9)], dtype=np.int64), GatingOptions())
+    assert survey.rows == ()
+    assert set(survey.activity.returns) == {0.0}
 
 
 class Radar:
