@@ -3,13 +3,12 @@
 A check says nothing when all is well. The texts are for people; the codes are for programs and stay as they are.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from calib_core.consensus import associate, log_odds_of
 from calib_core.findings import Findings
+from calib_core.intrinsics_doubts import intrinsics
 from calib_core.locating import CLUSTER_SCALE
+from calib_core.pair_doubts import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
 from calib_core.pose_doubts import camera_position, mirrored_axes, two_poses
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.results import Caution
@@ -22,8 +21,6 @@ _WEAK_POSITION_M = 0.15
 _NOISE_EXCESS = 2.5
 _NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
-_DECISIVE_INFLUENCE = 3.0
-_AMBIGUOUS_MARGIN = 4.0
 
 
 def cautions_of(findings: Findings) -> tuple[Caution, ...]:
@@ -35,13 +32,14 @@ def cautions_of(findings: Findings) -> tuple[Caution, ...]:
         _flat_radar,
         _many_outliers,
         _few_inliers,
+        intrinsics,
         _noise_excess,
         _smooth_angle_errors,
         _weak_geometry,
         _same_places,
-        _ambiguous_candidates,
-        _doubtful_pairs,
-        _decisive_pair,
+        ambiguous_candidates,
+        contradicted_pairs,
+        decisive_pair,
     )
     return tuple(caution for check in checks for caution in check(findings))
 
@@ -65,7 +63,7 @@ def _many_outliers(f: Findings) -> list[Caution]:
     return [
         Caution(
             "many-outliers",
-            f"{len(outliers)} of {len(f.ids)} pairs do not fit: {_listed(outliers)}",
+            f"{len(outliers)} of {len(f.ids)} pairs do not fit: {listed(outliers)}",
             "look at each: was the reflector clicked, did it rest, do both recordings run on one clock?",
         )
     ]
@@ -150,66 +148,3 @@ def _same_places(f: Findings) -> list[Caution]:
             "move the reflector between clicks; more clicks of one placement add little",
         )
     ]
-
-
-def _ambiguous_candidates(f: Findings) -> list[Caution]:
-    """Name the pairs where a second candidate explains the click nearly as well as the chosen one."""
-    if f.evidence.one_to_one:
-        return []
-    evidence, owner = f.refined.evidence, f.refined.evidence.owner
-    margins = np.full(len(evidence), np.inf)
-    cost = _candidate_costs(f)
-    for i in np.flatnonzero(f.inliers):
-        own = np.sort(cost[owner == i])
-        if len(own) > 1:
-            margins[i] = own[1] - own[0]
-    doubtful = [f.ids[i] for i in np.flatnonzero(margins < _AMBIGUOUS_MARGIN)]
-    if not doubtful:
-        return []
-    return [
-        Caution(
-            "uncertain-association",
-            f"more than one radar position suits the click of {_listed(doubtful)}",
-            "look at the radar view there; exclude the pair if the chosen return is not the reflector",
-        )
-    ]
-
-
-def _candidate_costs(f: Findings) -> np.ndarray:
-    evidence = f.refined.evidence
-    each = evidence.candidates_apart()
-    rows, model = associate(each, f.refined.camera_from_radar)
-    return -2.0 * log_odds_of(each, model, each.log_score[rows], 0.5)
-
-
-def _doubtful_pairs(f: Findings) -> list[Caution]:
-    return [
-        Caution(
-            "doubtful-pair",
-            f"without {f.ids[doubt.pair]} the camera moves {100 * doubt.camera_move_m:.0f} cm, and the other pairs predict it "
-            f"{doubt.standard_deviations:.1f} standard deviations from its click; the stated uncertainty allows for both",
-            f"look at the click of {f.ids[doubt.pair]}; correct it, exclude it, or add placements near it",
-        )
-        for doubt in f.doubts
-    ]
-
-
-def _decisive_pair(f: Findings) -> list[Caution]:
-    if f.inliers.sum() < 6:
-        return []
-    worst = int(np.argmax(np.where(f.inliers, f.left_out.influence, 0.0)))
-    doubted = any(doubt.pair == worst for doubt in f.doubts)
-    if doubted or f.left_out.influence[worst] < _DECISIVE_INFLUENCE:
-        return []
-    return [
-        Caution(
-            "one-pair-decides",
-            f"without {f.ids[worst]} the pose would move by {f.left_out.influence[worst]:.1f} standard deviations",
-            "look at that click again, and add a placement near it",
-        )
-    ]
-
-
-def _listed(names: Sequence[str]) -> str:
-    shown = ", ".join(names[:6])
-    return shown if len(names) <= 6 else f"{shown} and {len(names) - 6} more"
