@@ -73,11 +73,16 @@ def _read(content: str | bytes, source: str) -> ImportedCalibration:
             return (read_colmap if any("images.txt" in name for name in names) else read_numpy)(content, source)
         if content.startswith(b"MATLAB"):
             return read_matlab(content, source)
-        try:
-            content = content.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            raise InputError(f"{source}: neither text nor an archive; {_KNOWN}") from None
-    return _read_text(content, source)
+        content = _decoded(content, source)
+    return _read_text(content.replace("\r\n", "\n"), source)
+
+
+def _decoded(content: bytes, source: str) -> str:
+    """Return text of UTF-8, or of UTF-16 as Windows' shell writes what is sent to a file."""
+    try:
+        return content.decode("utf-16" if content.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{source}: neither text nor an archive; {_KNOWN}") from None
 
 
 def imported(file: CalibrationFile) -> ImportedCalibration:

@@ -435,3 +435,15 @@ def test_sensors_are_told_by_the_names_people_give_them_where_no_words_do(file, 
 
     assert "check point" not in bare
     assert check(read_any(bare.lstrip()), against=imported(file)).verdict == "right"
+
+
+@pytest.mark.parametrize("name", [known.name for known in FORMATS if known.name not in ("colmap", "matlab", "numpy")])
+def test_a_text_that_went_through_windows_is_read_the_same(file, name):
+    data = export(file, name).data
+    right = read_any(data).camera_from_radar.as_matrix()
+
+    for changed in (data.replace(b"\n", b"\r\n"), b"\xef\xbb\xbf" + data, data.decode().encode("utf-16")):
+        again = read_any(changed)
+        assert again.format == name
+        assert check(again, against=imported(file)).verdict == "right"
+        np.testing.assert_array_equal(again.camera_from_radar.as_matrix(), right)
