@@ -7,6 +7,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Values
 from calib_core.camera import Camera
+from calib_core.clock_doubts import clocks
 from calib_core.consensus import Consensus, associate, find_consensus
 from calib_core.diagnostics import cautions_of
 from calib_core.doubting import doubts_of, widened_by_doubts
@@ -57,7 +58,9 @@ def calibrate(
     pairing = pair_clicks(clicks, scans, options)
     excluded = frozenset(click.id for click in clicks if click.excluded)
     outcome = _solved(pairing.pairs, pairing.unpaired, excluded, camera, options)
-    return replace(outcome, unpaired=pairing.unpaired) if isinstance(outcome, Unsolvable) else outcome
+    if isinstance(outcome, Unsolvable):
+        return replace(outcome, unpaired=pairing.unpaired)
+    return replace(outcome, cautions=(*outcome.cautions, *clocks(outcome, scans)))
 
 
 def calibrate_pairs(
