@@ -3,13 +3,16 @@
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from app.cli.flags import File
 from app.cli.printing import read_text, write_whole
 from calib_core.errors import InputError
+
+if TYPE_CHECKING:
+    from calib_core.interchange import CalibrationFile
 
 __all__ = ["Check", "Export"]
 
@@ -34,7 +37,7 @@ class Export:
 
     def run(self) -> int:
         """Write the export; return the exit code."""
-        from calib_core.interchange import FORMATS, ExportBytes, export, format_named, parent_pose, read_calibration
+        from calib_core.interchange import FORMATS, ExportBytes, export, format_named, parent_pose
 
         if self.to == "list":
             width = max(len(known.name) for known in FORMATS)
@@ -45,7 +48,7 @@ class Export:
             raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
         path = self.calibration[0]
         parent = parent_pose(self.parent_from_radar) if self.parent_from_radar else None
-        written = export(read_calibration(read_text(path), source=str(path)), self.to, parent_from_radar=parent)
+        written = export(_own_calibration(path), self.to, parent_from_radar=parent)
         for note in written.notes:
             print(f"note: {note}", file=sys.stderr)
         if self.out is not None:
@@ -57,6 +60,18 @@ class Export:
         else:
             print(written.text, end="")
         return 0
+
+
+def _own_calibration(path: Path) -> "CalibrationFile":
+    from calib_core.interchange import read_any_file, read_calibration
+
+    found = read_any_file(path)
+    if found.file is None:
+        raise InputError(
+            f"{path}: is {found.format}, and export takes calibration-1; make one of it first: "
+            f"cocalib import {path.name} --out calibration.json"
+        )
+    return read_calibration(read_text(path), source=str(path))
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,7 +67,6 @@ def write_numpy(file: CalibrationFile) -> bytes:
         "camera_from_radar": calibration.camera_from_radar.as_matrix(),
         "R": calibration.camera_from_radar.rotation,
         "t": calibration.camera_from_radar.translation_m,
-        "covariance": calibration.covariance,
         "K": camera.matrix_px,
         "D": camera.distortion,
         "image_size_px": np.array([camera.width_px, camera.height_px], dtype=np.int64),
@@ -76,6 +75,8 @@ def write_numpy(file: CalibrationFile) -> bytes:
         "camera_frame": np.array(file.frames.camera),
         "equation": np.array(EQUATION),
     }
+    if np.isfinite(calibration.covariance).all():
+        arrays["covariance"] = calibration.covariance
     if check is not None:
         arrays |= {"check_point_radar_m": check.radar_m, "check_point_pixel_px": check.pixel_px}
     members = {}
@@ -160,8 +161,9 @@ def write_matlab(file: CalibrationFile) -> bytes:
         },
         "frames": {"radar": file.frames.radar, "camera": file.frames.camera},
         "equation": EQUATION,
-        "covariance": calibration.covariance,
     }
+    if np.isfinite(calibration.covariance).all():
+        content["covariance"] = calibration.covariance
     if check is not None:
         content["check_point"] = {"radar_m": check.radar_m[None, :], "pixel_px": check.pixel_px[None, :]}
     buffer = io.BytesIO()

@@ -121,6 +121,16 @@ def test_export_list_names_every_format(cocalib: Cocalib) -> None:
     assert {"tf2", "urdf", "json"} <= {line.split()[0] for line in answer.out.splitlines()}
 
 
+def test_export_of_another_stacks_file_says_how_to_come_to_a_calibration(
+    cocalib: Cocalib, calibration: Path, tmp_path: Path
+) -> None:
+    cocalib("export", calibration, "--to", "tf2", "--out", tmp_path / "old.sh")
+    refused = cocalib("export", tmp_path / "old.sh", "--to", "urdf")
+    assert refused.code == 2
+    assert "is tf2, and export takes calibration-1" in refused.err
+    assert "cocalib import old.sh --out calibration.json" in refused.err
+
+
 def test_export_without_out_prints_and_into_a_folder_names_itself(
     cocalib: Cocalib, calibration: Path, tmp_path: Path
 ) -> None:

@@ -19,6 +19,7 @@ from calib_core.interchange import (
     FrameNames,
     check,
     compare,
+    contents_text,
     export,
     imported,
     read_any,
@@ -369,6 +370,19 @@ def test_a_file_is_read_by_its_path(file, tmp_path):
         assert read_any_file(tmp_path / written.file_name).format == known.name
     with pytest.raises(InputError, match="cannot be read"):
         read_any_file(tmp_path / "absent")
+
+
+def test_an_unknown_covariance_is_left_out_of_binary_files_not_written_as_nan(file):
+    unknown = dataclasses.replace(file.calibration, covariance=np.full((6, 6), np.nan))
+
+    for name in ("numpy", "matlab"):
+        known, left_out = (
+            contents_text(export(dataclasses.replace(file, calibration=calibration), name))
+            for calibration in (file.calibration, unknown)
+        )
+        assert "covariance" in known
+        assert "covariance" not in left_out
+        assert "nan" not in left_out
 
 
 def test_an_npz_with_python_objects_is_refused(tmp_path):
