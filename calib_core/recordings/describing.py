@@ -110,7 +110,9 @@ def clock_lines(found: ClockDiagnosis) -> tuple[str, ...]:
     """Say which clock a topic goes by and why; in a second line, where there is something, what is known about both."""
     used = {"header": "stamps of measurement", "receive": "times of receiving"}[found.chosen]
     about = []
-    if found.delay_s is not None:
+    if found.delay_s == 0 and found.delay_jitter_s == 0:
+        about.append("the times of receiving are the same")
+    elif found.delay_s is not None:
         about.append(f"received {_delay_text(found.delay_s)} the stamp (± {(found.delay_jitter_s or 0) * 1e3:.1f} ms)")
     about.extend(found.remarks)
     return (f"{used}, because {found.reason}", *(["; ".join(about)] if about else []))

@@ -22,7 +22,10 @@ _MORE_SUFFIXES = (".active", ".zstd", ".zst", ".gz", ".bz2", ".lz4")
 _METADATA = "metadata.yaml"
 _MAX_METADATA_BYTES = 1 << 24
 _FIRST_ROWS = 500
-_KINDS = "ROS 1 .bag, ROS 2 .mcap and .db3 files and their folders can be opened"
+_KINDS = (
+    "ROS 1 .bag, ROS 2 .mcap and .db3 files and their folders can be opened, and folders of pictures or radar files, "
+    "radar CSV and videos"
+)
 _PACKED_MESSAGES = re.compile(r"^\s*compression_mode:\s*['\"]?message", re.IGNORECASE | re.MULTILINE)
 _PACKED = {b"PK\x03\x04": ("zip", "unzip"), b"\xfd7zXZ": ("xz", "unxz")}
 

@@ -1,5 +1,6 @@
 """What each topic can be used for, by its definition and its messages."""
 
+import re
 from dataclasses import dataclass, replace
 
 from calib_core.errors import MessageError, RecordingError
@@ -11,6 +12,12 @@ from calib_core.recordings.radar_layouts import RadarLayout, recognise
 from calib_core.recordings.topics import Topic, TopicKind
 
 __all__ = ["Usage", "usage_of"]
+
+_PACKETS = re.compile(r"/(?!FFMPEG)\w*Packets?$")
+_RAW = (
+    "raw packets as a sensor sends them, which only its driver understands; play the recording to the driver, and record "
+    "what it publishes"
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +45,8 @@ class Usage:
 
 def usage_of(topic: Topic) -> Usage:
     """Find out what a topic can be used for, by its definition and its first message that can be read."""
+    if _PACKETS.search(topic.type):
+        return Usage("other", problem=_RAW)
     try:
         definition = topic.definition()
     except MessageError as error:

@@ -57,9 +57,8 @@ def write_video(
         progress: called with frames done and frames in all.
 
     Raises:
-        InputError: PyAV is missing, or the suffix is of another format.
+        InputError: PyAV is missing, the suffix is of another format, or the file cannot be written.
         RecordingError: no frame can be read.
-        OSError: the file cannot be written.
     """
     form = _FORMATS.get(path.suffix.lower())
     if form is None:
@@ -70,8 +69,11 @@ def write_video(
     try:
         written = _write(recording, part, form, progress)
         part.replace(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
     finally:
-        part.unlink(missing_ok=True)
+        if part.parent.is_dir():
+            part.unlink(missing_ok=True)
     return written
 
 

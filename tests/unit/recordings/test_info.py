@@ -40,7 +40,7 @@ radar       /radar/points             sensor_msgs/PointCloud2            20  10.
 clocks    /camera/image/compressed: stamps of measurement, because the stamps are sound
             received 30.0 ms after the stamp (± 0.0 ms)
           /radar/points: stamps of measurement, because the stamps are sound
-            received 0.0 ms after the stamp (± 0.0 ms)
+            the times of receiving are the same
 radar     /radar/points, frame 'radar': 20 scans at 10.0 Hz, longest gap 0.100 s
           returns per scan: 4 (4 to 4)
           position from x, y, z (forward, left, up); speed from velocity; amplitude from snr

@@ -193,7 +193,9 @@ def test_a_nuscenes_radar_folder_is_a_radar(tmp_path) -> None:
         assert [caution.code for caution in recording.cautions] == ["flat-radar"]
         found = recording.radar_scans()
         text = describe(recording)
-        assert "nuScenes radar: position from x, y, z (forward, left, up); speed from vx, vy; amplitude from rcs" in text
+        assert (
+            "nuScenes radar: position from x, y, z (forward, left, up); speed from vx, vy; amplitude from rcs" in text
+        )
     rows = np.concatenate(scans).astype(np.float64)
     np.testing.assert_array_equal(found.points_radar_m, np.stack([rows[:, 0], rows[:, 1], 0 * rows[:, 0]], axis=1))
     np.testing.assert_allclose(found.doppler_mps, (rows[:, :2] * rows[:, 3:]).sum(1) / np.hypot(rows[:, 0], rows[:, 1]))

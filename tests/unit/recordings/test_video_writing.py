@@ -63,6 +63,8 @@ def test_another_suffix_and_a_missing_library_are_said_and_leave_no_file(ros1, w
     with open_recording(path, require=("image",)) as recording:
         with pytest.raises(InputError, match=r"can be written as \.mp4, \.mov, \.mkv"):
             write_video(recording, tmp_path / "camera.avi")
+        with pytest.raises(InputError, match=r"absent/camera\.mp4: cannot be written: no such file or directory"):
+            write_video(recording, tmp_path / "absent" / "camera.mp4")
         monkeypatch.setattr(video_writing, "find_spec", lambda name: None)
         with pytest.raises(InputError, match=r"needs PyAV, which is not installed: pip install 'cocalib\[video\]'"):
             write_video(recording, tmp_path / "camera.mp4")
