@@ -58,15 +58,19 @@ def _colmap_camera(camera: Camera) -> tuple[str, list[float]]:
 
 
 def read_colmap(data: bytes, source: str) -> ImportedCalibration:
-    """Read the first image of a zipped COLMAP text model and its camera.
+    """Read the image of a zipped COLMAP text model and its camera.
 
     Raises:
-        InputError: a file or a number is missing.
+        InputError: a file or a number is missing, or there are several images.
     """
     members = {name.rsplit("/", 1)[-1]: content for name, content in unpack(data, source=source).items()}
     if not {"cameras.txt", "images.txt"} <= set(members):
         raise InputError(f"{source}: no cameras.txt and images.txt in it; give a zipped COLMAP text model")
     text = members["images.txt"].decode("utf-8", errors="replace")
+    rows = [line for line in text.splitlines() if not line.startswith("#")]  # two per image, the second may be empty
+    count = sum(1 for line in rows[::2] if line.strip())
+    if count > 1:
+        raise InputError(f"{source}: images.txt: holds {count} images; keep the one that is meant")
     image, camera = _first_line(text), _first_line(members["cameras.txt"].decode("utf-8", errors="replace"))
     numbers = floats(image[1:8], source=source, place="images.txt", length=7)
     return ImportedCalibration(

@@ -10,6 +10,7 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.camera_fields import floats
+from calib_core.interchange.choosing import Ends, the_one_between
 from calib_core.interchange.imported import Form, ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.opencv_xml import parse_xml
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
@@ -96,12 +97,12 @@ def read_tf2_command(text: str, source: str) -> ImportedCalibration:
         InputError: there is no static_transform_publisher with a pose in it.
     """
     commands = "\n".join(line for line in text.replace("\\\n", " ").splitlines() if not line.lstrip().startswith("#"))
-    line = next((line for line in commands.splitlines() if _PUBLISHER in line), "")
+    lines = [line for line in commands.splitlines() if _PUBLISHER in line]
     try:
-        arguments = shlex.split(line.partition(_PUBLISHER)[2])
+        found = [shlex.split(line.partition(_PUBLISHER)[2], comments=True) for line in lines]
     except ValueError as error:
         raise InputError(f"{source}: the command cannot be split ({error}); correct its quotes") from None
-    return _from_arguments(arguments, text, source=source, name="tf2")
+    return _from_arguments(_chosen(found, text, source=source), text, source=source, name="tf2")
 
 
 def read_launch_python(text: str, source: str) -> ImportedCalibration:
@@ -114,11 +115,14 @@ def read_launch_python(text: str, source: str) -> ImportedCalibration:
         tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError) as error:
         raise InputError(f"{source}: not Python ({error}); correct it there") from None
+    found = []
     for node in ast.walk(tree):
         if isinstance(node, ast.keyword) and node.arg == "arguments" and isinstance(node.value, ast.List):
             words = [str(item.value) for item in node.value.elts if isinstance(item, ast.Constant)]
             if len(words) == len(node.value.elts):
-                return _from_arguments(words, text, source=source, name="tf2-launch-py")
+                found.append(words)
+    if found:
+        return _from_arguments(_chosen(found, text, source=source), text, source=source, name="tf2-launch-py")
     raise InputError(f"{source}: no arguments=[...] of plain strings in it; give a file with a {_PUBLISHER}")
 
 
@@ -128,15 +132,32 @@ def read_launch_xml(text: str, source: str) -> ImportedCalibration:
     Raises:
         InputError: there is no static_transform_publisher in it.
     """
-    for node in parse_xml(text, source=source).iter("node"):
-        if _PUBLISHER in (node.get("exec"), node.get("type")):
-            name = "tf2-launch-xml" if node.get("exec") else "tf1-launch"
-            try:
-                arguments = shlex.split(node.get("args", ""))
-            except ValueError as error:
-                raise InputError(f"{source}: args cannot be split ({error}); correct its quotes") from None
-            return _from_arguments(arguments, text, source=source, name=name)
-    raise InputError(f"{source}: no <node> that runs {_PUBLISHER}; give a file with one")
+    nodes = parse_xml(text, source=source).iter("node")
+    publishers = [node for node in nodes if _PUBLISHER in (node.get("exec"), node.get("type"))]
+    if not publishers:
+        raise InputError(f"{source}: no <node> that runs {_PUBLISHER}; give a file with one")
+    try:
+        found = [shlex.split(node.get("args", "")) for node in publishers]
+    except ValueError as error:
+        raise InputError(f"{source}: args cannot be split ({error}); correct its quotes") from None
+    name = "tf2-launch-xml" if publishers[0].get("exec") else "tf1-launch"
+    return _from_arguments(_chosen(found, text, source=source), text, source=source, name=name)
+
+
+def _chosen(found: list[list[str]], text: str, *, source: str) -> list[str]:
+    """Return the arguments of the one publisher that is between the radar and the camera."""
+    if not found:
+        return []
+    return found[the_one_between([_ends(words) for words in found], stated_frames(text), source=source)]
+
+
+def _ends(arguments: list[str]) -> Ends:
+    flags = _flags(arguments)
+    if flags:
+        return Ends(flags.get("frame-id", ""), flags.get("child-frame-id", ""))
+    words = [word for word in arguments if ":=" not in word]
+    names = words[-3:-1] if words and _is_number(words[-1]) else words[-2:]
+    return Ends(*names) if len(names) == 2 else Ends("", "")
 
 
 def _meaning(file: CalibrationFile) -> str:

@@ -9,6 +9,7 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.camera_fields import floats
+from calib_core.interchange.choosing import Ends, the_one_between
 from calib_core.interchange.imported import (
     ImportedCalibration,
     WrittenPose,
@@ -63,9 +64,10 @@ def read_urdf(text: str, source: str) -> ImportedCalibration:
     """
     joints = [joint for joint in parse_xml(text, source=source).iter("joint") if _ends(joint) != ("", "")]
     stated = stated_frames(text)
-    joint = next((j for j in joints if _is_between(j, stated)), None)
-    if joint is None:
+    between = [joint for joint in joints if _is_between(joint, stated)]
+    if not between:
         raise InputError(f"{source}: no joint between a radar and a camera in it; name its links so, for example radar")
+    joint = between[the_one_between([Ends(*_ends(one)) for one in between], stated, source=source)]
     if joint.get("type") != "fixed":
         raise InputError(f"{source}: the joint {joint.get('name')!r} is not fixed; a calibration is one fixed joint")
     parent, child = _ends(joint)

@@ -11,6 +11,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.camera_document import refuse_skew
 from calib_core.interchange.camera_fields import find_cameras, floats
+from calib_core.interchange.choosing import Ends, the_one_between
 from calib_core.interchange.imported import (
     ImportedCalibration,
     WrittenPose,
@@ -132,8 +133,10 @@ def read_transform_stamped(content: Mapping[str, Any], text: str, source: str) -
     Raises:
         InputError: a frame's name or a number is missing.
     """
-    if isinstance(content.get("transforms"), list) and content["transforms"]:
-        content = content["transforms"][0]
+    listed = content.get("transforms")
+    if isinstance(listed, list) and listed:
+        stamped = [one if isinstance(one, Mapping) else {} for one in listed]
+        content = stamped[the_one_between([_ends(one) for one in stamped], stated_frames(text), source=source)]
     header, transform = content.get("header"), content.get("transform")
     if not isinstance(header, Mapping) or not isinstance(transform, Mapping):
         raise InputError(f"{source}: a stamped transform needs header.frame_id, child_frame_id and transform; add them")
@@ -151,6 +154,12 @@ def read_transform_stamped(content: Mapping[str, Any], text: str, source: str) -
     return ImportedCalibration(
         "apollo", pose, frames=roles.frames, check_point=stated_check_point(text), notes=roles.notes
     ).checked(source)
+
+
+def _ends(stamped: Mapping[str, Any]) -> Ends:
+    header = stamped.get("header")
+    parent = header.get("frame_id") if isinstance(header, Mapping) else ""
+    return Ends(str(parent or ""), str(stamped.get("child_frame_id") or ""))
 
 
 def write_kalibr(file: CalibrationFile) -> str:
@@ -196,9 +205,13 @@ def read_kalibr(content: Mapping[str, Any], text: str, source: str) -> ImportedC
     """Read the camera of a chain that holds T_cam_radar.
 
     Raises:
-        InputError: a number is missing.
+        InputError: a number is missing, or several cameras hold one.
     """
-    key = next(key for key, value in content.items() if isinstance(value, Mapping) and "T_cam_radar" in value)
+    key, *others = [key for key, value in content.items() if isinstance(value, Mapping) and "T_cam_radar" in value]
+    if others:
+        raise InputError(
+            f"{source}: T_cam_radar stands in {key}, {', '.join(map(str, others))}; keep the camera that is meant"
+        )
     matrix = floats(content[key]["T_cam_radar"], source=source, place=f"{key}.T_cam_radar", length=16)
     rows = np.reshape(matrix, (4, 4))
     cameras = find_cameras({key: content[key]}, source=source) if "intrinsics" in content[key] else ()

@@ -28,6 +28,7 @@ from calib_core.interchange import (
     read_camera,
     write_calibration,
 )
+from calib_core.interchange.archives import pack, unpack
 from calib_core.interchange.mat_file import load_mat
 
 
@@ -461,3 +462,50 @@ def test_a_text_that_went_through_windows_is_read_the_same(file, name):
         assert again.format == name
         assert check(again, against=imported(file)).verdict == "right"
         np.testing.assert_array_equal(again.camera_from_radar.as_matrix(), right)
+
+
+TWO_MORE = {
+    "tf2": "ros2 run tf2_ros static_transform_publisher --x 1 --frame-id base_link --child-frame-id lidar\n"
+    "ros2 run tf2_ros static_transform_publisher 1 0 0 0 0 0 base_link imu\n",
+    "tf2-launch-xml": '<node pkg="tf2_ros" exec="static_transform_publisher" args="--frame-id base_link --child-frame-id lidar"/>'
+    '<node pkg="tf2_ros" exec="static_transform_publisher" args="1 0 0 0 0 0 1 base_link imu"/>',
+    "tf1-launch": '<node pkg="tf" type="static_transform_publisher" args="1 0 0 0 0 0 base_link lidar 100"/>',
+    "tf2-launch-py": "Node(arguments=['--frame-id', 'base_link', '--child-frame-id', 'lidar'])\n",
+    "urdf": '<joint name="a" type="fixed"><parent link="base_link"/><child link="radar"/></joint>',
+}
+
+
+@pytest.mark.parametrize("with_words", [True, False])
+@pytest.mark.parametrize("name", TWO_MORE)
+def test_among_other_transforms_the_one_between_radar_and_camera_is_read(file, name, with_words):
+    text = text_of(file, name)
+    if not with_words:
+        text = re.sub(r"<!--.*?-->", "", without_comments(text), flags=re.DOTALL)
+    for start in ("ros2 run", "<launch>", '<robot name="radar_camera">', "def generate"):
+        if start in text:
+            opening = start if start.startswith("<") else ""
+            text = text.replace(start, opening + TWO_MORE[name] + start.removeprefix(opening), 1)
+
+    assert check(read_any(text.lstrip()), against=imported(file)).verdict == "right"
+
+
+def test_several_transforms_that_may_be_meant_are_refused_with_their_names(file):
+    text = without_comments(text_of(file, "tf2"))
+    left, right = text.replace("camera_optical", "cam_left"), text.replace("camera_optical", "cam_right")
+
+    with pytest.raises(
+        InputError, match=r"file: holds 2 transforms \(radar to cam_left, radar to cam_right\), 2 of them"
+    ):
+        read_any(left + right, "file")
+    joint = '<joint name="j" type="fixed"><parent link="radar"/><child link="cam_{}"/></joint>'
+    with pytest.raises(InputError, match="holds 2 transforms"):
+        read_any(f"<robot>{joint.format(1)}{joint.format(2)}</robot>", "file")
+    chain = text_of(file, "kalibr")
+    with pytest.raises(InputError, match="T_cam_radar stands in cam0, cam1; keep the camera that is meant"):
+        read_any(chain + chain[chain.index("cam0:") :].replace("cam0", "cam1"))
+    members = unpack(export(file, "colmap").data, source="")
+    members["images.txt"] += b"2 1 0 0 0 0 0 0 1 other\n\n"
+    with pytest.raises(InputError, match="holds 2 images"):
+        read_any(pack(members))
+    with pytest.raises(InputError, match="0 of them between a radar and a camera"):
+        read_any("transforms:\n- {child_frame_id: a}\n- {child_frame_id: b}\n", "file")
