@@ -19,6 +19,8 @@ __all__ = ["CSV_EXAMPLE", "csv_columns", "open_radar_csv"]
 
 CSV_EXAMPLE = "time_ns,x_m,y_m,z_m,doppler_mps,snr_db"
 _FRAME = "radar"
+_DELIMITERS = ",;\t"
+_MAX_HEADER = 1 << 16
 _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "mrad": 0.001}
 _SPEEDS = {"mps": 1.0, "kmh": 1 / 3.6, "kph": 1 / 3.6, "cmps": 0.01}
@@ -73,7 +75,9 @@ def open_radar_csv(path: Path) -> PlainSource:
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = csv.reader(file)
+            delimiter = max(_DELIMITERS, key=file.readline(_MAX_HEADER).count)
+            file.seek(0)
+            rows = csv.reader(file, delimiter=delimiter)
             header = _read_header(path, next(rows, []))
             times, values = _read_rows(path, header, rows)
     except (OSError, UnicodeDecodeError, csv.Error) as error:

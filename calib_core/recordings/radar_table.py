@@ -85,8 +85,9 @@ apart, and that is said.
 
 ### Columns of a radar CSV
 
-A unit stands behind the name, as `x_m` or `x [m]`. Rows of one time are one scan. An unknown unit, or none, is an error;
-columns of other names are left out, and `cocalib info` says so. Axes and signs are those of the radar frame.
+Columns are parted by commas, semicolons or tabs. A unit stands behind the name, as `x_m` or `x [m]`. Rows of one time
+are one scan. An unknown unit, or none, is an error; columns of other names are left out, and `cocalib info` says so.
+Axes and signs are those of the radar frame.
 
 | column | units |
 |---|---|

@@ -267,6 +267,13 @@ def test_a_radar_csv_is_a_radar(tmp_path) -> None:
     np.testing.assert_array_equal(scans.snr_db, [9, 12, 11])
 
 
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_columns_may_be_parted_by_semicolons_or_tabs(tmp_path, delimiter) -> None:
+    text = "time_ns,x_m,y_m,doppler_mps\n1700000000000000001,3,1,-0.25\n".replace(",", delimiter)
+    with open_recording(radar_csv(tmp_path / "scan.csv", text), require=("radar",)) as recording:
+        np.testing.assert_array_equal(recording.radar_scans().points_radar_m, [[3, 1, 0]])
+
+
 @pytest.mark.parametrize(
     ("header", "row"),
     [
