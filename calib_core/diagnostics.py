@@ -5,7 +5,10 @@ A check says nothing when all is well. The texts are for people; the codes are f
 
 import numpy as np
 
+from calib_core.arrays import Vector3
 from calib_core.findings import Findings
+from calib_core.flat_elevations import is_flat
+from calib_core.geometry import skew
 from calib_core.intrinsics_doubts import intrinsics
 from calib_core.locating import CLUSTER_SCALE
 from calib_core.pair_doubts import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
@@ -45,15 +48,33 @@ def cautions_of(findings: Findings) -> tuple[Caution, ...]:
 
 
 def _flat_radar(f: Findings) -> list[Caution]:
-    if f.evidence.polar[:, 2].any():
+    """Say which parts of the pose the pairs fix, and which rest on where the reflector is thought to stand."""
+    if not is_flat(f.evidence):
         return []
+    position_cm, turn_deg = _sigmas_in_radar_axes(f)
+    fixed = (
+        f"ranges and azimuths fix forward +- {position_cm[0]:.0f} cm, left +- {position_cm[1]:.0f} cm, "
+        f"yaw +- {turn_deg[2]:.1f} deg; up +- {position_cm[2]:.0f} cm, pitch +- {turn_deg[1]:.1f} deg, "
+        f"roll +- {turn_deg[0]:.1f} deg rest on the clicks' rows and on a guess at how high the reflector stood"
+    )
     return [
         Caution(
             "flat-radar",
-            "every radar position has elevation 0: this radar measures none, and its real elevations are unknown",
-            "put the reflector's centre at the radar's height at every placement, and measure the camera position",
+            f"every radar position has elevation 0: this radar measures none, and the true ones are unknown. One sigma: {fixed}",
+            "measure the camera position, and put the reflector's centre at the radar's height at every placement: then the pose "
+            "is better than stated; for a radar that measures elevation, look why it is missing",
         )
     ]
+
+
+def _sigmas_in_radar_axes(f: Findings) -> tuple[Vector3, Vector3]:
+    """Return one sigma of the camera centre [cm], and of the rotation [deg], about forward, left and up."""
+    pose = f.refined.camera_from_radar
+    turned = pose.rotation.T
+    centre = np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1)
+    covariance = f.uncertainty.covariance
+    position_m = np.sqrt(np.diag(centre @ covariance @ centre.T))
+    return 100.0 * position_m, np.rad2deg(np.sqrt(np.diag(turned @ covariance[3:, 3:] @ turned.T)))
 
 
 def _many_outliers(f: Findings) -> list[Caution]:
@@ -97,7 +118,7 @@ def _noise_excess(f: Findings) -> list[Caution]:
 
 
 def _smooth_angle_errors(f: Findings) -> list[Caution]:
-    if f.uncertainty.growth < _NOTABLE_GROWTH:
+    if f.uncertainty.growth < _NOTABLE_GROWTH or is_flat(f.evidence):
         return []
     return [
         Caution(

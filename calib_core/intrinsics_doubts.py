@@ -8,7 +8,7 @@ Jacobians J of the pose and g of such an unknown, and M = I - J (J^T J)^-1 J^T, 
 
 for the noise was estimated with nu degrees of freedom by residuals that the wrong intrinsics had made larger. It is a score
 test: one step from the optimum tells it, and no second fit is made. A principal point that is off cannot be told: the
-rotation absorbs it.
+rotation absorbs it. Nor does a radar without elevation say anything: its own residuals grow towards the near placements.
 """
 
 from dataclasses import dataclass
@@ -17,6 +17,7 @@ import numpy as np
 
 from calib_core.arrays import Values
 from calib_core.findings import Findings
+from calib_core.flat_elevations import is_flat
 from calib_core.results import Caution
 
 __all__ = ["LensError", "intrinsics", "lens_errors"]
@@ -44,7 +45,7 @@ class LensError:
 
 def intrinsics(f: Findings) -> list[Caution]:
     """Doubt the focal length or the distortion, whichever explains more of the residuals."""
-    if f.inliers.sum() < _LEAST_PAIRS:
+    if f.inliers.sum() < _LEAST_PAIRS or is_flat(f.evidence):
         return []
     focal, radial = lens_errors(f)
     if min(focal.chance, radial.chance) >= _LEVEL:

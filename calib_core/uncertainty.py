@@ -8,6 +8,7 @@ from calib_core.angle_errors import pose_spread
 from calib_core.arrays import Matrix66, Points2, Points3, Values
 from calib_core.camera import Camera
 from calib_core.consensus import normal_equations
+from calib_core.flat_elevations import shared_elevation_spread
 from calib_core.geometry import RigidTransform
 from calib_core.linearising import with_respect_to_pose
 from calib_core.radar import cartesian_from_polar
@@ -40,7 +41,7 @@ class PoseUncertainty:
 
 
 def pose_uncertainty(refined: Refined) -> PoseUncertainty:
-    """Invert the observed information of the mixture at the optimum, and widen it by smooth angle errors.
+    """Invert the observed information of the mixture at the optimum, and widen it by errors that the pairs share.
 
     Pairs that may be outliers (0 < w < 1) carry less than w of their Gauss-Newton information: by Louis' identity
 
@@ -56,13 +57,16 @@ def pose_uncertainty(refined: Refined) -> PoseUncertainty:
     independent = _symmetric_inverse(information)
     spread = pose_spread(refined, plain)
     covariance = independent if spread is None else _widened(independent, plain, spread)
+    growth = float(np.sqrt(np.trace(covariance[3:, 3:]) / np.trace(independent[3:, 3:])))
+    shared = shared_elevation_spread(refined, plain)
+    covariance = covariance if shared is None else covariance + shared
     from_pairs = 1.0 - float(np.trace(prior_jacobian @ covariance @ prior_jacobian.T)) / 6.0
     return PoseUncertainty(
         covariance=covariance,
         information=plain,
         quantile=_quantile(refined.degrees_of_freedom, max(from_pairs, 0.0)),
         condition=_scaled_condition(pairs_only),
-        growth=float(np.sqrt(np.trace(covariance[3:, 3:]) / np.trace(independent[3:, 3:]))),
+        growth=growth,
     )
 
 
