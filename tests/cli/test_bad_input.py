@@ -195,7 +195,7 @@ def test_an_unwritable_folder_is_named(cocalib: Cocalib, pairs_file: Callable[..
         (["demo", "--no-browser", "--token", ""], "empty"),
         (["info"], "no recording given"),
         (["bogus"], "there is no command 'bogus': demo, open"),
-        (["opne", "a.bag"], "did you mean 'open'?"),
+        (["infos", "a.bag"], "did you mean 'info'?"),
         (["--json", "info"], "'--json' stands where a command belongs"),
         (["info", "a.bag", "--bogus"], "there is no option --bogus; cocalib info --help shows"),
         (["info", "a.bag", "--topic", "/radar"], "did you mean --camera-info-topic, --image-topic or --radar-topic?"),
