@@ -47,8 +47,9 @@ def pose_spread(refined: Refined, information: Matrix66) -> Matrix66 | None:
     nothing = np.zeros((len(residual), 0))
     likelihoods = [_log_likelihoods(residual, jacobian, prior, nothing, [(1.0, 0.0)]) + _RELUCTANCE]
     middles = [(jacobian.T @ jacobian)[None]]
+    directions = _directions(refined)
     for length_rad in _LENGTHS_RAD:
-        shape = _shape(refined, length_rad)
+        shape = _shape(refined, directions, length_rad)
         shared = shape.T @ jacobian
         likelihoods.append(_log_likelihoods(residual, jacobian, prior, shape, levels))
         parts = np.array(levels)[:, :, None, None]
@@ -68,9 +69,8 @@ def _weighted_rows(refined: Refined) -> tuple[Values, np.ndarray]:
     return (refined.model.residual * root).reshape(-1), jacobian
 
 
-def _shape(refined: Refined, length_rad: float) -> np.ndarray:
+def _shape(refined: Refined, directions: Points2, length_rad: float) -> np.ndarray:
     """Return B (2 n, 2 k), with the kernel's square root taken on at most _MOST_CENTRES directions (Nystrom)."""
-    directions = _directions(refined)
     inliers = np.flatnonzero(refined.weights > 0.5)
     chosen = inliers[np.linspace(0, len(inliers) - 1, min(len(inliers), _MOST_CENTRES)).round().astype(np.int64)]
     centres = directions[chosen]
@@ -87,7 +87,7 @@ def _shape(refined: Refined, length_rad: float) -> np.ndarray:
 
 def _directions(refined: Refined) -> Points2:
     """Return azimuth and elevation (n, 2) of each pair by its click: the measured angles carry the errors in question."""
-    rays = refined.evidence.camera.rays(refined.evidence.pixels_px) @ refined.camera_from_radar.rotation
+    rays = refined.evidence.rays @ refined.camera_from_radar.rotation
     directions = polar_from_cartesian(rays)[:, 1:]
     return np.where(np.isfinite(directions), directions, refined.evidence.polar[refined.rows, 1:])
 

@@ -82,6 +82,7 @@ class Evidence:
         camera: the intrinsics.
         pixels_px: (n, 2) clicks.
         sigma_px: (n,) their standard deviation per axis.
+        rays: (n, 3) unit directions in the camera frame that the clicks see; NaN where the lens model has none.
         first: (n + 1,).
         polar: (m, 3) measured range [m], azimuth, elevation [rad] of the candidates.
         sigma_polar: (m, 3) their standard deviations.
@@ -92,6 +93,7 @@ class Evidence:
     camera: Camera
     pixels_px: Points2
     sigma_px: Values
+    rays: Points3
     first: TimesNs
     polar: Points3
     sigma_polar: Points3
@@ -118,6 +120,7 @@ class Evidence:
             self,
             pixels_px=self.pixels_px[pairs],
             sigma_px=self.sigma_px[pairs],
+            rays=self.rays[pairs],
             first=np.concatenate([[0], np.cumsum(np.diff(self.first)[pairs])]),
             polar=self.polar[rows],
             sigma_polar=self.sigma_polar[rows],
@@ -133,8 +136,13 @@ class Evidence:
     def candidates_apart(self) -> "Evidence":
         """Make every candidate a pair of its own, with its pair's click."""
         owner = self.owner
-        first = np.arange(len(owner) + 1)
-        return replace(self, pixels_px=self.pixels_px[owner], sigma_px=self.sigma_px[owner], first=first)
+        return replace(
+            self,
+            pixels_px=self.pixels_px[owner],
+            sigma_px=self.sigma_px[owner],
+            rays=self.rays[owner],
+            first=np.arange(len(owner) + 1),
+        )
 
     def mirrored(self) -> "Evidence":
         """Return what the pairs would be if the radar's y axis pointed the other way."""
@@ -157,10 +165,12 @@ def evidence_of(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptio
         sigma_polar[:, 2] = np.maximum(sigma_polar[:, 2], _FLAT_SIGMA_RAD)
     score = np.array([candidate.score for candidate in candidates])
     sigma_px = [options.noise.sigma_px if pair.sigma_px is None else pair.sigma_px for pair in pairs]
+    pixels_px = np.array([pair.pixel_px for pair in pairs]).reshape(-1, 2)
     return Evidence(
         camera=camera,
-        pixels_px=np.array([pair.pixel_px for pair in pairs]).reshape(-1, 2),
+        pixels_px=pixels_px,
         sigma_px=np.array(sigma_px, dtype=np.float64),
+        rays=camera.rays(pixels_px),
         first=np.concatenate([[0], np.cumsum([len(pair.candidates) for pair in pairs])]).astype(np.int64),
         polar=polar_from_cartesian(points),
         sigma_polar=sigma_polar,

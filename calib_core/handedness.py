@@ -7,13 +7,17 @@ from calib_core.evidence import Evidence
 from calib_core.initial_pose import starting_poses
 from calib_core.refining import Refined, refine
 
-__all__ = ["MIRRORED_GAIN", "mirror_gain"]
+__all__ = ["MIRRORED_GAIN", "NOT_MIRRORED_GAIN", "mirror_gain"]
 
 MIRRORED_GAIN = 6.0
 """From how large a gain in twice the log-likelihood on mirrored axes are the likelier ones."""
 
+NOT_MIRRORED_GAIN = -3.0
+"""Up to how large a gain the axes are taken to be right; between the two, the question stays open."""
+
 _STARTS = 2
 _BEYOND_DOUBT = 30.0  # a difference that noise levels cannot turn
+_COARSE_ERROR = 1.2  # of a gain from fits that have not quite settled; three times the largest seen
 
 
 def mirror_gain(
@@ -24,7 +28,8 @@ def mirror_gain(
     A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be told by its residuals:
     placements on the ground fit a camera mirrored below the ground just as well. Only what is known of the camera
     position, or placements at varied heights, tell the two apart. The 24 right-handed conventions need no test: they are
-    rotations, and the pose absorbs them. Each hand is fitted with its own noise level.
+    rotations, and the pose absorbs them. Each hand is fitted with its own noise level, the mirrored one coarsely at first:
+    that settles nearly every case, and where the gain is then far from what it is judged by, it is returned as it is.
 
     Args:
         evidence: the pairs.
@@ -40,6 +45,18 @@ def mirror_gain(
         return -np.inf
     if abs(best.cost - found[0].cost) > _BEYOND_DOUBT:
         return best.cost - found[0].cost
-    plain = plain or refine(evidence, best, estimate_scale=estimate_scale)
-    other = refine(mirrored, found[0], estimate_scale=estimate_scale)
-    return mixture_cost(plain.evidence, plain.camera_from_radar) - mixture_cost(other.evidence, other.camera_from_radar)
+    gain = -np.inf
+    for coarse in (True, False):
+        straight = plain or refine(evidence, best, estimate_scale=estimate_scale, coarse=coarse)
+        other = refine(mirrored, found[0], estimate_scale=estimate_scale, coarse=coarse)
+        gain = _cost(straight) - _cost(other)
+        if (
+            gain < NOT_MIRRORED_GAIN - _COARSE_ERROR
+            or NOT_MIRRORED_GAIN + _COARSE_ERROR < gain < MIRRORED_GAIN - _COARSE_ERROR
+        ):
+            break
+    return gain
+
+
+def _cost(fit: Refined) -> float:
+    return mixture_cost(fit.evidence, fit.camera_from_radar)

@@ -19,6 +19,8 @@ __all__ = ["Hypotheses", "hypothesis_costs", "starting_poses", "three_point_pose
 _TWO_POINT_DRAWS = 800
 _THREE_POINT_DRAWS = 300
 _MOST_SCORED_ROWS = 400
+_SCORED_AT_ONCE = 8000  # residuals whose many intermediate arrays fit into the processor's cache
+_FAR = 1e12  # squared residual of what cannot be
 _ROBUST_RADIUS = 5.0  # whitened residuals beyond it count as about one outlier each
 _DIFFERENT = 0.15  # rad, or per metre of camera centre: closer starts end in the same pose
 
@@ -48,7 +50,7 @@ def starting_poses(evidence: Evidence, *, most: int, rng: np.random.Generator) -
         most: how many poses to return.
         rng: of the draws.
     """
-    rays = evidence.camera.rays(evidence.pixels_px)
+    rays = evidence.rays
     usable = np.flatnonzero(np.isfinite(rays).all(axis=1))
     if len(usable) < 2:
         return ()
@@ -152,17 +154,33 @@ def _grunert_distances(points: np.ndarray, rays: np.ndarray) -> tuple[Points3, T
 
 
 def _real_roots(quartic: np.ndarray) -> np.ndarray:
-    """Return the real parts (h, 4) of the nearly real roots of each quartic, NaN for the rest (companion matrices)."""
-    leading = np.where(np.abs(quartic[:, :1]) > 1e-12, quartic[:, :1], np.nan)
-    monic = quartic[:, 1:] / leading
-    roots = np.full((len(monic), 4), np.nan)
-    fine = np.isfinite(monic).all(axis=1)
-    companion = np.zeros((int(fine.sum()), 4, 4))
-    companion[:, 1:, :-1] = np.eye(3)
-    companion[:, :, -1] = -monic[fine][:, ::-1]
-    found = np.linalg.eigvals(companion)
-    roots[fine] = np.where(np.abs(found.imag) < 0.02 * np.abs(found.real) + 1e-9, found.real, np.nan)
-    return roots
+    """Return the real parts (h, 4) of the nearly real roots of each quartic, NaN for the rest (Ferrari's method).
+
+    With x = y - a / 4, y^4 + p y^2 + q y + r = (y^2 + p / 2 + m)^2 - 2 m (y - q / (4 m))^2 for a root m of
+    8 m^3 + 8 p m^2 + (2 p^2 - 8 r) m - q^2 = 0; the largest of the three loses the fewest digits.
+    """
+    leading = np.where(np.abs(quartic[:, 0]) > 1e-12, quartic[:, 0], np.nan)
+    a, b, c, d = (quartic[:, 1:].T / leading).astype(np.complex128)
+    p = b - 3.0 / 8.0 * a**2
+    q = c - a * b / 2.0 + a**3 / 8.0
+    r = d - a * c / 4.0 + a**2 * b / 16.0 - 3.0 / 256.0 * a**4
+    m = _largest_cubic_root(p, p**2 / 4.0 - r, -(q**2) / 8.0)
+    side = np.sqrt(2.0 * m)
+    lean = q / np.where(side == 0, 1.0, side)
+    plus, minus = np.sqrt(-2.0 * (p + m + lean)), np.sqrt(-2.0 * (p + m - lean))
+    roots = np.stack([side + plus, side - plus, minus - side, -minus - side], axis=1) / 2.0 - a[:, None] / 4.0
+    return np.where(np.abs(roots.imag) < 0.02 * np.abs(roots.real) + 1e-9, roots.real, np.nan)
+
+
+def _largest_cubic_root(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Return the root of m^3 + a m^2 + b m + c that is largest in magnitude, for each row (Cardano's formula)."""
+    p, q = b - a**2 / 3.0, 2.0 / 27.0 * a**3 - a * b / 3.0 + c
+    swing = np.sqrt(q**2 / 4.0 + p**3 / 27.0)
+    swing = np.where((np.conj(q) * swing).real > 0.0, -swing, swing)  # the sign that does not cancel
+    cube = (-q / 2.0 + swing) ** (1.0 / 3.0)
+    cubes = cube * np.exp(2j * np.pi / 3.0 * np.arange(3))[:, None]
+    roots = cubes - p / (3.0 * np.where(cubes == 0, 1.0, cubes)) - a / 3.0
+    return np.asarray(np.take_along_axis(roots, np.abs(roots).argmax(axis=0)[None], axis=0)[0])
 
 
 def _thinned(evidence: Evidence, usable: TimesNs) -> Evidence:
@@ -179,25 +197,47 @@ def hypothesis_costs(hypotheses: Hypotheses, evidence: Evidence) -> Values:
 
     The residual is split along azimuth and elevation of the radar, whitened there, and bounded (Geman-McClure).
     """
-    rays = evidence.camera.rays(evidence.pixels_px)[evidence.owner]
-    points_m = cartesian_from_polar(evidence.polar)
     variance = evidence.sigma_polar[:, 1:] ** 2 + (evidence.sigma_px[evidence.owner, None] / _focal(evidence)) ** 2
-    # directions and turned-back rays as three planes (h, m) each: contiguous planes are what makes this quick
-    x, y, z = points_m.T[:, None, :] - hypotheses.centres_m.T[:, :, None]
-    length = np.maximum(np.sqrt(x * x + y * y + z * z), 1e-9)
-    x, y, z = x / length, y / length, z / length
-    turned_x, turned_y, turned_z = np.moveaxis(hypotheses.rotations, 2, 0) @ rays.T  # R^T ray
-    along = x * turned_x + y * turned_y + z * turned_z
-    across = np.maximum(np.hypot(x, y), 1e-9)
-    to_left = (x * turned_y - y * turned_x) / across
-    upwards = (turned_z - z * along) / across
-    squared = to_left**2 / variance[:, 0] + upwards**2 / variance[:, 1]
-    squared = np.where(along > 0, squared, np.inf)
-    bounded = _ROBUST_RADIUS**2 * (1.0 - 1.0 / (1.0 + squared / _ROBUST_RADIUS**2)) - 2.0 * evidence.log_score
-    per_pair = np.minimum.reduceat(np.nan_to_num(bounded, nan=np.inf), evidence.first[:-1], axis=1)
+    scored = _Scored(
+        cartesian_from_polar(evidence.polar).T.copy(), evidence.rays[evidence.owner].T.copy(), 1.0 / variance.T
+    )
+    at_once = max(_SCORED_AT_ONCE // len(evidence.polar), 1)
+    costs = np.empty(len(hypotheses))
+    for start in range(0, len(hypotheses), at_once):
+        some = slice(start, start + at_once)
+        squared = scored.squared(hypotheses.rotations[some], hypotheses.centres_m[some])
+        bounded = _ROBUST_RADIUS**2 * squared / (squared + _ROBUST_RADIUS**2) - 2.0 * evidence.log_score
+        per_pair = bounded
+        if not evidence.one_to_one:
+            per_pair = np.minimum.reduceat(bounded, evidence.first[:-1], axis=1)
+        costs[some] = np.minimum(per_pair, _ROBUST_RADIUS**2).sum(axis=1)
     away_m = hypotheses.centres_m - evidence.belief.position_m
     belief = (away_m**2).sum(axis=1) / evidence.belief.sigma_m**2
-    return np.asarray(np.minimum(per_pair, _ROBUST_RADIUS**2).sum(axis=1) + np.minimum(belief, 2 * _ROBUST_RADIUS**2))
+    return np.asarray(costs + np.minimum(belief, 2 * _ROBUST_RADIUS**2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Scored:
+    """What hypotheses are scored against, as planes: contiguous rows are what makes this quick."""
+
+    points_m: np.ndarray
+    """(3, m) radar positions"""
+    rays: np.ndarray
+    """(3, m) where their clicks look"""
+    precision: np.ndarray
+    """(2, m) one over the variance of azimuth and elevation [rad^-2]"""
+
+    def squared(self, rotations: np.ndarray, centres_m: Points3) -> np.ndarray:
+        """Return the squared whitened angular residuals (h, m), large where a point lies behind its ray."""
+        x, y, z = self.points_m[:, None, :] - centres_m.T[:, :, None]
+        flat2 = np.maximum(x * x + y * y, 1e-18)
+        length2 = flat2 + z * z
+        turned_x, turned_y, turned_z = np.moveaxis(rotations, 2, 0) @ self.rays  # R^T ray
+        along = x * turned_x + y * turned_y + z * turned_z
+        to_left = x * turned_y - y * turned_x
+        upwards = turned_z * length2 - z * along
+        squared = to_left**2 / flat2 * self.precision[0] + upwards**2 / (length2 * flat2) * self.precision[1]
+        return np.where(along > 0, squared, _FAR)  # NaN counts as behind
 
 
 def _focal(evidence: Evidence) -> float:

@@ -7,15 +7,14 @@ import numpy as np
 from calib_core.consensus import Consensus
 from calib_core.findings import Findings
 from calib_core.geometry import RigidTransform
-from calib_core.handedness import MIRRORED_GAIN
+from calib_core.handedness import MIRRORED_GAIN, NOT_MIRRORED_GAIN
 from calib_core.refining import refine
 from calib_core.results import Caution
 from calib_core.uncertainty import pose_uncertainty
 
 __all__ = ["camera_position", "mirrored_axes", "two_poses"]
 
-_NOT_MIRRORED = -3.0  # differences of twice the log-likelihood
-_ALMOST_AS_LIKELY = 6.0
+_ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
 _OTHER_POSE_RAD = np.deg2rad(5.0)
 _OTHER_POSE_SIGMAS = 6.0
 _FAR_CAMERA = 3.0
@@ -35,7 +34,7 @@ def mirrored_axes(f: Findings) -> list[Caution]:
                 "positions come from; do not use this pose",
             )
         ]
-    if f.mirror_gain > _NOT_MIRRORED:
+    if f.mirror_gain > NOT_MIRRORED_GAIN:
         return [
             Caution(
                 "handedness-open",
