@@ -20,6 +20,9 @@ Clock = Literal["auto", "header", "receive"]
 _YEAR_2000_NS = 946_684_800 * NS_PER_S
 _MANY = 0.01
 _AGREE_NS = NS_PER_S
+_BLOCK = 11
+_FEW_BLOCKS = 0.05
+_FEWEST_BLOCKS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,8 +130,16 @@ def _near(radar: Stamps, camera: Stamps) -> bool:
 
 
 def _both_usable(radar: Stamps, camera: Stamps) -> ClockChoice:
-    if not (len(radar.receive_ns) and len(camera.receive_ns)) or _near(radar, camera):
+    if not (len(radar.receive_ns) and len(camera.receive_ns)):
         return ClockChoice(("header", "header"), ())
+    if _near(radar, camera):
+        worst_s = _parting_s(radar, camera)
+        if worst_s <= _AGREE_NS / NS_PER_S:
+            return ClockChoice(("header", "header"), ())
+        parting = (
+            f"the stamps of {radar.topic} and {camera.topic} part during the recording, by up to {span_text(worst_s)}"
+        )
+        return ClockChoice(("receive", "receive"), (_mixed(parting),))
     assert radar.header_ns is not None
     assert camera.header_ns is not None
     if not _overlap(radar.receive_ns, camera.receive_ns) and _overlap(radar.header_ns, camera.header_ns):
@@ -138,6 +149,28 @@ def _both_usable(radar: Stamps, camera: Stamps) -> ClockChoice:
         ("receive", "receive"),
         (_mixed(f"the stamps of {radar.topic} and {camera.topic} are on clocks {span_text(apart_s)} apart"),),
     )
+
+
+def _parting_s(radar: Stamps, camera: Stamps) -> float:
+    """Return by how much the delays of both differ at worst [s], for more than a few messages; 0 in short recordings.
+
+    A clock that is set or drifts on the way does that to one of them; the recorder's own clock does it to both alike.
+    """
+    (at_ns, lag_s), (other_ns, other_s) = _calm_lags(radar), _calm_lags(camera)
+    if min(len(at_ns), len(other_ns)) < _FEWEST_BLOCKS:
+        return 0.0
+    apart_s = np.abs(lag_s - np.interp(at_ns, other_ns, other_s))
+    return float(np.quantile(apart_s, 1.0 - _FEW_BLOCKS))
+
+
+def _calm_lags(stamps: Stamps) -> tuple[np.ndarray, np.ndarray]:
+    """Return times of receiving [ns] and median delays [s] of eleven messages each."""
+    assert stamps.header_ns is not None
+    dated = stamps.header_ns != 0
+    blocks = int(np.count_nonzero(dated)) // _BLOCK
+    received = stamps.receive_ns[dated][: blocks * _BLOCK].reshape(blocks, _BLOCK)
+    lags_s = (stamps.receive_ns - stamps.header_ns)[dated][: blocks * _BLOCK].reshape(blocks, _BLOCK) / NS_PER_S
+    return received[:, _BLOCK // 2].astype(np.float64), np.median(lags_s, axis=1)
 
 
 def _overlap(a: TimesNs, b: TimesNs) -> bool:

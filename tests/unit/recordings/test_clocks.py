@@ -81,6 +81,33 @@ def test_two_clocks_more_than_a_second_apart_are_not_compared():
     assert choose_clocks(stamps(RECEIVE_NS - 900_000_000), SOUND).clocks == ("header", "header")
 
 
+LONG_NS = START_NS + 100_000_000 * np.arange(1000)
+
+
+def late(by_s, of=LONG_NS):
+    """Stamps behind receive time by so much in the last two fifths."""
+    return of - np.where(np.arange(1000) < 600, 0, int(by_s * NS_PER_S))
+
+
+@pytest.mark.parametrize(
+    ("radar_ns", "camera_ns", "clock"),
+    [
+        (late(-3.0), LONG_NS, "receive"),
+        (LONG_NS, late(-1.5), "receive"),
+        (late(-0.5), LONG_NS, "header"),
+        (late(-3.0), late(-3.0), "header"),
+        (LONG_NS + 1_900_000 * np.arange(1000), LONG_NS, "receive"),
+        (LONG_NS + 900_000 * np.arange(1000), LONG_NS, "header"),
+    ],
+    ids=["radar set", "camera set", "set by little", "recorder set", "much drift", "some drift"],
+)
+def test_stamps_that_part_during_the_recording_are_not_compared(radar_ns, camera_ns, clock):
+    choice = choose_clocks(stamps(radar_ns, LONG_NS), stamps(camera_ns, LONG_NS, "/camera"))
+    assert choice.clocks == (clock, clock)
+    told = [caution.message for caution in choice.cautions]
+    assert ("stamps of /radar and /camera part during the recording" in "".join(told)) == (clock == "receive")
+
+
 def test_recordings_rewritten_at_different_times_are_matched_by_their_stamps():
     radar = stamps(RECEIVE_NS, RECEIVE_NS + YEAR_NS)
     assert choose_clocks(radar, SOUND).clocks == ("header", "header")
