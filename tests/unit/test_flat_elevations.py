@@ -43,7 +43,7 @@ def test_the_truth_lies_inside_whether_the_reflector_stood_on_the_ground_or_at_t
     for seed in range(10):
         calibration, truth = solved(seed, height_m, options)
         error = truth.error_from(calibration.camera_from_radar)
-        inside += error @ np.linalg.solve(calibration.covariance, error) < calibration.covariance_quantile
+        inside += bool(error @ np.linalg.solve(calibration.covariance, error) < calibration.covariance_quantile)
     assert inside >= 8
 
 
