@@ -54,8 +54,11 @@ def main() -> int:
     parser.add_argument("--scratch", type=Path, default=_ROOT / "build" / "accuracy", help="where raw figures are kept")
     parser.add_argument("--page", type=Path, default=_ROOT / "docs" / "accuracy.md", help="the page that is written")
     parser.add_argument("--write-only", action="store_true", help="write the page from what is kept, measure nothing")
+    parser.add_argument(
+        "--kept", type=Path, help="a folder of raw figures to go on with, whatever version of the code made it"
+    )
     arguments = parser.parse_args()
-    keeper = Keeper(arguments.scratch / digest_of_sources())
+    keeper = Keeper(arguments.kept or arguments.scratch / digest_of_sources())
     rows = [row for name in TABLES if not arguments.only or name in arguments.only for row in TABLES[name]]
     if not arguments.write_only:
         run(rows, keeper, jobs=arguments.jobs, most=arguments.trials)

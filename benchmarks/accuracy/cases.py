@@ -14,7 +14,9 @@ from calib_core.synthetic import AISLE, FIELD, NOISE_PROFILES, RigOptions, Simul
 from calib_core.synthetic.pairs import NoiseName, study_camera
 from calib_core.uncertainty import pose_jacobian
 
-__all__ = ["Bound", "Case", "bound_of", "draw", "options_of", "tape_measured"]
+__all__ = ["Bound", "Case", "SceneName", "bound_of", "draw", "options_of", "tape_measured"]
+
+SceneName = Literal["field", "aisle"]
 
 _CROWD = 200  # pairs beyond which placements need not keep apart
 _BLOCK = 50
@@ -30,7 +32,7 @@ class Case:
     outlier_share: float = 0.0
     tape_m: float | None = 0.01
     """Sigma of the tape-measured camera position [m]; None: not measured."""
-    scene: Literal["field", "aisle"] = "field"
+    scene: SceneName = "field"
     told: float = 1.0
     """The radar sigmas the estimator is told, over the true ones; 0: it is told none, for radar and clicks."""
 

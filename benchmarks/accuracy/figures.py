@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.accuracy.rows import Claim, Figures
+from benchmarks.accuracy.rows import Claim, Figures, Kept
 
 __all__ = [
     "MET",
@@ -15,6 +15,8 @@ __all__ = [
     "at_least",
     "at_most",
     "column",
+    "fewest",
+    "joined",
     "ratio",
     "share",
     "summed_up",
@@ -22,7 +24,7 @@ __all__ = [
     "worst",
 ]
 
-MET, UNDECIDED, MISSED = "met", "met within error", "**missed**"
+MET, UNDECIDED, MISSED = "met", "undecided", "**missed**"
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +40,11 @@ class Measured:
         if self.value >= 10.0:
             return f"{self.value:.0f}"
         return f"{self.value:.2f} ± {self.error:.2f}" if self.error < 1.0 else f"{self.value:.1f}"
+
+    @property
+    def percent(self) -> str:
+        """The figure as a percentage that it is already."""
+        return f"{self.value:.1f} ± {self.error:.1f} %" if np.isfinite(self.value) else "-"
 
 
 def column(trials: Sequence[Figures], name: str) -> np.ndarray:
@@ -69,7 +76,7 @@ def share(flags: np.ndarray) -> Measured:
 
 
 def at_most(measured: Measured, limit: float) -> str:
-    """Judge: above the limit by less than two standard errors is no miss, but said."""
+    """Judge: above the limit by less than two standard errors is neither met nor missed."""
     if measured.value <= limit:
         return MET
     return UNDECIDED if measured.value - measured.error <= limit else MISSED
@@ -91,10 +98,21 @@ def worst(verdicts: Iterable[str]) -> str:
     return max(verdicts, key=order.index, default="not run")
 
 
-def summed_up(aim: str, verdicts: Sequence[str], what: str) -> Claim:
+def joined(verdicts: Sequence[str]) -> str:
+    """Write several verdicts into one cell, once where they agree."""
+    return " / ".join(verdicts) if len(set(verdicts)) > 1 else next(iter(verdicts), "")
+
+
+def fewest(kept: Kept, keys: Iterable[str]) -> str:
+    """Say how many trials a row has at least, of those that were run."""
+    counts = [len(kept[key]) for key in keys if kept.get(key)]
+    return f"{min(counts):,} trials or more a row" if counts else ""
+
+
+def summed_up(aim: str, verdicts: Sequence[str], trials: str) -> Claim:
     """Turn the verdicts of rows into one claim."""
     if not verdicts:
         return Claim(aim, "not run", "not run")
     counts = [(name, verdicts.count(name)) for name in (MET, UNDECIDED, MISSED) if verdicts.count(name)]
-    rows = ", ".join(f"{count} {name.strip('*')}" for name, count in counts)
-    return Claim(aim, f"{what}; {len(verdicts)} rows: {rows}", worst(verdicts))
+    found = ", ".join(f"{count} {name.strip('*')}" for name, count in counts)
+    return Claim(aim, f"of {len(verdicts)} figures: {found}; {trials}", worst(verdicts))

@@ -15,8 +15,9 @@ with vendors' figures; no real radar was measured. `ti` is a TI AWR1843 (range 1
 radar (3 cm, 0.12, 0.25); clicks have 2 px of noise in a 1920 x 1080 picture of 75 deg. The field reaches from 2 to 20 m, the
 aisle is 2.4 m wide and 15 m long.
 
-**met**: the figure is on the right side of the aim. **met within error**: it is not, by less than two standard errors, so
-the trials cannot tell. **missed**: it is not, significantly.
+After ± stand two standard errors. "Met": the figure is on the right side of the aim. "Undecided": it is not, but by less
+than two standard errors, so the trials cannot tell. "Missed": it is not, significantly; where nothing is wrong, one row in
+forty comes out so by chance.
 """
 
 

@@ -136,7 +136,7 @@ def _cells(name: str, told: _Told, figures: Figures) -> tuple[str, ...]:
     )
 
 
-def _near(value: Figures) -> bool:
+def _near(value: dict[str, float]) -> bool:
     near = np.rad2deg(value["rotation_rad"]) <= 0.5 and value["position_m"] <= 0.07
     return bool(near and value["outliers"] == 1.0 and abs(value["outlier_px"] - _OUTLIER_PX) < 5.0)
 
