@@ -18,7 +18,6 @@ NOT_MIRRORED_GAIN = -3.0
 
 _STARTS = 2
 _BEYOND_DOUBT = 30.0  # a difference that noise levels cannot turn
-_COARSE_ERROR = 1.2  # of a gain from fits that have not quite settled; three times the largest seen
 
 
 def mirror_gain(
@@ -29,8 +28,8 @@ def mirror_gain(
     A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be told by its residuals:
     placements on the ground fit a camera mirrored below the ground just as well. Only what is known of the camera
     position, or placements at varied heights, tell the two apart. The 24 right-handed conventions need no test: they are
-    rotations, and the pose absorbs them. Each hand is fitted with its own noise level, the mirrored one coarsely at first:
-    that settles nearly every case, and where the gain is then far from what it is judged by, it is returned as it is.
+    rotations, and the pose absorbs them. Each hand is fitted with its own noise level, coarsely: the
+    gain is then good to a few tenths, and more is not asked of it.
 
     Args:
         evidence: the pairs.
@@ -46,17 +45,9 @@ def mirror_gain(
         return -np.inf
     if abs(best.cost - found[0].cost) > _BEYOND_DOUBT:
         return best.cost - found[0].cost
-    gain = -np.inf
-    for coarse in (True, False):
-        straight = plain or refine(evidence, best, estimate_scale=estimate_scale, coarse=coarse)
-        other = refine(mirrored, found[0], estimate_scale=estimate_scale, coarse=coarse)
-        gain = _cost(straight) - _cost(other)
-        if (
-            gain < NOT_MIRRORED_GAIN - _COARSE_ERROR
-            or NOT_MIRRORED_GAIN + _COARSE_ERROR < gain < MIRRORED_GAIN - _COARSE_ERROR
-        ):
-            break
-    return gain
+    straight = plain or refine(evidence, best, estimate_scale=estimate_scale, coarse=True)
+    other = refine(mirrored, found[0], estimate_scale=estimate_scale, coarse=True)
+    return _cost(straight) - _cost(other)
 
 
 def _cost(fit: Refined) -> float:

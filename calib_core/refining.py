@@ -36,7 +36,7 @@ _MOST_ROUNDS = 80
 _ROUNDS_BEFORE_SCALES = 3
 _ROUNDS_PER_WEIGHING = 3  # weights settle long before noise scales do
 _TOLERANCES = (1e-8, 1e-6)  # of a step in standard deviations of the pose, and of a relative change of the noise scales
-_COARSE_TOLERANCES = (0.05, 0.05)
+_COARSE_TOLERANCES = (0.02, 0.02)
 _STEADIEST = 0.95  # ratio of one change of the noise scales to the one before, beyond which none is foretold
 _PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # pseudo-counts of the inlier share
 _SLIP_SHARE = 0.01  # of the pairs that are no outliers anywhere on the image
@@ -140,7 +140,7 @@ def _first_weights(evidence: Evidence, state: _State) -> Values:
 
 
 def _probability(odds: Values) -> Values:
-    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(odds, -500.0, 500.0))))
+    return np.asarray(1.0 / (1.0 + np.exp(np.minimum(-odds, 500.0))))
 
 
 def _expect(evidence: Evidence, state: _State, *, weigh: bool, scaled: bool) -> tuple[Linearised, NoiseParts]:
