@@ -51,8 +51,8 @@ def test_the_caution_says_what_the_pairs_fix_and_what_rests_on_a_guess() -> None
     calibration, _ = solved(1, 1.2, FREE)
     (caution,) = (one for one in calibration.cautions if one.code == "flat-radar")
     fixed, guessed = caution.message.split("; up ")
-    assert "yaw +- 0." in fixed
-    assert "pitch" in guessed
+    assert "up axis +- 0." in fixed
+    assert "about left" in guessed
     assert "radar's height" in caution.hint
 
 
