@@ -101,7 +101,7 @@ def _clocks(topics: Sequence[TopicReport]) -> list[str]:
     for topic in topics:
         if topic.clocks is not None:
             first, *others = clock_lines(topic.clocks)
-            lines.append(f"{topic.name}: {first}")
+            lines.append(f"{topic.name}: {'' if topic.chosen else 'not in use; '}{first}")
             lines.extend(f"  {line}" for line in others)
     return lines
 

@@ -8,6 +8,7 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs, time_parts
 from calib_core.recordings.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.recording import Recording
+from calib_core.recordings.spare_clocks import spare_clocks
 from calib_core.recordings.topics import Rhythm, TopicSummary
 from calib_core.results import Caution
 
@@ -53,7 +54,7 @@ class FileSummary:
 
 @dataclass(frozen=True, slots=True)
 class TopicReport:
-    """One topic; the attributes are those of TopicSummary."""
+    """One topic; the attributes are those of TopicSummary. Clocks are known also of topics that could be used but are not."""
 
     name: str
     type: str
@@ -157,7 +158,8 @@ class RecordingSummary:
 
 
 def recording_summary(recording: Recording) -> RecordingSummary:
-    """Sum up an open recording; a few radar scans and one image are read."""
+    """Sum up an open recording; a few radar scans, one image, and the stamps of other topics that could be used are read."""
+    spare = spare_clocks(recording)
     used = [topic for topic in recording.topics if topic.chosen and topic.kind in ("radar", "image")]
     timed = [topic for topic in used or recording.topics if topic.start is not None and topic.end is not None]
     start = min((topic.start for topic in timed if topic.start is not None), default=None)
@@ -168,14 +170,14 @@ def recording_summary(recording: Recording) -> RecordingSummary:
         end=Stamp.of(end),
         duration_s=(end - start) / NS_PER_S if start is not None and end is not None else 0.0,
         overlap_s=_overlap_s(recording),
-        topics=tuple(_report(topic) for topic in recording.topics),
+        topics=tuple(_report(topic, spare.get(topic.name)) for topic in recording.topics),
         radar=_radar(recording),
         camera=_camera(recording),
         cautions=recording.cautions,
     )
 
 
-def _report(topic: TopicSummary) -> TopicReport:
+def _report(topic: TopicSummary, spare: ClockDiagnosis | None) -> TopicReport:
     return TopicReport(
         name=topic.name,
         type=topic.type,
@@ -190,7 +192,7 @@ def _report(topic: TopicSummary) -> TopicReport:
         jitter_s=topic.jitter_s,
         layout=topic.layout,
         problem=topic.problem,
-        clocks=topic.clocks,
+        clocks=topic.clocks or spare,
     )
 
 

@@ -107,6 +107,17 @@ def test_the_diagnosis_is_in_the_text_and_the_summary(ros, write, plain, jpeg):
     assert (radar.chosen, radar.messages) == ("header", 20)
 
 
+def test_clocks_of_sensors_that_are_not_in_use_are_shown_too(ros, write, plain, jpeg, cloud_points):
+    rows = plain(ros, jpeg)
+    rows += [("/rear/points", at + 5 * MS, ros.cloud(0, cloud_points(3))) for at in SOUND_NS[:10].tolist()]
+    with inspect_recording(write(ros, sorted(rows, key=lambda row: row[1]))) as recording:
+        text = describe(recording)
+        (rear,) = [topic for topic in recording_summary(recording).topics if topic.name == "/rear/points"]
+    assert rear.clocks is not None
+    assert (rear.chosen, rear.clocks.chosen, rear.clocks.zero_stamps) == (False, "receive", 10)
+    assert "/rear/points: not in use; times of receiving, because it has stamps that are all zero (10 messages)" in text
+
+
 def test_the_cautions_of_the_clocks_reach_the_recording(ros1, write, plain, jpeg):
     rows = [
         (t, at + (3600 * NS_PER_S if number > 120 else 0), m)
