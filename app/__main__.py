@@ -7,12 +7,14 @@ import sys
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from app.cli import run
+from app.memory import keep_freed_memory
 
 __all__ = ["main"]
 
 
 def main() -> None:
     """Run the command that was typed and leave with its exit code."""
+    keep_freed_memory()
     sys.exit(run(sys.argv[1:]))
 
 

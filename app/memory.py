@@ -1,0 +1,28 @@
+"""How the process deals with memory that was freed."""
+
+import ctypes
+import sys
+
+__all__ = ["keep_freed_memory"]
+
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # as <malloc.h> has them
+_KEPT_BYTES = 64 << 20
+_LARGEST_BYTES = 32 << 20
+
+
+def keep_freed_memory() -> bool:
+    """Have the C library keep up to 64 MB of freed memory instead of handing them back at once.
+
+    A picture's pixels are megabytes that are asked for and freed again with every frame. Fetching them from the system
+    anew each time, page by page, takes as long as decoding the picture.
+
+    Returns:
+        False where the C library cannot be told (it is not glibc).
+    """
+    if not sys.platform.startswith("linux"):
+        return False
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is None:
+        return False
+    kept = mallopt(_TRIM_THRESHOLD, _KEPT_BYTES) == 1
+    return bool(mallopt(_MMAP_THRESHOLD, _LARGEST_BYTES) == 1 and kept)

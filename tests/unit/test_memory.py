@@ -1,0 +1,29 @@
+"""Freed memory stays with the process."""
+
+import platform
+import subprocess
+import sys
+
+import pytest
+
+_FAULTS = """
+import resource, sys
+import numpy as np
+from app.memory import keep_freed_memory
+if "keep" in sys.argv:
+    keep_freed_memory()
+def faults():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(20):
+        np.ones(6_000_000, dtype=np.uint8)
+        np.ones(7_000_000, dtype=np.uint8)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+faults()
+print(faults())
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is not glibc")
+def test_pictures_are_put_where_the_last_ones_were() -> None:
+    answer = subprocess.run([sys.executable, "-c", _FAULTS, "keep"], check=True, capture_output=True, text=True)
+    assert int(answer.stdout) < 1000  # 20 pictures of two sizes are over 60 000 pages
