@@ -28,7 +28,7 @@ __all__ = ["CACHE_BYTES", "FIRST_CHUNKS", "MAX_MESSAGE_BYTES", "ChannelFilter", 
 
 ChannelFilter: TypeAlias = Callable[[Channel], bool]
 CACHE_BYTES = 64 * 2**20
-FIRST_CHUNKS = 64
+FIRST_CHUNKS = 16
 """Where the beginning of a file is enough, so many chunks are looked at, and as many more until all that is wanted is in them."""
 
 _FEW_MESSAGES = 64
@@ -282,9 +282,10 @@ class ChunkedSource:
             cached = self._cache.get(chunk)
         return cached if cached is not None else self._unpack(chunk)
 
-    def heads(self, index: MessageIndex, size: int) -> Heads:
+    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
         """Read the first bytes of many messages, in the order of the index."""
-        found = heads_from(self._kept, index, size)
+        cache = self._kept if keep else None
+        found = heads_from(cache, index, size)
         if found is None:
             places = self._far_places(index, size)
             found = (
@@ -292,7 +293,7 @@ class ChunkedSource:
                 if places is not None
                 else gather_heads(self, index, size)
             )
-            keep_heads(self._kept, index, size, found)
+            keep_heads(cache, index, size, found)
         return found
 
     def _far_places(self, index: MessageIndex, size: int) -> TimesNs | None:

@@ -136,7 +136,7 @@ class McapSource(ChunkedSource):
                 if info is None or not info.inside(self.size_bytes):
                     raise self._damaged(start + place)
                 infos.append(info)
-                if first_of is not None and len(infos) % FIRST_CHUNKS == 0 and _shows(infos, declared, first_of):
+                if first_of is not None and _shows(infos, declared, first_of):
                     break
             elif kind == STATISTICS:
                 self._counted, self.counts = statistics(body)
@@ -248,5 +248,8 @@ class McapSource(ChunkedSource):
 
 def _shows(infos: list[ChunkInfo], declared: Declarations, first_of: ChannelFilter) -> bool:
     """Tell whether some channels are known, and in the chunks seen so far."""
+    count = len(infos)
+    if count < FIRST_CHUNKS or count & (count - 1):  # looked at again whenever there are twice as many
+        return False
     wanted = {channel.id for channel in declared.channels if first_of(channel)}
     return bool(wanted) and wanted <= {number for info in infos for number in info.channels}

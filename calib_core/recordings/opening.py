@@ -22,6 +22,8 @@ _MORE_SUFFIXES = (".active", ".zstd", ".zst", ".gz", ".bz2", ".lz4")
 _METADATA = "metadata.yaml"
 _MAX_METADATA_BYTES = 1 << 24
 _FIRST_ROWS = 500
+_FIRST_BYTES = 1 << 19  # where the first picture usually lies
+_LAST_BYTES = 1 << 16  # most of what a file says about itself
 _KINDS = (
     "ROS 1 .bag, ROS 2 .mcap and .db3 files and their folders can be opened, and folders of pictures or radar files, "
     "radar CSV and videos"
@@ -108,6 +110,7 @@ def open_beginnings(paths: Sequence[Path], first_of: ChannelFilter) -> Iterator[
 
 
 def _beginning(file: FileBytes, first_of: ChannelFilter, *, packed: bool) -> "_AnySource | None":
+    file.expect([(0, _FIRST_BYTES), (max(0, file.size_bytes - _LAST_BYTES), file.size_bytes)])
     head = file.up_to(0, 16)
     if head.startswith(b"#ROSBAG V"):
         return Rosbag1Source(file, first_of=first_of)

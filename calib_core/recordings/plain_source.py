@@ -79,7 +79,7 @@ class PlainSource:
         """Make one message."""
         return self.message(chunk)
 
-    def heads(self, index: MessageIndex, size: int) -> Heads:
+    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
         """Return the first bytes of many messages; for stamps alone, no file is read."""
         rows = np.zeros((len(index), size), dtype=np.uint8)
         lengths = np.full(len(index), max(size, _HEADER_BYTES), dtype=np.int64)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 
 from calib_core.errors import MessageError
 from calib_core.recordings.decoding import Message, decode, payload_byte_order
@@ -185,7 +186,8 @@ def _points_of_rows(rows: np.ndarray, start: int, width: np.ndarray, dtype: np.d
         dtype: of a point.
     """
     if (width == width[0]).all():
-        return np.ndarray((len(rows), int(width[0])), dtype, rows, start, (rows.strides[0], dtype.itemsize))
+        shape, strides = (len(rows), int(width[0]), dtype.itemsize), (rows.strides[0], dtype.itemsize, 1)
+        return as_strided(rows[:, start:], shape, strides, writeable=False).view(dtype)[..., 0]
     ends = np.cumsum(width)
     points = np.empty(int(ends[-1]), dtype=dtype)
     raw = points.view(np.uint8)
@@ -212,7 +214,7 @@ def _points(data: np.ndarray, dtype: np.dtype[Any], height: int, width: int, row
 def _returns(points: np.ndarray, plan: ColumnPlan) -> Returns:
     if not points.size:
         return no_returns()
-    return returns_from(plan, lambda name: points[name].reshape(-1))
+    return returns_from(plan, lambda name: points[name])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

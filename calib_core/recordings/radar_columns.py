@@ -208,7 +208,7 @@ def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Retur
 
     Args:
         plan: which columns to use.
-        column: gives a column by the driver's name, of any number type; it is not changed.
+        column: gives a column by the driver's name, of any number type; (n,), or (m, k) with n = m k; it is not changed.
     """
     with np.errstate(all="ignore"):  # damaged bytes may hold signalling NaN, and figures whose squares overflow
         return _returns(plan, column)
@@ -220,11 +220,11 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     amplitude = _floats(column(plan.amplitude)) if plan.amplitude else unknown(n)
     doppler = _doppler(plan, column, position)
     for flag in plan.spoils_doppler:
-        doppler = np.where(np.asarray(column(flag)) != 0, np.nan, doppler)
+        doppler = np.where(column(flag).reshape(-1) != 0, np.nan, doppler)
     for flag in plan.spoils_position:
-        position[np.asarray(column(flag)) != 0] = np.nan
+        position[column(flag).reshape(-1) != 0] = np.nan
     for flag in plan.needed:
-        position[np.asarray(column(flag)) == 0] = np.nan
+        position[column(flag).reshape(-1) == 0] = np.nan
     if plan.axes:
         position = position @ plan.axes.matrix.T
     if plan.amplitude_scale != 1.0:
@@ -235,15 +235,15 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
 
 def _floats(values: np.ndarray) -> Values:
     """Copy a column into contiguous numbers."""
-    return np.array(values, dtype=np.float64, order="C")
+    return np.array(values, dtype=np.float64, order="C").reshape(-1)
 
 
 def _position(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Points3:
     """Return positions in the message's own axes; angles taken as positive to the left and upwards."""
     parts = [column(name) for name in plan.position]
-    position = np.empty((len(parts[0]), 3))
+    position = np.empty((parts[0].size, 3))
     for axis, part in enumerate(parts):
-        position[:, axis] = part
+        position[:, axis].reshape(part.shape)[...] = part
     position[:, len(parts) :] = 0.0
     if not plan.polar:
         return position
@@ -272,7 +272,7 @@ def _columns(names: Iterable[str | None], column: Callable[[str], np.ndarray], n
     found = np.full((n, 3), np.nan)
     for place, name in enumerate(names):
         if name is not None:
-            found[:, place] = column(name)
+            found[:, place] = column(name).reshape(-1)
     return found
 
 

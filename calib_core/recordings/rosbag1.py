@@ -10,18 +10,17 @@ import numpy as np
 from calib_core.errors import RecordingError
 from calib_core.recordings.chunks import ChannelFilter, ChunkedSource
 from calib_core.recordings.recovery import about_recovery
-from calib_core.recordings.rosbag1_index import (
+from calib_core.recordings.rosbag1_index import read_indexes
+from calib_core.recordings.rosbag1_recovery import fields_of, scan_bag
+from calib_core.recordings.rosbag1_tail import (
     CONNECTION,
-    MESSAGE,
     ChunkInfo,
     channel_of,
     counts_of,
     damaged,
     first_chunks,
-    read_indexes,
     read_tail,
 )
-from calib_core.recordings.rosbag1_recovery import fields_of, scan_bag
 from calib_core.recordings.sources import Channel, MessageIndex
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["Rosbag1Source"]
 
 _MAGIC = re.compile(rb"#ROSBAG V(\d+)\.(\d+)\n")
-_BAG_HEADER = 3
+_MESSAGE, _BAG_HEADER = 2, 3
 _U32 = struct.Struct("<I")
 _MESSAGE_HEADER_BYTES = 38  # conn, op and time fields, in any order
 _MAX_HEADER_BYTES = 1 << 24
@@ -155,7 +154,7 @@ class Rosbag1Source(ChunkedSource):
             fields = fields_of(head[4 : 4 + length])
             size = _U32.unpack_from(head, 4 + length)[0]
             kind = _number(fields.get("op", b""), 1) if fields else 0
-            if kind == MESSAGE:
+            if kind == _MESSAGE:
                 return offset + 8 + length, size
             if kind != CONNECTION:
                 break

@@ -125,8 +125,14 @@ class Source(Protocol):
         """Read one message whole."""
         ...
 
-    def heads(self, index: MessageIndex, size: int) -> Heads:
-        """Read the first bytes of many messages, in the order of the index, reading as little as the format allows."""
+    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
+        """Read the first bytes of many messages, in the order of the index, reading as little as the format allows.
+
+        Args:
+            index: the messages.
+            size: how many bytes of each.
+            keep: opening the file again will ask for the same; keep them in the user's cache.
+        """
         ...
 
     def close(self) -> None:

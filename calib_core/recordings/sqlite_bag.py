@@ -169,12 +169,13 @@ class SqliteSource:
     def _unpacked(self, data: bytes, row: int) -> bytes:
         return unpack_message(data, where=f"{self.path}: row {row}") if self._packed else data
 
-    def heads(self, index: MessageIndex, size: int) -> Heads:
+    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
         """Read the first bytes of many messages: short ones by query, long ones without their overflow pages."""
-        kept = heads_from(self._kept, index, size)
+        cache = self._kept if keep else None
+        kept = heads_from(cache, index, size)
         if kept is None:
             kept = self._read_heads(index, size)
-            keep_heads(self._kept, index, size, kept)
+            keep_heads(cache, index, size, kept)
         return kept
 
     def _read_heads(self, index: MessageIndex, size: int) -> Heads:

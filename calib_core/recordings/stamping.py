@@ -39,7 +39,7 @@ def read_stamps(topics: Sequence[tuple[Topic, int]]) -> tuple[StampedTopic, ...]
         topics: each with how many bytes of its messages to keep; 12 hold the stamp.
     """
     size = max((wanted for _, wanted in topics), default=0)
-    found = read_heads([(topic, np.arange(len(topic))) for topic, _ in topics], size)
+    found = read_heads([(topic, np.arange(len(topic))) for topic, _ in topics], size, keep=True)
     stamped = []
     for (topic, wanted), heads in zip(topics, found, strict=True):
         readable = heads.lengths >= 0

@@ -163,12 +163,12 @@ class Topic:
         return np.asarray(cdr & (heads[:, 1] == 0))
 
 
-def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int) -> list[Heads]:
-    """Read the first bytes of messages of several topics, file by file."""
+def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int, *, keep: bool = False) -> list[Heads]:
+    """Read the first bytes of messages of several topics, file by file; for keep see Source.heads."""
     if len(wanted) == 1 and len(wanted[0][0].parts) == 1:
         topic, rows = wanted[0]
         index = MessageIndex(topic.receive_ns[rows], topic.chunk[rows], topic.offset[rows])
-        return [topic.parts[0][0].heads(index, size)]
+        return [topic.parts[0][0].heads(index, size, keep=keep)]
     found = [
         Heads(np.zeros((len(rows), size), dtype=np.uint8), np.zeros(len(rows), dtype=np.int64)) for _, rows in wanted
     ]
@@ -186,7 +186,7 @@ def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int) -> list[He
         index = MessageIndex(
             *(np.concatenate([getattr(t, n) for t in picked]) for n in ("receive_ns", "chunk", "offset"))
         )
-        heads = sources[key].heads(index, size)
+        heads = sources[key].heads(index, size, keep=keep)
         edges = np.cumsum([0, *map(len, picked)])
         for (number, mine), first, last in zip(shares, edges[:-1], edges[1:], strict=True):
             found[number].rows[mine] = heads.rows[first:last]

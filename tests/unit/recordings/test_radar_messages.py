@@ -432,3 +432,20 @@ def test_scans_of_a_window_cannot_be_written_to(ros, write, plain, jpeg):
             getattr(scans, name)[0] = 1
         with pytest.raises(ValueError, match="cannot set WRITEABLE"):
             getattr(scans, name)[:1].setflags(write=True)
+
+
+@pytest.mark.parametrize("sizes", [[3], [3, 5, 0]])
+def test_clouds_far_apart_in_a_file_are_read_like_any(sizes, ros, write, plain, jpeg, cloud_points):
+    at = [START_NS + i * 10**8 for i in range(200)]
+    clouds = [cloud_points(sizes[i % len(sizes)], i) for i in range(200)]
+    rows = []
+    for t, points in zip(at, clouds, strict=True):
+        rows.append(("/radar/points", t, ros.cloud(t, points)))
+        rows.append(("/camera/image/compressed", t, ros.compressed(t, jpeg + bytes(20_000))))
+    with open_recording(write(ros, rows)) as recording:
+        scans = recording.radar_scans()
+        windows = list(recording.radar_windows())
+    expected = np.concatenate([np.stack([p["x"], p["y"], p["z"]], axis=1) for p in clouds])
+    np.testing.assert_array_equal(scans.points_radar_m, expected)
+    np.testing.assert_array_equal(np.concatenate([w.points_radar_m for w in windows]), expected)
+    np.testing.assert_array_equal(scans.doppler_mps, np.concatenate([p["velocity"] for p in clouds]))
