@@ -1,0 +1,28 @@
+"""Every caution of a calibration is explained on the page about doubts, and has a sentence and something to do."""
+
+import ast
+import re
+from pathlib import Path
+
+
+def _cautions(project_root: Path) -> dict[str, list[ast.Call]]:
+    found: dict[str, list[ast.Call]] = {}
+    for path in sorted((project_root / "calib_core").glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Caution":
+                code = node.args[0]
+                assert isinstance(code, ast.Constant)
+                found.setdefault(str(code.value), []).append(node)
+    return found
+
+
+def test_the_page_explains_every_code_and_no_other(project_root: Path) -> None:
+    page = (project_root / "docs" / "doubts.md").read_text(encoding="utf-8")
+    explained = set(re.findall(r"^\| `([a-z-]+)` \|", page, re.MULTILINE))
+    assert explained == set(_cautions(project_root))
+
+
+def test_every_caution_has_a_code_a_sentence_and_something_to_do(project_root: Path) -> None:
+    cautions = _cautions(project_root)
+    assert len(cautions) > 10
+    assert [code for code, calls in cautions.items() if any(len(call.args) != 3 for call in calls)] == []
