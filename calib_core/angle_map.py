@@ -1,0 +1,229 @@
+"""The radar's own angle errors as a map over direction: what to add to a measured azimuth and elevation.
+
+An array's calibration error changes slowly with direction, stays the same for years, and no rigid transform can take it
+out. The residuals of a calibration show it: where the click says the reflector is, less where the radar says it is, at
+the radar's range. Each of the two angles gets a Gaussian process over direction,
+
+    y_i = f(x_i) + e_i,   f ~ GP(0, a^2 exp(-|x - x'|^2 / 2 l^2)),   e_i ~ N(0, s^2 + click_i^2),              (6)
+
+and every (a, l, s) of a grid counts by its probability (marginal likelihood), a = 0 among them, so that the map comes out
+flat where the pairs show nothing but independent noise. The pose is held: the map goes with it and with no other.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Points2, Points3, Values, frozen_array
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
+from calib_core.radar import cartesian_from_polar, polar_from_cartesian
+from calib_core.results import Calibration, PairResult
+
+__all__ = ["AngleMap", "learn_angle_map"]
+
+_LEAST_PAIRS = 8
+_MOST_PAIRS = 120
+"""Neighbours say the same: beyond this many the pairs are thinned out."""
+
+_LENGTHS_RAD = np.deg2rad([10.0, 14.0, 20.0, 28.0])
+_SMOOTH_RAD = np.deg2rad([0.0, 0.2, 0.4, 0.8, 1.6, 3.2])
+_INDEPENDENT_RAD = np.deg2rad([0.05, 0.1, 0.2, 0.4, 0.8, 1.6])
+_STEP_RAD = np.deg2rad(2.5)
+_BEYOND_RAD = np.deg2rad(10.0)
+_ONE_PX = np.array([1.0, 0.0])
+_DECIMALS = 6
+"""Of the map [rad]: far finer than any radar, and short in a file."""
+
+_WORTH_SAYING = 0.97
+"""AED with the map over AED without it, above which the gain may be chance."""
+
+_MOST_OFF_RAD = np.deg2rad(15.0)
+"""A pair farther off is no smooth error of the radar."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AngleMap:
+    """What to add to the radar's angles, on a grid of directions; in between linear, beyond the edge as at the edge.
+
+    Attributes:
+        azimuth_rad: (a,) of the columns, ascending.
+        elevation_rad: (e,) of the rows, ascending.
+        correction_rad: (e, a, 2) to add to a measured (azimuth, elevation).
+        sigma_rad: (e, a, 2) standard deviation of the smooth error that is left.
+        raw_aed_px: AED of the pairs it was learnt from, under the pose as it is.
+        corrected_aed_px: the same with each pair corrected by what the others say of its direction.
+    """
+
+    azimuth_rad: Values
+    elevation_rad: Values
+    correction_rad: np.ndarray
+    sigma_rad: np.ndarray
+    raw_aed_px: float
+    corrected_aed_px: float
+
+    def __post_init__(self) -> None:
+        rows, columns = len(self.elevation_rad), len(self.azimuth_rad)
+        shapes = {"azimuth_rad": (columns,), "elevation_rad": (rows,)}
+        shapes |= {"correction_rad": (rows, columns, 2), "sigma_rad": (rows, columns, 2)}
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        for lines in (self.azimuth_rad, self.elevation_rad):
+            if len(lines) < 2 or not (np.diff(lines) > 0).all():
+                raise ValueError("the lines of an angle map must ascend, two or more of them")
+
+    @property
+    def largest_rad(self) -> float:
+        """The largest correction anywhere on the map."""
+        return float(np.abs(self.correction_rad).max())
+
+    @property
+    def pays(self) -> bool:
+        """Whether pairs that the map has not seen come out clearly closer to their clicks with it."""
+        return self.corrected_aed_px < _WORTH_SAYING * self.raw_aed_px
+
+    def corrected(self, points_radar_m: Points3) -> Points3:
+        """Return the positions (n, 3) with their angles corrected and their ranges kept."""
+        polar = polar_from_cartesian(points_radar_m)
+        row, row_share = _cell(self.elevation_rad, polar[:, 2])
+        column, column_share = _cell(self.azimuth_rad, polar[:, 1])
+        grid = self.correction_rad
+        lower = grid[row, column] * (1 - column_share) + grid[row, column + 1] * column_share
+        upper = grid[row + 1, column] * (1 - column_share) + grid[row + 1, column + 1] * column_share
+        polar[:, 1:] += lower * (1 - row_share) + upper * row_share
+        return cartesian_from_polar(polar)
+
+
+def learn_angle_map(calibration: Calibration) -> AngleMap | None:
+    """Learn the radar's smooth angle errors from the inlier pairs of a calibration.
+
+    None where they cannot be learnt: fewer than eight pairs, or a pose without a noise model (the paper's method).
+
+    Args:
+        calibration: of the default method.
+    """
+    pairs = _thinned([pair for pair in calibration.pairs if pair.inlier and not pair.excluded])
+    if calibration.options.method == "paper" or len(pairs) < _LEAST_PAIRS:
+        return None
+    seen = _observe(calibration, pairs)
+    if len(seen.polar) < _LEAST_PAIRS:
+        return None
+    directions = seen.polar[:, 1:]
+    elevation, azimuth = (_axis(directions[:, angle]) for angle in (1, 0))
+    grid = np.stack([*np.meshgrid(azimuth, elevation)], axis=-1).reshape(-1, 2)
+    fields = [_learn(directions, seen.off_rad[:, angle], seen.click_rad, grid) for angle in (0, 1)]
+    if np.ptp(directions[:, 1]) == 0.0:  # a radar without elevation says nothing about its error
+        fields[1] = _Field(*(np.zeros_like(part) for part in (fields[1].mean, fields[1].sigma, fields[1].held_out)))
+    polar = seen.polar.copy()
+    polar[:, 1:] += np.stack([field.held_out for field in fields], axis=1)
+    shape = (len(elevation), len(azimuth), 2)
+    return AngleMap(
+        azimuth_rad=azimuth.round(_DECIMALS),
+        elevation_rad=elevation.round(_DECIMALS),
+        correction_rad=np.stack([field.mean for field in fields], axis=1).reshape(shape).round(_DECIMALS),
+        sigma_rad=np.stack([field.sigma for field in fields], axis=1).reshape(shape).round(_DECIMALS),
+        raw_aed_px=_aed_px(calibration, seen, seen.polar),
+        corrected_aed_px=_aed_px(calibration, seen, polar),
+    )
+
+
+def _thinned(pairs: list[PairResult]) -> list[PairResult]:
+    if len(pairs) <= _MOST_PAIRS:
+        return pairs
+    return [pairs[i] for i in np.linspace(0, len(pairs) - 1, _MOST_PAIRS).round().astype(int)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """Pixels (n, 2), measured polar positions (n, 3), angles by the click less measured (n, 2), a click's part in them (n,)."""
+
+    pixels_px: Points2
+    polar: Points3
+    off_rad: Points2
+    click_rad: Values
+
+
+def _observe(calibration: Calibration, pairs: list[PairResult]) -> _Seen:
+    """Measure the angle errors: the reflector lies on the click's ray at the radar's range."""
+    pixels = np.array([pair.pixel_px for pair in pairs])
+    polar = polar_from_cartesian(np.array([pair.point_radar_m for pair in pairs]))
+    by_click, distance_m = _on_the_rays(calibration.camera, calibration.camera_from_radar, pixels, polar[:, 0])
+    aside, _ = _on_the_rays(calibration.camera, calibration.camera_from_radar, pixels + _ONE_PX, polar[:, 0])
+    one_px = np.hypot(*(aside - by_click).T)
+    off = by_click - polar[:, 1:]
+    off[:, 0] = (off[:, 0] + np.pi) % (2 * np.pi) - np.pi
+    with np.errstate(invalid="ignore"):
+        kept = (distance_m > 0) & (np.abs(off) < _MOST_OFF_RAD).all(axis=1) & np.isfinite(one_px)
+    click = calibration.options.noise.sigma_px * one_px
+    return _Seen(pixels[kept], polar[kept], off[kept], click[kept])
+
+
+def _on_the_rays(
+    camera: Camera, camera_from_radar: RigidTransform, pixels_px: Points2, range_m: Values
+) -> tuple[Points2, Values]:
+    """Return azimuth and elevation (n, 2) of the point on each pixel's ray at this range from the radar, and its distance."""
+    direction = camera.rays(pixels_px) @ camera_from_radar.rotation
+    centre = camera_from_radar.inverse().translation_m
+    along = direction @ centre
+    with np.errstate(invalid="ignore"):
+        distance_m = -along + np.sqrt(along**2 - centre @ centre + range_m**2)
+    return polar_from_cartesian(centre + distance_m[:, None] * direction)[:, 1:], distance_m
+
+
+def _aed_px(calibration: Calibration, seen: _Seen, polar: Points3) -> float:
+    projected = calibration.camera.project(calibration.camera_from_radar @ cartesian_from_polar(polar))
+    return float(np.nanmean(np.linalg.norm(projected - seen.pixels_px, axis=1)))
+
+
+def _axis(angles_rad: Values) -> Values:
+    """Return the grid's lines over these angles and a little beyond, at multiples of the step."""
+    first = np.floor((angles_rad.min() - _BEYOND_RAD) / _STEP_RAD)
+    last = np.ceil((angles_rad.max() + _BEYOND_RAD) / _STEP_RAD)
+    return np.asarray(np.arange(first, last + 1) * _STEP_RAD)
+
+
+def _cell(lines: Values, values: Values) -> tuple[np.ndarray, np.ndarray]:
+    """Return the index (n,) of the line below each value, and how far (n, 1) it is to the next; NaN stays NaN."""
+    held = np.clip(values, lines[0], lines[-1])
+    below = np.clip(np.searchsorted(lines, held, side="right") - 1, 0, len(lines) - 2)
+    return below, ((held - lines[below]) / (lines[below + 1] - lines[below]))[:, None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Field:
+    """One angle's smooth error: mean and sigma (g,) on the grid, and at each pair (n,) as the others predict it."""
+
+    mean: Values
+    sigma: Values
+    held_out: Values
+
+
+def _learn(directions: Points2, off_rad: Values, click_rad: Values, grid: Points2) -> _Field:
+    """Regress one angle's error on direction by equation (6), a click's part taken as the same for all pairs.
+
+    Then every covariance of one length has the kernel's own axes U, K = U diag(k) U^T: V = U diag(a^2 k + s^2) U^T.
+    """
+    noise = np.repeat(_INDEPENDENT_RAD**2, len(_SMOOTH_RAD)) + float(np.median(click_rad)) ** 2
+    smooth = np.tile(_SMOOTH_RAD**2, len(_INDEPENDENT_RAD))
+    parts = []
+    for length_rad in _LENGTHS_RAD:
+        strength, axes = np.linalg.eigh(np.exp(-0.5 * _squared(directions, directions) / length_rad**2))
+        on_grid = np.exp(-0.5 * _squared(grid, directions) / length_rad**2) @ axes
+        along = axes.T @ off_rad
+        precision = 1.0 / (smooth[:, None] * np.maximum(strength, 0.0) + noise[:, None])  # (cells, n)
+        log_evidence = -0.5 * (precision @ along**2 - np.log(precision).sum(axis=1))
+        pull = precision * along
+        held_out = off_rad - (pull @ axes.T) / (precision @ (axes**2).T)
+        mean = smooth[:, None] * (pull @ on_grid.T)
+        variance = smooth[:, None] - smooth[:, None] ** 2 * (precision @ (on_grid**2).T)
+        parts.append((log_evidence, held_out, mean, np.maximum(variance, 0.0)))
+    log_evidence, held_out, mean, variance = (np.concatenate(part) for part in zip(*parts, strict=True))
+    log_evidence -= np.where(np.tile(smooth, len(_LENGTHS_RAD)) == 0.0, np.log(len(_LENGTHS_RAD)), 0.0)
+    share = np.exp(log_evidence - log_evidence.max())
+    share /= share.sum()
+    expected = share @ mean
+    return _Field(expected, np.sqrt(share @ (variance + (mean - expected) ** 2)), share @ held_out)
+
+
+def _squared(a: Points2, b: Points2) -> np.ndarray:
+    return np.asarray(((a[:, None] - b[None]) ** 2).sum(axis=2))
