@@ -46,7 +46,8 @@ cocalib solve RECORDING --radar-axes degrees ...                 the angles are 
 cocalib solve RECORDING --radar-axes forward,left,down,radians ...
 ```
 
-Polar messages are first turned into x, y, z as the table says, then the option is applied.
+Polar messages are first turned into x, y, z as the table says, then the option is applied. It is kept in the calibration
+(`provenance.radar_axes`); a session that is opened with other axes than before says so, and solves its clicks anew.
 
 ## What is compared
 
