@@ -153,8 +153,9 @@ def _weak_geometry(f: Findings) -> list[Caution]:
 def _places(f: Findings) -> int:
     """Count the distinct places among the inlier placements, by the radar's own resolution."""
     centres = direction_cosines(cartesian_from_polar(f.evidence.polar[f.refined.rows[f.inliers]])) / CLUSTER_SCALE
-    close = ((centres[:, None] - centres[None]) ** 2).sum(axis=2) <= 1.0
-    return int((~np.tril(close, -1).any(axis=1)).sum())
+    apart = sum(((axis[:, None] - axis) ** 2 for axis in centres.T), start=np.zeros((len(centres), len(centres))))
+    first_close = (apart <= 1.0).argmax(axis=1)  # at the latest the place itself
+    return int((first_close == np.arange(len(centres))).sum())
 
 
 def _same_places(f: Findings) -> list[Caution]:
