@@ -111,8 +111,10 @@ class _Windows:
         self._last = (-1, b"")
 
     def _read(self, number: int) -> bytes:
-        if number % _AHEAD == 0:
-            self._file.expect(self._places[number : number + _AHEAD])
+        if number == 0:
+            self._file.expect(self._places[:_AHEAD])
+        if number % _AHEAD == 0:  # the disk goes on while these are read
+            self._file.expect(self._places[number + _AHEAD : number + 2 * _AHEAD])
         begin, end = self._places[number]
         self._last = (number, self._file.up_to(begin, end - begin))
         return self._last[1]

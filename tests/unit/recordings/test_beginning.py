@@ -1,6 +1,9 @@
 """The first picture comes from the beginning of a file, and little else is read."""
 
+from typing import Any
+
 import pytest
+from rosbags.rosbag1 import Writer
 
 from calib_core.recordings import RecordingOptions, first_picture, open_recording
 from calib_core.recordings.files import FileBytes
@@ -67,6 +70,36 @@ def test_little_of_a_large_bag_is_read_for_it(ros1, plain, jpeg, write, monkeypa
     assert first_picture([path]) is not None
     assert len(read) < 20
     assert sum(read) < 1_000_000
+
+
+def test_gaps_behind_the_chunks_of_a_bag_are_not_read(ros1, plain, jpeg, tmp_path, monkeypatch):
+    path = tmp_path / "gaps.bag"
+    writer = Writer(path)
+    topics: dict[str, Any] = {}
+    with writer:
+        for topic, at, message in plain(ros1, jpeg, n=30):
+            if topic not in topics:
+                topics[topic] = writer.add_connection(topic, message.__msgtype__, typestore=ros1.store)
+            writer.write(topics[topic], at, ros1.serialise(message))
+            if topic == "/camera/camera_info" and len(writer.chunks) < 20:
+                writer.write_chunk(writer.chunks[-1])
+                writer.bio.seek(5_000_000, 1)
+    assert path.stat().st_size > 80_000_000
+    sizes = []
+    up_to = FileBytes.up_to
+
+    def counted(self, offset, size):
+        data = up_to(self, offset, size)
+        sizes.append(len(data))
+        return data
+
+    monkeypatch.setattr(FileBytes, "up_to", counted)
+    with open_recording(path) as recording:
+        assert len(recording.image_times) == 30
+        assert len(recording.radar_scans()) == 30
+        assert recording.cautions == ()
+        assert first_picture([path]) == recording.image_bytes(0)
+    assert sum(sizes) < 2_000_000
 
 
 @pytest.mark.parametrize("keep", [0.0, 0.5, 0.99])
