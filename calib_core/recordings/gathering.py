@@ -62,6 +62,25 @@ def gather_heads(source: ChunkAccess, index: MessageIndex, size: int) -> Heads:
     gather = _Gather(source, index, size, keep=len(groups) <= _FEW_CHUNKS)
     if len(groups) <= _FEW_CHUNKS:
         return Heads(gather.rows, gather.lengths, gather.chunks(groups))
+    batches = [groups[first : first + _FEW_CHUNKS] for first in range(0, len(groups), _FEW_CHUNKS)]
+    with ThreadPoolExecutor(_THREADS) as pool:
+        faults = [fault for fault in pool.map(gather.chunks, batches) if fault]
+    return Heads(gather.rows, gather.lengths, faults[0] if faults else "")
+
+
+def gather_far(source: ChunkAccess, file: FileBytes, index: MessageIndex, places: TimesNs, size: int) -> Heads:
+    """Read the first bytes of messages that are stored as they are and lie far apart: one small read for each.
+
+    Args:
+        source: the chunked file.
+        file: its bytes.
+        index: the messages.
+        places: (n,) where their records begin in the file.
+        size: how many bytes of each message.
+    """
+    width = source.lead_bytes + size
+    order = np.argsort(places)
+    read: list[bytes] = []
     batches = [places[order[first : first + _AHEAD]].tolist() for first in range(0, len(order), _AHEAD)]
     told = 0
     for number, batch in enumerate(batches):
