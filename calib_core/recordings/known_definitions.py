@@ -1,4 +1,4 @@
-"""Definitions of standard messages, for recordings that carry none (ROS 2 before Iron wrote SQLite bags without).
+"""Definitions of standard and well-known messages, for recordings that carry none (ROS 2 before Iron wrote SQLite bags without).
 
 The field lists are those of ROS 2; only types whose layout has not changed since Foxy are here.
 """
@@ -25,6 +25,16 @@ KNOWN_DEFINITIONS: Mapping[str, str] = {
         "std_msgs/Header header\nuint32 height\nuint32 width\nPointField[] fields\nbool is_bigendian\nuint32 point_step\n"
         "uint32 row_step\nuint8[] data\nbool is_dense\n"
         f"{_SEPARATOR}MSG: sensor_msgs/PointField\nstring name\nuint32 offset\nuint8 datatype\nuint32 count\n"
+    ),
+    "sensor_msgs/PointCloud": (
+        "std_msgs/Header header\ngeometry_msgs/Point32[] points\nChannelFloat32[] channels\n"
+        f"{_SEPARATOR}MSG: geometry_msgs/Point32\nfloat32 x\nfloat32 y\nfloat32 z\n"
+        f"{_SEPARATOR}MSG: sensor_msgs/ChannelFloat32\nstring name\nfloat32[] values\n"
+    ),
+    "foxglove_msgs/CompressedVideo": "builtin_interfaces/Time timestamp\nstring frame_id\nuint8[] data\nstring format\n",
+    "ffmpeg_image_transport_msgs/FFMPEGPacket": (
+        "std_msgs/Header header\nint32 width\nint32 height\nstring encoding\nuint64 pts\nuint8 flags\nbool is_bigendian\n"
+        "uint8[] data\n"
     ),
     "radar_msgs/RadarScan": (
         "std_msgs/Header header\nRadarReturn[] returns\n"

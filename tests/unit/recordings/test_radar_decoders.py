@@ -2,6 +2,7 @@
 
 import contextlib
 import random
+import sqlite3
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,20 @@ def test_damaged_messages_of_any_layout_give_values_or_one_clear_error(name: str
         with contextlib.suppress(MessageError):
             assert layout is not None
             layout.returns(worse)
+
+
+@pytest.mark.parametrize(
+    "name", ["Oculii cloud", "ARS548 detections, 18 fields", "radar_msgs scan", "radar_msgs tracks"]
+)
+def test_what_ros_itself_defines_is_read_from_bags_without_definitions(name: str, ros2: Any, write: Any) -> None:
+    expected = sample(ros2, name)
+    path = write(ros2, [("/radar", START_NS, message) for message in expected.messages], "db3")
+    database = sqlite3.connect(path)
+    with database:
+        database.execute("DROP TABLE message_definitions")
+    database.close()
+    with open_recording(path, require=("radar",)) as recording:
+        np.testing.assert_allclose(recording.radar_scans().points_radar_m, expected.points, rtol=1e-6, atol=1e-6)
 
 
 # -- contradictions

@@ -1,5 +1,6 @@
 """Topics of H.264 and H.265: frames that need those before them."""
 
+import sqlite3
 from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
@@ -144,3 +145,19 @@ def test_a_jpeg_that_says_h264_is_a_jpeg(ros2, write, jpeg) -> None:
     path = recorded(write, ros2, image, "h264", [jpeg, jpeg])
     with open_recording(path, require=("image",)) as recording:
         assert recording.image_bytes(1).data == jpeg
+
+
+@pytest.mark.parametrize("make", [foxglove, ffmpeg])
+def test_video_is_read_from_bags_without_definitions(coded, ros2, write, make) -> None:
+    codec, packets = coded
+    rows = [
+        ("/video", START_NS + i * NS_PER_S // 10, make(ros2, codec, START_NS + i * NS_PER_S // 10, data))
+        for i, data in enumerate(packets[:12])
+    ]
+    path = write(ros2, rows, "db3")
+    database = sqlite3.connect(path)
+    with database:
+        database.execute("DROP TABLE message_definitions")
+    database.close()
+    with open_recording(path, require=("image",)) as recording:
+        assert [number_in(recording.image(i)) for i in range(12)] == list(range(12))
