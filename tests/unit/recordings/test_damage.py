@@ -15,7 +15,7 @@ import pytest
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings import describe, inspect_recording, open_recording
+from calib_core.recordings import describe, first_picture, inspect_recording, open_recording
 from calib_core.recordings.compression import unpack, unpack_message
 
 START_NS = 1_700_000_000 * NS_PER_S
@@ -227,6 +227,7 @@ def test_random_damage_is_answered_with_values_or_one_clear_error(
             del data[place : place + rng.randrange(1, 200)]
         damaged = tmp_path / f"damaged{number}{path.suffix}"
         damaged.write_bytes(data)
+        first_picture([damaged])
         try:
             with inspect_recording(damaged) as recording:
                 recording.radar_scans()

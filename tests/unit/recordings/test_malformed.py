@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from calib_core.errors import RecordingError
-from calib_core.recordings import describe, inspect_recording
+from calib_core.recordings import describe, first_picture, inspect_recording
 from tests.unit.recordings.malformed import CASES, FRAMES, Kit
 
 LOSSLESS = {
@@ -54,6 +54,13 @@ def _picture(recording, index):
         return recording.image_bytes(index).data
     except RecordingError:
         return b""
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_first_picture_is_a_whole_one_or_none(name, tmp_path, jpeg):
+    path = CASES[name](Kit(tmp_path, jpeg))
+    picture = first_picture([path])
+    assert picture is None or picture.data == jpeg
 
 
 def test_there_is_no_silent_loss():
