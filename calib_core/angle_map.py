@@ -29,7 +29,8 @@ _MOST_PAIRS = 120
 _LENGTHS_RAD = np.deg2rad([10.0, 14.0, 20.0, 28.0])
 _SMOOTH_RAD = np.deg2rad([0.0, 0.2, 0.4, 0.8, 1.6, 3.2])
 _INDEPENDENT_RAD = np.deg2rad([0.05, 0.1, 0.2, 0.4, 0.8, 1.6])
-_STEP_RAD = np.deg2rad(2.5)
+_IMPROBABLE = 1e-3  # against the likeliest
+_STEP_RAD = np.deg2rad(5.0)
 _BEYOND_RAD = np.deg2rad(10.0)
 _ONE_PX = np.array([1.0, 0.0])
 _DECIMALS = 6
@@ -64,7 +65,7 @@ class AngleMap:
 
     def __post_init__(self) -> None:
         rows, columns = len(self.elevation_rad), len(self.azimuth_rad)
-        shapes = {"azimuth_rad": (columns,), "elevation_rad": (rows,)}
+        shapes: dict[str, tuple[int, ...]] = {"azimuth_rad": (columns,), "elevation_rad": (rows,)}
         shapes |= {"correction_rad": (rows, columns, 2), "sigma_rad": (rows, columns, 2)}
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
@@ -205,24 +206,32 @@ def _learn(directions: Points2, off_rad: Values, click_rad: Values, grid: Points
     """
     noise = np.repeat(_INDEPENDENT_RAD**2, len(_SMOOTH_RAD)) + float(np.median(click_rad)) ** 2
     smooth = np.tile(_SMOOTH_RAD**2, len(_INDEPENDENT_RAD))
-    parts = []
-    for length_rad in _LENGTHS_RAD:
-        strength, axes = np.linalg.eigh(np.exp(-0.5 * _squared(directions, directions) / length_rad**2))
-        on_grid = np.exp(-0.5 * _squared(grid, directions) / length_rad**2) @ axes
-        along = axes.T @ off_rad
-        precision = 1.0 / (smooth[:, None] * np.maximum(strength, 0.0) + noise[:, None])  # (cells, n)
-        log_evidence = -0.5 * (precision @ along**2 - np.log(precision).sum(axis=1))
-        pull = precision * along
-        held_out = off_rad - (pull @ axes.T) / (precision @ (axes**2).T)
-        mean = smooth[:, None] * (pull @ on_grid.T)
-        variance = smooth[:, None] - smooth[:, None] ** 2 * (precision @ (on_grid**2).T)
-        parts.append((log_evidence, held_out, mean, np.maximum(variance, 0.0)))
-    log_evidence, held_out, mean, variance = (np.concatenate(part) for part in zip(*parts, strict=True))
-    log_evidence -= np.where(np.tile(smooth, len(_LENGTHS_RAD)) == 0.0, np.log(len(_LENGTHS_RAD)), 0.0)
-    share = np.exp(log_evidence - log_evidence.max())
-    share /= share.sum()
-    expected = share @ mean
-    return _Field(expected, np.sqrt(share @ (variance + (mean - expected) ** 2)), share @ held_out)
+    flat = np.where(smooth == 0.0, np.log(len(_LENGTHS_RAD)), 0.0)  # without a smooth part all lengths are one
+    between, to_grid = _squared(directions, directions), _squared(grid, directions)
+    bases = [np.linalg.eigh(np.exp(-0.5 * between / length_rad**2)) for length_rad in _LENGTHS_RAD]
+    precisions = [1.0 / (np.outer(smooth, np.maximum(strength, 0.0)) + noise[:, None]) for strength, _ in bases]
+    log_evidence = np.array(
+        [
+            -0.5 * (precision @ (axes.T @ off_rad) ** 2 - np.log(precision).sum(axis=1)) - flat
+            for precision, (_, axes) in zip(precisions, bases, strict=True)
+        ]
+    )
+    shares = np.exp(log_evidence - log_evidence.max())
+    shares = np.where(shares > _IMPROBABLE, shares, 0.0) / shares[shares > _IMPROBABLE].sum()
+    mean, square, held_out = np.zeros(len(grid)), np.zeros(len(grid)), np.zeros(len(off_rad))
+    for length_rad, share, precision, (_, axes) in zip(_LENGTHS_RAD, shares, precisions, bases, strict=True):
+        kept = np.flatnonzero(share)
+        if not kept.size:
+            continue
+        share, amplitude, precision = share[kept], smooth[kept, None], precision[kept]
+        on_grid = np.exp(-0.5 * to_grid / length_rad**2) @ axes
+        pull = precision * (axes.T @ off_rad)
+        means = amplitude * (pull @ on_grid.T)
+        spread = amplitude - amplitude**2 * (precision @ (on_grid**2).T)
+        mean += share @ means
+        square += share @ (np.maximum(spread, 0.0) + means**2)
+        held_out += share @ (off_rad - (pull @ axes.T) / (precision @ (axes**2).T))
+    return _Field(mean, np.sqrt(np.maximum(square - mean**2, 0.0)), held_out)
 
 
 def _squared(a: Points2, b: Points2) -> np.ndarray:

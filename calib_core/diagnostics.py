@@ -125,7 +125,8 @@ def _smooth_angle_errors(f: Findings) -> list[Caution]:
             "smooth-angle-errors",
             "neighbouring placements share their residuals: the radar's angles are off by an amount that changes slowly with "
             f"direction; the stated rotation uncertainty is {f.uncertainty.growth:.1f} times wider for it",
-            "more placements will not average it away; calibrate the radar's angles, or trust the stated uncertainty",
+            "more placements will not average it away: correct the radar's angles by radar_angle_map of the calibration, or "
+            "calibrate them; the stated uncertainty allows for it",
         )
     ]
 

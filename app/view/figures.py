@@ -1,6 +1,7 @@
 """The figures beside the picture, each with one sentence that explains it."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from app.view.digits import plain, with_sigma
 from app.view.drawn import Figure
 from app.view.mounting import mounting_of
 from app.view.rows import ellipse_of
+from calib_core.angle_map import AngleMap, learn_angle_map
 from calib_core.results import Calibration
 
 __all__ = ["metric_figures", "pose_figures", "residual_limit_px"]
@@ -69,7 +71,29 @@ def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:
         Figure(key, label, with_sigma(float(value), float(sigma)), "deg", hint)
         for (key, label, hint), value, sigma in zip(_ANGLES, degrees, sigmas, strict=True)
     ]
-    return tuple(figures)
+    return (*figures, *_radar_figures(calibration))
+
+
+def _radar_figures(calibration: Calibration) -> tuple[Figure, ...]:
+    """Return how far off the radar's own angles are, where correcting them would pay."""
+    angle_map = _angle_map_of(calibration)
+    if angle_map is None or not angle_map.pays:
+        return ()
+    hint = (
+        "The radar's angles are off smoothly with direction, which no pose can take out. Correcting them by the map in "
+        f"calibration.json (radar_angle_map) brings AED from {plain(angle_map.raw_aed_px)} to "
+        f"{plain(angle_map.corrected_aed_px)} px, each pair corrected by what the others say."
+    )
+    return (
+        Figure(
+            "radar_angles", "radar's angles off by", f"up to {plain(np.rad2deg(angle_map.largest_rad))}", "deg", hint
+        ),
+    )
+
+
+@lru_cache(maxsize=4)
+def _angle_map_of(calibration: Calibration) -> AngleMap | None:
+    return learn_angle_map(calibration)
 
 
 def residual_limit_px(calibration: Calibration) -> float | None:

@@ -7,20 +7,22 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from calib_core.angle_map import learn_angle_map
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz, quaternion_wxyz_from_matrix
 from calib_core.interchange import documents
+from calib_core.interchange.angle_map_document import angle_map_document, angle_map_of
 from calib_core.interchange.calibration_file import (
     EQUATION,
     CalibrationFile,
     FrameNames,
-    InputFile,
     Provenance,
     UnknownResult,
     choose_check_point,
 )
 from calib_core.interchange.camera_document import camera_document, camera_of
 from calib_core.interchange.json_text import json_text
+from calib_core.interchange.provenance_document import provenance_document, provenance_of
 from calib_core.interchange.strict_json import json_object, parse_document
 from calib_core.interchange.unknown_results import unknown_results, with_unknown
 from calib_core.measurements import ReflectorClick, TimeNs, Unpaired, time_from_parts, time_parts
@@ -65,8 +67,15 @@ def calibration_text(
         for pair in calibration.pairs
     )
     stamped = dataclasses.replace(calibration, pairs=pairs)
-    check_point = choose_check_point(stamped)
-    return write_calibration(CalibrationFile(stamped, frames or FrameNames(), check_point, provenance or Provenance()))
+    learnt = learn_angle_map(stamped)
+    file = CalibrationFile(
+        calibration=stamped,
+        frames=frames or FrameNames(),
+        check_point=choose_check_point(stamped),
+        provenance=provenance or Provenance(),
+        angle_map=learnt if learnt is not None and learnt.pays else None,
+    )
+    return write_calibration(file)
 
 
 def write_calibration(file: CalibrationFile) -> str:
@@ -87,22 +96,24 @@ def write_calibration(file: CalibrationFile) -> str:
         check_point=documents.CheckPointDocument(_nested(check.radar_m), _nested(check.pixel_px)) if check else None,
         metrics=_metrics_document(calibration.metrics),
         noise_scale=documents.NoiseScaleDocument(*calibration.noise_scale),
+        radar_angle_map=angle_map_document(file.angle_map),
         paper=documents.PaperDocument(_known(calibration.iterative_px), _known(calibration.sqpnp_px)),
         warnings=[documents.WarningDocument(c.code, c.message, c.hint) for c in calibration.cautions],
         unpaired=[documents.UnpairedDocument(u.id, u.code, u.reason, u.hint) for u in calibration.unpaired],
         pairs=[_pair_document(pair) for pair in calibration.pairs],
         camera=camera_document(calibration.camera),
         options=calibration.options,
-        provenance=_provenance_document(file.provenance),
+        provenance=provenance_document(file.provenance),
     )
     content = msgspec.to_builtins(document)
-    return json_text(with_unknown({key: content[key] for key in _KEY_ORDER}, file.unknown))
+    known = {key: content[key] for key in _KEY_ORDER if key != "radar_angle_map" or file.angle_map is not None}
+    return json_text(with_unknown(known, file.unknown))
 
 
 _KEY_ORDER = (
     *("schema", "equation", "frames", "camera_from_radar", "radar_from_camera", "check_point", "sigma", "covariance"),
-    *("covariance_convention", "covariance_quantile", "metrics", "noise_scale", "paper", "warnings", "unpaired"),
-    *("pairs", "camera", "options", "provenance"),
+    *("covariance_convention", "covariance_quantile", "metrics", "noise_scale", "radar_angle_map", "paper", "warnings"),
+    *("unpaired", "pairs", "camera", "options", "provenance"),
 )
 
 
@@ -162,7 +173,8 @@ def calibration_file_of(
         calibration=calibration,
         frames=frames,
         check_point=CheckPoint(np.array(check.radar_m), np.array(check.pixel_px)) if check else None,
-        provenance=_provenance(document.provenance),
+        provenance=provenance_of(document.provenance),
+        angle_map=angle_map_of(document.radar_angle_map, source=source),
     )
 
 
@@ -272,29 +284,4 @@ def _pair(document: documents.SolvedPairDocument) -> PairResult:
         candidate=document.candidate,
         expected_covariance_px2=np.array(document.expected_covariance_px2 or [[_NAN] * 2] * 2),
         image_time=None if time is None else TimeNs(time_from_parts(time.sec, time.nanosec)),
-    )
-
-
-def _provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
-    return documents.ProvenanceDocument(
-        inputs=[documents.InputDocument(f.name, f.size_bytes, f.sha256) for f in provenance.inputs],
-        topics=documents.TopicsDocument(provenance.radar_topic, provenance.image_topic, provenance.camera_info_topic),
-        clocks=documents.ClocksDocument(provenance.radar_clock, provenance.image_clock),
-        radar_axes=provenance.radar_axes,
-        video_start=provenance.video_start,
-        version=provenance.version,
-    )
-
-
-def _provenance(document: documents.ProvenanceDocument) -> Provenance:
-    return Provenance(
-        inputs=tuple(InputFile(f.name, f.size_bytes, f.sha256) for f in document.inputs),
-        radar_topic=document.topics.radar,
-        image_topic=document.topics.image,
-        camera_info_topic=document.topics.camera_info,
-        radar_clock=document.clocks.radar,
-        image_clock=document.clocks.image,
-        radar_axes=document.radar_axes,
-        video_start=document.video_start,
-        version=document.version,
     )

@@ -13,6 +13,7 @@ __all__ = [
     "CALIBRATION_SCHEMA",
     "CLICKS_SCHEMA",
     "PAIRS_SCHEMA",
+    "AngleMapDocument",
     "CalibrationDocument",
     "CameraDocument",
     "CheckPointDocument",
@@ -247,6 +248,22 @@ class PaperDocument(Struct, frozen=True):
     sqpnp_px: float | None = None
 
 
+class AngleMapDocument(Struct, frozen=True):
+    """The radar's own smooth angle errors: what to add to a measured azimuth and elevation before the pose is applied.
+
+    Rows go with elevation_rad, columns with azimuth_rad; in between linear, beyond the edge as at the edge.
+    """
+
+    azimuth_rad: list[float]
+    elevation_rad: list[float]
+    add_azimuth_rad: list[list[float]]
+    add_elevation_rad: list[list[float]]
+    sigma_azimuth_rad: list[list[float]]
+    sigma_elevation_rad: list[list[float]]
+    aed_px: float | None = None
+    corrected_aed_px: float | None = None
+
+
 class CalibrationDocument(Struct, frozen=True):
     """A solved extrinsic calibration, and how far to trust it."""
 
@@ -263,6 +280,7 @@ class CalibrationDocument(Struct, frozen=True):
     check_point: CheckPointDocument | None = None
     metrics: MetricsDocument = field(default_factory=MetricsDocument)
     noise_scale: NoiseScaleDocument = field(default_factory=NoiseScaleDocument)
+    radar_angle_map: AngleMapDocument | None = None
     paper: PaperDocument = field(default_factory=PaperDocument)
     warnings: list[WarningDocument] = []
     unpaired: list[UnpairedDocument] = []

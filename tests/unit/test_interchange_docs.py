@@ -1,11 +1,23 @@
 """The published schemas and the page about formats say what the code does."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from calib_core.interchange import FORMATS, export, read_calibration, read_camera, read_clicks, read_pairs
+from calib_core.angle_map import AngleMap
+from calib_core.interchange import (
+    FORMATS,
+    export,
+    read_calibration,
+    read_camera,
+    read_clicks,
+    read_pairs,
+    write_calibration,
+)
 from calib_core.interchange.schemas import schema_texts
 
 
@@ -50,3 +62,21 @@ def test_formats_are_named_once_and_each_says_what_it_lacks(project_root: Path):
         notes = export(file, known.name).notes
         assert known.carries_camera or any("carries the pose only" in note for note in notes)
         assert known.comment != "none" or any("calibration.json" in note for note in notes)
+
+
+def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(
+    project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
+    (recipe,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    golden = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+    add = np.deg2rad(np.random.default_rng(2).uniform(-2, 2, (4, 6, 2)))
+    angle_map = AngleMap(np.linspace(-0.5, 0.5, 6), np.linspace(-0.2, 0.1, 4), add, np.abs(add), 9.0, 5.0)
+    (tmp_path / "calibration.json").write_text(write_calibration(replace(golden, angle_map=angle_map)))
+    monkeypatch.chdir(tmp_path)
+
+    names: dict[str, Any] = {}
+    exec(recipe, names)
+
+    np.testing.assert_allclose(names["corrected"], angle_map.corrected(names["points"]), rtol=0, atol=1e-12)
+    assert np.abs(names["corrected"] - names["points"]).max() > 0.01

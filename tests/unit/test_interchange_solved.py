@@ -20,7 +20,9 @@ from calib_core.interchange import (
 )
 from calib_core.measurements import time_from_parts
 from calib_core.options import CalibrationOptions
+from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
+from calib_core.synthetic import NoiseProfile, simulate_pairs
 
 
 @pytest.fixture
@@ -116,3 +118,25 @@ def test_a_file_of_the_required_keys_alone_is_read(project_root: Path):
     for missing in required:
         with pytest.raises(InputError, match=f"{missing}: "):
             read_calibration(json.dumps({key: value for key, value in required.items() if key != missing}))
+
+
+def test_the_radars_angle_errors_travel_with_the_calibration_where_correcting_them_pays():
+    simulated = simulate_pairs(30, rng=np.random.default_rng(7), noise=NoiseProfile(0.008, 0.1, 0.25))
+    pairs = []
+    for pair in simulated.pairs:
+        polar = polar_from_cartesian(pair.candidates[0].position_radar_m)
+        polar[2] += np.deg2rad(1.5) * np.cos(9.0 * polar[1])
+        bent = dataclasses.replace(pair.candidates[0], position_radar_m=cartesian_from_polar(polar))
+        pairs.append(dataclasses.replace(pair, candidates=(bent,)))
+    outcome = calibrate_pairs(pairs, simulated.camera, CalibrationOptions())
+    assert isinstance(outcome, Calibration)
+    text = calibration_text(outcome)
+    content = json.loads(text)["radar_angle_map"]
+    assert content["corrected_aed_px"] < content["aed_px"]
+    back = read_calibration(text)
+    assert back.angle_map is not None
+    assert np.shape(content["add_elevation_rad"]) == back.angle_map.correction_rad.shape[:2]
+    assert write_calibration(back) == text
+    content["add_azimuth_rad"].pop()
+    with pytest.raises(InputError, match="radar_angle_map"):
+        read_calibration(json.dumps(json.loads(text) | {"radar_angle_map": content}))

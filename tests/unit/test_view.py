@@ -8,14 +8,18 @@ import pytest
 from app.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Stamp, Undo, advance
 from app.view import CautionRow, View, summary_lines, view
 from app.view.digits import plain, with_sigma
+from app.view.figures import pose_figures
 from app.view.mounting import OPTICAL_FROM_BODY, mounting_of
 from app.view.rows import ellipse_of
 from app.view.wording import sentence
+from calib_core.calibrate import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import TimeNs, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions
+from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, Caution, Metrics, PairResult
+from calib_core.synthetic import NoiseProfile, simulate_pairs
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), width_px=640, height_px=480)
 TIMES = [TimeNs(int(time)) for time in FACTS.image_times]
@@ -201,6 +205,22 @@ def test_every_figure_has_a_value_and_a_sentence_that_explains_it() -> None:
         *("camera_x", "camera_y", "camera_z", "roll", "pitch", "yaw"),
     ]
     assert all(figure.hint.endswith(".") and len(figure.hint) > 20 for figure in figures.values())
+
+
+def test_smooth_angle_errors_of_the_radar_are_a_figure_where_correcting_them_pays() -> None:
+    simulated = simulate_pairs(30, rng=np.random.default_rng(7), noise=NoiseProfile(0.008, 0.1, 0.25))
+    solved = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions())
+    assert isinstance(solved, Calibration)
+    assert "radar_angles" not in {figure.key for figure in pose_figures(solved)}
+    bent = []
+    for row in solved.pairs:
+        polar = polar_from_cartesian(row.point_radar_m)
+        polar[2] += np.deg2rad(1.5) * np.cos(9.0 * polar[1])
+        bent.append(replace(row, point_radar_m=cartesian_from_polar(polar)))
+    figure = pose_figures(replace(solved, pairs=tuple(bent)))[-1]
+    assert figure.key == "radar_angles"
+    assert 0.5 < float(figure.value.removeprefix("up to ")) < 3.0
+    assert "radar_angle_map" in figure.hint
 
 
 def test_a_figure_that_was_not_computed_is_a_dash() -> None:
