@@ -56,6 +56,7 @@ class FileBytes:
     def up_to(self, offset: int, size: int) -> bytes:
         """Read at most size bytes from offset; fewer where the file ends."""
         size = max(0, min(size, self.size_bytes - offset))
+        offset = min(offset, self.size_bytes)  # one out of a damaged index may be more than the system takes
         try:
             if hasattr(os, "pread"):
                 data = os.pread(self._file.fileno(), size, offset)
@@ -77,7 +78,8 @@ class FileBytes:
         """Tell the system which small pieces, from here to there, are read next: a slow disk gets them all at once."""
         if hasattr(os, "posix_fadvise"):
             for begin, end in places:
-                os.posix_fadvise(self._file.fileno(), begin, end - begin, os.POSIX_FADV_WILLNEED)
+                if 0 <= begin < end <= self.size_bytes:
+                    os.posix_fadvise(self._file.fileno(), begin, end - begin, os.POSIX_FADV_WILLNEED)
 
     def at(self, offset: int, size: int) -> bytes:
         """Read exactly size bytes from offset.

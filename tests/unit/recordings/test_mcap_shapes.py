@@ -7,7 +7,7 @@ import pytest
 
 from calib_core.errors import MessageError
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings import RecordingOptions, inspect_recording, open_recording
+from calib_core.recordings import RecordingOptions, first_picture, inspect_recording, open_recording
 from tests.unit.recordings.mcap_writing import mcap
 
 START_NS = 1_700_000_000 * NS_PER_S
@@ -56,3 +56,18 @@ def test_an_encoding_that_is_not_of_ros_is_a_problem_of_its_topic(ros2, plain, j
         assert "encoded as 'protobuf'; only ros1 and cdr can be read" in str(recording.topics[0].problem)
     with pytest.raises(MessageError, match="protobuf"):
         open_recording(path, RecordingOptions(radar_topic="/radar/points"))
+
+
+@pytest.mark.parametrize("claimed", [1 << 40, 1 << 63, (1 << 64) - 1])
+def test_a_chunk_that_claims_to_be_longer_than_any_file_is_walked_over(claimed, ros2, plain, jpeg, tmp_path):
+    data = bytearray(mcap(ros2, plain(ros2, jpeg, n=20), chunk_rows=15))
+    start = 8 + 9 + int.from_bytes(data[9:17], "little")
+    length = 9 + int.from_bytes(data[start + 1 : start + 9], "little")
+    place = data.rindex(struct.pack("<QQ", start, length))  # in the summary
+    data[place + 8 : place + 16] = struct.pack("<Q", claimed)
+    path = tmp_path / "made.mcap"
+    path.write_bytes(data)
+    assert first_picture([path]) is None
+    with open_recording(path) as recording:
+        assert len(recording.radar_times) == len(recording.image_times) == 20
+        assert [caution.code for caution in recording.cautions] == ["not-closed"]
