@@ -10,7 +10,7 @@ from calib_core.camera import Camera
 from calib_core.clock_doubts import clocks
 from calib_core.consensus import Consensus, associate, find_consensus
 from calib_core.diagnostics import cautions_of
-from calib_core.doubting import doubts_of, widened_by_doubts
+from calib_core.doubting import between_doubts, doubts_of
 from calib_core.evidence import Evidence, evidence_of
 from calib_core.findings import Findings
 from calib_core.handedness import MIRRORED_GAIN, mirror_gain
@@ -103,7 +103,7 @@ def _solved(
         return _no_shape(len(used))
     left_out = leave_one_out(refined, uncertainty.information)
     doubts = doubts_of(evidence, refined, uncertainty.information)
-    uncertainty = widened_by_doubts(uncertainty, doubts)
+    refined, uncertainty = between_doubts(refined, uncertainty, doubts)
     metrics = _metrics(evidence, refined, left_out)
     findings = Findings(
         ids=tuple(pair.id for pair in used),

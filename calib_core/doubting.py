@@ -17,7 +17,7 @@ from calib_core.predicting import noise_parts, predict, tail_chance
 from calib_core.refining import Refined, refine
 from calib_core.uncertainty import PoseUncertainty, pose_uncertainty
 
-__all__ = ["Doubt", "doubts_of", "widened_by_doubts"]
+__all__ = ["Doubt", "between_doubts", "doubts_of"]
 
 _LEVEL = 0.055  # of a false alarm in a whole set of pairs
 _LARGEST_SHARE = 0.25  # of that level that goes to one pair
@@ -98,7 +98,16 @@ def _left_out(evidence: Evidence, refined: Refined, pair: int) -> tuple[Doubt, f
     return doubt, float(tail_chance(np.array([squared]), np.array([degrees]))[0])
 
 
-def widened_by_doubts(uncertainty: PoseUncertainty, doubts: Sequence[Doubt]) -> PoseUncertainty:
-    """Widen the covariance as if the pose with each doubtful pair and the one without it were equally likely."""
-    covariance = uncertainty.covariance + sum(0.5 * np.outer(doubt.move, doubt.move) for doubt in doubts)
-    return replace(uncertainty, covariance=covariance) if doubts else uncertainty
+def between_doubts(
+    refined: Refined, uncertainty: PoseUncertainty, doubts: Sequence[Doubt]
+) -> tuple[Refined, PoseUncertainty]:
+    """Put the pose midway between the one with each doubtful pair and the one without it, and state both as likely.
+
+    Of two values m apart that are equally likely, the middle has the smallest expected squared error, m m^T / 4.
+    """
+    if not doubts:
+        return refined, uncertainty
+    move = np.sum([0.5 * doubt.move for doubt in doubts], axis=0)
+    covariance = uncertainty.covariance + sum(0.25 * np.outer(doubt.move, doubt.move) for doubt in doubts)
+    moved = replace(refined, camera_from_radar=refined.camera_from_radar.perturbed(move))
+    return moved, replace(uncertainty, covariance=covariance)

@@ -51,8 +51,9 @@ def contradicted_pairs(f: Findings) -> list[Caution]:
     return [
         Caution(
             "doubtful-pair",
-            f"without {f.ids[doubt.pair]} the camera moves {100 * doubt.camera_move_m:.0f} cm, and the other pairs predict it "
-            f"{doubt.standard_deviations:.1f} standard deviations from its click; the stated uncertainty allows for both",
+            f"without {f.ids[doubt.pair]} the camera moves {50 * doubt.camera_move_m:.0f} cm, and the other pairs predict it "
+            f"{doubt.standard_deviations:.1f} standard deviations from its click; the stated pose lies midway between the one "
+            "with it and the one without, and its uncertainty allows for both",
             f"look at the click of {f.ids[doubt.pair]}; correct it, exclude it, or add placements near it",
         )
         for doubt in f.doubts
