@@ -69,4 +69,9 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted; what was measured is kept, the same command goes on from there\n")
+        sys.stderr.flush()
+        os._exit(130)  # without waiting for the trials under way; the children end with us

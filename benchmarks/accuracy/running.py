@@ -1,11 +1,13 @@
 """Measure rows trial by trial over several processes. Neither their number nor an interruption changes a figure."""
 
 import os
+import signal
 import sys
+import threading
 import time
 from collections.abc import Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 
 from benchmarks.accuracy.keeping import Keeper
 from benchmarks.accuracy.rows import Figures, Kept, Row
@@ -35,16 +37,15 @@ def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = No
             progress.tell(row.key, len(chunk))
         return
     os.environ.update(dict.fromkeys(_THREADS, "1"))  # before the children load NumPy
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_one_thread) as pool:
+    pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_begin)
+    try:
         running: dict[Future[_Measured], Row] = {pool.submit(_measure, row, chunk): row for row, chunk in chunks}
-        try:
-            for done in as_completed(running):
-                row, measured = running[done], done.result()
-                keeper.add(row.key, measured)
-                progress.tell(row.key, len(measured))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        for done in as_completed(running):
+            row, measured = running[done], done.result()
+            keeper.add(row.key, measured)
+            progress.tell(row.key, len(measured))
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def kept_figures(rows: Sequence[Row], keeper: Keeper, *, most: int | None = None) -> Kept:
@@ -70,10 +71,20 @@ def _measure(row: Row, trials: list[int]) -> _Measured:
     return [(trial, row.measure(trial)) for trial in trials]
 
 
-def _one_thread() -> None:
+def _begin() -> None:
+    """Prepare a child: one thread, and no life beyond its parent's, however that ends."""
     import cv2
 
     cv2.setNumThreads(1)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 class _Progress:
