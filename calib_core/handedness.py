@@ -18,6 +18,7 @@ NOT_MIRRORED_GAIN = -3.0
 
 _STARTS = 2
 _BEYOND_DOUBT = 30.0  # a difference that noise levels cannot turn
+_COARSE_ERROR = 0.5  # of a gain from coarse fits, a little more than the largest seen
 
 
 def mirror_gain(
@@ -28,8 +29,8 @@ def mirror_gain(
     A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be told by its residuals:
     placements on the ground fit a camera mirrored below the ground just as well. Only what is known of the camera
     position, or placements at varied heights, tell the two apart. The 24 right-handed conventions need no test: they are
-    rotations, and the pose absorbs them. Each hand is fitted with its own noise level, coarsely: the
-    gain is then good to a few tenths, and more is not asked of it.
+    rotations, and the pose absorbs them. Each hand is fitted with its own noise level, coarsely
+    at first: the gain is then good to a few tenths, and only next to what it is judged by more is asked of it.
 
     Args:
         evidence: the pairs.
@@ -45,9 +46,14 @@ def mirror_gain(
         return -np.inf
     if abs(best.cost - found[0].cost) > _BEYOND_DOUBT:
         return best.cost - found[0].cost
-    straight = plain or refine(evidence, best, estimate_scale=estimate_scale, coarse=True)
-    other = refine(mirrored, found[0], estimate_scale=estimate_scale, coarse=True)
-    return _cost(straight) - _cost(other)
+    gain = -np.inf
+    for coarse in (True, False):
+        straight = plain or refine(evidence, best, estimate_scale=estimate_scale, coarse=coarse)
+        other = refine(mirrored, found[0], estimate_scale=estimate_scale, coarse=coarse)
+        gain = _cost(straight) - _cost(other)
+        if all(abs(gain - limit) > _COARSE_ERROR for limit in (NOT_MIRRORED_GAIN, MIRRORED_GAIN)):
+            break
+    return gain
 
 
 def _cost(fit: Refined) -> float:
