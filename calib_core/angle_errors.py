@@ -41,15 +41,16 @@ def pose_spread(refined: Refined, information: Matrix66) -> Matrix66 | None:
     """
     if refined.weights.sum() < _LEAST_PAIRS or refined.degrees_of_freedom <= 0:
         return None
-    residual, jacobian = _weighted_rows(refined)
+    inliers = np.flatnonzero(refined.weights > 0.5)  # an outlier's residual, weighed away, would pass for a perfect one
+    residual, jacobian = _weighted_rows(refined, inliers)
     prior = refined.evidence.belief.rows(refined.camera_from_radar)
     levels = [(independent, smooth) for independent in _INDEPENDENT for smooth in _SMOOTH]
     nothing = np.zeros((len(residual), 0))
     likelihoods = [_log_likelihoods(residual, jacobian, prior, nothing, [(1.0, 0.0)]) + _RELUCTANCE]
     middles = [(jacobian.T @ jacobian)[None]]
-    directions = _directions(refined)
+    directions = _directions(refined, inliers)
     for length_rad in _LENGTHS_RAD:
-        shape = _shape(refined, directions, length_rad)
+        shape = _shape(refined, inliers, directions, length_rad)
         shared = shape.T @ jacobian
         likelihoods.append(_log_likelihoods(residual, jacobian, prior, shape, levels))
         parts = np.array(levels)[:, :, None, None]
@@ -63,33 +64,32 @@ def pose_spread(refined: Refined, information: Matrix66) -> Matrix66 | None:
     return np.asarray(inverse @ middle @ inverse)
 
 
-def _weighted_rows(refined: Refined) -> tuple[Values, np.ndarray]:
-    root = np.sqrt(refined.weights)[:, None]
-    jacobian = (refined.model.pose_jacobian * root[:, :, None]).reshape(-1, 6)
-    return (refined.model.residual * root).reshape(-1), jacobian
+def _weighted_rows(refined: Refined, inliers: np.ndarray) -> tuple[Values, np.ndarray]:
+    root = np.sqrt(refined.weights[inliers])[:, None]
+    jacobian = (refined.model.pose_jacobian[inliers] * root[:, :, None]).reshape(-1, 6)
+    return (refined.model.residual[inliers] * root).reshape(-1), jacobian
 
 
-def _shape(refined: Refined, directions: Points2, length_rad: float) -> np.ndarray:
-    """Return B (2 n, 2 k), with the kernel's square root taken on at most _MOST_CENTRES directions (Nystrom)."""
-    inliers = np.flatnonzero(refined.weights > 0.5)
-    chosen = inliers[np.linspace(0, len(inliers) - 1, min(len(inliers), _MOST_CENTRES)).round().astype(np.int64)]
+def _shape(refined: Refined, inliers: np.ndarray, directions: Points2, length_rad: float) -> np.ndarray:
+    """Return B (2 n, 2 k) of the inliers, with the kernel's square root taken on at most _MOST_CENTRES directions (Nystrom)."""
+    chosen = np.linspace(0, len(inliers) - 1, min(len(inliers), _MOST_CENTRES)).round().astype(np.int64)
     centres = directions[chosen]
     values, vectors = np.linalg.eigh(_kernel(centres, centres, length_rad))
     kept = values > 1e-6 * values[-1]
     features = _kernel(directions, centres, length_rad) @ (vectors[:, kept] / np.sqrt(values[kept]))
-    sigma = refined.evidence.sigma_polar[refined.rows] * np.sqrt(refined.weights)[:, None]
+    sigma = refined.evidence.sigma_polar[refined.rows[inliers]] * np.sqrt(refined.weights[inliers])[:, None]
     parts = []
     for angle in (1, 2):
-        gain = refined.model.point_jacobian[:, :, angle] * sigma[:, None, angle]  # G, (n, 2)
+        gain = refined.model.point_jacobian[inliers, :, angle] * sigma[:, None, angle]  # G, (n, 2)
         parts.append((gain[:, :, None] * features[:, None, :]).reshape(2 * len(directions), -1))
     return np.concatenate(parts, axis=1)
 
 
-def _directions(refined: Refined) -> Points2:
-    """Return azimuth and elevation (n, 2) of each pair by its click: the measured angles carry the errors in question."""
-    rays = refined.evidence.rays @ refined.camera_from_radar.rotation
+def _directions(refined: Refined, inliers: np.ndarray) -> Points2:
+    """Return azimuth and elevation (n, 2) of each inlier by its click: the measured angles carry the errors in question."""
+    rays = refined.evidence.rays[inliers] @ refined.camera_from_radar.rotation
     directions = polar_from_cartesian(rays)[:, 1:]
-    return np.where(np.isfinite(directions), directions, refined.evidence.polar[refined.rows, 1:])
+    return np.where(np.isfinite(directions), directions, refined.evidence.polar[refined.rows[inliers], 1:])
 
 
 def _kernel(a: Points2, b: Points2, length_rad: float) -> np.ndarray:
