@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.accuracy.cases import tape_measured
-from benchmarks.accuracy.figures import MET, MISSED, Measured, at_least, at_most, column, fewest, summed_up
+from benchmarks.accuracy.figures import MET, MISSED, Measured, at_least, at_most, column, fewest, share, summed_up
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
 from calib_core.calibrate import calibrate
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
@@ -264,8 +264,8 @@ reflector has 12 dBsm. Placements whose echo merges with an object's in one rada
 
 
 def _percent(counts: np.ndarray) -> Measured:
-    """Return counts of 20 per trial in percent; trials are independent, placements of one are not."""
+    """Return counts of 20 per trial in percent. Placements of one trial are not independent; none wrong is not certainty."""
     shares = 100.0 * counts / _PLACEMENTS
-    return Measured(
-        float(shares.mean()), float(2.0 * shares.std(ddof=1) / np.sqrt(len(shares))) if len(shares) > 1 else 100.0
-    )
+    flags = np.repeat([1.0, 0.0], [int(counts.sum()), int(len(counts) * _PLACEMENTS - counts.sum())])
+    between = float(2.0 * shares.std(ddof=1) / np.sqrt(len(shares))) if len(shares) > 1 else 100.0
+    return Measured(float(shares.mean()), max(between, share(flags).error))

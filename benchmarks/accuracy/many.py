@@ -20,7 +20,7 @@ _CASES = (
     Case("ti", 1000, 0.1, tape_m=None),
     Case("ti_aisle", 1000, 0.1, tape_m=None),
 )
-_TRIALS = 100
+_TRIALS = 200
 _LIMIT = 1.05
 
 
