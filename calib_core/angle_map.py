@@ -4,7 +4,7 @@ An array's calibration error changes slowly with direction, stays the same for y
 out. The residuals of a calibration show it: where the click says the reflector is, less where the radar says it is, at
 the radar's range. Each of the two angles gets a Gaussian process over direction,
 
-    y_i = f(x_i) + e_i,   f ~ GP(0, a^2 exp(-|x - x'|^2 / 2 l^2)),   e_i ~ N(0, s^2 + click_i^2),              (6)
+    y_i = f(x_i) + e_i,   f ~ GP(0, a^2 exp(-|x - x'|^2 / 2 l^2)),   e_i ~ N(0, s^2 + click_i^2),              (7)
 
 and every (a, l, s) of a grid counts by its probability (marginal likelihood), a = 0 among them, so that the map comes out
 flat where the pairs show nothing but independent noise. The pose is held: the map goes with it and with no other.
@@ -200,7 +200,7 @@ class _Field:
 
 
 def _learn(directions: Points2, off_rad: Values, click_rad: Values, grid: Points2) -> _Field:
-    """Regress one angle's error on direction by equation (6), a click's part taken as the same for all pairs.
+    """Regress one angle's error on direction by equation (7), a click's part taken as the same for all pairs.
 
     Then every covariance of one length has the kernel's own axes U, K = U diag(k) U^T: V = U diag(a^2 k + s^2) U^T.
     """
