@@ -53,9 +53,9 @@ def _flat_radar(f: Findings) -> list[Caution]:
         return []
     position_cm, turn_deg = _sigmas_in_radar_axes(f)
     fixed = (
-        f"ranges and azimuths fix forward +- {position_cm[0]:.0f} cm, left +- {position_cm[1]:.0f} cm and the turn about the "
-        f"radar's up axis +- {turn_deg[2]:.1f} deg; up +- {position_cm[2]:.0f} cm and the turns about left +- {turn_deg[1]:.1f}"
-        f" and forward +- {turn_deg[0]:.1f} deg rest on the clicks' rows and on a guess at how high the reflector stood"
+        f"ranges and azimuths fix forward ± {position_cm[0]:.0f} cm, left ± {position_cm[1]:.0f} cm and the turn about the "
+        f"radar's up axis ± {turn_deg[2]:.1f} deg; up ± {position_cm[2]:.0f} cm and the turns about left ± {turn_deg[1]:.1f}"
+        f" and forward ± {turn_deg[0]:.1f} deg rest on the clicks' rows and on a guess at how high the reflector stood"
     )
     return [
         Caution(

@@ -4,7 +4,7 @@ To first order a focal length that is longer by a share a moves a pixel by a d, 
 radial distortion that is off by b moves it by b |d / f|^2 d, whatever the lens model. With whitened residuals e, whitened
 Jacobians J of the pose and g of such an unknown, and M = I - J (J^T J)^-1 J^T, which removes what the pose can explain,
 
-    a = g^T M e / g^T M g,    var a = 1 / g^T M g,    F(1, nu - 1) = (a^2 / var a) (nu - 1) / (nu - a^2 / var a),       (5)
+    a = g^T M e / g^T M g,    var a = 1 / g^T M g,    F(1, nu - 1) = (a^2 / var a) (nu - 1) / (nu - a^2 / var a),       (8)
 
 for the noise was estimated with nu degrees of freedom by residuals that the wrong intrinsics had made larger. It is a score
 test: one step from the optimum tells it, and no second fit is made. A principal point that is off cannot be told: the
@@ -64,7 +64,7 @@ def intrinsics(f: Findings) -> list[Caution]:
 def _focal_text(focal: LensError) -> str:
     return (
         f"residuals grow with the distance from the picture's centre: the focal length given seems "
-        f"{100 * abs(focal.amount):.1f} +- {100 * focal.sigma:.1f} % too {'short' if focal.amount > 0 else 'long'}"
+        f"{100 * abs(focal.amount):.1f} ± {100 * focal.sigma:.1f} % too {'short' if focal.amount > 0 else 'long'}"
     )
 
 
@@ -74,7 +74,7 @@ def _radial_text(f: Findings, radial: LensError) -> str:
     reach_px = float(share[outermost] * np.linalg.norm(offset_px[outermost]))
     return (
         "residuals grow with the cube of the distance from the picture's centre: the lens distortion given seems off, by "
-        f"{abs(radial.amount) * reach_px:.0f} +- {radial.sigma * reach_px:.0f} px at the outermost click"
+        f"{abs(radial.amount) * reach_px:.0f} ± {radial.sigma * reach_px:.0f} px at the outermost click"
     )
 
 
@@ -103,7 +103,7 @@ def _offsets(f: Findings) -> tuple[np.ndarray, Values]:
 
 
 def _lens_error(gain: Values, residual: Values, degrees_of_freedom: float) -> LensError:
-    """Evaluate equation (5); with the noise known, nu is infinite."""
+    """Evaluate equation (8); with the noise known, nu is infinite."""
     information = float(gain @ gain)
     if information <= 0.0:
         return LensError(0.0, float("inf"), 1.0)

@@ -41,7 +41,7 @@ def test_a_focal_length_that_is_three_percent_off_is_suspected_by_amount_and_sig
         text = suspicion(seed, "imaging", MEASURED, focal=focal)
         assert text is not None
         assert word in text
-        amount, sigma = map(float, re.findall(r"([\d.]+) \+- ([\d.]+) %", text)[0])
+        amount, sigma = map(float, re.findall(r"([\d.]+) ± ([\d.]+) %", text)[0])
         assert abs(amount - 3.0) < 3.5 * sigma
         assert sigma < 0.7
 
