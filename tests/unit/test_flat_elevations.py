@@ -51,7 +51,7 @@ def test_the_caution_says_what_the_pairs_fix_and_what_rests_on_a_guess() -> None
     calibration, _ = solved(1, 1.2, FREE)
     (caution,) = (one for one in calibration.cautions if one.code == "flat-radar")
     fixed, guessed = caution.message.split("; up ")
-    assert "up axis +- 0." in fixed
+    assert "up axis ± 0." in fixed
     assert "about left" in guessed
     assert "radar's height" in caution.hint
 
