@@ -10,6 +10,9 @@ from calib_core.synthetic.recording import SimulatedRecording
 
 __all__ = ["clicks_text", "truth_text"]
 
+_PIXEL_DECIMALS = 6
+"""The last bits of a projection depend on the order of its sums; the file must not."""
+
 
 def truth_text(recording: SimulatedRecording) -> str:
     """Write down what is true about a recording (schema cocalib/truth-1). Nothing that estimates may read it."""
@@ -26,7 +29,7 @@ def truth_text(recording: SimulatedRecording) -> str:
                 "start": _time(placement.start),
                 "end": _time(placement.end),
                 "position_radar_m": placement.position_radar_m.tolist(),
-                "pixel_px": placement.pixel_px.tolist(),
+                "pixel_px": placement.pixel_px.round(_PIXEL_DECIMALS).tolist(),
                 "best_image_time": _time(placement.best_image_time),
             }
             for placement in recording.placements

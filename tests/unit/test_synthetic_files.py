@@ -135,7 +135,7 @@ def test_truth_and_clicks_say_what_the_simulation_knows(recording: SimulatedReco
     assert np.array_equal(truth["camera_from_radar"]["translation_m"], recording.camera_from_radar.translation_m)
     for entry, placement in zip(truth["placements"], recording.placements, strict=True):
         assert entry["start"]["sec"] * 10**9 + entry["start"]["nanosec"] == placement.start
-        assert np.array_equal(entry["pixel_px"], placement.pixel_px)
+        np.testing.assert_allclose(entry["pixel_px"], placement.pixel_px, rtol=0, atol=1e-6)
     assert clicks["schema"] == "cocalib/clicks-1"
     assert [entry["image_time"] for entry in clicks["clicks"]] == [e["best_image_time"] for e in truth["placements"]]
 
