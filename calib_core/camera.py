@@ -59,6 +59,11 @@ class Camera:
         if self.matrix_px[0, 0] <= 0 or self.matrix_px[1, 1] <= 0:
             raise ValueError("the focal lengths must be positive (a zero camera matrix means: not calibrated)")
 
+    @property
+    def is_distorted(self) -> bool:
+        """Whether its matrix alone does not tell where a point is seen: a coefficient is not zero, or the lens is equidistant."""
+        return self.model == "equidistant" or bool(self.distortion.any())
+
     def project(self, points_camera_m: Points3) -> Points2:
         """Project points [m] to pixels [px], through the lens. Points behind a pinhole become NaN.
 

@@ -39,3 +39,28 @@ export function cautionBox(rows) {
   });
   return [make("div", "with-cautions", [make("strong", "", [icon("caution"), title]), make("ul", "", items)])];
 }
+
+const RECTIFIED = "cocalib-rectified";
+
+/** The word about the pictures that a format without a place for distortion asks for. It is kept for this visit only: the next
+ * recording's pictures may be others. @param {() => void} changed */
+export function rectifiedBox(changed) {
+  const box = make("input", "", []);
+  box.type = "checkbox";
+  try {
+    box.checked = sessionStorage.getItem(RECTIFIED) === "1";
+  } catch {
+    // A browser that keeps nothing forgets the word, no more.
+  }
+  box.addEventListener("change", () => {
+    try {
+      sessionStorage.setItem(RECTIFIED, box.checked ? "1" : "0");
+    } catch {
+      // As above.
+    }
+    changed();
+  });
+  const label = make("label", "", [box, "My pictures are rectified (undistorted with this K)"]);
+  label.dataset.hint = "They are undistorted with this same camera matrix, and no distortion is left in them: this format has no place for any.";
+  return { box, row: make("div", "rectified", [label]) };
+}

@@ -1,13 +1,13 @@
 // @ts-check
 /** The export panel: every format with its text before it is saved, which way it carries points, and the clicks. */
 
-import { cautionBox, lines, numbers } from "./export_parts.js";
+import { cautionBox, lines, numbers, rectifiedBox } from "./export_parts.js";
 import { frameDrawing } from "./frames.js";
 import { icon, make, toast } from "./notices.js";
 import { send } from "./socket.js";
 import { on, state } from "./state.js";
 
-/** @typedef {{key: string, label: string, takes_parent: boolean}} Format */
+/** @typedef {{key: string, label: string, takes_parent: boolean, takes_rectified: boolean}} Format */
 /** What the server says about a format: ExportPreview in app/web/exports.py. @typedef {Record<string, any>} Preview */
 const KEPT = "cocalib-export";
 const CLICKS = "clicks";
@@ -26,6 +26,7 @@ let parentTimer = 0;
 const list = make("div", "formats", []);
 const head = make("div", "what", []);
 const parent = make("div", "parent", []);
+const rectified = rectifiedBox(() => load());
 const text = make("pre", "text", "");
 const notes = make("ul", "notes", []);
 const side = make("aside", "", []);
@@ -59,7 +60,7 @@ export function setFormats(given) {
 }
 
 export function openExport() {
-  if (dialog.open) return;
+  if (dialog.open || !state.recording) return;
   drawList();
   dialog.showModal();
   /** @type {HTMLElement|null} */ (list.querySelector('[aria-selected="true"]'))?.focus();
@@ -88,7 +89,7 @@ function build() {
   save.onclick = download;
   parent.append(...parentFields());
   const foot = make("footer", "", [importer(), make("span", "gap", ""), make("label", "name", ["File name", fileName]), copy, save]);
-  dialog.append(make("header", "", [title, close]), list, make("section", "", [head, parent, text, notes]), side, foot);
+  dialog.append(make("header", "", [title, close]), list, make("section", "", [head, rectified.row, parent, text, notes]), side, foot);
 }
 
 function drawList() {
@@ -162,17 +163,22 @@ async function load() {
 
 /** @param {"preview"|"export"} kind */
 function address(kind) {
-  const posed = takesParent() && kept.parent.join() !== NOWHERE.join();
-  return `api/${kind}/${encodeURIComponent(kept.format)}${posed ? `?parent_from_radar=${encodeURIComponent(kept.parent.join())}` : ""}`;
+  const query = new URLSearchParams();
+  if (takesParent() && kept.parent.join() !== NOWHERE.join()) query.set("parent_from_radar", kept.parent.join());
+  if (takesRectified() && rectified.box.checked) query.set("rectified", "1");
+  return `api/${kind}/${encodeURIComponent(kept.format)}${query.size ? `?${query}` : ""}`;
 }
 
-const takesParent = () => formats.find((format) => format.key === kept.format)?.takes_parent ?? false;
+const form = () => formats.find((format) => format.key === kept.format);
+const takesParent = () => form()?.takes_parent ?? false;
+const takesRectified = () => form()?.takes_rectified ?? false;
 
 /** @param {Preview} preview */
 function drawPreview(preview) {
   const kind = preview.is_binary ? `binary, ${preview.size_bytes} bytes: this is what is in it` : "";
   head.replaceChildren(make("span", "", preview.numbers), make("span", "kind", kind));
   parent.hidden = !takesParent();
+  rectified.row.hidden = !preview.is_for_rectified;
   show(preview.text, preview.file_name, preview.is_binary);
   notes.replaceChildren(...preview.notes.map((/** @type {string} */ note) => make("li", "", note)));
   side.replaceChildren(
@@ -188,6 +194,7 @@ function drawClicks(content) {
   const count = state.view?.clicks.length ?? 0;
   head.replaceChildren(make("span", "", `${count} click${count === 1 ? "" : "s"} with the stamps of their frames: for cocalib solve, or to load on another machine`));
   parent.hidden = true;
+  rectified.row.hidden = true;
   show(content, "clicks.json", false);
   notes.replaceChildren();
   side.replaceChildren();
@@ -198,6 +205,7 @@ function drawReason(reason) {
   head.replaceChildren();
   const inParent = takesParent() && reason.includes("parent");
   parent.hidden = !inParent;
+  rectified.row.hidden = !(takesRectified() && reason.includes("rectified"));
   text.replaceChildren(make("div", "reason", [icon("caution"), make("span", "", reason.trim())]));
   notes.replaceChildren();
   side.replaceChildren();

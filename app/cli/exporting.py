@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.cli.flags import File
+from app.cli.flags import File, Switch
 from app.cli.printing import read_text, write_whole
 from calib_core.errors import InputError
 
@@ -35,6 +35,9 @@ class Export:
     ] = None
     """Pose of the radar in the third frame of autoware (kit), driveworks (rig), nuscenes (ego): metres, quaternion, w last."""
 
+    rectified: Switch = False
+    """Your pictures are rectified: undistorted with this same camera matrix. kitti and nuscenes take a distorted lens only so."""
+
     def run(self) -> int:
         """Write the export; return the exit code."""
         from calib_core.interchange import FORMATS, ExportBytes, export, format_named, parent_pose
@@ -48,7 +51,7 @@ class Export:
             raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
         path = self.calibration[0]
         parent = parent_pose(self.parent_from_radar) if self.parent_from_radar else None
-        written = export(_own_calibration(path), self.to, parent_from_radar=parent)
+        written = export(_own_calibration(path), self.to, parent_from_radar=parent, rectified=self.rectified)
         for note in written.notes:
             print(f"note: {note}", file=sys.stderr)
         if self.out is not None:

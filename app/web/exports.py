@@ -24,9 +24,19 @@ from calib_core.interchange import (
     read_any,
 )
 
-__all__ = ["ExportPreview", "FormatRow", "NoPreview", "export_preview", "exported", "format_rows", "parent_in"]
+__all__ = [
+    "ExportPreview",
+    "FormatRow",
+    "NoPreview",
+    "export_preview",
+    "exported",
+    "format_rows",
+    "parent_in",
+    "rectified_in",
+]
 
 _PARENT = "parent_from_radar"
+_RECTIFIED = "rectified"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +47,13 @@ class FormatRow:
         key: what `--to` takes.
         label: one line for people.
         takes_parent: the radar can be posed in a third frame.
+        takes_rectified: a person may have to say that the pictures are rectified.
     """
 
     key: str
     label: str
     takes_parent: bool
+    takes_rectified: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +68,7 @@ class ExportPreview:
         size_bytes: of the file.
         numbers: what the file's numbers are.
         notes: what a person must know who uses it.
+        is_for_rectified: it is written only because the pictures are said to be rectified.
         carries: which way the pose in the file carries points, as it is read back.
         axes: of the camera frame whose pose the file states: optical, or its body frame.
         check: what `cocalib check` says about the file.
@@ -75,6 +88,7 @@ class ExportPreview:
     size_bytes: int
     numbers: str
     notes: tuple[str, ...]
+    is_for_rectified: bool
     carries: Literal["camera_from_radar", "radar_from_camera"]
     axes: Literal["optical", "link"]
     check: str
@@ -96,7 +110,9 @@ class NoPreview:
 
 def format_rows() -> tuple[FormatRow, ...]:
     """Return the list of formats."""
-    return tuple(FormatRow(form.name, form.title, form.write_in_parent is not None) for form in FORMATS)
+    return tuple(
+        FormatRow(form.name, form.title, form.write_in_parent is not None, form.is_for_rectified) for form in FORMATS
+    )
 
 
 def parent_in(query: str) -> RigidTransform | None:
@@ -115,13 +131,25 @@ def parent_in(query: str) -> RigidTransform | None:
     return parent_pose(numbers)
 
 
+def rectified_in(query: str) -> bool:
+    """Tell whether an address says that the pictures are rectified, `rectified=1`.
+
+    Raises:
+        InputError: it says something else about it.
+    """
+    given = parse_qs(query, keep_blank_values=True).get(_RECTIFIED, ["0"])[-1]
+    if given not in ("0", "1"):
+        raise InputError(f"{_RECTIFIED}: {given!r} is neither 1 nor 0; 1 says that the pictures are rectified")
+    return given == "1"
+
+
 def exported(file: CalibrationFile, key: str, query: str) -> ExportText | ExportBytes:
-    """Write a calibration in a format, with the pose that the address may hold.
+    """Write a calibration in a format, with the pose and the word about the pictures that the address may hold.
 
     Raises:
         InputError: the format cannot carry this calibration, or has no third frame.
     """
-    return export(file, key, parent_from_radar=parent_in(query))
+    return export(file, key, parent_from_radar=parent_in(query), rectified=rectified_in(query))
 
 
 def export_preview(file: CalibrationFile, key: str, query: str, recording_name: str) -> ExportPreview:
@@ -130,13 +158,13 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
     Args:
         file: the calibration.
         key: of the format.
-        query: of the address; it may pose the radar in a third frame.
+        query: of the address; it may pose the radar in a third frame, and say that the pictures are rectified.
         recording_name: what the person calls the recording.
 
     Raises:
         InputError: the format cannot carry this calibration, or has no third frame.
     """
-    written = exported(file, key, query)
+    written, form = exported(file, key, query), format_named(key)
     report = check(read_any(written.data, written.file_name), against=imported(file))
     pose = file.calibration.camera_from_radar
     wxyz = quaternion_wxyz_from_matrix(pose.rotation).tolist()
@@ -147,8 +175,9 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         text=contents_text(written),
         is_binary=isinstance(written, ExportBytes),
         size_bytes=len(written.data),
-        numbers=sentence(format_named(key).numbers),
+        numbers=sentence(form.numbers),
         notes=tuple(sentence(note) for note in written.notes),
+        is_for_rectified=form.is_for_rectified and file.calibration.camera.is_distorted,
         carries=report.imported.pose.direction,
         axes=report.imported.pose.axes,
         check=_read_back(report),

@@ -15,7 +15,8 @@ from calib_core.interchange.clicks import read_clicks, write_clicks
 from calib_core.interchange.comparing import Comparison, PixelDifference, compare
 from calib_core.interchange.contents import contents_text
 from calib_core.interchange.explaining import Finding
-from calib_core.interchange.formats import FORMATS, ExportBytes, ExportText, Format, export, format_named
+from calib_core.interchange.exporting import ExportBytes, ExportText, export
+from calib_core.interchange.formats import FORMATS, Format, format_named
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.importing import imported, read_any, read_any_file
 from calib_core.interchange.pair_evidence import PairEvidence, read_pair_evidence, read_pair_evidence_file

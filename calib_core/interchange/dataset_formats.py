@@ -25,15 +25,14 @@ __all__ = [
     "write_nuscenes_in_ego",
 ]
 
-_UNDISTORTED = "expects undistorted images: undistort with the camera of calibration.json first (same camera matrix)"
 KITTI_NOTES = (
     "Tr_velo_to_cam carries radar points into the camera: p_camera = R p_radar + t (View-of-Delft keeps this key too)",
-    f"the format {_UNDISTORTED}; a comment would break its readers, so the check point is only in calibration.json",
+    "a comment would break its readers, so the check point is only in calibration.json",
 )
 NUSCENES_NOTES = (
     "translation and rotation (w x y z) are the sensor's pose in the ego frame, camera optical; "
     "the radar's frame is taken for the ego frame (parent_from_radar places it elsewhere)",
-    f"the format {_UNDISTORTED}; tokens are made from the frames' names: put yours in",
+    "tokens are made from the frames' names: put yours in; JSON has no comments, so the check point is only in calibration.json",
 )
 
 

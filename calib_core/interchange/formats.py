@@ -30,9 +30,11 @@ from calib_core.interchange.ros_formats import (
 from calib_core.interchange.urdf_format import write_urdf
 from calib_core.interchange.yaml_formats import write_apollo, write_autoware, write_autoware_in_kit, write_kalibr
 
-__all__ = ["FORMATS", "ExportBytes", "ExportText", "Format", "export", "format_named"]
+__all__ = ["FORMATS", "CameraShare", "Format", "format_named"]
 
 Comment = Literal["#", "<!-- -->", "keys", "none"]
+CameraShare = Literal["none", "matrix", "lens"]
+"""What of the camera a format carries: nothing, its matrix with no place for distortion, or the whole lens."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +46,7 @@ class Format:
         title: one line for people.
         numbers: what the file's numbers are, in one line: which way they carry points, and in which order they stand.
         file_name: what the file is called unless a person says otherwise.
-        carries_camera: whether the camera's intrinsics are in it too.
+        camera: what of the camera is in it too.
         comment: how it says its frames and check point in words: "#", "<!-- -->", its own keys, or none.
         write: turns a calibration into the file's content; refuses in words what the format cannot carry.
         notes: what a person must know who uses it, one sentence each.
@@ -55,46 +57,16 @@ class Format:
     title: str
     numbers: str
     file_name: str
-    carries_camera: bool
+    camera: CameraShare
     comment: Comment
     write: Callable[[CalibrationFile], str | bytes]
     notes: tuple[str, ...] = ()
     write_in_parent: Callable[[CalibrationFile, RigidTransform], str | bytes] | None = None
 
-
-@dataclass(frozen=True, slots=True)
-class ExportText:
-    """A text file to write.
-
-    Attributes:
-        file_name: what to call it.
-        text: its content.
-        notes: what a person must know who uses it.
-    """
-
-    file_name: str
-    text: str
-    notes: tuple[str, ...] = ()
-
     @property
-    def data(self) -> bytes:
-        """The file's bytes."""
-        return self.text.encode()
-
-
-@dataclass(frozen=True, slots=True)
-class ExportBytes:
-    """A binary file to write.
-
-    Attributes:
-        file_name: what to call it.
-        data: its content.
-        notes: what a person must know who uses it.
-    """
-
-    file_name: str
-    data: bytes
-    notes: tuple[str, ...] = ()
+    def is_for_rectified(self) -> bool:
+        """Whether its pictures must be rectified: it carries a camera matrix and has no place for distortion."""
+        return self.camera == "matrix"
 
 
 _POSE_ONLY = ("carries the pose only: keep your camera_info, or export opencv too, which carries the camera",)
@@ -110,7 +82,7 @@ FORMATS: tuple[Format, ...] = (
         "cocalib's own calibration-1",
         "camera_from_radar and its inverse, both as matrix, translation and quaternion w x y z",
         "calibration.json",
-        True,
+        "lens",
         "keys",
         write_calibration,
     ),
@@ -119,7 +91,7 @@ FORMATS: tuple[Format, ...] = (
         "ROS 2 command",
         "pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
         "static_transform.sh",
-        False,
+        "none",
         "#",
         write_tf2_command,
         _POSE_ONLY,
@@ -129,7 +101,7 @@ FORMATS: tuple[Format, ...] = (
         "ROS 2 launch file, Python",
         "pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
         "radar_camera.launch.py",
-        False,
+        "none",
         "#",
         write_launch_python,
         _POSE_ONLY,
@@ -139,7 +111,7 @@ FORMATS: tuple[Format, ...] = (
         "ROS 2 launch file, XML",
         "pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
         "radar_camera.launch.xml",
-        False,
+        "none",
         "<!-- -->",
         write_ros2_launch_xml,
         _POSE_ONLY,
@@ -149,7 +121,7 @@ FORMATS: tuple[Format, ...] = (
         "ROS 1 launch file",
         "pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
         "radar_camera.launch",
-        False,
+        "none",
         "<!-- -->",
         write_ros1_launch,
         _POSE_ONLY,
@@ -159,7 +131,7 @@ FORMATS: tuple[Format, ...] = (
         "URDF: camera_link and optical frame",
         "pose of camera_link (body axes) in the radar, roll pitch yaw about fixed axes; then the optical joint",
         "radar_camera.urdf",
-        False,
+        "none",
         "<!-- -->",
         write_urdf,
         _POSE_ONLY,
@@ -169,7 +141,7 @@ FORMATS: tuple[Format, ...] = (
         "Autoware sensor kit",
         "pose of each sensor in sensor_kit_base_link, roll pitch yaw about fixed axes; camera_link has body axes",
         "sensor_kit_calibration.yaml",
-        False,
+        "none",
         "#",
         write_autoware,
         _KIT,
@@ -180,7 +152,7 @@ FORMATS: tuple[Format, ...] = (
         "Apollo extrinsics",
         "pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
         "radar_camera_extrinsics.yaml",
-        False,
+        "none",
         "#",
         write_apollo,
         _POSE_ONLY,
@@ -190,7 +162,7 @@ FORMATS: tuple[Format, ...] = (
         "Kalibr camera chain",
         "T_cam_radar carries radar points into the camera; our key, Kalibr has none for radars",
         "camchain.yaml",
-        True,
+        "lens",
         "#",
         write_kalibr,
         _KALIBR,
@@ -200,7 +172,7 @@ FORMATS: tuple[Format, ...] = (
         "OpenCV FileStorage",
         "R, T, rvec carry radar points into the camera",
         "radar_camera.yml",
-        True,
+        "lens",
         "#",
         write_opencv,
     ),
@@ -209,7 +181,7 @@ FORMATS: tuple[Format, ...] = (
         "KITTI and View-of-Delft calibration",
         "Tr_velo_to_cam carries radar points into the camera; images undistorted",
         "calib.txt",
-        True,
+        "matrix",
         "none",
         write_kitti,
         KITTI_NOTES,
@@ -219,7 +191,7 @@ FORMATS: tuple[Format, ...] = (
         "nuScenes calibrated_sensor",
         "pose of each sensor in the ego frame, quaternion w x y z; images undistorted",
         "calibrated_sensor.json",
-        True,
+        "matrix",
         "none",
         write_nuscenes,
         NUSCENES_NOTES,
@@ -230,7 +202,7 @@ FORMATS: tuple[Format, ...] = (
         "NVIDIA DriveWorks rig",
         "pose of each sensor in the rig, roll pitch yaw in degrees about fixed axes; the camera with body axes",
         "rig.json",
-        False,
+        "none",
         "none",
         write_driveworks,
         DRIVEWORKS_NOTES,
@@ -241,7 +213,7 @@ FORMATS: tuple[Format, ...] = (
         "Foxglove messages",
         "FrameTransform: pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
         "foxglove.json",
-        True,
+        "lens",
         "none",
         write_foxglove,
         FOXGLOVE_NOTES,
@@ -251,7 +223,7 @@ FORMATS: tuple[Format, ...] = (
         "COLMAP text model",
         "world (radar) into camera, quaternion w x y z; principal point half a pixel larger",
         "colmap.zip",
-        True,
+        "lens",
         "#",
         write_colmap,
         COLMAP_NOTES,
@@ -261,7 +233,7 @@ FORMATS: tuple[Format, ...] = (
         "MATLAB mat file",
         "camera_from_radar.A carries radar points into the camera; camera.PrincipalPoint counts from 1",
         "radar_camera.mat",
-        True,
+        "lens",
         "keys",
         write_matlab,
         MATLAB_NOTES,
@@ -271,7 +243,7 @@ FORMATS: tuple[Format, ...] = (
         "NumPy arrays, no pickle",
         "camera_from_radar (4x4), R and t carry radar points into the camera; K and D are the camera's",
         "radar_camera.npz",
-        True,
+        "lens",
         "keys",
         write_numpy,
     ),
@@ -280,7 +252,7 @@ FORMATS: tuple[Format, ...] = (
         "4x4 matrix as text",
         "rows of the 4x4 matrix that carries radar points into the camera",
         "camera_from_radar.txt",
-        False,
+        "none",
         "#",
         write_matrix,
         _POSE_ONLY,
@@ -302,29 +274,3 @@ def format_named(name: str) -> Format:
     raise InputError(
         f"no format {name!r}; did you mean {near[0]}?" if near else f"no format {name!r}; there are {', '.join(names)}"
     )
-
-
-def export(
-    file: CalibrationFile, name: str, *, parent_from_radar: RigidTransform | None = None
-) -> ExportText | ExportBytes:
-    """Write a calibration in another format: the same calibration gives the same bytes.
-
-    Args:
-        file: what to export.
-        name: one of FORMATS.
-        parent_from_radar: the radar's pose in the third frame of "autoware" (kit), "driveworks" (rig) or "nuscenes" (ego).
-
-    Raises:
-        InputError: no such format, or it cannot carry this calibration: why, and what to take instead.
-    """
-    chosen = format_named(name)
-    if parent_from_radar is None:
-        content = chosen.write(file)
-    elif chosen.write_in_parent is None:
-        able = ", ".join(known.name for known in FORMATS if known.write_in_parent)
-        raise InputError(f"the format {name} has no third frame to pose the radar in; those that have: {able}")
-    else:
-        content = chosen.write_in_parent(file, parent_from_radar)
-    if isinstance(content, bytes):
-        return ExportBytes(chosen.file_name, content, chosen.notes)
-    return ExportText(chosen.file_name, content, chosen.notes)

@@ -9,11 +9,12 @@ import pytest
 from playwright.sync_api import expect
 
 from app.workspace import Workspace
-from calib_core.interchange import FORMATS, check, read_any, read_any_file
+from calib_core.interchange import FORMATS, check, format_named, read_any, read_any_file
 from tests.browser.driving import Driver
 
 pytestmark = pytest.mark.browser
 DIALOG = "#export-dialog"
+RECTIFIED = f"{DIALOG} .rectified input"
 
 
 @pytest.fixture
@@ -25,8 +26,10 @@ def solved(page: Driver, workspace: Workspace, project_root: Path) -> Driver:
 
 
 def choose(page: Driver, name: str) -> None:
-    """Choose a format and wait for its text."""
+    """Choose a format and wait for its text; where it is for rectified pictures only, say that they are."""
     page.page.click(f'{DIALOG} [data-export="{name}"]')
+    if name != "clicks" and format_named(name).is_for_rectified:
+        page.page.check(RECTIFIED)
     suggested = next((form.file_name for form in FORMATS if form.name == name), "clicks.json")
     page.until(f"document.querySelector('{DIALOG} .name input').value.endsWith({suggested!r})")
 
@@ -111,6 +114,43 @@ def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_in_words(
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("x: 3.5")
 
 
+def test_a_format_without_a_place_for_distortion_is_refused_until_the_pictures_are_said_to_be_rectified(
+    solved: Driver, tmp_path: Path
+) -> None:
+    page = solved.page
+    page.click("#export")
+    choose(solved, "opencv")
+    expect(page.locator(RECTIFIED)).to_be_hidden()
+    for name in ("kitti", "nuscenes"):
+        page.click(f'{DIALOG} [data-export="{name}"]')
+        expect(page.locator(f"{DIALOG} .reason")).to_contain_text(f"The format {name} holds a camera matrix")
+        expect(page.locator(f"{DIALOG} .reason")).to_contain_text("opencv or numpy")
+        expect(page.locator(f"{DIALOG} .first")).to_be_disabled()
+        expect(page.locator(RECTIFIED)).not_to_be_checked()
+
+    for _ in range(4):
+        page.keyboard.press("Tab")
+        if page.locator(RECTIFIED).evaluate("box => box === document.activeElement"):
+            break
+    page.keyboard.press("Space")
+    expect(page.locator(f"{DIALOG} .notes")).to_contain_text("Written for rectified pictures")
+    expect(page.locator(RECTIFIED)).to_be_focused()
+    assert b"camera_intrinsic" in saved(solved, tmp_path).read_bytes()
+    page.click(f'{DIALOG} [data-export="kitti"]')
+    assert b"Tr_velo_to_cam" in saved(solved, tmp_path).read_bytes()
+    choose(solved, "tf2")
+    assert b"static_transform" in saved(solved, tmp_path).read_bytes()
+
+    page.reload()
+    solved.until("__cocalib.state.shown && __cocalib.state.view.has_calibration")
+    page.click("#export")
+    page.click(f'{DIALOG} [data-export="kitti"]')
+    expect(page.locator(RECTIFIED)).to_be_checked()
+    page.uncheck(RECTIFIED)
+    expect(page.locator(f"{DIALOG} .reason")).to_contain_text("no place for the distortion")
+    expect(page.locator(f"{DIALOG} .first")).to_be_disabled()
+
+
 def test_a_keyboard_is_enough_and_stays_in_the_panel(solved: Driver) -> None:
     solved.page.keyboard.press("e")
     expect(solved.page.locator(f'{DIALOG} [data-export="json"]')).to_be_focused()
@@ -153,13 +193,19 @@ def test_cautions_of_the_calibration_stand_beside_the_text(page: Driver, truth: 
 def test_the_panel_fits_the_screen(solved: Driver, size: tuple[int, int]) -> None:
     solved.page.set_viewport_size({"width": size[0], "height": size[1]})
     solved.page.click("#export")
-    for name in ("autoware", "numpy", "kitti"):
+    solved.page.click(f'{DIALOG} [data-export="nuscenes"]')
+    expect(solved.page.locator(f"{DIALOG} .reason")).to_be_visible()
+    assert solved.value(
+        f"document.querySelector('{DIALOG} .text').scrollHeight <= document.querySelector('{DIALOG} .text').clientHeight"
+    )
+    for name in ("autoware", "numpy", "nuscenes", "kitti"):
         choose(solved, name)
         solved.until(f"document.querySelector('{DIALOG} .frames')")
         solved.drawn()
+        parts = ", ".join(f"{DIALOG} {part}" for part in ("", "footer *", "aside *", ".rectified *"))
         spilled = solved.value(
-            f"[...document.querySelectorAll('{DIALOG}, {DIALOG} footer *, {DIALOG} aside *')].filter((part) => "
-            "{ const box = part.getBoundingClientRect(); return box.width && (box.right > innerWidth || box.left < 0); }).length"
+            f"[...document.querySelectorAll('{parts}')].filter((part) => {{ const box = part.getBoundingClientRect(); "
+            "return box.width && (box.right > innerWidth || box.left < 0); }).length"
         )
         assert spilled == 0
         panel = solved.page.locator(f"{DIALOG} aside").bounding_box()

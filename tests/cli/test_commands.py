@@ -168,11 +168,30 @@ def test_import_turns_another_stacks_file_into_a_calibration_again(
     cocalib: Cocalib, calibration: Path, tmp_path: Path
 ) -> None:
     other, back = tmp_path / "calib.txt", tmp_path / "back.json"
-    assert cocalib("export", calibration, "--to", "kitti", "--out", other).code == 0
+    assert cocalib("export", calibration, "--to", "kitti", "--rectified", "--out", other).code == 0
     assert cocalib("import", other, "--out", back, "--camera", calibration).code == 0
     checked = cocalib("check", back, "--against", calibration)
     assert checked.code == 0
     assert "0 deg apart" in checked.out
+
+
+def test_a_format_without_a_place_for_distortion_wants_to_hear_that_the_pictures_are_rectified(
+    cocalib: Cocalib, calibration: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "calib.txt"
+    refused = cocalib("export", calibration, "--to", "kitti", "--out", out)
+    assert refused.code == 2
+    assert "kitti holds a camera matrix but has no place for the distortion of this plumb_bob lens" in refused.err
+    assert "opencv or numpy" in refused.err
+    assert "--rectified" in refused.err
+    assert len(refused.err.splitlines()) == 1
+    assert not out.exists()
+
+    written = cocalib("export", calibration, "--to", "kitti", "--rectified", "--out", out)
+    assert written.code == 0
+    assert "note: written for rectified pictures" in written.err
+    assert cocalib("check", out, "--against", calibration).code == 0
+    assert cocalib("export", calibration, "--to", "opencv", "--rectified").code == 2
 
 
 def test_import_says_that_the_camera_is_missing(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from ruamel.yaml import YAML
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
-from calib_core.interchange import FORMATS, CalibrationFile, export, read_any, read_calibration
+from calib_core.interchange import FORMATS, CalibrationFile, export, format_named, read_any, read_calibration
 
 RADAR_FROM_CAMERA_M = [0.006418, 0.000900, -0.062374]
 QUATERNION_XYZW = [-0.536832, 0.529679, -0.447351, 0.480758]
@@ -43,7 +43,7 @@ def published(project_root: Path) -> CalibrationFile:
 
 
 def text_of(file: CalibrationFile, name: str) -> str:
-    return export(file, name).data.decode()
+    return export(file, name, rectified=format_named(name).is_for_rectified).data.decode()
 
 
 def origin_of(joint: ElementTree.Element) -> tuple[list[float], list[float]]:

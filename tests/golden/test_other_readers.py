@@ -18,7 +18,7 @@ from pytransform3d.urdf import UrdfTransformManager
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
-from calib_core.interchange import CalibrationFile, export, parent_pose, read_any, read_calibration
+from calib_core.interchange import CalibrationFile, export, format_named, parent_pose, read_any, read_calibration
 
 BODY_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 POINT_RADAR_M = np.array([8.0, -1.5, 0.4])
@@ -39,7 +39,7 @@ def expected_m(file: CalibrationFile) -> np.ndarray:
 
 
 def text_of(file: CalibrationFile, name: str) -> str:
-    return export(file, name).data.decode()
+    return export(file, name, rectified=format_named(name).is_for_rectified).data.decode()
 
 
 def into_camera(radar_from_camera: np.ndarray) -> np.ndarray:
@@ -120,7 +120,7 @@ def test_xacro_takes_the_urdf_into_a_vehicle_and_pytransform3d_reads_what_comes_
 def test_nuscenes_records_carry_a_radar_point_into_the_image_as_the_devkit_does(file, expected_m):
     """The devkit's documented steps: rotate and translate into the ego frame by the radar's record, undo the camera's."""
     ego_from_radar = parent_pose([3.4, 0.0, 0.5, 0.0, 0.0, np.sin(0.1), np.cos(0.1)])
-    radar, camera = json.loads(export(file, "nuscenes", parent_from_radar=ego_from_radar).data)
+    radar, camera = json.loads(export(file, "nuscenes", parent_from_radar=ego_from_radar, rectified=True).data)
     point = Quaternion(radar["rotation"]).rotation_matrix @ POINT_RADAR_M + np.array(radar["translation"])
     point = Quaternion(camera["rotation"]).rotation_matrix.T @ (point - np.array(camera["translation"]))
     np.testing.assert_allclose(point, expected_m, **CLOSE)

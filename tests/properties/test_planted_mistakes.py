@@ -14,7 +14,17 @@ from scipy.spatial.transform import Rotation
 
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
-from calib_core.interchange import FORMATS, CalibrationFile, FrameNames, WrittenPose, check, export, imported, read_any
+from calib_core.interchange import (
+    FORMATS,
+    CalibrationFile,
+    FrameNames,
+    WrittenPose,
+    check,
+    export,
+    format_named,
+    imported,
+    read_any,
+)
 from calib_core.interchange.archives import pack, unpack
 from calib_core.interchange.calibration_file import choose_check_point
 from calib_core.interchange.mistakes import suspicions
@@ -101,12 +111,14 @@ def with_words_of(right: bytes, wrong: bytes) -> bytes:
 
 def planted(file: CalibrationFile, name: str, slip: Callable[[np.ndarray, WrittenPose], np.ndarray]) -> bytes:
     """Return a file whose numbers went through a slip, while its words are those of the right one."""
-    right = export(file, name).data
+    rectified = format_named(name).is_for_rectified
+    right = export(file, name, rectified=rectified).data
     pose = read_any(right).pose
     numbers = slip(pose.as_written().as_matrix(), pose)
     meant = WrittenPose("matrix", numbers[:3, :3], numbers[:3, 3], pose.direction, pose.axes).camera_from_radar()
     calibration = dataclasses.replace(file.calibration, camera_from_radar=meant)
-    return with_words_of(right, export(dataclasses.replace(file, calibration=calibration), name).data)
+    wrong = export(dataclasses.replace(file, calibration=calibration), name, rectified=rectified)
+    return with_words_of(right, wrong.data)
 
 
 def found(data: bytes, file: CalibrationFile, name: str, *, by_other: bool) -> tuple[list[str], set[str]]:

@@ -13,7 +13,15 @@ import pytest
 from app.session import Session
 from app.web.routes import Reply, Routes
 from calib_core.errors import InputError
-from calib_core.interchange import FORMATS, CalibrationFile, contents_text, export, parent_pose, read_calibration
+from calib_core.interchange import (
+    FORMATS,
+    CalibrationFile,
+    contents_text,
+    export,
+    format_named,
+    parent_pose,
+    read_calibration,
+)
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from tests.picture_recording import PictureRecording, grey_pictures
 
@@ -57,7 +65,10 @@ def test_why_there_is_none_is_said_in_words(ask):
 @pytest.mark.parametrize("name", [form.name for form in FORMATS])
 def test_a_preview_reads_its_own_text_back(file, ask, name):
     preview = json.loads(
-        ask(Session(CLICKS, outcome=file.calibration, outcome_revision=0), f"/api/preview/{name}").body
+        ask(
+            Session(CLICKS, outcome=file.calibration, outcome_revision=0),
+            f"/api/preview/{name}{'?rectified=1' if format_named(name).is_for_rectified else ''}",
+        ).body
     )
     assert preview["check_is_good"]
     assert preview["file_name"].startswith("drive_7_")

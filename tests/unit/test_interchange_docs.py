@@ -28,12 +28,15 @@ def test_the_published_schema_is_the_one_the_types_give(project_root: Path, name
     assert published == schema_texts()[name], "run: python -m calib_core.interchange.schemas docs/schemas"
 
 
-def test_the_page_lists_every_format_with_its_file_name_and_what_its_numbers_are(project_root: Path):
+def test_the_page_lists_every_format_with_its_file_what_it_holds_of_the_camera_and_what_its_numbers_are(
+    project_root: Path,
+):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
 
-    rows = re.findall(r"^\| `([\w-]+)` \| [^|]* \| `([^`]+)` \| (.*) \|$", page, flags=re.MULTILINE)
+    rows = re.findall(r"^\| `([\w-]+)` \| [^|]* \| `([^`]+)` \| ([^|]*) \| (.*) \|$", page, flags=re.MULTILINE)
 
-    assert rows == [(known.name, known.file_name, known.numbers) for known in FORMATS]
+    camera = {"none": "none", "matrix": "K only", "lens": "lens"}
+    assert rows == [(known.name, known.file_name, camera[known.camera], known.numbers) for known in FORMATS]
 
 
 def test_the_examples_on_the_page_are_read(project_root: Path):
@@ -59,8 +62,8 @@ def test_formats_are_named_once_and_each_says_what_it_lacks(project_root: Path):
 
     file = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
     for known in FORMATS:
-        notes = export(file, known.name).notes
-        assert known.carries_camera or any("carries the pose only" in note for note in notes)
+        notes = export(file, known.name, rectified=known.is_for_rectified).notes
+        assert (known.camera == "none") == any("carries the pose only" in note for note in notes)
         assert known.comment != "none" or any("calibration.json" in note for note in notes)
 
 

@@ -18,6 +18,7 @@ from calib_core.interchange import (
     FrameNames,
     adopt,
     export,
+    format_named,
     read_any,
     read_calibration,
     write_calibration,
@@ -108,7 +109,7 @@ def test_once_solved_the_own_calibration_is_drawn_and_compared(facts, file):
 
 @pytest.mark.parametrize("name", [form.name for form in FORMATS])
 def test_every_format_becomes_calibration_1_and_stays_the_same_calibration(file, name):
-    found = read_any(export(file, name).data, name)
+    found = read_any(export(file, name, rectified=format_named(name).is_for_rectified).data, name)
     camera = None if found.camera else file.calibration.camera
     text = write_calibration(adopt(found, name, camera=camera))
     again = read_calibration(text)
