@@ -38,9 +38,10 @@ def statement(file: CalibrationFile, meaning: str) -> tuple[str, ...]:
             f"check point: p_radar [{numbers_text(check.radar_m)}] m -> p_camera [{numbers_text(point_camera_m[0])}] m"
             f" -> pixel [{numbers_text(check.pixel_px)}] px"
         )
-    version = file.provenance.version
+    # A file may hold any text for the version; the frames' names are checked and stay as they are, spaces and all.
+    version = " ".join((file.provenance.version or "").split())
     lines.append(f"cocalib{f' {version}' if version else ''}: read it back with: cocalib check THIS_FILE")
-    return tuple(" ".join(line.split()) for line in lines)
+    return tuple(lines)
 
 
 def hash_comment(lines: tuple[str, ...]) -> str:
@@ -49,10 +50,8 @@ def hash_comment(lines: tuple[str, ...]) -> str:
 
 
 def xml_comment(lines: tuple[str, ...]) -> str:
-    """Return lines as one XML comment, in which no two hyphens may stand together."""
-    body = "\n     ".join(lines)
-    while "--" in body:
-        body = body.replace("--", "- -")
+    """Return lines as one XML comment, in which no two hyphens may stand together; in the names, JSON reads the second again."""
+    body = "\n     ".join(lines).replace("--", "-\\u002d")
     return f"<!-- {body} -->\n"
 
 

@@ -42,6 +42,7 @@ from calib_core.results import Calibration, Metrics, PairResult
 COMPONENT = st.floats(-1.0, 1.0).map(lambda x: round(x, 6))
 DISTANCE_M = st.floats(-5.0, 5.0, allow_subnormal=False)
 FINITE = st.floats(-1e4, 1e4, allow_subnormal=False)
+CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 NAME = st.text(string.ascii_letters + string.digits + "_/-. ;|#:*{}[]()=!?äé漢", min_size=1, max_size=20)
 
 
@@ -94,6 +95,8 @@ def refusal(read: Callable[..., object], *given: object) -> str:
 @pytest.mark.parametrize("name", [known.name for known in FORMATS])
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(pose=poses(), camera=cameras(), frames=frame_names())
+@example(pose=RigidTransform.identity(), camera=CAMERA, frames=FrameNames("two  spaces", "radar   or not"))
+@example(pose=RigidTransform.identity(), camera=CAMERA, frames=FrameNames("front--left", "---"))
 def test_a_pose_comes_back_from_every_format_bit_for_bit_or_nearly(name, pose, camera, frames):
     file = file_of(pose, camera, frames)
     refused = refusal(lambda: export(file, name, rectified=format_named(name).is_for_rectified))
@@ -276,7 +279,7 @@ def test_a_damaged_file_is_read_or_refused(name, place, junk, cut):
 @settings(max_examples=30, deadline=None)
 @given(pose=poses(), edit=st.sampled_from(["direction", "axes", "translation", "rotation"]))
 def test_a_slip_is_never_passed_over(pose, edit):
-    file = file_of(pose, Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])))
+    file = file_of(pose, CAMERA)
     right = imported(file)
     changes = {
         "direction": {"direction": "radar_from_camera"},
