@@ -212,6 +212,7 @@ export async function removeSelected() {
 
 /** @param {"undo"|"redo"} type */
 export async function turnBack(type) {
+  if (!state.view) return;
   flushNudge();
   const refusal = await send({ type });
   if (refusal) toast(refusal);

@@ -27,6 +27,11 @@ import { startTimeline } from "./timeline.js";
 
 /** @type {Record<string, (message: any) => void>} */
 const readers = {
+  opening(message) {
+    state.opening = message;
+    setBanner(message.problem);
+    emit("opening");
+  },
   recording: takeRecording,
   view(message) {
     state.view = message;
@@ -62,9 +67,11 @@ const readers = {
 function takeRecording(message) {
   const same = state.recording !== null;
   state.recording = message;
+  state.opening = null;
   const { sec, nanosec } = message.frame_times;
   state.seconds = Float64Array.from(sec, (value, index) => value - sec[0] + (nanosec[index] - nanosec[0]) * 1e-9);
   document.title = `${message.name} · cocalib`;
+  emit("opening");
   emit("recording");
   loadFormats();
   if (message.session.note) toast(message.session.note);
@@ -126,7 +133,8 @@ connect({
   frame: receiveFrame,
   connection(connected) {
     state.connected = connected;
-    setBanner(connected ? "" : "The server does not answer. Clicks are kept here and sent when it is back.");
+    const why = state.opening?.problem || "The server does not answer. Clicks are kept here and sent when it is back.";
+    setBanner(connected ? "" : why);
     emit("connection");
   },
 });

@@ -144,6 +144,14 @@ export interface View {
   comparison: Figure[];
 }
 
+/** The recording is being opened: at most a picture of it can be seen, and nothing can be clicked yet. */
+export interface Opening {
+  type: "opening";
+  name: string;
+  doing: string;
+  problem: string;
+}
+
 /** Many stamps, as two columns. */
 export interface StampColumns {
   sec: number[];
@@ -382,6 +390,7 @@ export interface ImportForm {
 
 export type FromServer =
   | View
+  | Opening
   | RecordingNote
   | Placements
   | Overlay

@@ -24,7 +24,7 @@ const COLUMNS = [
 let drawn = "";
 
 export function startPairs() {
-  on(["view", "selected", "recording", "placements"], draw);
+  on(["opening", "view", "selected", "recording", "placements"], draw);
   page.addEventListener("click", pressed);
 }
 
@@ -53,7 +53,7 @@ export function nextWorst() {
 function draw() {
   const rows = sorted();
   count.textContent = rows.length ? String(rows.length) : "";
-  const text = JSON.stringify([rows, state.selected, sorting, state.view?.residual_limit_px, state.placements.length, state.placementsKnown]);
+  const text = JSON.stringify([rows, state.selected, sorting, state.view?.residual_limit_px, state.placements.length, state.placementsKnown, state.recording === null]);
   if (text === drawn) return;
   drawn = text;
   if (!rows.length) return page.replaceChildren(drawSteps());

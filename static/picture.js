@@ -19,7 +19,8 @@ let drawInk = false;
 export function startPicture() {
   new ResizeObserver(measure).observe(pane);
   watchRatio();
-  on(["shown"], () => {
+  on(["shown", "opening"], () => {
+    if (state.shown) dropPreview();
     takeSize();
     redraw();
   });
@@ -52,9 +53,15 @@ function measure() {
   emit("box");
 }
 
+/** The first frame takes the place of what was shown before it. */
+function dropPreview() {
+  state.preview?.bitmap.close();
+  state.preview = null;
+}
+
 /** The first frame tells how large the picture is. */
 function takeSize() {
-  const shown = state.shown;
+  const shown = state.shown ?? state.preview;
   if (!shown || (shown.width === viewport.imageWidth && shown.height === viewport.imageHeight)) return;
   viewport.imageWidth = shown.width;
   viewport.imageHeight = shown.height;
@@ -85,7 +92,7 @@ function paint() {
 function paintPicture() {
   paper.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ground").trim() || "#000";
   paper.fillRect(0, 0, picture.width, picture.height);
-  const shown = state.shown;
+  const shown = state.shown ?? state.preview;
   if (!shown) return;
   paper.imageSmoothingEnabled = viewport.scale < SQUARES_FROM * shown.scale;
   paper.imageSmoothingQuality = state.playing ? "low" : "high";

@@ -114,15 +114,29 @@ export function requestAgain() {
 
 /** A frame arrived. @param {any} header @param {Uint8Array<ArrayBuffer>} data */
 export async function receiveFrame(header, data) {
+  if (header.index < 0) return receivePreview(header, data);
   coming = coming.filter((request) => request > header.request);
   const stale = header.request < newest && !state.playing;
   if (stale) return;
-  const blob = new Blob([data], { type: `image/${header.format}` });
-  const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
-  const shown = { index: header.index, bitmap, scale: header.scale, width: header.width_px, height: header.height_px };
+  const shown = { index: header.index, ...(await decoded(header, data)) };
   keep(shown);
   const wanted = state.playing ? header.index > (state.shown?.index ?? -1) || header.request === newest : header.index === state.cursor;
   if (wanted) show(shown);
+}
+
+/** A picture arrived before the recording is open. @param {any} header @param {Uint8Array<ArrayBuffer>} data */
+async function receivePreview(header, data) {
+  const preview = await decoded(header, data);
+  if (state.shown) return preview.bitmap.close();
+  state.preview = preview;
+  emit("opening");
+}
+
+/** @param {any} header @param {Uint8Array<ArrayBuffer>} data */
+async function decoded(header, data) {
+  const blob = new Blob([data], { type: `image/${header.format}` });
+  const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+  return { bitmap, scale: header.scale, width: header.width_px, height: header.height_px };
 }
 
 /** A frame could not be read. @param {number|null} request */

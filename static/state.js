@@ -4,9 +4,11 @@
 /** @typedef {import("./messages.js").View} View */
 /** @typedef {import("./messages.js").ClickRow} Click */
 /** A decoded frame. @typedef {{index: number, bitmap: ImageBitmap, scale: number, width: number, height: number}} Shown */
-/** @typedef {"recording"|"view"|"progress"|"placements"|"overlay"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"} Topic */
+/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"} Topic */
 
 export const state = {
+  /** While the recording is being opened. @type {import("./messages.js").Opening|null} */ opening: null,
+  /** A picture of it to look at meanwhile: no frame yet, so nothing can be clicked in it. @type {Omit<Shown, "index">|null} */ preview: null,
   /** @type {import("./messages.js").RecordingNote|null} */ recording: null,
   /** @type {View|null} */ view: null,
   /** @type {import("./messages.js").PlacementRow[]} */ placements: [],

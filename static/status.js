@@ -9,16 +9,28 @@ import { nextWords } from "./steps.js";
 
 /** @param {string} id */
 const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+/** What has nothing to work on before the recording is open. */
+const NEED_FRAMES = ["export", "play", "step-back", "step-forward", "previous-placement", "next-placement"];
 /** A return this near to the hand is spelt out [CSS px]. */
 const REACH = 8;
 
 export function startStatus() {
+  on(["opening"], drawOpening);
   on(["recording"], drawRecording);
-  on(["view", "connection", "progress", "placements"], drawStatus);
+  on(["opening", "view", "connection", "progress", "placements"], drawStatus);
   get("zoom").onclick = fit;
   on(["cursor", "shown", "recording"], drawClock);
   on(["playing"], drawPlay);
   on(["hover", "shown", "box"], drawReadout);
+}
+
+function drawOpening() {
+  document.body.classList.toggle("opening", state.opening !== null);
+  const early = state.opening !== null && !state.recording;
+  for (const id of NEED_FRAMES) /** @type {HTMLButtonElement} */ (get(id)).disabled = early;
+  if (!early) return;
+  get("recording-name").textContent = state.opening?.name ?? "";
+  document.title = `${state.opening?.name} · cocalib`;
 }
 
 function drawRecording() {
@@ -50,7 +62,8 @@ function drawStatus() {
   get("connection").classList.toggle("off", !state.connected);
   get("connection").dataset.hint = state.connected ? "Connected. Every click is kept on disk at once." : "Not connected.";
   get("connection").dataset.stage = view?.stage ?? "collecting";
-  const words = view ? [view.status, nextWords()].filter(Boolean) : ["Opening the recording…"];
+  const opening = state.opening;
+  const words = opening || !view ? [opening?.problem || opening?.doing || "Opening the recording…"] : [view.status, nextWords()].filter(Boolean);
   get("status-text").textContent = words.join("  ·  ");
   get("status-text").dataset.hint = [...words, view?.stage === "unsolvable" ? view.hint : ""].filter(Boolean).join("\n");
   const undo = /** @type {HTMLButtonElement} */ (get("undo"));
@@ -59,10 +72,12 @@ function drawStatus() {
   redo.disabled = !view?.can_redo;
   const progress = state.progress;
   const running = progress !== null && progress.done < progress.total;
-  get("progress").hidden = !running;
-  if (!progress || !running) return;
-  get("progress-label").textContent = progress.label;
+  const reading = opening !== null && !opening.problem;
+  get("progress").hidden = !running && !reading;
   const bar = /** @type {HTMLProgressElement} */ (get("progress-bar"));
+  get("progress-label").textContent = reading ? "" : (progress?.label ?? "");
+  if (reading) return bar.removeAttribute("value"); // nobody knows how long the rest takes
+  if (!progress || !running) return;
   bar.max = progress.total;
   bar.value = progress.done;
 }

@@ -13,17 +13,19 @@ const CENTRE = "the inner corner, where its three sheets meet";
 /** Words with keys between them. @typedef {(string|{key: string})[]} Words */
 
 export function startGuide() {
-  on(["shown", "view", "placements", "playing", "overlay"], drawGuide);
+  on(["opening", "shown", "view", "placements", "playing", "overlay"], drawGuide);
 }
 
 /** Three steps to the first calibration. */
 export function drawSteps() {
   const count = clicks().filter((click) => click.state !== "excluded").length;
   const found = state.placements.length;
-  const searching = state.placementsKnown ? "The radar shows no clear dwell: step to a frame in which the reflector stands still." : "The radar is searched for places where the reflector stood still…";
+  const foundNone = "The radar shows no clear dwell: step to a frame in which the reflector stands still.";
+  const goesOn = state.recording ? "The radar is searched for places where the reflector stood still…" : "Once the recording is open, the radar is searched for places where the reflector stood still.";
+  const searching = state.placementsKnown ? foundNone : goesOn;
   const now = count === 0 ? 0 : count < FEWEST ? 1 : 2;
   const steps = [
-    ["Go to a placement", [key("N"), found ? ` jumps to the next of ${found} that the radar has found.` : ` ${searching}`]],
+    ["Go to a placement", found ? [key("N"), ` jumps to the next of ${found} that the radar has found.`] : [searching]],
     ["Click the reflector's centre", [`That is ${CENTRE}. Wheel zooms at the cursor; `, key("Alt"), "+arrows move the mark by 0.1 px."]],
     [`Do so for ${FEWEST} placements or more`, [count ? `${count} done. ` : "", "Near and far, left and right: the pose appears by itself and gets surer with each."]],
   ];
@@ -39,11 +41,17 @@ export function drawSteps() {
 const key = (name) => make("span", "key", name);
 
 function drawGuide() {
-  const words = state.shown && !state.playing ? advice(state.shown.index) : null;
+  const words = state.shown ? (state.playing ? null : advice(state.shown.index)) : opening();
   guide.hidden = !words;
   if (!words) return;
   guide.classList.toggle("act", words.act);
   guide.replaceChildren(...words.text.map((word) => (typeof word === "string" ? word : key(word.key))));
+}
+
+/** What goes on before there is a frame. @returns {{text: Words, act: boolean}|null} */
+function opening() {
+  const now = state.opening;
+  return now && !now.problem ? { text: [state.preview ? "A first look while the recording is opened; clicking begins as soon as that is done" : now.doing], act: false } : null;
 }
 
 /** @param {number} index @returns {{text: Words, act: boolean}|null} */

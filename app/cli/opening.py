@@ -4,8 +4,9 @@ import dataclasses
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -23,10 +24,20 @@ from app.cli.flags import (
 from app.cli.importing import camera_in, reference_from
 from app.cli.printing import read_text, required_camera
 from calib_core.camera import Camera
+from calib_core.errors import InputError
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, RecordingOptions
 
+if TYPE_CHECKING:
+    from app.web.serving import Service
+
 __all__ = ["Demo", "Open"]
+
+_RECORDING_SUFFIXES = (".bag", ".mcap", ".db3")
+_LARGE_BYTES = 1_000_000_000
+"""Files of this size together are hardly open before the page is: it comes first."""
+_SOON_S = 0.2
+"""Smaller ones are usually open after this, and then the page never sees them opened [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,15 +143,16 @@ def _serve(
     from app.session_file import set_aside
     from app.view import sentence
     from app.web.address import require_address, require_token
-    from app.web.server import ServerOptions, serve
     from app.workspace import open_workspace
     from calib_core.recordings import open_recording
 
     check_installation()
     require_address(serving.host, serving.port)
     require_token(serving.token)
-    with ExitStack() as stack:
-        recording = stack.enter_context(open_recording(paths, topics or RecordingOptions()))
+    _require_given(camera_file, calibration_file, clicks_file)
+    topics = topics or RecordingOptions()
+    with _service(paths, topics, serving, name) as service, ExitStack() as stack:
+        recording = stack.enter_context(open_recording(paths, topics))
         camera = _camera(recording, camera_file, calibration_file)
         reference = reference_from(calibration_file, camera) if calibration_file else None
         if fresh and (kept := set_aside(session)) is not None:
@@ -155,8 +167,46 @@ def _serve(
             workspace.import_clicks(read_text(clicks_file), source=str(clicks_file))
         elif clicks_file is not None:
             print(f"The session goes on as it was; {clicks_file} was not taken in again (--fresh begins anew)")
-        serve(workspace, recording, ServerOptions(**dataclasses.asdict(serving)))
+        service.serve(workspace, recording)
     return 0
+
+
+def _service(paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str) -> "Service":
+    """Return what serves; a large recording is served, to be waited for, before it is open."""
+    from app.web.messages import Opening
+    from app.web.server import ServerOptions
+    from app.web.serving import Service
+    from calib_core.recordings import first_picture
+
+    size_bytes = sum(map(_size_bytes, paths))
+    size = f" ({size_bytes / 1e9:.1f} GB)" if size_bytes >= _LARGE_BYTES / 10 else ""
+    return Service(
+        ServerOptions(**dataclasses.asdict(serving)),
+        Opening(name, f"Opening {name}{size}: reading its index and times…"),
+        partial(first_picture, paths, topics),
+        let_in_after_s=0.0 if size_bytes >= _LARGE_BYTES else _SOON_S,
+    )
+
+
+def _size_bytes(path: Path) -> int:
+    """Return the size of a file, or of the recording files in a folder; 0 where that cannot be told."""
+    try:
+        if path.is_dir():
+            return sum(inside.stat().st_size for inside in path.iterdir() if inside.suffix in _RECORDING_SUFFIXES)
+        return path.stat().st_size
+    except OSError:  # opening the recording tells what is wrong
+        return 0
+
+
+def _require_given(*files: Path | None) -> None:
+    """Refuse files that are not there before anything is read or served.
+
+    Raises:
+        InputError: a file is missing.
+    """
+    for path in files:
+        if path is not None and not path.exists():
+            raise InputError(f"{path}: no such file; check the path")
 
 
 def _camera(recording: Recording, camera_file: Path | None, calibration_file: Path | None) -> Camera:

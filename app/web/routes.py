@@ -4,7 +4,7 @@ import asyncio
 import gzip
 import http
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -103,20 +103,14 @@ def refusal(status: int, reason: str) -> Reply:
 class Routes:
     """Answers by path; every path that is served is known by name."""
 
-    def __init__(self, static: Path, workspace: Workspace, recording: RecordingSource, hub: Surveyor) -> None:
+    def __init__(self, static: Path) -> None:
         self._files = {f"/{path.name}": path for path in static.iterdir() if path.suffix in _TYPES and path.is_file()}
         self._files["/"] = self._files["/index.html"]
-        self._workspace = workspace
-        self._recording = recording
-        self._hub = hub
-        self._made: dict[str, Callable[[str], Reply]] = {
-            "/api/calibration.json": self._calibration,
-            "/api/clicks.json": self._clicks,
-            "/api/formats.json": _formats,
-            "/api/activity.json": self._activity,
-            **{f"/api/export/{form.name}": partial(self._export, form.name) for form in FORMATS},
-            **{f"/api/preview/{form.name}": partial(self._preview, form.name) for form in FORMATS},
-        }
+        self._made: Mapping[str, Callable[[str], Reply]] | None = None
+
+    def admit(self, workspace: Workspace, recording: RecordingSource, hub: Surveyor) -> None:
+        """Answer for this recording from now on."""
+        self._made = _Downloads(workspace, recording, hub).by_path()
 
     async def answer(self, address: str) -> Reply:
         """Answer a GET; files and exports are made off the event loop.
@@ -125,7 +119,9 @@ class Routes:
             address: path and query, as sent.
         """
         path, _, query = address.partition("?")
-        make = self._made.get(path)
+        if path.startswith("/api/") and self._made is None:
+            return refusal(503, "The recording is still being opened; ask again in a moment.")
+        make = self._made.get(path) if self._made is not None else None
         if path in self._files:
             make = lambda _query: _file(self._files[path])  # noqa: E731
         elif _VISER_PAGE.fullmatch(path):
@@ -133,6 +129,26 @@ class Routes:
         if make is None:
             return refusal(404, "There is nothing here.")
         return await asyncio.get_running_loop().run_in_executor(None, make, query)
+
+
+class _Downloads:
+    """What is made of a recording's session when it is asked for."""
+
+    def __init__(self, workspace: Workspace, recording: RecordingSource, hub: Surveyor) -> None:
+        self._workspace = workspace
+        self._recording = recording
+        self._hub = hub
+
+    def by_path(self) -> Mapping[str, Callable[[str], Reply]]:
+        """Return the makers of all answers, each given the query."""
+        return {
+            "/api/calibration.json": self._calibration,
+            "/api/clicks.json": self._clicks,
+            "/api/formats.json": _formats,
+            "/api/activity.json": self._activity,
+            **{f"/api/export/{form.name}": partial(self._export, form.name) for form in FORMATS},
+            **{f"/api/preview/{form.name}": partial(self._preview, form.name) for form in FORMATS},
+        }
 
     def _calibration(self, _query: str) -> Reply:
         return self._of_calibration(lambda text: _download(text.encode(), "calibration.json"))

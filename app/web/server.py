@@ -5,8 +5,6 @@ import contextlib
 import io
 import os
 import secrets
-import threading
-import webbrowser
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -21,17 +19,19 @@ from websockets.http11 import Request, Response
 from app.resources import state_folder, static_folder
 from app.solving import RecordingSource
 from app.web import guard as doors
-from app.web.channel import Channel
+from app.web.channel import Channel, Socket
+from app.web.frames import EncodedPicture
 from app.web.hook import ProcessRequest, SocketHandler, start_viser
 from app.web.hub import Hub, PageRecording
 from app.web.routes import Reply, Routes, refusal
 from app.web.scene import FIELD_OF_VIEW_RAD, LOOK_AT, STAND_AT, TabScene
+from app.web.waiting import WaitingRoom
 from app.workspace import Workspace
 
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["RunningServer", "ServedRecording", "ServerOptions", "serve", "start"]
+__all__ = ["RunningServer", "ServedRecording", "ServerOptions", "start"]
 
 
 class ServedRecording(PageRecording, RecordingSource, Protocol):
@@ -58,16 +58,18 @@ class ServerOptions:
 
 
 class RunningServer:
-    """A server at work; `close` ends it."""
+    """A server at work; `close` ends it. Pages may come at once; they wait until a recording is admitted."""
 
-    def __init__(self, workspace: Workspace, recording: ServedRecording, options: ServerOptions) -> None:
+    def __init__(self, options: ServerOptions, room: WaitingRoom) -> None:
         self._options = options
         self._guard = doors.Guard(
             host=options.host, key=_cookie_key(), token=options.token, more_hosts=options.more_hosts
         )
         self._executor = ThreadPoolExecutor(max_workers=3, thread_name_prefix="frames")
-        self._hub = Hub(workspace, recording, self._executor)
-        self._routes = Routes(static_folder(), workspace, recording, self._hub)
+        self._room = room
+        self._routes = Routes(static_folder())
+        self._hub: Hub | None = None
+        self._is_closed = False
         self._channels: dict[str, Channel] = {}
         self._scenes: dict[str, tuple[int, TabScene]] = {}
         self.on_new_link: Callable[[], None] = lambda: None
@@ -79,7 +81,31 @@ class RunningServer:
         self._viser.initial_camera.fov = FIELD_OF_VIEW_RAD
         self._viser.on_client_connect(self._space_came)
         self._viser.on_client_disconnect(self._space_went)
-        asyncio.run_coroutine_threadsafe(self._hub.start(), self._viser.get_event_loop()).result()
+
+    def admit(self, workspace: Workspace, recording: ServedRecording) -> None:
+        """Serve this recording from now on; pages that wait go on with it."""
+        hub = Hub(workspace, recording, self._executor)
+
+        async def open_up() -> None:
+            await hub.start()
+            self._hub = hub
+            self._routes.admit(workspace, recording, hub)
+            self._room.end()
+
+        asyncio.run_coroutine_threadsafe(open_up(), self._viser.get_event_loop()).result()
+
+    def show(self, picture: EncodedPicture) -> None:
+        """Show pages that wait for the recording a picture of it.
+
+        Raises:
+            RuntimeError: the server has stopped.
+        """
+        self._viser.get_event_loop().call_soon_threadsafe(self._room.show, picture)
+
+    def refuse(self, problem: str) -> None:
+        """Tell pages that wait why there will be no recording; does nothing once it was admitted, or after closing."""
+        if self._hub is None and not self._is_closed:
+            asyncio.run_coroutine_threadsafe(self._room.refuse(problem), self._viser.get_event_loop()).result()
 
     @property
     def port(self) -> int:
@@ -99,9 +125,13 @@ class RunningServer:
         return f"{self.origin}/?token={quote(self._guard.token)}"
 
     def close(self) -> None:
-        """Stop serving; the workspace and the recording stay open."""
-        asyncio.run_coroutine_threadsafe(self._hub.end(), self._viser.get_event_loop()).result()
-        self._hub.steps.shutdown(wait=True, cancel_futures=True)
+        """Stop serving; the workspace and the recording stay open. Closing again does nothing."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        if self._hub is not None:
+            asyncio.run_coroutine_threadsafe(self._hub.end(), self._viser.get_event_loop()).result()
+            self._hub.steps.shutdown(wait=True, cancel_futures=True)
         with contextlib.redirect_stdout(io.StringIO()):  # viser says that it stopped
             self._viser.stop()
         self._executor.shutdown(wait=True, cancel_futures=True)
@@ -139,12 +169,15 @@ class RunningServer:
         return handle
 
     async def _run_channel(self, connection: ServerConnection, tab: str) -> None:
+        socket: Socket = connection if self._hub else await self._room.stay(connection)
+        if self._hub is None:
+            return
         channel = Channel(self._hub)
         self._channels[tab] = channel
         if tab in self._scenes:
             channel.scene = self._scenes[tab][1]
         try:
-            await channel.run(connection)
+            await channel.run(socket)
         finally:
             if self._channels.get(tab) is channel:
                 del self._channels[tab]
@@ -168,30 +201,10 @@ class RunningServer:
 
 
 def start(workspace: Workspace, recording: ServedRecording, options: ServerOptions) -> RunningServer:
-    """Start to serve; returns once the port answers."""
-    return RunningServer(workspace, recording, options)
-
-
-def serve(workspace: Workspace, recording: ServedRecording, options: ServerOptions) -> None:
-    """Serve until Ctrl+C."""
-    server = start(workspace, recording, options)
-    stop = threading.Event()
-    try:
-        if not doors.is_loopback(options.host):
-            print(
-                f"Warning: bound to {options.host}: whoever has the link and reaches this machine sees the recording. "
-                "From another machine, put this machine's address into the link."
-            )
-        print(f"Open {server.url}", flush=True)
-        if options.token is None:
-            server.on_new_link = lambda: print(f"For another browser, open {server.url}", flush=True)
-        if not options.no_browser:
-            threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
-        stop.wait()
-    except KeyboardInterrupt:
-        print("\nStopped; every click is kept.")
-    finally:
-        server.close()
+    """Start to serve a recording; returns once the port answers."""
+    server = RunningServer(options, WaitingRoom())
+    server.admit(workspace, recording)
+    return server
 
 
 def _all_headers(headers: Headers) -> dict[str, list[str]]:

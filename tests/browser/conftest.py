@@ -83,10 +83,12 @@ def open_page(chromium: Browser) -> Iterator[Callable[..., Driver]]:
     drivers: list[Driver] = []
     contexts = []
 
-    def open_one(url: str, browser: Browser | None = None, **context_options: Any) -> Driver:
+    def open_one(
+        url: str, browser: Browser | None = None, ready: str = "__cocalib.state.shown", **context_options: Any
+    ) -> Driver:
         context = (browser or chromium).new_context(**{"viewport": {"width": 1280, "height": 720}, **context_options})
         contexts.append(context)
-        drivers.append(Driver(context.new_page(), url))
+        drivers.append(Driver(context.new_page(), url, ready))
         return drivers[-1]
 
     yield open_one

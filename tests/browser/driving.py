@@ -22,7 +22,7 @@ FLAGS = [
 class Driver:
     """One open page and what a person does with it."""
 
-    def __init__(self, page: Page, url: str) -> None:
+    def __init__(self, page: Page, url: str, ready: str = "__cocalib.state.shown") -> None:
         self.page = page
         self.complaints: list[str] = []
         self.addresses: set[str] = set()
@@ -31,7 +31,7 @@ class Driver:
         page.on("request", lambda request: self.addresses.add(request.url))
         page.on("websocket", lambda socket: self.addresses.add(socket.url))
         page.goto(url)
-        self.until("__cocalib.state.shown")
+        self.until(ready)
 
     def _console(self, message: Any) -> None:
         if message.type == "error":

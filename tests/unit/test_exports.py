@@ -39,7 +39,8 @@ def ask(project_root: Path) -> Callable[[Session, str], Reply]:
     def answer(session: Session, address: str) -> Reply:
         workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive 7.mcap"))
         hub: Any = SimpleNamespace(survey=None)
-        routes = Routes(project_root / "static", workspace, PictureRecording(grey_pictures(1)), hub)
+        routes = Routes(project_root / "static")
+        routes.admit(workspace, PictureRecording(grey_pictures(1)), hub)
         return asyncio.run(routes.answer(address))
 
     return answer

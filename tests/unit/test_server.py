@@ -1,21 +1,20 @@
 """The port as a client meets it: the contract with viser's server, the attacks, and the words of the channel."""
 
 import gzip
-import http.client
 import json
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
 
 from app.web.server import RunningServer, ServerOptions, start
 from app.workspace import open_workspace
 from tests.picture_recording import START, PictureRecording, grey_pictures
+from tests.port_client import channel, come_in, get, wanted
 
 HOSTILE = '<img src=x onerror="alert(1)">'
 
@@ -37,38 +36,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
 @pytest.fixture(scope="module")
 def cookie(server: RunningServer) -> str:
     """Come in by the link."""
-    answer = get(server, server.url.removeprefix(server.origin))
-    assert answer.status == 303
-    assert answer.headers["Location"] == "/"
-    return answer.headers["Set-Cookie"].partition(";")[0]
-
-
-class Answer:
-    def __init__(self, response: http.client.HTTPResponse) -> None:
-        self.status, self.headers, self.body = response.status, response.headers, response.read()
-
-
-def get(server: RunningServer, path: str, **headers: str) -> Answer:
-    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
-    connection.request("GET", path, headers=headers)
-    answer = Answer(connection.getresponse())
-    connection.close()
-    return answer
-
-
-@contextmanager
-def channel(server: RunningServer, cookie: str, path: str = "/ws/tab1") -> Iterator[ClientConnection]:
-    address = server.origin.replace("http", "ws") + path
-    with connect(address, origin=server.origin, additional_headers={"Cookie": cookie}, max_size=None) as socket:
-        yield socket
-
-
-def wanted(socket: ClientConnection, kind: str) -> Any:
-    """Read on until a message of this kind comes."""
-    while True:
-        message = socket.recv(timeout=20)
-        if isinstance(message, str) and json.loads(message)["type"] == kind:
-            return json.loads(message)
+    return come_in(server)
 
 
 def stamp(index: int) -> dict[str, int]:

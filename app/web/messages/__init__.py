@@ -20,6 +20,7 @@ from app.web.messages.incoming import (
 from app.web.messages.outgoing import (
     Done,
     FrameHeader,
+    Opening,
     Outgoing,
     Overlay,
     OverlayReturn,
@@ -45,6 +46,7 @@ __all__ = [
     "Hello",
     "ImportWanted",
     "Incoming",
+    "Opening",
     "Outgoing",
     "Overlay",
     "OverlayReturn",

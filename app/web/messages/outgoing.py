@@ -17,6 +17,7 @@ __all__ = [
     "TYPES",
     "Done",
     "FrameHeader",
+    "Opening",
     "Outgoing",
     "Overlay",
     "OverlayReturn",
@@ -81,6 +82,21 @@ class SensorNote:
     topic: str
     clock: str = ""
     about: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Opening:
+    """The recording is being opened: at most a picture of it can be seen, and nothing can be clicked yet.
+
+    Attributes:
+        name: what the person calls it.
+        doing: what is going on, in words.
+        problem: why it cannot be opened; "" while it is being opened.
+    """
+
+    name: str
+    doing: str
+    problem: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,8 +233,8 @@ class FrameHeader:
     """What comes before the bytes of a picture.
 
     Attributes:
-        index: of the frame.
-        request: the number of the message it answers.
+        index: of the frame; -1 where it is shown while the recording is being opened, and is none yet.
+        request: the number of the message it answers; 0 where it answers none.
         width_px: columns of the recorded frame.
         height_px: rows of the recorded frame.
         scale: size of this picture over the recorded one.
@@ -233,10 +249,11 @@ class FrameHeader:
     format: Literal["jpeg", "png"]
 
 
-Outgoing: TypeAlias = View | RecordingNote | Placements | Overlay | Progress | Problem | Done
+Outgoing: TypeAlias = View | Opening | RecordingNote | Placements | Overlay | Progress | Problem | Done
 
 TYPES: Mapping[type, str] = {
     View: "view",
+    Opening: "opening",
     RecordingNote: "recording",
     Placements: "placements",
     Overlay: "overlay",

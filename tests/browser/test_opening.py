@@ -1,0 +1,125 @@
+"""While a large recording is still being opened: its first picture is there, nothing can be clicked, and then all goes on."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.web.messages import Opening
+from app.web.server import RunningServer, ServerOptions
+from app.web.serving import Service
+from app.workspace import Workspace
+from calib_core.recordings import Recording, first_picture
+from tests.browser.driving import Driver
+
+pytestmark = pytest.mark.browser
+
+OPTIONS = ServerOptions(port=0, token="test", no_browser=True)
+OPENING = Opening("long.bag", "Opening long.bag (5.1 GB): reading its index and times…")
+
+
+@contextmanager
+def opening(picture_of: Recording) -> Iterator[RunningServer]:
+    """Be in the middle of opening a recording that takes its time."""
+    with Service(OPTIONS, OPENING, partial(first_picture, picture_of.paths), let_in_after_s=0) as service:
+        server = service._early.result(timeout=40)
+        assert server is not None
+        yield server
+
+
+@pytest.fixture
+def open_early(open_page: Callable[..., Driver]) -> Callable[[RunningServer], Driver]:
+    """Return a function that opens a page and waits until it shows the first picture."""
+    return lambda server: open_page(server.url, ready="__cocalib.state.preview")
+
+
+def shade_at(page: Driver, u: float, v: float) -> np.ndarray:
+    """Return what the canvas shows at an image point: red, green, blue."""
+    return np.array(
+        page.value(
+            f"(() => {{ const box = document.getElementById('picture'); const [x, y] = __cocalib.toCss({u}, {v});"
+            "const ratio = box.width / box.clientWidth;"
+            "return [...box.getContext('2d').getImageData(x * ratio, y * ratio, 1, 1).data.slice(0, 3)]; })()"
+        ),
+        dtype=float,
+    )
+
+
+def test_the_first_picture_is_there_and_nothing_can_be_done_to_it_until_the_recording_is(
+    sample: Recording, workspace: Workspace, open_early: Callable[[RunningServer], Driver]
+) -> None:
+    with opening(sample) as server:
+        page, second = open_early(server), open_early(server)
+        page.drawn()
+        picture, (u, v) = sample.image(0), (300, 420)
+        for at in ((u, v), (914, 242), (100, 130)):
+            assert shade_at(page, *at) == pytest.approx(picture[at[1], at[0], ::-1], abs=12)
+        assert OPENING.doing in page.text("#status-text")
+        assert "first look" in page.text("#guide")
+        assert page.text("#recording-name") == "long.bag"
+        page.page.mouse.click(*page.place_of(u, v))
+        for key in (
+            "Enter",
+            "n",
+            "p",
+            "j",
+            "e",
+            " ",
+            "ArrowRight",
+            "Alt+ArrowRight",
+            "End",
+            "x",
+            "Delete",
+            "Control+z",
+        ):
+            page.page.keyboard.press(key)
+        assert page.value("__cocalib.unconfirmed() + __cocalib.clicks().length") == 0
+        assert not page.page.is_visible("#export-dialog")
+        assert page.page.is_disabled("#play")
+        server.admit(workspace, sample)
+        for each in (page, second):
+            each.until("__cocalib.state.shown && __cocalib.state.view && __cocalib.state.preview === null")
+        assert page.text("#recording-name") == "sample"
+        assert page.page.is_enabled("#play")
+        page.click(u, v)
+        assert [round(row["u_px"]) for row in page.view["clicks"]] == [u]
+        second.until("__cocalib.state.view.clicks.length === 1")
+        page.page.frame_locator("#space-view").locator("canvas").last.wait_for(state="attached")
+
+
+def test_why_it_cannot_be_opened_stays_on_the_page(
+    sample: Recording, open_early: Callable[[RunningServer], Driver]
+) -> None:
+    with opening(sample) as server:
+        page = open_early(server)
+        server.refuse("long.bag: no radar topic; it has /camera/image.")
+    page.until("!__cocalib.state.connected")
+    assert "no radar topic" in page.text("#banner")
+    assert "no radar topic" in page.text("#status-text")
+    assert not page.page.is_visible("#guide")
+    assert not page.page.is_visible("#progress")
+    page.complaints[:] = [text for text in page.complaints if "WebSocket connection" not in text]
+
+
+def test_a_page_that_comes_back_to_a_recording_still_being_opened_loses_no_click(
+    sample: Recording, workspace: Workspace, server: RunningServer, page: Driver, tmp_path: Path
+) -> None:
+    port = server.port
+    server.close()
+    page.until("!__cocalib.state.connected")
+    again = ServerOptions(port=port, token="test", no_browser=True)
+    with Service(again, OPENING, lambda: None, let_in_after_s=0) as service:
+        second = service._early.result(timeout=40)
+        assert second is not None
+        assert second.port == port
+        page.until("__cocalib.state.connected && __cocalib.state.opening")
+        assert OPENING.doing in page.text("#status-text")
+        page.page.mouse.click(*page.place_of(300, 420))
+        page.until("__cocalib.unconfirmed() === 1")
+        second.admit(workspace, sample)
+        page.settle()
+        assert [round(row["u_px"]) for row in page.view["clicks"]] == [300]
+    page.complaints[:] = [text for text in page.complaints if "WebSocket connection" not in text]

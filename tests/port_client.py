@@ -1,0 +1,49 @@
+"""A client of the port: GET, the link that gives a cookie, and a page's channel."""
+
+import http.client
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+from app.web.server import RunningServer
+
+__all__ = ["Answer", "channel", "come_in", "get", "wanted"]
+
+
+class Answer:
+    def __init__(self, response: http.client.HTTPResponse) -> None:
+        self.status, self.headers, self.body = response.status, response.headers, response.read()
+
+
+def get(server: RunningServer, path: str, **headers: str) -> Answer:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
+    connection.request("GET", path, headers=headers)
+    answer = Answer(connection.getresponse())
+    connection.close()
+    return answer
+
+
+@contextmanager
+def channel(server: RunningServer, cookie: str, path: str = "/ws/tab1") -> Iterator[ClientConnection]:
+    address = server.origin.replace("http", "ws") + path
+    with connect(address, origin=server.origin, additional_headers={"Cookie": cookie}, max_size=None) as socket:
+        yield socket
+
+
+def come_in(server: RunningServer) -> str:
+    """Come in by the link; return the cookie."""
+    answer = get(server, server.url.removeprefix(server.origin))
+    assert answer.status == 303
+    assert answer.headers["Location"] == "/"
+    return answer.headers["Set-Cookie"].partition(";")[0]
+
+
+def wanted(socket: ClientConnection, kind: str) -> Any:
+    """Read on until a message of this kind comes."""
+    while True:
+        message = socket.recv(timeout=20)
+        if isinstance(message, str) and json.loads(message)["type"] == kind:
+            return json.loads(message)

@@ -1,0 +1,288 @@
+"""A recording that takes its time to open: pages are let in to wait, and end or go on with it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection
+
+from app.cli import run
+from app.web import serving
+from app.web.messages import Opening
+from app.web.server import RunningServer, ServerOptions
+from app.web.serving import Service
+from app.workspace import Workspace, open_workspace
+from calib_core.errors import RecordingError
+from tests.picture_recording import START, PictureRecording, grey_pictures
+from tests.port_client import channel, come_in, get, wanted
+
+OPENING = Opening("long.bag", "Opening long.bag")
+RECORDING = PictureRecording(grey_pictures(3))
+LONG_S = 60.0
+
+
+@pytest.fixture(autouse=True)
+def own_state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Iterator[Workspace]:
+    opened = open_workspace(RECORDING, camera=None, session_folder=tmp_path / "session", name="three greys")
+    yield opened
+    opened.close()
+
+
+def service(first_picture: Callable[[], Any] = lambda: None, *, let_in_after_s: float = 0.0) -> Service:
+    return Service(ServerOptions(port=0, no_browser=True), OPENING, first_picture, let_in_after_s=let_in_after_s)
+
+
+def early(opening: Service) -> RunningServer:
+    """Return the server that was started before the recording is open."""
+    server = opening._early.result(timeout=20)
+    assert server is not None
+    return server
+
+
+def picture(socket: ClientConnection) -> tuple[Any, bytes]:
+    """Read on until a picture comes: its header, its bytes."""
+    while not isinstance(message := socket.recv(timeout=20), bytes):
+        pass
+    length = int.from_bytes(message[:4], "little")
+    return json.loads(message[4 : 4 + length]), message[4 + length :]
+
+
+def test_a_page_that_waits_sees_the_first_picture_and_is_greeted_once_the_recording_is_open(
+    workspace: Workspace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with service(lambda: RECORDING.image_bytes(0)) as opening:
+        server = early(opening)
+        assert capsys.readouterr().out.splitlines() == ["Opening long.bag", f"Open {server.url}"]
+        cookie = come_in(server)
+        with channel(server, cookie, "/ws/tab1") as one, channel(server, cookie, "/ws/tab2") as two:
+            for socket in (one, two):
+                socket.send('{"type":"hello"}')
+                told = wanted(socket, "opening")
+                assert (told["name"], told["doing"], told["problem"]) == ("long.bag", "Opening long.bag", "")
+                header, data = picture(socket)
+                assert (header["index"], header["request"], header["width_px"]) == (-1, 0, 320)
+                assert data == RECORDING.image_bytes(0).data
+            server.admit(workspace, RECORDING)
+            for socket in (one, two):
+                assert wanted(socket, "recording")["name"] == "three greys"
+                assert wanted(socket, "view")["clicks"] == []
+
+
+def test_the_page_is_served_meanwhile_and_downloads_are_put_off(workspace: Workspace) -> None:
+    with service() as opening:
+        server = early(opening)
+        assert get(server, "/").status == 401
+        cookie = come_in(server)
+        assert get(server, "/", Cookie=cookie).status == 200
+        assert get(server, "/viser/tab1/", Cookie=cookie).status == 200
+        for path in ("/api/clicks.json", "/api/formats.json", "/api/export/tf2"):
+            answer = get(server, path, Cookie=cookie)
+            assert answer.status == 503
+            assert b"still being opened" in answer.body
+        server.admit(workspace, RECORDING)
+        assert get(server, "/api/clicks.json", Cookie=cookie).status == 200
+
+
+def test_what_a_page_says_meanwhile_is_done_afterwards_and_in_order(workspace: Workspace) -> None:
+    sec, nanosec = divmod(START, 10**9)
+    place = {"type": "click_placed", "image_time": {"sec": sec, "nanosec": nanosec}}
+    with service() as opening:
+        server = early(opening)
+        with channel(server, come_in(server)) as socket:
+            for request in range(40):
+                socket.send(json.dumps({**place, "pixel_px": [request, 1], "request": request}))
+            wanted(socket, "opening")
+            server.admit(workspace, RECORDING)
+            assert [wanted(socket, "done")["request"] for _ in range(40)] == list(range(40))
+    assert [click.u_px for click in workspace.session.clicks] == [39]
+
+
+def test_a_page_that_leaves_while_waiting_disturbs_nobody(workspace: Workspace) -> None:
+    with service() as opening:
+        server = early(opening)
+        cookie = come_in(server)
+        with channel(server, cookie, "/ws/gone") as gone:
+            wanted(gone, "opening")
+        with channel(server, cookie, "/ws/stays") as stays:
+            stays.send('{"type":"hello"}')
+            server.admit(workspace, RECORDING)
+            assert wanted(stays, "recording")["name"] == "three greys"
+
+
+def test_a_page_that_says_too_much_while_waiting_is_let_go() -> None:
+    with service() as opening:
+        server = early(opening)
+        with channel(server, come_in(server)) as socket:
+            for _ in range(2000):
+                socket.send('{"type":"hello"}')
+            with pytest.raises(ConnectionClosed):
+                wanted(socket, "never")
+
+
+def fail_to_open(error: BaseException, pages: ExitStack) -> None:
+    """Let a page in to wait, then fail; the page goes onto the stack of the test."""
+    with service() as opening:
+        server = early(opening)
+        socket = pages.enter_context(channel(server, come_in(server)))
+        wanted(socket, "opening")
+        pages.callback(_end_of, server, socket, error)
+        raise error
+
+
+def _end_of(server: RunningServer, socket: ClientConnection, error: BaseException) -> None:
+    """See what the page heard last, and that nobody serves any more."""
+    if isinstance(error, RecordingError):
+        assert wanted(socket, "opening")["problem"] == "No radar in it."
+    with pytest.raises(ConnectionClosed):
+        wanted(socket, "never")
+    with pytest.raises(ConnectionRefusedError):
+        get(server, "/")
+
+
+@pytest.mark.parametrize("error", [RecordingError("no radar in it"), KeyboardInterrupt()])
+def test_an_end_while_opening_reaches_the_page_and_the_caller(error: BaseException) -> None:
+    with ExitStack() as pages, pytest.raises(type(error)):
+        fail_to_open(error, pages)
+
+
+def test_an_error_of_another_kind_is_left_to_the_terminal() -> None:
+    assert serving._in_words(OSError(5, "Input/output error")).endswith("the terminal says why.")
+
+
+def test_a_first_picture_that_cannot_be_read_harms_nothing(
+    workspace: Workspace, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken() -> Any:
+        raise ZeroDivisionError("odd")
+
+    with service(broken) as opening:
+        server = early(opening)
+        server.admit(workspace, RECORDING)
+        with channel(server, come_in(server)) as socket:
+            socket.send('{"type":"hello"}')
+            assert wanted(socket, "recording")["name"] == "three greys"
+    assert "odd" in caplog.text
+
+
+def test_a_recording_that_is_open_at_once_is_served_without_a_word_of_opening(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    admit, started = RunningServer.admit, []
+
+    def admit_look_and_stop(server: RunningServer, *opened: Any) -> None:
+        admit(server, *opened)
+        with channel(server, come_in(server)) as socket:
+            socket.send('{"type":"hello"}')
+            first = json.loads(socket.recv(timeout=20))
+            started.append((server, first["type"]))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(RunningServer, "admit", admit_look_and_stop)
+    with service(let_in_after_s=LONG_S) as opening:
+        opening.serve(workspace, RECORDING)
+    ((server, first),) = started
+    assert first == "recording"
+    printed = capsys.readouterr().out
+    assert "Opening" not in printed
+    assert "every click is kept" in printed
+    with pytest.raises(ConnectionRefusedError):
+        get(server, "/")
+
+
+def test_an_error_at_once_is_served_to_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serving, "RunningServer", None)
+    with pytest.raises(RecordingError, match="empty"), service(let_in_after_s=LONG_S):
+        raise RecordingError("empty")
+
+
+def test_a_port_that_cannot_be_had_is_told_before_anything_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    def taken(*_: object) -> None:
+        raise OSError("no port is free")
+
+    monkeypatch.setattr(serving, "RunningServer", taken)
+    with pytest.raises(OSError, match="no port is free"), service():
+        pytest.fail("opened all the same")
+
+
+def test_a_late_error_is_one_line_and_exit_code_2(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    link_is_out = threading.Event()
+
+    def slow_and_wrong(*_: object) -> None:
+        assert link_is_out.wait(20)
+        raise RecordingError("holiday.bag: not a recording")
+
+    monkeypatch.setattr("webbrowser.open", lambda _: link_is_out.set())
+    monkeypatch.setattr("calib_core.recordings.open_recording", slow_and_wrong)
+    (tmp_path / "holiday.bag").write_bytes(b"GIF89a")
+    assert run(["open", str(tmp_path / "holiday.bag"), "--port", "0"]) == 2
+    printed = capsys.readouterr()
+    assert printed.err == "cocalib: holiday.bag: not a recording\n"
+    assert "Open http://" in printed.out
+
+
+@pytest.mark.parametrize("flag", ["--camera", "--calibration", "--clicks"])
+def test_a_named_file_that_is_missing_is_refused_before_anything_is_read(
+    flag: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("calib_core.recordings.open_recording", None)
+    (tmp_path / "a.bag").write_bytes(b"")
+    assert run(["open", str(tmp_path / "a.bag"), "--no-browser", flag, str(tmp_path / "absent")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("absent: no such file; check the path")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a signal to one process is a matter of POSIX")
+def test_ctrl_c_while_opening_ends_the_program_quietly(tmp_path: Path) -> None:
+    program = (
+        "import sys, threading, calib_core.recordings as recordings\n"
+        "recordings.open_recording = lambda *_: threading.Event().wait()\n"
+        "from app.cli import run\n"
+        "sys.exit(run(['open', sys.argv[1], '--no-browser', '--port', '0']))\n"
+    )
+    (tmp_path / "long.bag").write_bytes(b"")
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    running = subprocess.Popen(
+        [sys.executable, "-c", program, str(tmp_path / "long.bag")],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment,
+    )  # fmt: skip
+    assert running.stdout is not None
+    assert any("http://" in line for line in running.stdout)
+    running.send_signal(signal.SIGINT)
+    _, complaints = running.communicate(timeout=30)
+    assert (running.returncode, complaints.strip()) == (130, "")
+
+
+def test_a_large_recording_has_its_link_before_it_is_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    printed_before = []
+
+    def look(*_: object) -> None:
+        printed_before.append(capsys.readouterr().out)
+        raise RecordingError("long: not a recording")
+
+    monkeypatch.setattr("calib_core.recordings.open_recording", look)
+    folder = tmp_path / "long"
+    folder.mkdir()
+    with (folder / "long.mcap").open("wb") as file:
+        file.truncate(2_000_000_000)
+    assert run(["open", str(folder), "--port", "0", "--no-browser"]) == 2
+    opening, link = printed_before[0].splitlines()
+    assert opening.startswith("Opening long (2.0 GB)")
+    assert link.startswith("Open http://")
