@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import logging
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -249,3 +250,16 @@ def test_after_closing_nobody_answers(tmp_path: Path, monkeypatch: pytest.Monkey
     with pytest.raises(ConnectionRefusedError):
         get(running, "/")
     assert (tmp_path / "cocalib" / "cookie.key").stat().st_mode & 0o077 == 0
+
+
+def test_the_terminal_is_told_of_failures_but_not_of_clients_that_leave(
+    server: RunningServer, caplog: pytest.LogCaptureFixture
+) -> None:
+    port = logging.getLogger("cocalib.port")
+    for message, error in (
+        ("opening handshake failed", ValueError("a port scan")),
+        ("unexpected internal error", AssertionError("eof_sent")),
+        ("unexpected internal error", OSError("no more memory")),
+    ):
+        port.error(message, exc_info=error)
+    assert [str(record.exc_info[1]) for record in caplog.records if record.exc_info] == ["no more memory"]
