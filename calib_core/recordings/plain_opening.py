@@ -41,6 +41,11 @@ def open_plain_sources(
                 left.append(path)
             else:
                 opened.append(_with_own_topic(source, [other.channel.topic for other in opened]))
+        if video_start is not None and not any(source.path.suffix.lower() in VIDEO_SUFFIXES for source in opened):
+            raise RecordingError(
+                f"--video-start {video_start}: there is no video among {', '.join(path.name for path in paths)}; "
+                "leave it away, or give the video too"
+            )
     except RecordingError:
         for source in opened:
             source.close()

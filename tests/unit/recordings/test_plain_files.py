@@ -356,6 +356,11 @@ def test_a_video_without_its_start_or_without_frames_is_refused_in_words(tmp_pat
     assert "no video that can be read" in refusal(tmp_path / "b.mp4", video_start="1700000000")
 
 
+def test_a_start_without_a_video_is_refused_rather_than_ignored(project_root: Path) -> None:
+    words = refusal(project_root / "sample_data" / "rooftop" / "camera.bag", video_start="1700000000")
+    assert "there is no video among camera.bag" in words
+
+
 # -- together
 
 
