@@ -12,7 +12,7 @@ from calib_core.geometry import skew
 from calib_core.intrinsics_doubts import intrinsics
 from calib_core.locating import CLUSTER_SCALE
 from calib_core.pair_doubts import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
-from calib_core.pose_doubts import camera_position, mirrored_axes, two_poses
+from calib_core.pose_doubts import assumed_axes, camera_position, mirrored_axes, two_poses
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.results import Caution
 
@@ -43,6 +43,7 @@ def cautions_of(findings: Findings) -> tuple[Caution, ...]:
         ambiguous_candidates,
         contradicted_pairs,
         decisive_pair,
+        assumed_axes,
     )
     return tuple(caution for check in checks for caution in check(findings))
 

@@ -6,13 +6,15 @@ import numpy as np
 
 from calib_core.consensus import Consensus
 from calib_core.findings import Findings
+from calib_core.flat_elevations import is_flat
 from calib_core.geometry import RigidTransform
 from calib_core.handedness import MIRRORED_GAIN, NOT_MIRRORED_GAIN
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.refining import refine
 from calib_core.results import Caution
 from calib_core.uncertainty import pose_uncertainty
 
-__all__ = ["camera_position", "mirrored_axes", "two_poses"]
+__all__ = ["assumed_axes", "camera_position", "mirrored_axes", "two_poses"]
 
 _ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
 _OTHER_POSE_RAD = np.deg2rad(5.0)
@@ -20,6 +22,8 @@ _OTHER_POSE_SIGMAS = 6.0
 _FAR_CAMERA = 3.0
 _CONTRADICTION_SIGMAS = 4.0
 _SUSPICIOUS_NOISE = 1.6
+_PLANE_ROUNDS = 6
+_ONE_IN_A_HUNDRED = 2.33
 
 
 def mirrored_axes(f: Findings) -> list[Caution]:
@@ -43,6 +47,41 @@ def mirrored_axes(f: Findings) -> list[Caution]:
             )
         ]
     return []
+
+
+def assumed_axes(f: Findings) -> list[Caution]:
+    """Say that the choice between the two hands is not the pairs' own, where it passes for clear."""
+    said = f.mirror_gain > NOT_MIRRORED_GAIN or is_flat(f.evidence)
+    if said or f.evidence.belief.measured or _heights_decide(f):
+        return []
+    return [
+        Caution(
+            "handedness-assumed",
+            "the placements lie near one plane, where mirrored radar axes fit as well: that none is mirrored rests on the "
+            f"camera being within about {f.evidence.belief.sigma_m:g} m of the radar",
+            "measure the camera position (0.3 m is enough for this), or add placements at other heights (a tripod)",
+        )
+    ]
+
+
+def _heights_decide(f: Findings) -> bool:
+    """Tell whether the placements leave every plane so far that the pairs alone rule mirrored axes out.
+
+    Mirrored axes and a turned camera are a reflection in some plane; it moves a placement by twice its height h above that
+    plane. So twice the log-likelihood falls by about sum (2 h / sigma)^2 with the true heights, by 4 (chi2 - (n - 3)) with
+    measured ones, and the noise of that is asked to matter in one set of a hundred only.
+    """
+    evidence, rows = f.refined.evidence, f.refined.rows[f.inliers]
+    points = cartesian_from_polar(evidence.polar[rows])
+    covariances = covariance_from_sigma_polar(points, evidence.sigma_polar[rows])
+    weights, chi2 = np.ones(len(points)), np.inf
+    for _ in range(_PLANE_ROUNDS):
+        offsets = points - (weights @ points) / weights.sum()
+        normal = np.linalg.svd(offsets * np.sqrt(weights)[:, None])[2][2]
+        weights = 1.0 / np.einsum("i,nij,j->n", normal, covariances, normal)
+        chi2 = min(chi2, float(weights @ (offsets @ normal) ** 2))
+    redundancy = max(len(points) - 3, 1)
+    return 4.0 * (chi2 - redundancy) > MIRRORED_GAIN + 4.0 * _ONE_IN_A_HUNDRED * np.sqrt(2.0 * redundancy)
 
 
 def two_poses(f: Findings) -> list[Caution]:

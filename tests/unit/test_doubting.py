@@ -62,10 +62,10 @@ def named(calibration: Calibration) -> set[str]:
     return out | {pair.id for pair in calibration.pairs if any(f"without {pair.id} " in text for text in texts)}
 
 
-def test_the_sample_as_clicked_raises_no_doubt(rooftop: Session, truth: RigidTransform) -> None:
+def test_the_sample_raises_no_doubt_but_that_flat_ground_has_two_hands(rooftop: Session, truth: RigidTransform) -> None:
     calibration = solved_with(rooftop, "c1")
     assert named(calibration) == set()
-    assert calibration.cautions == ()
+    assert [one.code for one in calibration.cautions] == ["handedness-assumed"]
     assert inside_what_is_stated(calibration, truth)
 
 
