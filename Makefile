@@ -43,9 +43,9 @@ test: dev  ## Every test, the browser ones included.
 	@$(BIN)/python tests/find_browser.py --install
 	$(BIN)/pytest
 
-bench: dev  ## Speed, as ratios within one run; writes docs/speed.md.
+bench: dev  ## Speed, as ratios within one run; writes docs/speed.md. BENCH=--large opens 5 GB and 100 GB as well.
 	@$(BIN)/python tests/find_browser.py --install
-	$(BIN)/python -m benchmarks.speed
+	$(BIN)/python -m benchmarks.speed $(BENCH)
 
 bench-accuracy: $(VENV)/.bench  ## Accuracy against the bound and other estimators; writes docs/accuracy.md (an hour or two).
 	$(BIN)/python -m benchmarks.accuracy $(ACCURACY)

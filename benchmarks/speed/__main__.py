@@ -16,14 +16,15 @@ _PAGE = Path(__file__).resolve().parents[2] / "docs" / "speed.md"
 
 def main() -> int:
     """Run every measurement; the exit code is 0 whatever the figures are."""
+    large = "--large" in sys.argv
     with tempfile.TemporaryDirectory() as scratch:
         tables = [
             *measure_page(Path(scratch)),
             measure_solving(),
             measure_starting(sample_folder() / "rooftop"),
-            measure_recordings(Path(scratch), large="--large" in sys.argv),
+            measure_recordings(Path(scratch), large=large),
         ]
-    text = page(tables)
+    text = page(tables, command="make bench BENCH=--large" if large else "make bench")
     _PAGE.write_text(text, encoding="utf-8")
     print(text)
     return 0

@@ -45,12 +45,12 @@ def spread(values_ms: Sequence[float]) -> str:
     return f"{np.median(values_ms):.0f} ms (p95 {np.percentile(values_ms, 95):.0f})"
 
 
-def page(tables: Sequence[Table]) -> str:
-    """Write the page of tables in Markdown."""
+def page(tables: Sequence[Table], *, command: str) -> str:
+    """Write the page of tables in Markdown, and the command that measured them."""
     lines = [
         "# Speed",
         "",
-        f"Written by `make bench`. Machine: {_machine()}. Read times as ratios within this one run.",
+        f"Written by `{command}`. Machine: {_machine()}. Read times as ratios within this one run.",
     ]
     for table in tables:
         lines += ["", f"## {table.title}", "", table.how, "", "| what | measured | ratio | aim |", "|---|---|---|---|"]
