@@ -1,4 +1,4 @@
-"""Measure everything and write docs/speed.md; --large takes recordings of 5 GB and, sparse, 100 GB."""
+"""Measure everything and write docs/speed.md; --large opens recordings of 5 GB and, sparse, 100 GB as well."""
 
 import sys
 import tempfile
