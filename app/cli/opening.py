@@ -1,6 +1,7 @@
 """`cocalib demo` and `cocalib open`: the page."""
 
 import dataclasses
+import hashlib
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -70,13 +71,22 @@ class Demo:
         from app.session_file import user_session_folder
 
         sample = sample_folder() / "rooftop"
+        bags = (sample / "radar.bag", sample / "camera.bag")
         return _serve(
-            (sample / "radar.bag", sample / "camera.bag"),
-            session=self.session or user_session_folder("demo"),
+            bags,
+            session=self.session or user_session_folder(f"demo-{_digest(bags)}"),
             fresh=self.fresh,
             serving=self.serving,
             name="the sample recording",
         )
+
+
+def _digest(files: Sequence[Path]) -> str:
+    """Return a few letters that tell one sample from that of another version: a session belongs to one recording."""
+    content = hashlib.sha256()
+    for file in files:
+        content.update(file.read_bytes())
+    return content.hexdigest()[:8]
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,12 +3,15 @@
 import json
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from app import resources
+from app.cli import opening
 from calib_core.geometry import rotation_angle_rad
 from tests.cli.conftest import Made
 
@@ -249,3 +252,21 @@ def test_video_writes_the_camera_and_says_when_it_begins(
     assert answer.code == 0, answer.err
     assert re.search(r"camera\.mp4: \d+ frames, [\d.]+ s, from \d+\.\d{9} s", answer.out)
     assert (tmp_path / "camera.mp4").stat().st_size > 1000
+
+
+def test_the_demo_of_another_version_has_a_session_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sessions: list[Path] = []
+
+    def serve(_bags: Any, *, session: Path, **_more: Any) -> int:
+        sessions.append(session)
+        return 0
+
+    monkeypatch.setattr(opening, "_serve", serve)
+    for sample in ("first", "first", "second"):
+        (tmp_path / sample / "rooftop").mkdir(parents=True, exist_ok=True)
+        for bag in ("radar.bag", "camera.bag"):
+            (tmp_path / sample / "rooftop" / bag).write_text(f"{bag} of the {sample} version")
+        monkeypatch.setattr(resources, "sample_folder", partial(tmp_path.__truediv__, sample))
+        assert opening.Demo().run() == 0
+    assert sessions[0] == sessions[1]
+    assert sessions[2] != sessions[0]
