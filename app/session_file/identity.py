@@ -62,7 +62,8 @@ def require_same_recording(kept: RecordingForm, facts: RecordingFacts, folder: P
         return
     raise SessionFileError(
         f"{folder}: the session is of {_described(kept)}, but what was opened is {_described(opened)}; "
-        "open the recording and the image topic it was made with, or give another --session folder"
+        "open the recording and the image topic it was made with, give another --session folder, or begin anew with --fresh "
+        "(the old one is kept beside)"
     )
 
 
