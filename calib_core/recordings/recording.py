@@ -175,12 +175,8 @@ class Recording:
             IndexError: there is no such frame.
         """
         self._check(index)
-        images = self._assembly.images
-        assert images is not None
-        if self.video_start is not None:
-            return "video file"
-        row = int(images.row[index])
-        return images.layouts[int(images.topic.part[row])].recorded_as(images.topic.payload(row))
+        assert self._assembly.images is not None
+        return "video file" if self.video_start is not None else self._assembly.images.recorded_as(index)
 
     def _check(self, index: int) -> None:
         self._check_open()

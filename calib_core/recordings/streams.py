@@ -304,15 +304,25 @@ class ImageStream:
 
     def encoded(self, index: int) -> EncodedImage:
         """Return a frame as a file."""
-        row = int(self.row[index])
-        return self.layouts[int(self.topic.part[row])].encoded(self.topic.payload(row))
+        layout, payload = self._frame(index)
+        return layout.encoded(payload)
 
     def picture(self, index: int) -> np.ndarray:
         """Return a frame's pixels, blue first."""
-        row = int(self.row[index])
-        return self.layouts[int(self.topic.part[row])].picture(self.topic.payload(row))
+        layout, payload = self._frame(index)
+        return layout.picture(payload)
 
     def size_px(self, index: int) -> tuple[int, int]:
         """Return a frame's width and height, without decoding it."""
+        layout, payload = self._frame(index)
+        return layout.size_px(payload)
+
+    def recorded_as(self, index: int) -> str:
+        """Return what a frame was recorded as, for people."""
+        layout, payload = self._frame(index)
+        return layout.recorded_as(payload)
+
+    def _frame(self, index: int) -> tuple[ImageLayout, bytes]:
+        """Return a frame's message, and how to read it."""
         row = int(self.row[index])
-        return self.layouts[int(self.topic.part[row])].size_px(self.topic.payload(row))
+        return self.layouts[int(self.topic.part[row])], self.topic.payload(row)
