@@ -21,13 +21,9 @@ def angle_map_document(angle_map: AngleMap | None) -> AngleMapDocument | None:
         add_elevation_rad=add[:, :, 1].tolist(),
         sigma_azimuth_rad=sigma[:, :, 0].tolist(),
         sigma_elevation_rad=sigma[:, :, 1].tolist(),
-        aed_px=_known(angle_map.raw_aed_px),
-        corrected_aed_px=_known(angle_map.corrected_aed_px),
+        aed_px=angle_map.raw_aed_px,
+        corrected_aed_px=angle_map.corrected_aed_px,
     )
-
-
-def _known(value: float) -> float | None:
-    return value if np.isfinite(value) else None
 
 
 def angle_map_of(document: AngleMapDocument | None, *, source: str) -> AngleMap | None:

@@ -7,31 +7,23 @@ import numpy as np
 import pytest
 
 from calib_core.calibrate import calibrate
-from calib_core.camera import Camera
 from calib_core.clock_doubts import clock_offset
-from calib_core.interchange import read_clicks
-from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
+from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
-from calib_core.recordings import open_recording
 from calib_core.results import Calibration, PairResult
+from tests.rooftop import ClickedSample, read_rooftop
 
-Session = tuple[tuple[ReflectorClick, ...], RadarScans, Camera]
 DWELL_S = 4.0
 EVERY_S = 10.0
 AHEAD_S = 3.0
 
 
 @pytest.fixture(scope="module")
-def rooftop(project_root: Path) -> Session:
-    folder = project_root / "sample_data" / "rooftop"
-    clicks = read_clicks((folder / "clicks.json").read_text(encoding="utf-8"), "clicks.json")
-    with open_recording([folder / "camera.bag", folder / "radar.bag"]) as recording:
-        camera = recording.camera()
-        assert camera is not None
-        return clicks, recording.radar_scans_around([click.image_time for click in clicks], 8.0), camera
+def rooftop(project_root: Path) -> ClickedSample:
+    return read_rooftop(project_root, 8.0)
 
 
-def said(rooftop: Session, ahead_s: float) -> list[str]:
+def said(rooftop: ClickedSample, ahead_s: float) -> list[str]:
     clicks, scans, camera = rooftop
     shifted = replace(scans, times_ns=scans.times_ns + round(ahead_s * NS_PER_S))
     outcome = calibrate(clicks, shifted, camera, CalibrationOptions())
@@ -41,14 +33,14 @@ def said(rooftop: Session, ahead_s: float) -> list[str]:
 
 @pytest.mark.parametrize("ahead_s", [0.0, 1.0, -1.0])
 def test_an_offset_that_leaves_the_clicks_in_their_dwells_does_no_harm_and_is_not_spoken_of(
-    rooftop: Session, ahead_s: float
+    rooftop: ClickedSample, ahead_s: float
 ) -> None:
     assert said(rooftop, ahead_s) == []
 
 
 @pytest.mark.parametrize(("ahead_s", "words"), [(AHEAD_S, "ahead of"), (-AHEAD_S, "behind")])
 def test_stamps_that_take_the_clicks_out_of_their_dwells_are_suspected(
-    rooftop: Session, ahead_s: float, words: str
+    rooftop: ClickedSample, ahead_s: float, words: str
 ) -> None:
     (text,) = said(rooftop, ahead_s)
     assert words in text

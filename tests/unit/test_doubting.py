@@ -8,29 +8,19 @@ import numpy as np
 import pytest
 
 from calib_core.calibrate import calibrate, calibrate_pairs
-from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
-from calib_core.interchange import read_clicks
-from calib_core.measurements import RadarScans, ReflectorClick
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
-from calib_core.recordings import open_recording
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
+from tests.rooftop import ClickedSample, read_rooftop
 
 FREE = CalibrationOptions()
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 
-Session = tuple[tuple[ReflectorClick, ...], RadarScans, Camera]
-
 
 @pytest.fixture(scope="module")
-def rooftop(project_root: Path) -> Session:
-    folder = project_root / "sample_data" / "rooftop"
-    clicks = read_clicks((folder / "clicks.json").read_text(encoding="utf-8"), "clicks.json")
-    with open_recording([folder / "camera.bag", folder / "radar.bag"]) as recording:
-        camera = recording.camera()
-        assert camera is not None
-        return clicks, recording.radar_scans_around([click.image_time for click in clicks], 1.6), camera
+def rooftop(project_root: Path) -> ClickedSample:
+    return read_rooftop(project_root, 1.6)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +31,7 @@ def truth(project_root: Path) -> RigidTransform:
 
 
 def solved_with(
-    rooftop: Session, click: str, *, du_px: float = 0.0, dv_px: float = 0.0, method: str = "default"
+    rooftop: ClickedSample, click: str, *, du_px: float = 0.0, dv_px: float = 0.0, method: str = "default"
 ) -> Calibration:
     clicks, scans, camera = rooftop
     slipped = [replace(one, u_px=one.u_px + du_px, v_px=one.v_px + dv_px) if one.id == click else one for one in clicks]
@@ -62,7 +52,9 @@ def named(calibration: Calibration) -> set[str]:
     return out | {pair.id for pair in calibration.pairs if any(f"without {pair.id} " in text for text in texts)}
 
 
-def test_the_sample_raises_no_doubt_but_that_flat_ground_has_two_hands(rooftop: Session, truth: RigidTransform) -> None:
+def test_the_sample_raises_no_doubt_but_that_flat_ground_has_two_hands(
+    rooftop: ClickedSample, truth: RigidTransform
+) -> None:
     calibration = solved_with(rooftop, "c1")
     assert named(calibration) == set()
     assert [one.code for one in calibration.cautions] == ["handedness-assumed"]
@@ -73,21 +65,21 @@ def test_the_sample_raises_no_doubt_but_that_flat_ground_has_two_hands(rooftop: 
     ("click", "du_px", "dv_px"), [("c1", -40.0, 0.0), ("c11", 0.0, -40.0), ("c6", 35.0, 0.0), ("c2", -40.0, 0.0)]
 )
 def test_a_click_that_slipped_is_named_and_the_truth_stays_inside_what_is_stated(
-    rooftop: Session, truth: RigidTransform, click: str, du_px: float, dv_px: float
+    rooftop: ClickedSample, truth: RigidTransform, click: str, du_px: float, dv_px: float
 ) -> None:
     calibration = solved_with(rooftop, click, du_px=du_px, dv_px=dv_px)
     assert named(calibration) == {click}
     assert inside_what_is_stated(calibration, truth)
 
 
-def test_a_slip_far_away_leaves_the_noise_level_alone(rooftop: Session) -> None:
+def test_a_slip_far_away_leaves_the_noise_level_alone(rooftop: ClickedSample) -> None:
     clicks, scans, camera = rooftop
     without = calibrate([replace(one, excluded=one.id == "c11") for one in clicks], scans, camera, FREE)
     assert isinstance(without, Calibration)
     assert solved_with(rooftop, "c11", dv_px=-60.0).noise_scale == pytest.approx(without.noise_scale, rel=0.1)
 
 
-def test_a_doubtful_pair_that_is_let_go_moves_the_camera_as_announced(rooftop: Session) -> None:
+def test_a_doubtful_pair_that_is_let_go_moves_the_camera_as_announced(rooftop: ClickedSample) -> None:
     clicks, scans, camera = rooftop
     doubted = solved_with(rooftop, "c1", du_px=-40.0)
     rest = [replace(click, excluded=click.id == "c1") for click in clicks]
@@ -112,7 +104,7 @@ def test_a_hundred_good_sets_raise_hardly_a_doubt(options: CalibrationOptions) -
     assert wrongly_out <= 4  # of 2000
 
 
-def test_algorithm_1_says_that_most_pairs_disagree_and_residuals_are_too_large(rooftop: Session) -> None:
+def test_algorithm_1_says_that_most_pairs_disagree_and_residuals_are_too_large(rooftop: ClickedSample) -> None:
     calibration = solved_with(rooftop, "c1", method="paper")
     codes = {caution.code for caution in calibration.cautions}
     assert {"many-outliers", "residuals-too-large"} <= codes
