@@ -16,6 +16,7 @@ from app.option_changes import checked_options
 from app.resources import version
 from app.session import Outcome, Solved
 from calib_core.arrays import TimesNs
+from calib_core.association.pairing import pair_clicks
 from calib_core.calibrate import calibrate, calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError, InputError
@@ -29,7 +30,6 @@ from calib_core.interchange import (
 from calib_core.interchange import calibration_text as interchange_text
 from calib_core.measurements import Pair, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.pairing import pair_clicks
 from calib_core.results import Calibration, PairResult
 
 __all__ = [

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol, TypeAlias
 
 from app.session import ClicksImported, History, RecordingFacts, Redo, Session, Solved, Step, Undo, advance, settled
-from app.session_file import Restored, open_session_file
+from app.session.file import Restored, open_session_file
 from app.solving import RecordingSource, SolverWorker
 from app.view import Reference, View, view
 from calib_core.camera import Camera
@@ -22,7 +22,7 @@ Subscriber: TypeAlias = Callable[[View], None]
 
 
 class Journal(Protocol):
-    """What keeps the steps: app.session_file.SessionFile, or a list in a test."""
+    """What keeps the steps: app.session.file.SessionFile, or a list in a test."""
 
     def append(self, step: Step, history: History) -> None:
         """Keep a step for good before returning; `history` is what it leads to."""

@@ -6,24 +6,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Flags, Values
+from calib_core.association.pairing import pair_clicks
 from calib_core.camera import Camera
-from calib_core.clock_doubts import clocks
-from calib_core.consensus import Consensus, associate, find_consensus
 from calib_core.diagnostics import cautions_of
-from calib_core.doubting import between_doubts, doubts_of
-from calib_core.evidence import Evidence, evidence_of
-from calib_core.findings import Findings
-from calib_core.handedness import MIRRORED_GAIN, mirror_gain
-from calib_core.initial_pose import starting_poses
-from calib_core.linearising import Linearised
+from calib_core.diagnostics.clock_doubts import clocks
+from calib_core.diagnostics.findings import Findings
+from calib_core.estimation.consensus import Consensus, associate, find_consensus
+from calib_core.estimation.doubting import between_doubts, doubts_of
+from calib_core.estimation.evidence import Evidence, evidence_of
+from calib_core.estimation.handedness import MIRRORED_GAIN, mirror_gain
+from calib_core.estimation.initial_pose import starting_poses
+from calib_core.estimation.linearising import Linearised
+from calib_core.estimation.refining import Refined, refine
+from calib_core.estimation.uncertainty import LeftOut, leave_one_out, pose_uncertainty
 from calib_core.measurements import Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.metrics import distances, metrics_of
 from calib_core.options import CalibrationOptions
-from calib_core.pairing import pair_clicks
 from calib_core.radar import cartesian_from_polar
-from calib_core.refining import Refined, refine
 from calib_core.results import Calibration, Metrics, PairResult
-from calib_core.uncertainty import LeftOut, leave_one_out, pose_uncertainty
 
 __all__ = ["MIN_PAIRS", "calibrate", "calibrate_pairs"]
 
@@ -52,7 +52,7 @@ def calibrate(
         options: method "paper" is Algorithm 1 as printed.
     """
     if options.method == "paper":
-        from calib_core.paper import calibrate_as_printed
+        from calib_core.paper.algorithm_1 import calibrate_as_printed
 
         return calibrate_as_printed(clicks, scans, camera, options)
     pairing = pair_clicks(clicks, scans, options)
@@ -75,7 +75,7 @@ def calibrate_pairs(
         excluded: ids of pairs that are shown, but not used.
     """
     if options.method == "paper":
-        from calib_core.paper import solve_pairs_as_printed
+        from calib_core.paper.algorithm_1 import solve_pairs_as_printed
 
         return solve_pairs_as_printed(pairs, camera, options, excluded)
     shown = sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, sync_playwright
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from app.web.server import RunningServer, ServerOptions, start  # noqa: E402
+from app.web.port.server import RunningServer, ServerOptions, start  # noqa: E402
 from app.workspace import open_workspace  # noqa: E402
 from calib_core.recordings import open_recording  # noqa: E402
 from tests.browser.driving import FLAGS, Driver  # noqa: E402

@@ -8,7 +8,7 @@ import { send } from "./socket.js";
 import { on, state } from "./state.js";
 
 /** @typedef {{key: string, label: string, takes_parent: boolean, takes_rectified: boolean}} Format */
-/** What the server says about a format: ExportPreview in app/web/exports.py. @typedef {Record<string, any>} Preview */
+/** What the server says about a format: ExportPreview in app/web/channel/exports.py. @typedef {Record<string, any>} Preview */
 const KEPT = "cocalib-export";
 const CLICKS = "clicks";
 const PARENT = ["x", "y", "z", "qx", "qy", "qz", "qw"];

@@ -8,7 +8,7 @@ from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
-from app.web.server import RunningServer
+from app.web.port.server import RunningServer
 
 __all__ = ["Answer", "channel", "come_in", "get", "wanted"]
 

@@ -30,7 +30,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, RecordingOptions
 
 if TYPE_CHECKING:
-    from app.web.serving import Service
+    from app.web.port.serving import Service
 
 __all__ = ["Demo", "Open"]
 
@@ -68,7 +68,7 @@ class Demo:
     def run(self) -> int:
         """Serve until Ctrl+C; return the exit code."""
         from app.resources import sample_folder
-        from app.session_file import user_session_folder
+        from app.session.file import user_session_folder
 
         sample = sample_folder() / "rooftop"
         bags = (sample / "radar.bag", sample / "camera.bag")
@@ -112,7 +112,7 @@ class Open:
 
     def run(self) -> int:
         """Serve until Ctrl+C; return the exit code."""
-        from app.session_file import recording_session_folder
+        from app.session.file import recording_session_folder
         from calib_core.recordings import require_files
 
         paths = require_files(self.recording)
@@ -150,9 +150,9 @@ def _serve(
     """
     from app.resources import check_installation
     from app.session import OptionsChanged
-    from app.session_file import set_aside
+    from app.session.file import set_aside
     from app.view import sentence
-    from app.web.address import require_address, require_token
+    from app.web.port.address import require_address, require_token
     from app.workspace import open_workspace
     from calib_core.recordings import open_recording
 
@@ -184,8 +184,8 @@ def _serve(
 def _service(paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str) -> "Service":
     """Return what serves; a large recording is served, to be waited for, before it is open."""
     from app.web.messages import Opening
-    from app.web.server import ServerOptions
-    from app.web.serving import Service
+    from app.web.port.server import ServerOptions
+    from app.web.port.serving import Service
     from calib_core.recordings import first_picture
 
     size_bytes = sum(map(_size_bytes, paths))

@@ -9,7 +9,7 @@ from app.view.digits import plain, with_sigma
 from app.view.drawn import Figure
 from app.view.mounting import mounting_of
 from app.view.rows import ellipse_of
-from calib_core.angle_map import AngleMap, learn_angle_map
+from calib_core.advice.angle_map import AngleMap, learn_angle_map
 from calib_core.results import Calibration
 
 __all__ = ["metric_figures", "pose_figures", "residual_limit_px"]

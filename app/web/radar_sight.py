@@ -10,10 +10,10 @@ from app.session import Session
 from app.view import Reference, shown_calibration
 from app.web.messages import Overlay, OverlayReturn
 from calib_core.arrays import Flags, Points3
-from calib_core.gating import static_returns
+from calib_core.association.gating import static_returns
+from calib_core.association.placements import Placement
 from calib_core.measurements import RadarScan, RadarScans, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
-from calib_core.placements import Placement
 from calib_core.results import Calibration
 
 __all__ = ["RadarSight", "Scans", "overlay_of", "still_returns"]

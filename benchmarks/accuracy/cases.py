@@ -5,14 +5,14 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.evidence import CameraBelief
-from calib_core.locating import candidate_at
+from calib_core.association.locating import candidate_at
+from calib_core.estimation.evidence import CameraBelief
+from calib_core.estimation.uncertainty import pose_jacobian
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.synthetic import AISLE, FIELD, NOISE_PROFILES, RigOptions, SimulatedPairs, random_rig, simulate_pairs
 from calib_core.synthetic.pairs import NoiseName, study_camera
-from calib_core.uncertainty import pose_jacobian
 
 __all__ = ["Bound", "Case", "SceneName", "bound_of", "draw", "options_of", "tape_measured"]
 

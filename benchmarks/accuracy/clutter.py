@@ -11,7 +11,7 @@ from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
 from calib_core.calibrate import calibrate
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
-from calib_core.paper import pair_as_printed, static_returns_as_printed
+from calib_core.paper.algorithm_1 import pair_as_printed, static_returns_as_printed
 from calib_core.radar import direction_cosines
 from calib_core.results import Calibration
 from calib_core.synthetic import AISLE, FIELD, RADAR_PROFILES, PairsLayout, RadarProfile, Rig, random_rig

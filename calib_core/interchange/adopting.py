@@ -5,7 +5,7 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance, choose_check_point
-from calib_core.interchange.checking import check
+from calib_core.interchange.check.checking import check
 from calib_core.interchange.imported import TRUTH_FORMAT, ImportedCalibration
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, Caution, Metrics

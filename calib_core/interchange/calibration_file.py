@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from calib_core.angle_map import AngleMap
+from calib_core.advice.angle_map import AngleMap
 from calib_core.errors import InputError
 from calib_core.results import Calibration, CheckPoint, PairResult
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from calib_core.interchange.archives import unpack
 from calib_core.interchange.exporting import ExportBytes, ExportText
-from calib_core.interchange.mat_file import load_mat
+from calib_core.interchange.syntax.archives import unpack
+from calib_core.interchange.syntax.mat_file import load_mat
 
 __all__ = ["contents_text"]
 

@@ -1,12 +1,12 @@
 """Recordings: ROS 1 and ROS 2 files in, radar scans, images and intrinsics out. Only here are containers known."""
 
 from calib_core.recordings.beginning import first_picture
-from calib_core.recordings.clock_diagnosis import ClockDiagnosis
+from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.describing import clock_lines, describe
-from calib_core.recordings.images import EncodedImage
 from calib_core.recordings.recording import InputFile, Recording, inspect_recording, open_recording, require_files
 from calib_core.recordings.selection import RecordingOptions
 from calib_core.recordings.summary import RecordingSummary, recording_summary
+from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.topics import TopicSummary
 from calib_core.recordings.video_writing import WrittenVideo, write_video
 

@@ -11,23 +11,24 @@ from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import TimeNs
+from calib_core.recordings.camera.image_stream import ImageStream
+from calib_core.recordings.camera.images import ImageLayout
+from calib_core.recordings.camera.recorded_camera import recorded_camera
+from calib_core.recordings.camera.video_stream import about_video, image_stream
 from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap
-from calib_core.recordings.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
-from calib_core.recordings.clocks import ClockChoice, Stamps, choose_clock, choose_clocks
-from calib_core.recordings.decoding import Message
-from calib_core.recordings.images import ImageLayout
-from calib_core.recordings.radar_axes import parse_radar_axes
-from calib_core.recordings.radar_checks import about_claims
-from calib_core.recordings.radar_layouts import layouts_of_parts
-from calib_core.recordings.radar_lists import PointLayout
-from calib_core.recordings.recorded_camera import recorded_camera
+from calib_core.recordings.containers.sources import Source
+from calib_core.recordings.messages.decoding import Message
+from calib_core.recordings.radar.radar_axes import parse_radar_axes
+from calib_core.recordings.radar.radar_checks import about_claims
+from calib_core.recordings.radar.radar_layouts import layouts_of_parts
+from calib_core.recordings.radar.radar_lists import PointLayout
+from calib_core.recordings.radar.radar_stream import RadarStream
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
-from calib_core.recordings.sources import Source
 from calib_core.recordings.stamping import StampedTopic, read_stamps
-from calib_core.recordings.streams import ImageStream, RadarStream
+from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
+from calib_core.recordings.time.clocks import ClockChoice, Stamps, choose_clock, choose_clocks
 from calib_core.recordings.topics import Rhythm, Topic, TopicSummary, join_topics
 from calib_core.recordings.usages import Usage, usage_of
-from calib_core.recordings.video_stream import about_video, image_stream
 from calib_core.results import Caution
 
 __all__ = ["Assembly", "assemble"]

@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.camera_info import is_camera_info
-from calib_core.recordings.definitions import definition_of
-from calib_core.recordings.images import EncodedImage, is_picture
-from calib_core.recordings.opening import open_beginnings
+from calib_core.recordings.camera.camera_info import is_camera_info
+from calib_core.recordings.camera.images import EncodedImage, is_picture
+from calib_core.recordings.containers.opening import open_beginnings
+from calib_core.recordings.containers.sources import Channel, Source
+from calib_core.recordings.messages.definitions import definition_of
 from calib_core.recordings.selection import Inventory, RecordingOptions, select_image
-from calib_core.recordings.sources import Channel, Source
 from calib_core.recordings.topics import Topic, join_topics
 from calib_core.recordings.usages import Usage, usage_of
 

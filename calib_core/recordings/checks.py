@@ -5,9 +5,10 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
-from calib_core.recordings.calendar import utc
+from calib_core.recordings.camera.image_stream import ImageStream
+from calib_core.recordings.radar.radar_stream import RadarStream
 from calib_core.recordings.stamping import StampedTopic
-from calib_core.recordings.streams import ImageStream, RadarStream
+from calib_core.recordings.time.calendar import utc
 from calib_core.results import Caution
 
 __all__ = ["about_images", "about_lost", "about_radar", "check_overlap"]

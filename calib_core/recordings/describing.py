@@ -2,8 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 
-from calib_core.recordings.calendar import span_text, utc
-from calib_core.recordings.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.summary import (
     CameraSummary,
@@ -13,6 +11,8 @@ from calib_core.recordings.summary import (
     TopicReport,
     recording_summary,
 )
+from calib_core.recordings.time.calendar import span_text, utc
+from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 
 __all__ = ["clock_lines", "describe", "summary_text"]
 

@@ -15,13 +15,13 @@ from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
-from calib_core.recordings.images import EncodedImage
-from calib_core.recordings.opening import open_sources
-from calib_core.recordings.plain_opening import files_behind, open_plain_sources
+from calib_core.recordings.camera.images import EncodedImage
+from calib_core.recordings.containers.opening import open_sources
+from calib_core.recordings.containers.sources import Source
+from calib_core.recordings.plain_files.plain_opening import files_behind, open_plain_sources
+from calib_core.recordings.plain_files.video_files import VIDEO_SUFFIXES
 from calib_core.recordings.selection import Need, RecordingOptions
-from calib_core.recordings.sources import Source
 from calib_core.recordings.topics import TopicSummary
-from calib_core.recordings.video_files import VIDEO_SUFFIXES
 from calib_core.results import Caution
 
 __all__ = ["InputFile", "Recording", "inspect_recording", "open_recording", "require_files"]

@@ -6,9 +6,9 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs, time_parts
-from calib_core.recordings.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.spare_clocks import spare_clocks
+from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.topics import Rhythm, TopicSummary
 from calib_core.results import Caution
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, TimeNs
-from calib_core.recordings.clock_diagnosis import ClockDiagnosis, between_islands
-from calib_core.recordings.decoding import Message, decode
-from calib_core.recordings.definitions import Definition, definition_of
-from calib_core.recordings.sources import Channel, Heads, MessageIndex, Source
+from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex, Source
+from calib_core.recordings.messages.decoding import Message, decode
+from calib_core.recordings.messages.definitions import Definition, definition_of
+from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, between_islands
 from calib_core.results import Caution
 
 __all__ = ["Rhythm", "Topic", "TopicKind", "TopicSummary", "join_topics", "read_heads"]

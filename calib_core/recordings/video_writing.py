@@ -8,7 +8,7 @@ from pathlib import Path
 
 from calib_core.errors import InputError, RecordingError
 from calib_core.measurements import TimeNs
-from calib_core.recordings.images import EncodedImage
+from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.recording import Recording
 
 __all__ = ["WrittenVideo", "write_video"]

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
-from calib_core.recordings.writing import write_ros1_bag, write_ros2
+from calib_core.recordings.containers.writing import write_ros1_bag, write_ros2
 from calib_core.synthetic.messages import all_messages, camera_messages, radar_messages
 from calib_core.synthetic.options import Container
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from calib_core.measurements import RadarScan, TimeNs
-from calib_core.recordings.writing import (
+from calib_core.recordings.containers.writing import (
     CameraInfoMessage,
     CloudMessage,
     CompressedImageMessage,

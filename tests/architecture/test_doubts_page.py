@@ -7,7 +7,8 @@ from pathlib import Path
 
 def _cautions(project_root: Path) -> dict[str, list[ast.Call]]:
     found: dict[str, list[ast.Call]] = {}
-    for path in sorted((project_root / "calib_core").glob("*.py")):
+    core = project_root / "calib_core"
+    for path in sorted([*(core / "diagnostics").rglob("*.py"), *(core / "paper").rglob("*.py")]):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Caution":
                 code = node.args[0]

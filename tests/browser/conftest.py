@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Playwright, sync_playwright
 
-from app.web.server import RunningServer, ServerOptions, start
+from app.web.port.server import RunningServer, ServerOptions, start
 from app.workspace import Workspace, open_workspace
 from calib_core.recordings import Recording, open_recording
 from tests.browser.driving import FLAGS, Driver

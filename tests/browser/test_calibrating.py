@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.web.server import RunningServer
+from app.web.port.server import RunningServer
 from tests.browser.driving import Driver
 
 pytestmark = pytest.mark.browser

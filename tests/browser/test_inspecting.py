@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from app.web.server import ServerOptions, start
+from app.web.port.server import ServerOptions, start
 from app.workspace import open_workspace
 from calib_core.recordings import RecordingOptions, open_recording
 from tests.browser.driving import Driver

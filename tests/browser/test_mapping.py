@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from app.web.server import RunningServer, ServerOptions, start
+from app.web.port.server import RunningServer, ServerOptions, start
 from app.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.picture_recording import PictureRecording

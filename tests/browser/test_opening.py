@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from app.web.messages import Opening
-from app.web.server import RunningServer, ServerOptions
-from app.web.serving import Service
+from app.web.port.server import RunningServer, ServerOptions
+from app.web.port.serving import Service
 from app.workspace import Workspace
 from calib_core.recordings import Recording, first_picture
 from tests.browser.driving import Driver

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.cli.importing import reference_from
-from app.web.server import ServerOptions, start
+from app.web.port.server import ServerOptions, start
 from app.workspace import open_workspace
 from calib_core.recordings import Recording
 from tests.browser.driving import Driver

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from app.web.server import ServerOptions, start
+from app.web.port.server import ServerOptions, start
 from app.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.picture_recording import PictureRecording, grey_pictures

@@ -13,7 +13,7 @@ from app.cli import run
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import NS_PER_S, TimeNs, time_parts
-from calib_core.recordings.writing import (
+from calib_core.recordings.containers.writing import (
     CameraInfoMessage,
     CloudMessage,
     CompressedImageMessage,

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from calib_core.recordings.writing import write_ros2
+from calib_core.recordings.containers.writing import write_ros2
 
 Cocalib = Callable[..., Any]
 MadeRecording = Callable[..., Path]

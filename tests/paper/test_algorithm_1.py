@@ -19,9 +19,8 @@ from calib_core.measurements import (
     Unsolvable,
 )
 from calib_core.metrics import aed, cdsd, distances
-from calib_core.opencv import project_points, refine_lm, solve_pnp_ransac
 from calib_core.options import CalibrationOptions, LocatingOptions, PaperOptions
-from calib_core.paper import (
+from calib_core.paper.algorithm_1 import (
     ScoredPose,
     calibrate_as_printed,
     clicks_by_time,
@@ -37,6 +36,7 @@ from calib_core.paper import (
     window_around,
     z_score_inliers,
 )
+from calib_core.paper.opencv import project_points, refine_lm, solve_pnp_ransac
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from calib_core.synthetic.pairs import study_camera

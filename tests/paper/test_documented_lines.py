@@ -5,7 +5,7 @@ from pathlib import Path
 
 import calib_core.geometry
 import calib_core.metrics
-import calib_core.paper
+import calib_core.paper.algorithm_1
 import calib_core.radar
 from calib_core.results import Calibration
 
@@ -15,7 +15,7 @@ _ROW = re.compile(r"\| `(\w+)` \| `(test_\w+)` \|$", re.MULTILINE)
 def test_every_function_and_test_in_the_table_exists(project_root: Path) -> None:
     rows = _ROW.findall((project_root / "docs" / "paper.md").read_text(encoding="utf-8"))
     tests = "".join(path.read_text(encoding="utf-8") for path in (project_root / "tests" / "paper").glob("test_*.py"))
-    homes = (calib_core.paper, calib_core.metrics, calib_core.geometry, calib_core.radar, Calibration)
+    homes = (calib_core.paper.algorithm_1, calib_core.metrics, calib_core.geometry, calib_core.radar, Calibration)
     assert len(rows) == 10 + 6
     assert [function for function, _ in rows if not any(hasattr(home, function) for home in homes)] == []
     assert [test for _, test in rows if f"def {test}(" not in tests] == []
@@ -23,16 +23,16 @@ def test_every_function_and_test_in_the_table_exists(project_root: Path) -> None
 
 def test_every_line_of_algorithm_1_cites_itself() -> None:
     lines = {
-        1: calib_core.paper.clicks_by_time,
-        2: calib_core.paper.static_returns_as_printed,
-        3: calib_core.paper.nearest_stamp,
-        4: calib_core.paper.window_around,
-        5: calib_core.paper.z_score_inliers,
-        6: calib_core.paper.mean_position,
-        7: calib_core.paper.pose_by_iterative_ransac,
-        8: calib_core.paper.pose_by_sqpnp_ransac,
-        9: calib_core.paper.pose_of_smaller_error,
-        10: calib_core.paper.refined_on_all_pairs,
+        1: calib_core.paper.algorithm_1.clicks_by_time,
+        2: calib_core.paper.algorithm_1.static_returns_as_printed,
+        3: calib_core.paper.algorithm_1.nearest_stamp,
+        4: calib_core.paper.algorithm_1.window_around,
+        5: calib_core.paper.algorithm_1.z_score_inliers,
+        6: calib_core.paper.algorithm_1.mean_position,
+        7: calib_core.paper.algorithm_1.pose_by_iterative_ransac,
+        8: calib_core.paper.algorithm_1.pose_by_sqpnp_ransac,
+        9: calib_core.paper.algorithm_1.pose_of_smaller_error,
+        10: calib_core.paper.algorithm_1.refined_on_all_pairs,
     }
     for line, function in lines.items():
         assert f"Algorithm 1, line {line}:" in (function.__doc__ or "")

@@ -25,9 +25,9 @@ from calib_core.interchange import (
     imported,
     read_any,
 )
-from calib_core.interchange.archives import pack, unpack
 from calib_core.interchange.calibration_file import choose_check_point
-from calib_core.interchange.mistakes import suspicions
+from calib_core.interchange.check.mistakes import suspicions
+from calib_core.interchange.syntax.archives import pack, unpack
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, Metrics
 

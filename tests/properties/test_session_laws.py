@@ -30,7 +30,7 @@ from app.session import (
     advance,
     settled,
 )
-from app.session_file import SessionFileError, open_session_file
+from app.session.file import SessionFileError, open_session_file
 from app.view import View, view
 from app.workspace import Workspace
 from calib_core.errors import CalibrationError

@@ -10,7 +10,7 @@ from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import CalibrationOptions
-from calib_core.paper import solve_pairs_as_printed
+from calib_core.paper.algorithm_1 import solve_pairs_as_printed
 from calib_core.results import Calibration
 
 pytestmark = pytest.mark.real

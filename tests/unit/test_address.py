@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.web.address import AddressError, require_address, require_token
+from app.web.port.address import AddressError, require_address, require_token
 
 
 @pytest.mark.parametrize("port", [-1, 65536, 99999])

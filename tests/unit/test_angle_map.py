@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib_core.angle_map import AngleMap, learn_angle_map
+from calib_core.advice.angle_map import AngleMap, learn_angle_map
 from calib_core.arrays import Points3
 from calib_core.calibrate import calibrate_pairs
 from calib_core.options import CalibrationOptions

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from calib_core.calibrate import calibrate
-from calib_core.clock_doubts import clock_offset
+from calib_core.diagnostics.clock_doubts import clock_offset
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.results import Calibration, PairResult

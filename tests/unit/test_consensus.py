@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from calib_core.consensus import associate, find_consensus, mixture_cost
-from calib_core.evidence import evidence_of
-from calib_core.initial_pose import starting_poses
+from calib_core.estimation.consensus import associate, find_consensus, mixture_cost
+from calib_core.estimation.evidence import evidence_of
+from calib_core.estimation.initial_pose import starting_poses
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.synthetic import simulate_pairs
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from calib_core.evidence import CameraBelief, Evidence, evidence_of
+from calib_core.estimation.evidence import CameraBelief, Evidence, evidence_of
+from calib_core.estimation.linearising import linearise
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.linearising import linearise
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar
 from calib_core.synthetic import SimulatedPairs, simulate_pairs

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from app.session import Session
-from app.web.routes import Reply, Routes
+from app.web.port.routes import Reply, Routes
 from calib_core.errors import InputError
 from calib_core.interchange import (
     FORMATS,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calib_core.gating import static_returns
+from calib_core.association.gating import static_returns
 from calib_core.measurements import RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.web.guard import Admitted, Allowed, Guard, Refused, Request, is_loopback
+from app.web.port.guard import Admitted, Allowed, Guard, Refused, Request, is_loopback
 
 KEY = b"k" * 32
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from calib_core.advice.guidance import PlacementLimits, next_placement
 from calib_core.calibrate import calibrate_pairs
-from calib_core.guidance import PlacementLimits, next_placement
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian

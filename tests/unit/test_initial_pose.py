@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from calib_core.evidence import evidence_of
+from calib_core.estimation.evidence import evidence_of
+from calib_core.estimation.initial_pose import Hypotheses, hypothesis_costs, starting_poses
 from calib_core.geometry import rotation_angle_rad
-from calib_core.initial_pose import Hypotheses, hypothesis_costs, starting_poses
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.synthetic import RigOptions, simulate_pairs
 

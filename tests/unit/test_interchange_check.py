@@ -29,8 +29,8 @@ from calib_core.interchange import (
     read_camera,
     write_calibration,
 )
-from calib_core.interchange.archives import pack, unpack
-from calib_core.interchange.mat_file import load_mat
+from calib_core.interchange.syntax.archives import pack, unpack
+from calib_core.interchange.syntax.mat_file import load_mat
 
 
 @pytest.fixture(scope="module")

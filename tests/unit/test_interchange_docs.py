@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calib_core.angle_map import AngleMap
+from calib_core.advice.angle_map import AngleMap
 from calib_core.interchange import (
     FORMATS,
     export,
@@ -18,14 +18,14 @@ from calib_core.interchange import (
     read_pairs,
     write_calibration,
 )
-from calib_core.interchange.schemas import schema_texts
+from calib_core.interchange.own.schemas import schema_texts
 
 
 @pytest.mark.parametrize("name", ["clicks-1.schema.json", "pairs-1.schema.json", "calibration-1.schema.json"])
 def test_the_published_schema_is_the_one_the_types_give(project_root: Path, name):
     published = (project_root / "docs/schemas" / name).read_text(encoding="utf-8")
 
-    assert published == schema_texts()[name], "run: python -m calib_core.interchange.schemas docs/schemas"
+    assert published == schema_texts()[name], "run: python -m calib_core.interchange.own.schemas docs/schemas"
 
 
 def test_the_page_lists_every_format_with_its_file_what_it_holds_of_the_camera_and_what_its_numbers_are(

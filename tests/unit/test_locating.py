@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from calib_core.locating import candidate_at, candidates_of, clusters_of, floor_sigma_polar, scores_of, window_around
+from calib_core.association.locating import (
+    candidate_at,
+    candidates_of,
+    clusters_of,
+    floor_sigma_polar,
+    scores_of,
+    window_around,
+)
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
 

@@ -5,7 +5,7 @@ import pytest
 
 from calib_core.camera import CAMERA_MODELS, Camera, CameraModel
 from calib_core.geometry import RigidTransform, rotation_angle_rad
-from calib_core.opencv import PnPSolver, project_points, refine_lm, solve_pnp, solve_pnp_ransac, spans_a_plane
+from calib_core.paper.opencv import PnPSolver, project_points, refine_lm, solve_pnp, solve_pnp_ransac, spans_a_plane
 from calib_core.synthetic import SimulatedPairs, simulate_pairs, typical_camera
 from calib_core.synthetic.pairs import study_camera
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from app.session import Session
-from app.web.newest import NewestWins
-from app.web.outbox import Outbox
+from app.web.channel.newest import NewestWins
+from app.web.channel.outbox import Outbox
+from app.web.channel.survey import placements_at, survey_of
 from app.web.radar_sight import RadarSight, overlay_of
-from app.web.survey import placements_at, survey_of
 from calib_core.measurements import RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 
@@ -156,7 +156,7 @@ def test_a_survey_in_windows_and_in_stretches_finds_the_same(monkeypatch: pytest
     windows = [scans.between(TimeNs(int(s * 1e9)), TimeNs(int((s + 1) * 1e9) - 1)) for s in range(10)]
     assert survey_of(windows, image_times, GatingOptions()).rows == whole.rows
     assert survey_of(windows, image_times, GatingOptions()).activity == whole.activity
-    monkeypatch.setattr("app.web.survey._MOST_STATIC_RETURNS", 128)  # 9 s of 10
+    monkeypatch.setattr("app.web.channel.survey._MOST_STATIC_RETURNS", 128)  # 9 s of 10
     in_stretches = survey_of(windows, image_times, GatingOptions())
     assert [row.frame for row in in_stretches.rows] == [row.frame for row in whole.rows]
     assert in_stretches.activity == whole.activity

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from calib_core.association.pairing import pair_clicks
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
-from calib_core.pairing import pair_clicks
 
 
 def scans_at(times_s: list[float], *, doppler_mps: float = 0.0) -> RadarScans:

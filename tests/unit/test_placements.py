@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calib_core.association.placements import Placement, find_placements
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs, time_from_parts
 from calib_core.options import GatingOptions
-from calib_core.placements import Placement, find_placements
 from calib_core.recordings import open_recording
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.scans import SimulatedPlacement, simulate_scans

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, f
 
-from calib_core.consensus import Consensus, associate
-from calib_core.evidence import evidence_of
+from calib_core.estimation.consensus import Consensus, associate
+from calib_core.estimation.evidence import evidence_of
+from calib_core.estimation.predicting import noise_parts, predict, shrunk_scales, tail_chance
+from calib_core.estimation.refining import refine
 from calib_core.options import CalibrationOptions
-from calib_core.predicting import noise_parts, predict, shrunk_scales, tail_chance
-from calib_core.refining import refine
 from calib_core.synthetic import simulate_pairs
 
 

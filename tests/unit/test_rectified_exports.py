@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.web.exports import export_preview, exported, format_rows
+from app.web.channel.exports import export_preview, exported, format_rows
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import (

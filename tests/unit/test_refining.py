@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from calib_core.consensus import Consensus
-from calib_core.evidence import evidence_of
+from calib_core.estimation.consensus import Consensus
+from calib_core.estimation.evidence import evidence_of
+from calib_core.estimation.refining import refine
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.radar import cartesian_from_polar
-from calib_core.refining import refine
 from calib_core.synthetic import FIELD, simulate_pairs
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))

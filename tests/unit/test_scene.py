@@ -13,8 +13,8 @@ import pytest
 from app.session import History, RecordingFacts, Session
 from app.view import Advice, view
 from app.web.frames import Frame
-from app.web.scene import Sight, TabScene
-from app.web.scene_shapes import (
+from app.web.view3d.scene import Sight, TabScene
+from app.web.view3d.scene_shapes import (
     ellipsoids,
     next_place,
     nominal_camera_from_radar,

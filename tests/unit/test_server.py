@@ -12,7 +12,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from app.web.server import RunningServer, ServerOptions, start
+from app.web.port.server import RunningServer, ServerOptions, start
 from app.workspace import open_workspace
 from tests.picture_recording import START, PictureRecording, grey_pictures
 from tests.port_client import channel, come_in, get, wanted

@@ -16,10 +16,10 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
 from app.cli import run
-from app.web import serving
 from app.web.messages import Opening
-from app.web.server import RunningServer, ServerOptions
-from app.web.serving import Service
+from app.web.port import serving
+from app.web.port.server import RunningServer, ServerOptions
+from app.web.port.serving import Service
 from app.workspace import Workspace, open_workspace
 from calib_core.errors import RecordingError
 from tests.picture_recording import START, PictureRecording, grey_pictures

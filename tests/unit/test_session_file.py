@@ -29,7 +29,7 @@ from app.session import (
     Undo,
     advance,
 )
-from app.session_file import (
+from app.session.file import (
     SessionFile,
     SessionFileError,
     open_session_file,
@@ -37,7 +37,7 @@ from app.session_file import (
     set_aside,
     user_session_folder,
 )
-from app.session_file.forms import StepForm, form_of_step, step_from_form
+from app.session.file.forms import StepForm, form_of_step, step_from_form
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 
@@ -126,7 +126,7 @@ def test_a_process_killed_outright_loses_nothing_that_was_confirmed(tmp_path: Pa
         import numpy as np
         from pathlib import Path
         from app.session import ClickPlaced, History, RecordingFacts, advance
-        from app.session_file import open_session_file
+        from app.session.file import open_session_file
         facts = RecordingFacts("drive", {START_NS} + 100_000_000 * np.arange(50), 640, 480)
         session_file, history = open_session_file(Path({str(tmp_path)!r}), facts), History()
         for frame in range(13):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from rosbags.highlevel import AnyReader
 
-from calib_core.recordings.writing import write_ros1_bag
+from calib_core.recordings.containers.writing import write_ros1_bag
 from calib_core.synthetic import simulate
 from calib_core.synthetic.messages import radar_messages
 from calib_core.synthetic.sample import SAMPLE_NAME, SAMPLE_OPTIONS, write_sample

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from calib_core.calibrate import calibrate_pairs
+from calib_core.estimation.uncertainty import pixel_covariance
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
-from calib_core.uncertainty import pixel_covariance
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 

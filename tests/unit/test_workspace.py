@@ -20,7 +20,7 @@ from app.session import (
     Step,
     Undo,
 )
-from app.session_file import Restored, SessionFileError
+from app.session.file import Restored, SessionFileError
 from app.view import View, view
 from app.workspace import Workspace, open_workspace, recording_facts
 from calib_core.errors import InputError

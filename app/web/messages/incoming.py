@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from app.option_changes import changes_from_tree
 from app.session import OptionsEdited, Step
-from app.session_file import forms
+from app.session.file import forms
 from calib_core.errors import InputError
 
 __all__ = [

@@ -6,7 +6,7 @@ import pytest
 from rosbags.rosbag1 import Writer
 
 from calib_core.recordings import RecordingOptions, first_picture, open_recording
-from calib_core.recordings.files import FileBytes
+from calib_core.recordings.containers.files import FileBytes
 from tests.unit.recordings.conftest import Ros
 from tests.unit.recordings.mcap_writing import mcap
 

@@ -16,7 +16,7 @@ import pytest
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import describe, first_picture, inspect_recording, open_recording
-from calib_core.recordings.compression import unpack, unpack_message
+from calib_core.recordings.containers.compression import unpack, unpack_message
 
 START_NS = 1_700_000_000 * NS_PER_S
 

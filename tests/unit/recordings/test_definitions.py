@@ -12,8 +12,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from calib_core.errors import MessageError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import inspect_recording
-from calib_core.recordings.decoding import Message, decode
-from calib_core.recordings.definitions import Field, parse_definition
+from calib_core.recordings.messages.decoding import Message, decode
+from calib_core.recordings.messages.definitions import Field, parse_definition
 
 START_NS = 1_700_000_000 * NS_PER_S
 

@@ -7,7 +7,7 @@ import pytest
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import RecordingOptions, inspect_recording, open_recording
-from calib_core.recordings.jpeg import mended_jpeg
+from calib_core.recordings.camera.jpeg import mended_jpeg
 
 START_NS = 1_700_000_000 * NS_PER_S
 EXIF_TURNED = b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"

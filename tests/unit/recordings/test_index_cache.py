@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings import chunks, index_cache, open_recording
-from calib_core.recordings.index_cache import FileCache, cache_folder
-from calib_core.recordings.sqlite_bag import SqliteSource
+from calib_core.recordings import open_recording
+from calib_core.recordings.containers import chunks, index_cache
+from calib_core.recordings.containers.index_cache import FileCache, cache_folder
+from calib_core.recordings.containers.sqlite.sqlite_bag import SqliteSource
 from tests.unit.recordings.conftest import plain_rows
 from tests.unit.recordings.malformed import Kit, without_index
 
@@ -50,9 +51,9 @@ def test_reopening_gives_the_same_and_reads_neither_index_nor_stamps_again(path,
     def never(*_, **__):
         raise AssertionError("read again")
 
-    monkeypatch.setattr("calib_core.recordings.rosbag1.Rosbag1Source._read_tail", never)
-    monkeypatch.setattr("calib_core.recordings.mcap.McapSource._open", never)
-    monkeypatch.setattr("calib_core.recordings.sqlite_bag.scan_rows", never)
+    monkeypatch.setattr("calib_core.recordings.containers.rosbag1.rosbag1.Rosbag1Source._read_tail", never)
+    monkeypatch.setattr("calib_core.recordings.containers.mcap.mcap.McapSource._open", never)
+    monkeypatch.setattr("calib_core.recordings.containers.sqlite.sqlite_bag.scan_rows", never)
     gather, read = chunks.gather_heads, SqliteSource._read_heads
     few = lambda index: index if len(index) < 500 else never()  # noqa: E731
     monkeypatch.setattr(chunks, "gather_heads", lambda source, index, size: gather(source, few(index), size))

@@ -11,7 +11,7 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import RecordingOptions, describe, inspect_recording, open_recording
-from calib_core.recordings.written_times import read_time, time_from_name
+from calib_core.recordings.time.written_times import read_time, time_from_name
 
 START_NS = 1_700_000_000 * NS_PER_S
 

@@ -12,11 +12,11 @@ import pytest
 
 from calib_core.errors import MessageError, OptionError
 from calib_core.recordings import RecordingOptions, describe, open_recording
-from calib_core.recordings.opening import open_sources
-from calib_core.recordings.radar_axes import parse_radar_axes
-from calib_core.recordings.radar_decoders import DECODERS
-from calib_core.recordings.radar_layouts import recognise
-from calib_core.recordings.radar_table import radar_formats
+from calib_core.recordings.containers.opening import open_sources
+from calib_core.recordings.radar.radar_axes import parse_radar_axes
+from calib_core.recordings.radar.radar_decoders import DECODERS
+from calib_core.recordings.radar.radar_layouts import recognise
+from calib_core.recordings.radar.radar_table import radar_formats
 from calib_core.recordings.topics import join_topics
 from tests.unit.recordings.radar_samples import CLOUDS, OTHERS, START_NS, sample
 
@@ -257,6 +257,6 @@ def test_an_option_of_nonsense_is_refused_before_anything_is_read(ros1, write, p
 def test_the_page_of_radar_formats_is_the_one_the_registry_writes() -> None:
     page = Path(__file__).parents[3] / "docs" / "radar-formats.md"
     assert page.read_text(encoding="utf-8") == radar_formats(), (
-        "python -m calib_core.recordings.radar_table docs/radar-formats.md"
+        "python -m calib_core.recordings.radar.radar_table docs/radar-formats.md"
     )
     assert all(f"| {name} |" in radar_formats() for name in NAMES)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from calib_core.measurements import NS_PER_S
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import RecordingOptions, open_recording
-from calib_core.recordings.radar_columns import plan_columns
-from calib_core.recordings.radar_lists import first_of_scans
+from calib_core.recordings.radar.radar_columns import plan_columns
+from calib_core.recordings.radar.radar_lists import first_of_scans
 
 START_NS = 1_700_000_000 * NS_PER_S
 

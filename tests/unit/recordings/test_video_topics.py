@@ -131,7 +131,7 @@ def test_video_without_start_codes_is_explained(ros2, write) -> None:
 
 
 def test_without_the_extra_the_recording_says_what_to_install(coded, ros2, write, monkeypatch) -> None:
-    monkeypatch.setattr("calib_core.recordings.packets.find_spec", lambda name: None)
+    monkeypatch.setattr("calib_core.recordings.camera.packets.find_spec", lambda name: None)
     path = recorded(write, ros2, foxglove, *coded)
     with pytest.raises(
         RecordingError, match=r"video, which needs PyAV; install it with: pip install 'cocalib\[video\]'"

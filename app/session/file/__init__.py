@@ -1,0 +1,19 @@
+"""The session on disk: a journal of every step, kept before anybody is told of it, and a snapshot to start again from.
+
+A session is a folder, `NAME.cocalib-session/`, with `journal.jsonl` (one line per step, only ever appended to), `session.json`
+(the clicks and options, replaced as a whole from time to time) and `lock` (held while a process has the session open).
+"""
+
+from app.session.file.errors import SessionFileError
+from app.session.file.keeping import Restored, SessionFile, open_session_file, set_aside
+from app.session.file.places import recording_session_folder, user_session_folder
+
+__all__ = [
+    "Restored",
+    "SessionFile",
+    "SessionFileError",
+    "open_session_file",
+    "recording_session_folder",
+    "set_aside",
+    "user_session_folder",
+]

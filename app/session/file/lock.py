@@ -1,0 +1,62 @@
+"""One process per session: a lock that the system lets go of by itself when the process dies."""
+
+import os
+import socket
+import sys
+from pathlib import Path
+
+from app.session.file.errors import SessionFileError
+
+__all__ = ["FolderLock"]
+
+_LOCKED_BYTE = 1 << 20  # far behind the text: Windows lets nobody read a locked byte
+
+
+class FolderLock:
+    """Holds `lock` in a folder from construction to `close`."""
+
+    def __init__(self, folder: Path) -> None:
+        path = folder / "lock"
+        try:
+            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise SessionFileError(
+                f"{path}: cannot be written: {error.strerror}; give another --session folder"
+            ) from error
+        try:
+            _lock(self._descriptor)
+        except OSError as error:
+            holder = os.read(self._descriptor, 200).decode("utf-8", "replace").strip() or "another process"
+            os.close(self._descriptor)
+            if not isinstance(error, BlockingIOError | PermissionError):
+                raise SessionFileError(
+                    f"{path}: this file system does not lock files: {error.strerror}; give a --session folder on a local disk"
+                ) from error
+            raise SessionFileError(
+                f"{folder}: the session is open already, in {holder}; use that page, close it, or give another --session folder"
+            ) from None
+        os.ftruncate(self._descriptor, 0)
+        os.write(self._descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode())
+
+    def close(self) -> None:
+        """Let go; the file stays, since deleting it would race with the next holder."""
+        descriptor, self._descriptor = self._descriptor, -1  # never closed twice: others reuse the number
+        if descriptor >= 0:
+            os.close(descriptor)
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _lock(descriptor: int) -> None:
+        os.lseek(descriptor, _LOCKED_BYTE, os.SEEK_SET)
+        try:
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        finally:
+            os.lseek(descriptor, 0, os.SEEK_SET)
+
+else:
+    import fcntl
+
+    def _lock(descriptor: int) -> None:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,0 +1,1 @@
+"""The page's channel: what it sends and gets, and what all tabs share."""

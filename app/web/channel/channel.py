@@ -1,0 +1,215 @@
+"""One page's channel: reads what it wants, answers in order, never lets it wait for another page."""
+
+import asyncio
+import time
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+
+from app.view import sentence
+from app.web.channel.hub import Hub
+from app.web.channel.newest import NewestWins
+from app.web.channel.outbox import Outbox
+from app.web.channel.survey import placements_at
+from app.web.frames import Frame
+from app.web.messages import (
+    CursorMoved,
+    Done,
+    FrameHeader,
+    FrameWanted,
+    Hello,
+    ImportWanted,
+    Incoming,
+    Problem,
+    ViewpointWanted,
+    encode,
+    encode_frame,
+    parse,
+    request_of,
+)
+from app.web.radar_sight import overlay_of
+from app.web.view3d.scene import Sight, TabScene
+from calib_core.arrays import Points3
+from calib_core.errors import CalibrationError
+from calib_core.measurements import RadarScan, TimeNs
+
+__all__ = ["Channel", "Socket"]
+
+_SPACE_EVERY_S = 0.34
+"""While playing, the 3D view is drawn no oftener than this: it shares the page's main thread [s]."""
+
+
+class Socket(Protocol):
+    """The part of a WebSocket that a channel needs."""
+
+    async def recv(self) -> str | bytes: ...  # noqa: D102
+    async def send(self, message: str | bytes, /) -> None: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class Cursor:
+    """Where a page is.
+
+    Attributes:
+        index: of the frame.
+        playing: frames follow one another quickly.
+        selected: id of the selected click.
+        light: the page has its light theme on.
+    """
+
+    index: int = 0
+    playing: bool = False
+    selected: str | None = None
+    light: bool = False
+
+
+class Channel:
+    """One page. Lives on the event loop."""
+
+    def __init__(self, hub: Hub) -> None:
+        self.outbox = Outbox()
+        self.scene: TabScene | None = None
+        self._hub = hub
+        self._cursor = Cursor()
+        self._frames = NewestWins(self._send_frame)
+        self._overlay = NewestWins(self._send_overlay)
+        self._space = NewestWins(self._draw_space)
+        self._forward = True
+
+    async def run(self, socket: Socket) -> None:
+        """Serve the page until it goes; what the socket raises then goes to the caller."""
+        self._hub.tabs.add(self)
+        sending = asyncio.create_task(self.outbox.deliver(socket.send))
+        reading = asyncio.create_task(self._read(socket))
+        try:
+            done, _ = await asyncio.wait({sending, reading}, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        finally:
+            self._hub.tabs.discard(self)
+            for worker in (self._frames, self._overlay, self._space):
+                worker.close()
+            for task in (sending, reading):
+                task.cancel()
+            await asyncio.gather(sending, reading, return_exceptions=True)
+
+    def refresh(self) -> None:
+        """The session changed, or the 3D view came: draw again."""
+        self._overlay.give(self._cursor)
+        self._space.give(self._cursor)
+
+    async def _read(self, socket: Socket) -> None:
+        while True:
+            text = await socket.recv()
+            try:
+                incoming = parse(text)
+                await self._obey(incoming)
+            except CalibrationError as error:
+                self.outbox.put(encode(Problem(sentence(str(error)), request=request_of(text))))
+
+    async def _obey(self, incoming: Incoming) -> None:
+        """Do what the page wants.
+
+        Raises:
+            CalibrationError: it cannot be done; nothing changed.
+        """
+        command = incoming.command
+        if isinstance(command, FrameWanted):
+            self._frames.give(command)
+        elif isinstance(command, CursorMoved):
+            self._move(command)
+        elif isinstance(command, Hello):
+            self._hub.greet(self.outbox)
+        elif isinstance(command, ViewpointWanted):
+            if self.scene is not None:
+                self.scene.look_from(command.viewpoint)
+        else:
+            workspace = self._hub.workspace
+            deed = (
+                partial(workspace.import_clicks, command.text, command.name)
+                if isinstance(command, ImportWanted)
+                else partial(workspace.dispatch, command)
+            )
+            await asyncio.get_running_loop().run_in_executor(self._hub.steps, deed)
+        if incoming.request is not None:
+            self.outbox.put(encode(Done(incoming.request)))
+
+    def _move(self, command: CursorMoved) -> None:
+        if not 0 <= command.index < len(self._hub.frames):
+            return
+        self._cursor = Cursor(command.index, command.playing, command.selected, command.light)
+        self.refresh()
+
+    async def _send_frame(self, wanted: FrameWanted) -> None:
+        store, size = self._hub.frames, wanted.size
+        try:
+            frame = await store.get(wanted.index, size)
+        except (CalibrationError, ValueError, IndexError) as error:
+            self.outbox.put(
+                encode(Problem(f"Frame {wanted.index + 1} cannot be shown: {error}", request=wanted.request))
+            )
+            return
+        header = FrameHeader(frame.index, wanted.request, frame.width_px, frame.height_px, frame.scale, frame.format)
+        self.outbox.put(encode_frame(header, frame.data), kind="frame")
+        self._prefetch(wanted)
+
+    def _prefetch(self, wanted: FrameWanted) -> None:
+        if wanted.index != self._cursor.index:
+            self._forward = wanted.index > self._cursor.index
+        self._hub.frames.prefetch(wanted.index, wanted.size, 1 if self._forward or wanted.playing else -1)
+
+    async def _send_overlay(self, cursor: Cursor) -> None:
+        stamp = TimeNs(int(self._hub.recording.image_times[cursor.index]))
+        session = self._hub.workspace.session
+        scan = await self._scan(stamp)
+        overlay = overlay_of(
+            cursor.index, session, scan, placements_at(self._hub.survey, stamp), self._hub.workspace.reference
+        )
+        self.outbox.put(encode(overlay), kind="overlay")
+
+    async def _draw_space(self, cursor: Cursor) -> None:
+        """Draw the 3D view; while playing, then rest: the last frame is always drawn."""
+        if self.scene is None:
+            return
+        started = time.monotonic()
+        hub, stamp = self._hub, TimeNs(int(self._hub.recording.image_times[cursor.index]))
+        sight = Sight(
+            session=hub.workspace.session,
+            view=hub.view,
+            selected=cursor.selected,
+            scan=await self._scan(stamp),
+            window=await self._window(cursor),
+            picture=await self._thumbnail(cursor.index),
+            camera=hub.camera,
+            reference=hub.workspace.reference,
+            light=cursor.light,
+        )
+        await asyncio.get_running_loop().run_in_executor(hub.executor, self.scene.show, sight)
+        if cursor.playing:
+            await asyncio.sleep(max(0.0, started + _SPACE_EVERY_S - time.monotonic()))
+
+    async def _scan(self, stamp: TimeNs) -> RadarScan | None:
+        """Return the scan of a moment; a scan that cannot be read is none."""
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._hub.executor, self._hub.radar.scan_at, stamp)
+        except CalibrationError:
+            return None
+
+    async def _window(self, cursor: Cursor) -> Points3:
+        session = self._hub.workspace.session
+        click = next((click for click in session.clicks if click.id == cursor.selected), None)
+        if click is None or cursor.playing:
+            return np.zeros((0, 3))
+        look = partial(self._hub.radar.window, click.image_time, session.options)
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._hub.executor, look)
+        except CalibrationError:
+            return np.zeros((0, 3))
+
+    async def _thumbnail(self, index: int) -> Frame | None:
+        try:
+            return await self._hub.frames.get(index, "thumbnail")
+        except (CalibrationError, ValueError):
+            return None

@@ -1,0 +1,187 @@
+"""What all tabs share: the workspace's news, the survey of the radar, the frames; and which tab has which 3D view."""
+
+import asyncio
+import logging
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Protocol
+
+from app.resources import version
+from app.session import Stamp
+from app.view import CautionRow, View, sentence
+from app.web.channel.outbox import Outbox
+from app.web.channel.survey import Survey, survey_of
+from app.web.frames import EncodedPicture, FrameStore
+from app.web.messages import (
+    Outgoing,
+    Placements,
+    Progress,
+    RecordingNote,
+    SensorNote,
+    SessionNote,
+    StampColumns,
+    encode,
+)
+from app.web.radar_sight import RadarSight
+from app.workspace import Workspace
+from calib_core.arrays import TimesNs
+from calib_core.camera import Camera
+from calib_core.errors import CalibrationError
+from calib_core.measurements import RadarScans, TimeNs
+from calib_core.recordings import TopicSummary, clock_lines
+from calib_core.results import Caution
+
+__all__ = ["Hub", "PageRecording", "Tab"]
+
+_SEARCHING = "Searching the radar for the reflector"
+_log = logging.getLogger(__name__)
+
+
+class PageRecording(Protocol):
+    """The part of a Recording that the page needs."""
+
+    @property
+    def paths(self) -> Sequence[Path]: ...  # noqa: D102
+    @property
+    def radar_topic(self) -> str | None: ...  # noqa: D102
+    @property
+    def image_topic(self) -> str | None: ...  # noqa: D102
+    @property
+    def topics(self) -> Sequence[TopicSummary]: ...  # noqa: D102
+    @property
+    def cautions(self) -> Sequence[Caution]: ...  # noqa: D102
+    @property
+    def image_times(self) -> TimesNs: ...  # noqa: D102
+    @property
+    def radar_times(self) -> TimesNs: ...  # noqa: D102
+
+    def camera(self) -> Camera | None: ...  # noqa: D102
+    def image_bytes(self, index: int, /) -> EncodedPicture: ...  # noqa: D102
+    def radar_windows(self) -> Iterator[RadarScans]: ...  # noqa: D102
+    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans: ...  # noqa: D102
+
+
+class Tab(Protocol):
+    """One open page."""
+
+    outbox: Outbox
+
+    def refresh(self) -> None:
+        """The session changed: draw the overlay and the 3D view again."""
+
+
+class Hub:
+    """Lives on viser's event loop, but for the workspace's callback."""
+
+    def __init__(self, workspace: Workspace, recording: PageRecording, executor: Executor) -> None:
+        self.workspace = workspace
+        self.recording = recording
+        self.executor = executor
+        self.frames = FrameStore(recording, len(recording.image_times), executor)
+        self.radar = RadarSight(recording)
+        self.camera = recording.camera()
+        self.survey: Survey | None = None
+        self.tabs: set[Tab] = set()
+        self.steps = ThreadPoolExecutor(max_workers=1, thread_name_prefix="steps")
+        self._view = workspace.view
+        self._searching: asyncio.Task[None] | None = None
+
+    async def start(self) -> None:
+        """Begin to listen to the workspace, and to search the radar."""
+        loop = asyncio.get_running_loop()
+        self._end_subscription = self.workspace.subscribe(
+            lambda view: None if loop.is_closed() else _soon(loop, partial(self._take, view))
+        )
+        self._searching = loop.create_task(self._search())
+
+    async def end(self) -> None:
+        """Stop listening, and drop what is on its way."""
+        self._end_subscription()
+        if self._searching is not None:
+            self._searching.cancel()
+        await self.frames.close()
+
+    @property
+    def view(self) -> View:
+        """The last news of the workspace."""
+        return self._view
+
+    def greet(self, outbox: Outbox) -> None:
+        """Tell a page that has just opened what there is."""
+        outbox.put(encode(self._recording_note()), kind="recording")
+        outbox.put(encode(self._view), kind="view")
+        if self.survey is not None:
+            outbox.put(encode(Placements(self.survey.rows)), kind="placements")
+        else:
+            outbox.put(encode(Progress(_SEARCHING, 0, 1)), kind="progress")
+
+    def broadcast(self, message: Outgoing, kind: str) -> None:
+        """Tell all pages; written once."""
+        text = encode(message)
+        for tab in self.tabs:
+            tab.outbox.put(text, kind=kind)
+
+    def _take(self, view: View) -> None:
+        self._view = view
+        self.broadcast(view, "view")
+        if view.solving:
+            return  # overlay and 3D view show the last answer until the next one, and would only hold the solver up
+        for tab in self.tabs:
+            tab.refresh()
+
+    async def _search(self) -> None:
+        """Survey the radar once, off the loop."""
+        options = self.workspace.session.options.gating
+        try:
+            self.survey = await asyncio.get_running_loop().run_in_executor(
+                self.executor, lambda: survey_of(self.recording.radar_windows(), self.recording.image_times, options)
+            )
+        except CalibrationError as error:
+            _log.warning("the radar could not be searched for placements: %s", error)
+        self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
+        self.broadcast(Placements(self.survey.rows if self.survey else ()), "placements")
+        for tab in self.tabs:
+            tab.refresh()
+
+    def _recording_note(self) -> RecordingNote:
+        facts, recording, restored = self.workspace.facts, self.recording, self.workspace.restored
+        return RecordingNote(
+            name=facts.name,
+            radar_topic=recording.radar_topic or "none",
+            image_topic=recording.image_topic or "none",
+            width_px=facts.width_px,
+            height_px=facts.height_px,
+            frame_times=StampColumns.of(facts.image_times),
+            start=Stamp.of(TimeNs(int(facts.image_times[0]))),
+            radar=StampColumns.of(recording.radar_times),
+            cautions=tuple(
+                CautionRow(row.code, sentence(row.message), sentence(row.hint))
+                for row in (*restored.cautions, *recording.cautions)
+            ),
+            sensors=(
+                _sensor("radar", recording.radar_topic, recording.topics),
+                _sensor("camera", recording.image_topic, recording.topics),
+            ),
+            session=SessionNote(str(restored.folder), len(restored.history.present.clicks), restored.note),
+            version=version(),
+        )
+
+
+def _sensor(name: str, chosen: str | None, topics: Sequence[TopicSummary]) -> SensorNote:
+    """Say how a sensor is read."""
+    topic = next((topic for topic in topics if topic.name == chosen), None)
+    if topic is None:
+        return SensorNote(name, chosen or "none")
+    clocks = () if topic.clocks is None else clock_lines(topic.clocks)
+    about = tuple(line for line in (topic.layout, *clocks) if line)
+    return SensorNote(name, topic.name, topic.clock if topic.clocks else "", about)
+
+
+def _soon(loop: asyncio.AbstractEventLoop, call: "partial[None]") -> None:
+    """Run on the loop; a loop that is closing has nobody left to tell."""
+    try:
+        loop.call_soon_threadsafe(call)
+    except RuntimeError:
+        _log.debug("a view came after the server had stopped")

@@ -1,0 +1,228 @@
+"""What the port answers to GET: the page's files, downloads, and viser's own page; nothing else exists."""
+
+import asyncio
+import gzip
+import http
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache, partial
+from pathlib import Path
+from typing import Protocol
+
+import msgspec
+
+from app.session import Session
+from app.solving import RecordingSource, calibration_text
+from app.view import sentence
+from app.view.drawing import MIN_PLACEMENTS
+from app.web.channel.exports import NoPreview, export_preview, exported, format_rows
+from app.web.channel.survey import Survey
+from app.workspace import Workspace
+from calib_core.errors import CalibrationError
+from calib_core.interchange import FORMATS, CalibrationFile, read_calibration
+from calib_core.measurements import Unsolvable
+from calib_core.results import Calibration
+
+__all__ = ["Reply", "Routes", "refusal"]
+
+_TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".json": "application/json",
+}
+_ALWAYS = (
+    ("X-Content-Type-Options", "nosniff"),
+    ("X-Frame-Options", "SAMEORIGIN"),
+    ("Referrer-Policy", "no-referrer"),
+    ("Cross-Origin-Resource-Policy", "same-origin"),
+    ("Cross-Origin-Opener-Policy", "same-origin"),
+    ("Cache-Control", "no-cache"),
+)
+_OWN_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+    "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+_VISER_POLICY = (
+    "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; worker-src blob: data: 'self'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'self'"
+)
+_VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
+_VISER_STYLE = b"""<style>
+.mantine-Notifications-root, .mantine-Paper-root, [data-portal], [data-dock-root] > :not(:first-child) {
+  display: none !important;
+}
+html, body, #root, #root div { background-color: transparent !important; }
+html { background: #0d1014 !important; }
+html[data-theme="light"] { background: #e4e8ed !important; }
+</style>
+</head>"""
+
+
+class Surveyor(Protocol):
+    """Who knows the survey of the radar, once it is made."""
+
+    @property
+    def survey(self) -> Survey | None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """An HTTP answer.
+
+    Attributes:
+        status: such as 200.
+        headers: all of them but the length.
+        body: the content.
+    """
+
+    status: http.HTTPStatus
+    headers: tuple[tuple[str, str], ...]
+    body: bytes
+
+
+def _reply(
+    body: bytes,
+    content_type: str,
+    *,
+    status: int = 200,
+    policy: str = _OWN_POLICY,
+    more: tuple[tuple[str, str], ...] = (),
+) -> Reply:
+    headers = (("Content-Type", content_type), *_ALWAYS, ("Content-Security-Policy", policy), *more)
+    return Reply(http.HTTPStatus(status), headers, body)
+
+
+def refusal(status: int, reason: str) -> Reply:
+    """Refuse in plain text."""
+    return _reply(f"{reason}\n".encode(), "text/plain; charset=utf-8", status=status)
+
+
+class Routes:
+    """Answers by path; every path that is served is known by name."""
+
+    def __init__(self, static: Path) -> None:
+        self._files = {f"/{path.name}": path for path in static.iterdir() if path.suffix in _TYPES and path.is_file()}
+        self._files["/"] = self._files["/index.html"]
+        self._made: Mapping[str, Callable[[str], Reply]] | None = None
+
+    def admit(self, workspace: Workspace, recording: RecordingSource, hub: Surveyor) -> None:
+        """Answer for this recording from now on."""
+        self._made = _Downloads(workspace, recording, hub).by_path()
+
+    async def answer(self, address: str) -> Reply:
+        """Answer a GET; files and exports are made off the event loop.
+
+        Args:
+            address: path and query, as sent.
+        """
+        path, _, query = address.partition("?")
+        if path.startswith("/api/") and self._made is None:
+            return refusal(503, "The recording is still being opened; ask again in a moment.")
+        make = self._made.get(path) if self._made is not None else None
+        if path in self._files:
+            make = lambda _query: _file(self._files[path])  # noqa: E731
+        elif _VISER_PAGE.fullmatch(path):
+            make = lambda _query: _viser_page()  # noqa: E731
+        if make is None:
+            return refusal(404, "There is nothing here.")
+        return await asyncio.get_running_loop().run_in_executor(None, make, query)
+
+
+class _Downloads:
+    """What is made of a recording's session when it is asked for."""
+
+    def __init__(self, workspace: Workspace, recording: RecordingSource, hub: Surveyor) -> None:
+        self._workspace = workspace
+        self._recording = recording
+        self._hub = hub
+
+    def by_path(self) -> Mapping[str, Callable[[str], Reply]]:
+        """Return the makers of all answers, each given the query."""
+        return {
+            "/api/calibration.json": self._calibration,
+            "/api/clicks.json": self._clicks,
+            "/api/formats.json": _formats,
+            "/api/activity.json": self._activity,
+            **{f"/api/export/{form.name}": partial(self._export, form.name) for form in FORMATS},
+            **{f"/api/preview/{form.name}": partial(self._preview, form.name) for form in FORMATS},
+        }
+
+    def _calibration(self, _query: str) -> Reply:
+        return self._of_calibration(lambda text: _download(text.encode(), "calibration.json"))
+
+    def _export(self, name: str, query: str) -> Reply:
+        def make(text: str) -> Reply:
+            written = exported(_file_of(text), name, query)
+            return _download(written.data, written.file_name)
+
+        return self._of_calibration(make)
+
+    def _preview(self, name: str, query: str) -> Reply:
+        def make(text: str) -> Reply:
+            preview = export_preview(_file_of(text), name, query, self._workspace.facts.name)
+            return _reply(msgspec.json.encode(preview), _TYPES[".json"])
+
+        reply = self._of_calibration(make)
+        if reply.status != 409:
+            return reply
+        return _reply(msgspec.json.encode(NoPreview(reply.body.decode().strip())), _TYPES[".json"])
+
+    def _of_calibration(self, make: Callable[[str], Reply]) -> Reply:
+        """Make something of the calibration-1 text of now, or say why there is none; an older answer is never handed out."""
+        session = self._workspace.session
+        if not session.is_solved or not isinstance(session.outcome, Calibration):
+            return refusal(409, _why_none(session))
+        try:
+            return make(calibration_text(session.outcome, self._recording))
+        except CalibrationError as error:
+            return refusal(409, sentence(str(error)))
+
+    def _clicks(self, _query: str) -> Reply:
+        return _download(self._workspace.clicks_text().encode(), "clicks.json")
+
+    def _activity(self, _query: str) -> Reply:
+        survey = self._hub.survey
+        if survey is None:
+            return refusal(409, "The radar is still being read.")
+        return _reply(msgspec.json.encode(survey.activity), _TYPES[".json"])
+
+
+def _file(path: Path) -> Reply:
+    return _reply(path.read_bytes(), _TYPES[path.suffix])
+
+
+def _download(data: bytes, name: str) -> Reply:
+    kind = _TYPES.get(Path(name).suffix, "application/octet-stream")
+    return _reply(data, kind, more=(("Content-Disposition", f'attachment; filename="{name}"'),))
+
+
+def _formats(_query: str) -> Reply:
+    return _reply(msgspec.json.encode(format_rows()), _TYPES[".json"])
+
+
+def _file_of(text: str) -> CalibrationFile:
+    return read_calibration(text, "the calibration")
+
+
+@cache
+def _viser_page() -> Reply:
+    """Return viser's own client, its panels hidden, for our page has them, and its drawing paced (static/pace.js)."""
+    import viser
+
+    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
+    page = page.replace(b"<head>", b'<head><script src="../../pace.js"></script>', 1).replace(
+        b"</head>", _VISER_STYLE, 1
+    )
+    body = gzip.compress(page, mtime=0)
+    return _reply(body, _TYPES[".html"], policy=_VISER_POLICY, more=(("Content-Encoding", "gzip"),))
+
+
+def _why_none(session: Session) -> str:
+    if session.needs_solving and len(session.clicks) >= MIN_PLACEMENTS:
+        return "The newest change is still being solved; in a moment the calibration is there."
+    if session.is_solved and isinstance(session.outcome, Unsolvable):
+        return f"{sentence(session.outcome.reason)} {sentence(session.outcome.hint)}"
+    return "There is no calibration yet: click the reflector in at least four placements."

@@ -1,0 +1,134 @@
+"""From a command to a page that works, until Ctrl+C. Where opening takes long, the page is there before the recording is."""
+
+import contextlib
+import logging
+import threading
+import webbrowser
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import TracebackType
+from typing import Self
+
+from app.view import sentence
+from app.web.frames import EncodedPicture
+from app.web.messages import Opening
+from app.web.port.guard import is_loopback
+from app.web.port.server import RunningServer, ServedRecording, ServerOptions
+from app.web.port.waiting import WaitingRoom
+from app.workspace import Workspace
+from calib_core.errors import CalibrationError
+
+__all__ = ["Service"]
+
+_log = logging.getLogger(__name__)
+
+
+class Service:
+    """Serves a recording that is opened within `with`; when that takes longer than a moment, pages are let in to wait.
+
+    An error within `with` is told to the pages that wait, and goes on to the caller.
+    """
+
+    def __init__(
+        self,
+        options: ServerOptions,
+        opening: Opening,
+        first_picture: Callable[[], EncodedPicture | None],
+        *,
+        let_in_after_s: float,
+    ) -> None:
+        """Prepare; nothing is served yet.
+
+        Args:
+            options: where and to whom.
+            opening: what pages that wait are told.
+            first_picture: reads what they see, in a thread of its own; None where there is nothing to show early.
+            let_in_after_s: how long nobody is let in; with 0, the link is out before anything is opened, so that opening and
+                the browser do not hold one another up [s].
+        """
+        self._options = options
+        self._opening = opening
+        self._first_picture = first_picture
+        self._let_in_after_s = let_in_after_s
+        self._is_settled = threading.Event()
+        self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="early")
+
+    def __enter__(self) -> Self:
+        self._early: Future[RunningServer | None] = self._threads.submit(self._start_if_slow)
+        try:
+            if self._let_in_after_s <= 0:
+                self._early.result()
+        except BaseException:
+            self._end(None)
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._end(error)
+
+    def serve(self, workspace: Workspace, recording: ServedRecording) -> None:
+        """Serve what has been opened until Ctrl+C.
+
+        Raises:
+            OSError: the port cannot be had.
+        """
+        self._is_settled.set()
+        server = self._early.result() or self._start(WaitingRoom())
+        try:
+            server.admit(workspace, recording)
+            threading.Event().wait()
+        except KeyboardInterrupt:
+            print("\nStopped; every click is kept.")
+        finally:
+            server.close()
+
+    def _end(self, error: BaseException | None) -> None:
+        """Tell pages that wait what was wrong, and stop serving."""
+        self._is_settled.set()
+        server = None if self._early.exception() else self._early.result()
+        if server is not None:
+            if isinstance(error, Exception):
+                server.refuse(_in_words(error))
+            server.close()
+        self._threads.shutdown()
+
+    def _start_if_slow(self) -> RunningServer | None:
+        if self._is_settled.wait(self._let_in_after_s):
+            return None
+        picture = self._threads.submit(self._first_picture)
+        print(self._opening.doing, flush=True)
+        server = self._start(WaitingRoom(self._opening))
+        picture.add_done_callback(lambda done: _show(server, done))
+        return server
+
+    def _start(self, room: WaitingRoom) -> RunningServer:
+        """Start the server, and tell its link."""
+        options, server = self._options, RunningServer(self._options, room)
+        if not is_loopback(options.host):
+            print(
+                f"Warning: bound to {options.host}: whoever has the link and reaches this machine sees the recording. "
+                "From another machine, put this machine's address into the link."
+            )
+        print(f"Open {server.url}", flush=True)
+        if options.token is None:
+            server.on_new_link = lambda: print(f"For another browser, open {server.url}", flush=True)
+        if not options.no_browser:
+            threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
+        return server
+
+
+def _show(server: RunningServer, picture: "Future[EncodedPicture | None]") -> None:
+    """Show the first picture, if there is one; opening the recording tells what is wrong with it."""
+    if picture.exception() is not None:
+        _log.warning("the first picture could not be read: %s", picture.exception())
+    elif (found := picture.result()) is not None:
+        with contextlib.suppress(RuntimeError):  # the server has stopped meanwhile
+            server.show(found)
+
+
+def _in_words(error: Exception) -> str:
+    if isinstance(error, CalibrationError):
+        return sentence(str(error))
+    return "The recording cannot be opened; the terminal says why."

@@ -1,0 +1,279 @@
+"""The 3D view of one tab, in viser: radar axes, the scan of the frame, chosen returns, and the camera with its live picture."""
+
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from app.session import Session
+from app.view import Reference, View, shown_calibration
+from app.web.frames import Frame
+from app.web.radar_sight import still_returns
+from app.web.view3d.scene_shapes import (
+    DARK,
+    LIGHT,
+    ellipsoids,
+    next_place,
+    nominal_camera_from_radar,
+    range_numbers,
+    range_rings,
+    rays_to,
+    residual_colours,
+    vertical_field_of_view_rad,
+)
+from calib_core.arrays import Points3
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+from calib_core.measurements import RadarScan
+from calib_core.results import Calibration, PairResult
+
+if TYPE_CHECKING:
+    import viser
+
+__all__ = ["FIELD_OF_VIEW_RAD", "LOOK_AT", "STAND_AT", "Sight", "TabScene"]
+
+STAND_AT, LOOK_AT = (-5.0, 0.0, 3.6), (6.0, 0.0, -0.4)
+"""Where the 3D view's camera begins: behind and above the radar, looking forward."""
+
+FIELD_OF_VIEW_RAD = 0.75
+
+_VIEWPOINTS = {
+    "behind": (STAND_AT, LOOK_AT),
+    "above": ((7.0, 0.0, 26.0), (7.01, 0.0, 0.0)),
+    "side": ((7.0, -20.0, 4.0), (7.0, 0.0, 0.0)),
+}
+_RINGS_EVERY_M, _RINGS_UP_TO_M = 5.0, 30.0
+_DIM, _ORANGE = (112, 124, 136), (255, 180, 84)
+_NOWHERE = np.zeros((1, 3))
+_NO_LINE = np.zeros((1, 2, 3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """Everything that one 3D view shows at one moment.
+
+    Attributes:
+        session: with the newest answer.
+        view: of the same session.
+        selected: id of the selected click; None without one.
+        scan: of the frame; None when there is none.
+        window: (n, 3) still returns around the selected click [m].
+        picture: a thumbnail of the frame; None when it cannot be read.
+        camera: the recording's intrinsics, for the time before a calibration.
+        reference: a calibration to look at until there is one; None without one.
+        light: drawn on a light ground.
+    """
+
+    session: Session
+    view: View
+    selected: str | None
+    scan: RadarScan | None
+    window: Points3
+    picture: Frame | None
+    camera: Camera | None
+    reference: Reference | None = None
+    light: bool = False
+
+
+class TabScene:
+    """The nodes of one tab's 3D view. Properties are assigned, nodes are never added twice. Any one thread at a time."""
+
+    def __init__(self, client: "viser.ClientHandle") -> None:
+        self._client = client
+        self._lock = threading.Lock()
+        self._pictured: int | None = None
+        self._posed: object = self
+        self._radar_from_camera = nominal_camera_from_radar().inverse()
+        scene = client.scene
+        scene.add_frame("/radar", axes_length=0.6, axes_radius=0.018, origin_radius=0.03)
+        self._palette = DARK
+        self._grid, self._rings = _ground(scene)
+        self._scan = _cloud(scene, "/scan", 0.12)
+        self._window = _cloud(scene, "/window", 0.06)
+        self._chosen = _cloud(scene, "/chosen", 0.24)
+        self._rays = _lines(scene, "/rays", 1.0, (72, 110, 138))
+        self._ray = _lines(scene, "/ray", 2.0, DARK.ray)
+        self._gap = _lines(scene, "/gap", 3.0, _ORANGE)
+        self._ellipsoids = _lines(scene, "/ellipsoids", 1.0, (96, 118, 140))
+        self._ellipsoid = _lines(scene, "/ellipsoid", 1.5, _ORANGE)
+        self._next = _lines(scene, "/next", 2.0, DARK.next)
+        self._next_name = scene.add_label("/next_name", "", visible=False, anchor="top-center", font_screen_scale=0.9)
+        self._name = scene.add_label("/selected", "", visible=False, anchor="bottom-left", font_screen_scale=0.9)
+        self._frustum = scene.add_camera_frustum(
+            "/camera",
+            fov=0.9,
+            aspect=1.6,
+            scale=1.1,
+            thickness=1.5,
+            thickness_units="screen",
+            color=_DIM,
+            format="jpeg",
+        )
+
+    def show(self, sight: Sight) -> None:
+        """Show this."""
+        with self._lock, self._client.atomic():
+            self._show_theme(sight)
+            self._show_scan(sight)
+            self._show_pose(sight)
+            self._show_pairs(sight)
+            self._show_advice(sight)
+            self._show_picture(sight)
+        self._client.flush()
+
+    def look_from(self, viewpoint: str) -> None:
+        """Move the view's own camera: "behind", "above", "side" or "camera"."""
+        camera = self._client.camera
+        with self._client.atomic():
+            if viewpoint == "camera":
+                rotation, position = self._radar_from_camera.rotation, self._radar_from_camera.translation_m
+                camera.up_direction = tuple(-rotation[:, 1])
+                camera.position = tuple(position - 0.02 * rotation[:, 2])
+                camera.look_at = tuple(position + 8.0 * rotation[:, 2])
+                return
+            stand, target = _VIEWPOINTS[viewpoint]
+            camera.up_direction = (1.0, 0.0, 0.0) if viewpoint == "above" else (0.0, 0.0, 1.0)
+            camera.position, camera.look_at = stand, target
+
+    def _show_theme(self, sight: Sight) -> None:
+        """Paint what is drawn in one colour for the ground it is seen on."""
+        palette = LIGHT if sight.light else DARK
+        if palette is self._palette:
+            return
+        self._palette, self._posed = palette, self
+        for node, colour in ((self._ray, palette.ray), (self._next, palette.next)):
+            node.colors = np.array(colour, dtype=np.uint8)
+        for rings in self._rings:
+            rings.colors = np.array(palette.rings, dtype=np.uint8)
+        self._grid.cell_color = self._grid.section_color = palette.cells
+
+    def _show_scan(self, sight: Sight) -> None:
+        if sight.scan is None:
+            self._scan.visible = False
+            return
+        still = still_returns(sight.scan, sight.session.options.gating)
+        colours = np.where(still[:, None], np.array(self._palette.still), np.array(self._palette.moving)).astype(
+            np.uint8
+        )
+        _fill_cloud(self._scan, sight.scan.points_radar_m, colours)
+        window = np.tile(np.array([self._palette.window], dtype=np.uint8), (len(sight.window), 1))
+        _fill_cloud(self._window, sight.window, window)
+
+    def _show_pose(self, sight: Sight) -> None:
+        """Move the frustum, and the ground below the lowest chosen return; nothing moves while the answer stays."""
+        outcome = sight.session.outcome
+        if outcome is self._posed:
+            return
+        self._posed = outcome
+        calibration = shown_calibration(sight.session, sight.reference)
+        camera = calibration.camera if calibration else sight.camera
+        camera_from_radar = calibration.camera_from_radar if calibration else nominal_camera_from_radar()
+        self._radar_from_camera = camera_from_radar.inverse()
+        _place(self._frustum, self._radar_from_camera)
+        self._frustum.color = self._palette.solved if isinstance(outcome, Calibration) else _DIM
+        if camera is not None:
+            self._frustum.fov = vertical_field_of_view_rad(camera)
+            self._frustum.aspect = camera.width_px / camera.height_px
+        heights = [float(pair.point_radar_m[2]) for pair in calibration.pairs if pair.inlier] if calibration else []
+        self._grid.position = (0.0, 0.0, min([0.0, *heights]))
+
+    def _show_pairs(self, sight: Sight) -> None:
+        calibration = sight.session.outcome
+        if not isinstance(calibration, Calibration):
+            for node in (self._chosen, self._rays, self._ray, self._gap, self._ellipsoids, self._ellipsoid, self._name):
+                node.visible = False
+            return
+        points = np.array([pair.point_radar_m for pair in calibration.pairs]).reshape(-1, 3)
+        residuals = np.array([pair.distance_px for pair in calibration.pairs])
+        _fill_cloud(self._chosen, points, residual_colours(residuals, sight.view.residual_limit_px or 20.0))
+        chosen = tuple(pair for pair in calibration.pairs if pair.id == sight.selected)
+        others = tuple(pair for pair in calibration.pairs if pair.inlier and pair.id != sight.selected)
+        _fill_lines(self._rays, rays_to(calibration, others))
+        _fill_lines(self._ellipsoids, _shells(calibration, others))
+        _fill_lines(self._ellipsoid, _shells(calibration, chosen))
+        self._show_selected(calibration, chosen)
+
+    def _show_selected(self, calibration: Calibration, chosen: tuple[PairResult, ...]) -> None:
+        rays = rays_to(calibration, chosen)
+        _fill_lines(self._ray, rays)
+        _fill_lines(self._gap, np.stack([rays[0, 1], chosen[0].point_radar_m])[None] if len(rays) else rays)
+        self._name.visible = bool(chosen)
+        if chosen:
+            point = chosen[0].point_radar_m
+            self._name.position = tuple(point + np.array([0.0, 0.0, 0.15]))
+            self._name.text = f"{chosen[0].id}: {np.linalg.norm(point):.2f} m, {_residual(chosen[0])}"
+
+    def _show_advice(self, sight: Sight) -> None:
+        """Ring the place where another placement pays most."""
+        advice = sight.view.advice
+        if advice is None or advice.may_stop:
+            self._next.visible = self._next_name.visible = False
+            return
+        place = np.array(advice.position_radar_m)
+        _fill_lines(self._next, next_place(place[None]))
+        self._next_name.position = tuple(place - np.array([0.0, 0.0, 0.3]))
+        self._next_name.text = f"next {advice.range_m:.1f} m"
+        self._next_name.visible = True
+
+    def _show_picture(self, sight: Sight) -> None:
+        picture = sight.picture
+        if picture is None or picture.index == self._pictured:
+            return
+        self._pictured = picture.index
+        self._frustum._format = "jpeg"
+        self._frustum._image_data = picture.data  # the compressed bytes as they are; the public property encodes again
+
+
+def _residual(pair: PairResult) -> str:
+    return f"{pair.distance_px:.1f} px" if np.isfinite(pair.distance_px) else "behind the camera"
+
+
+def _ground(scene: "viser.SceneApi") -> tuple[Any, list[Any]]:
+    """Add the grid with rings of equal range and their numbers; return the node that moves them all, and the rings."""
+    grid = scene.add_grid(
+        "/ground", width=60.0, height=60.0, cell_size=1.0, section_size=5.0, cell_color=DARK.cells,
+        section_color=(52, 62, 73), cell_thickness=0.6, section_thickness=0.8, shadow_opacity=0.0, fade_distance=40.0,
+    )  # fmt: skip
+    extent = {"every_m": _RINGS_EVERY_M, "up_to_m": _RINGS_UP_TO_M}
+    rings = [
+        scene.add_line_segments(f"/ground/{name}", strokes, DARK.rings, thickness=1.2, thickness_units="screen")
+        for name, strokes in (("rings", range_rings(**extent)), ("numbers", range_numbers(**extent)))
+    ]
+    return grid, rings
+
+
+def _shells(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:
+    points = np.array([pair.point_radar_m for pair in pairs]).reshape(-1, 3)
+    return ellipsoids(points, calibration.options.noise, calibration.noise_scale)
+
+
+def _cloud(scene: "viser.SceneApi", name: str, size_m: float) -> Any:
+    return scene.add_point_cloud(
+        name, _NOWHERE, (255, 255, 255), point_size=size_m, point_shape="circle", precision="float32", visible=False
+    )
+
+
+def _lines(scene: "viser.SceneApi", name: str, thickness_px: float, colour: tuple[int, int, int]) -> Any:
+    """Add line segments of one colour: viser takes the colours of single points for linear light, one colour as it is."""
+    return scene.add_line_segments(
+        name, _NO_LINE, colour, thickness=thickness_px, thickness_units="screen", visible=False
+    )
+
+
+def _fill_cloud(node: Any, points: Points3, colours: np.ndarray) -> None:
+    """Assign points and colours; viser has no empty cloud, so an empty one is hidden."""
+    node.visible = len(points) > 0
+    if len(points):
+        node.points, node.colors = points, colours
+
+
+def _fill_lines(node: Any, segments: np.ndarray) -> None:
+    node.visible = len(segments) > 0
+    if len(segments):
+        node.points = segments
+
+
+def _place(node: Any, target_from_node: RigidTransform) -> None:
+    node.wxyz = quaternion_wxyz_from_matrix(target_from_node.rotation)
+    node.position = target_from_node.translation_m

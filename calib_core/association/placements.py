@@ -1,0 +1,280 @@
+"""Where and when the reflector stood still, found from the radar alone: what the timeline shows and the N and P keys visit.
+
+A placement is a strong static return that appears, stays in one place for seconds, and leaves. What is there all the time
+is clutter. What appears together with something stronger is its ghost, or the person who waits beside the reflector: there
+is one reflector, so of two dwells at the same time only one is a placement.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Flags, Points3, TimesNs, Values, Vector3, frozen_array
+from calib_core.association.gating import static_returns
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
+from calib_core.options import GatingOptions
+from calib_core.radar import direction_cosines
+
+__all__ = ["Placement", "find_placements"]
+
+CELL = np.array([0.08, 0.04, 0.08])
+"""Size of a cell in range [m], u = y / r and w = z / r: the reflector's returns scatter over a few of them."""
+
+_REACH = np.array([0.07, 0.035, 0.09])  # of a dwell's returns about their median, in the same coordinates
+_LARGEST_GAP_S = 0.7  # a longer silence ends a dwell
+_SEED_GAP_S = 1.2  # in one cell alone, for the returns may alternate between neighbours
+_SEED_SHARE_OF_DWELL = 0.5
+_LEAST_PRESENCE = 0.4  # share of a dwell's scans that show it
+_MOST_PRESENCE_ELSEWHEN = 0.25  # the same for the rest of the recording, relative to the dwell's
+_MOST_OF_RECORDING = 0.5  # what stays longer is part of the scene
+_MARGIN_S = 1.0  # around a dwell, where the reflector is being put down or picked up
+_SHORTEST_OVERLAP_S = 0.5
+_WEAKER_DB = 10.0  # below the typical placement: somebody stands still, or a door moved
+_MOST_SEEDS = 4000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """One dwell of the reflector.
+
+    Attributes:
+        start: stamp of the first scan that shows it.
+        end: stamp of the last.
+        position_radar_m: (3,) median of its returns.
+        score: 0 to 1: how steadily it is seen, how new it is, and how strong it is among the placements.
+        snr_db: mean of its returns; NaN when the radar reports none.
+    """
+
+    start: TimeNs
+    end: TimeNs
+    position_radar_m: Vector3
+    score: float
+    snr_db: float = float("nan")
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position_radar_m", frozen_array(self.position_radar_m, (3,)))
+
+
+def find_placements(scans: RadarScans, options: GatingOptions, *, min_dwell_s: float = 2.0) -> tuple[Placement, ...]:
+    """Find the intervals during which the reflector stood still, by their start. They do not overlap.
+
+    The time it takes grows with n log n of the returns.
+
+    Args:
+        scans: of a whole recording; novelty is judged against the rest of it. A reflector that stays at one place for
+            more than half of the recording cannot be told from the scene.
+        options: which returns are static and within reach.
+        min_dwell_s: the shortest placement [s].
+    """
+    grid = _Grid.of(static_returns(scans, options))
+    dwells = [dwell for seed in _seeds(grid, min_dwell_s) if (dwell := _dwell_of(grid, seed, min_dwell_s)) is not None]
+    alone = _one_at_a_time(dwells)
+    typical_db = float(np.median([dwell.strength_db for dwell in alone])) if alone else 0.0
+    strong = [dwell for dwell in alone if not dwell.strength_db < typical_db - _WEAKER_DB]
+    return tuple(_placement(dwell, typical_db) for dwell in sorted(strong, key=lambda dwell: dwell.start))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Grid:
+    """Static returns sorted by cell, and by time within a cell.
+
+    Attributes:
+        times_s: (m,) of all scans, from the first.
+        times_ns: (m,) the same as stamps.
+        cells: (k, 3) the occupied cells in the order of their keys.
+        keys: (k,) ascending.
+        first: (k + 1,) cell i owns the rows first[i] to first[i + 1].
+        scan: (n,) the scan of each row.
+        cosines: (n, 3) range [m], u, w.
+        points_radar_m: (n, 3).
+        snr_db: (n,) NaN where unknown.
+    """
+
+    times_s: Values
+    times_ns: TimesNs
+    cells: TimesNs
+    keys: TimesNs
+    first: TimesNs
+    scan: TimesNs
+    cosines: Points3
+    points_radar_m: Points3
+    snr_db: Values
+
+    @classmethod
+    def of(cls, static: RadarScans) -> "_Grid":
+        cosines = direction_cosines(static.points_radar_m)
+        cells = np.floor(cosines / CELL).astype(np.int64)
+        keys = _keys(cells)
+        order = np.argsort(keys, kind="stable")
+        unique, first = np.unique(keys[order], return_index=True)
+        start_ns = static.times_ns[0] if len(static) else 0
+        return cls(
+            times_s=(static.times_ns - start_ns) / NS_PER_S,
+            times_ns=static.times_ns,
+            cells=cells[order][first],
+            keys=unique,
+            first=np.append(first, len(order)),
+            scan=static.scan_of_return()[order],
+            cosines=cosines[order],
+            points_radar_m=static.points_radar_m[order],
+            snr_db=static.snr_db[order],
+        )
+
+    def around(self, cell: TimesNs) -> TimesNs:
+        """Return the rows of a cell and of its 26 neighbours."""
+        keys = _keys(cell + _NEIGHBOURS)
+        places = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        owned = places[self.keys[places] == keys]
+        return np.concatenate([np.arange(self.first[i], self.first[i + 1]) for i in owned.tolist()])
+
+
+_NEIGHBOURS = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], [-1, 0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
+_U_CELLS = 64  # u and w lie in -1 to 1: 51 and 26 cells, and a margin for neighbours
+_W_CELLS = 64
+
+
+def _keys(cells: TimesNs) -> TimesNs:
+    return (cells[..., 0] * _U_CELLS + cells[..., 1] + _U_CELLS // 2) * _W_CELLS + cells[..., 2] + _W_CELLS // 2
+
+
+@dataclass(frozen=True, slots=True)
+class _Seed:
+    """A run of returns in one cell: rows first to last of the grid."""
+
+    first: int
+    last: int
+
+
+def _seeds(grid: _Grid, min_dwell_s: float) -> Iterator[_Seed]:
+    """Yield the runs that may belong to a placement, those with the most scans first."""
+    if not len(grid.scan):
+        return
+    times_s = grid.times_s[grid.scan]
+    breaks = np.diff(times_s) > _SEED_GAP_S
+    breaks[grid.first[1:-1] - 1] = True
+    start = np.concatenate([[0], np.flatnonzero(breaks) + 1])
+    end = np.append(start[1:], len(times_s))
+    lasted_s = times_s[end - 1] - times_s[start]
+    in_cell = np.diff(grid.first)[np.searchsorted(grid.first, start, side="right") - 1]
+    inside = (end - start) / (lasted_s + _MARGIN_S)
+    elsewhen = (in_cell - (end - start)) / np.maximum(grid.times_s[-1] - lasted_s, _MARGIN_S)
+    likely = (lasted_s >= _SEED_SHARE_OF_DWELL * min_dwell_s) & (elsewhen <= 2.0 * _MOST_PRESENCE_ELSEWHEN * inside)
+    rows = np.flatnonzero(likely)
+    for i in rows[np.argsort(start[rows] - end[rows], kind="stable")][:_MOST_SEEDS].tolist():
+        yield _Seed(int(start[i]), int(end[i]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Dwell:
+    """A placement before it is compared with the others.
+
+    Attributes:
+        start: first stamp.
+        end: last stamp.
+        position_radar_m: (3,) median.
+        presence: share of its scans that show it.
+        elsewhen: share of the other scans that show the same place.
+        snr_db: mean of its returns; NaN when unknown.
+        strength_db: what its reflecting area is proportional to: SNR made good for range; 0 when unknown.
+    """
+
+    start: TimeNs
+    end: TimeNs
+    position_radar_m: Vector3
+    presence: float
+    elsewhen: float
+    snr_db: float
+    strength_db: float
+
+    @property
+    def weight(self) -> float:
+        """What decides between two dwells at the same time: strength, steadiness and length [dB]."""
+        lasted_s = (self.end - self.start) / NS_PER_S
+        return self.strength_db + float(10.0 * np.log10(self.presence * lasted_s))
+
+
+def _dwell_of(grid: _Grid, seed: _Seed, min_dwell_s: float) -> _Dwell | None:
+    """Follow a seed over its cell's borders: collect the returns around its median, and see when they are there."""
+    centre = np.median(grid.cosines[seed.first : seed.last], axis=0)
+    rows = grid.around(np.floor(centre / CELL).astype(np.int64))
+    seed_times_s = grid.times_s[grid.scan[seed.first : seed.last]]
+    members = rows[:0]
+    span: tuple[int, int] | None = None
+    for _ in range(2):  # the second time about the median of the dwell itself
+        members = rows[(np.abs(grid.cosines[rows] - centre) <= _REACH).all(axis=1)]
+        span = _span(grid, members, float(np.median(seed_times_s)))
+        if span is None:
+            return None
+        in_span = (grid.scan[members] >= span[0]) & (grid.scan[members] <= span[1])
+        centre = np.median(grid.cosines[members[in_span]], axis=0)
+    if span is None or grid.times_s[span[1]] - grid.times_s[span[0]] < min_dwell_s:
+        return None
+    return _judged(grid, members, span)
+
+
+def _span(grid: _Grid, members: TimesNs, within_s: float) -> tuple[int, int] | None:
+    """Return the first and last scan of the unbroken presence around a time; None where there is none."""
+    shown = np.unique(grid.scan[members])
+    if not len(shown):
+        return None
+    nearest = int(np.argmin(np.abs(grid.times_s[shown] - within_s)))
+    ends = np.flatnonzero(np.diff(grid.times_s[shown]) > _LARGEST_GAP_S)
+    after = int(np.searchsorted(ends, nearest))
+    first = int(ends[after - 1]) + 1 if after > 0 else 0
+    last = int(ends[after]) if after < len(ends) else len(shown) - 1
+    return int(shown[first]), int(shown[last])
+
+
+def _judged(grid: _Grid, members: TimesNs, span: tuple[int, int]) -> _Dwell | None:
+    """Measure how steadily a dwell is seen and how new it is; None where it is clutter or chance."""
+    shown = np.unique(grid.scan[members])
+    inside = (shown >= span[0]) & (shown <= span[1])
+    presence = float(inside.sum()) / (span[1] - span[0] + 1)
+    start_s, end_s = grid.times_s[span[0]], grid.times_s[span[1]]
+    others = _outside(grid.times_s, start_s, end_s)
+    elsewhen = float(_outside(grid.times_s[shown], start_s, end_s).sum()) / max(float(others.sum()), 1.0)
+    stays = end_s - start_s > _MOST_OF_RECORDING * grid.times_s[-1]
+    if stays or presence < _LEAST_PRESENCE or elsewhen > _MOST_PRESENCE_ELSEWHEN * presence:
+        return None
+    mine = members[(grid.scan[members] >= span[0]) & (grid.scan[members] <= span[1])]
+    position_radar_m = np.median(grid.points_radar_m[mine], axis=0)
+    snr_db = grid.snr_db[mine]
+    known = snr_db[np.isfinite(snr_db)]
+    mean_db = float(known.mean()) if len(known) else float("nan")
+    range_m = float(np.linalg.norm(position_radar_m))
+    return _Dwell(
+        start=TimeNs(int(grid.times_ns[span[0]])),
+        end=TimeNs(int(grid.times_ns[span[1]])),
+        position_radar_m=position_radar_m,
+        presence=presence,
+        elsewhen=elsewhen,
+        snr_db=mean_db,
+        strength_db=mean_db + 40.0 * float(np.log10(max(range_m, 1e-3))) if len(known) else 0.0,
+    )
+
+
+def _outside(times_s: Values, start_s: float, end_s: float) -> Flags:
+    return (times_s < start_s - _MARGIN_S) | (times_s > end_s + _MARGIN_S)
+
+
+def _one_at_a_time(dwells: Sequence[_Dwell]) -> list[_Dwell]:
+    """Of dwells that overlap in time keep the weightiest: there is one reflector."""
+    kept: list[_Dwell] = []
+    shortest_ns = _SHORTEST_OVERLAP_S * NS_PER_S
+    for dwell in sorted(dwells, key=lambda dwell: (-dwell.weight, dwell.start, dwell.end)):
+        if all(min(dwell.end, other.end) - max(dwell.start, other.start) < shortest_ns for other in kept):
+            kept.append(dwell)
+    return kept
+
+
+def _placement(dwell: _Dwell, typical_db: float) -> Placement:
+    strength = float(np.clip(1.0 + (dwell.strength_db - typical_db) / (2.0 * _WEAKER_DB), 0.0, 1.0))
+    novelty = 1.0 - dwell.elsewhen / dwell.presence
+    return Placement(
+        start=dwell.start,
+        end=dwell.end,
+        position_radar_m=dwell.position_radar_m,
+        score=dwell.presence * novelty * strength,
+        snr_db=dwell.snr_db,
+    )

@@ -1,0 +1,1 @@
+"""Camera intrinsics in whatever file people have them."""

@@ -1,0 +1,1 @@
+"""Calibrations in the formats of other tools, reader beside writer, and the registry of them."""

@@ -1,0 +1,77 @@
+"""What every file that may hold comments says in words: both frames, the equation, the order, the check point."""
+
+import json
+import re
+
+import numpy as np
+
+from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
+from calib_core.interchange.imported import StatedCheckPoint
+from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
+
+__all__ = ["hash_comment", "stated_check_point", "stated_frames", "statement", "xml_comment"]
+
+_STRING = r'"(?:[^"\\]|\\.)*"'
+_FRAMES = re.compile(rf"radar frame ({_STRING}) \(.*?\), camera frame ({_STRING}) \(")
+_CHECK_POINT = re.compile(
+    r"check point: p_radar \[([^\]]*)\] m -> p_camera \[([^\]]*)\] m(?: -> pixel \[([^\]]*)\] px)?"
+)
+
+
+def statement(file: CalibrationFile, meaning: str) -> tuple[str, ...]:
+    """Return the lines a file opens with.
+
+    Args:
+        file: what is exported.
+        meaning: what the numbers of this format are, with the quaternion's or the angles' order.
+    """
+    frames = file.frames
+    lines = [
+        f"{EQUATION} with radar frame {quoted(frames.radar)} (x forward, y left, z up), "
+        f"camera frame {quoted(frames.camera)} (optical: x right, y down, z forward), metres",
+        meaning,
+    ]
+    check = file.check_point
+    if check is not None:
+        point_camera_m = file.calibration.camera_from_radar @ check.radar_m[None]
+        lines.append(
+            f"check point: p_radar [{numbers_text(check.radar_m)}] m -> p_camera [{numbers_text(point_camera_m[0])}] m"
+            f" -> pixel [{numbers_text(check.pixel_px)}] px"
+        )
+    # A file may hold any text for the version; the frames' names are checked and stay as they are, spaces and all.
+    version = " ".join((file.provenance.version or "").split())
+    lines.append(f"cocalib{f' {version}' if version else ''}: read it back with: cocalib check THIS_FILE")
+    return tuple(lines)
+
+
+def hash_comment(lines: tuple[str, ...]) -> str:
+    """Return lines as comments of YAML, shell, Python and plain text."""
+    return "".join(f"# {line}\n" for line in lines)
+
+
+def xml_comment(lines: tuple[str, ...]) -> str:
+    """Return lines as one XML comment, in which no two hyphens may stand together; in the names, JSON reads the second again."""
+    body = "\n     ".join(lines).replace("--", "-\\u002d")
+    return f"<!-- {body} -->\n"
+
+
+def stated_frames(text: str) -> FrameNames | None:
+    """Find the two frames' names in a file's words."""
+    match = _FRAMES.search(text)
+    try:
+        return FrameNames(json.loads(match[1]), json.loads(match[2])) if match else None
+    except ValueError:
+        return None
+
+
+def stated_check_point(text: str) -> StatedCheckPoint | None:
+    """Find the check point in a file's words."""
+    match = _CHECK_POINT.search(text)
+    if match is None:
+        return None
+    try:
+        radar_m, camera_m = (np.array(match[i].split(","), dtype=np.float64) for i in (1, 2))
+        pixel_px = np.array(match[3].split(","), dtype=np.float64) if match[3] else None
+        return StatedCheckPoint(radar_m, camera_m, pixel_px)
+    except ValueError:
+        return None

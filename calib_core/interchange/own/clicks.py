@@ -1,0 +1,69 @@
+"""clicks-1: the clicks of a session as a file."""
+
+from collections.abc import Iterable, Sequence
+
+import msgspec
+
+from calib_core.errors import InputError
+from calib_core.interchange.own.documents import CLICKS_SCHEMA, ClickDocument, ClicksDocument, TimeDocument
+from calib_core.interchange.syntax.json_text import json_text
+from calib_core.interchange.syntax.strict_json import parse_document
+from calib_core.measurements import ReflectorClick, time_from_parts, time_parts
+
+__all__ = ["read_clicks", "refuse_repeated_ids", "write_clicks"]
+
+
+def read_clicks(text: str, source: str = "clicks") -> tuple[ReflectorClick, ...]:
+    """Read clicks-1 text; the clicks come back in order of time.
+
+    Args:
+        text: the file's content.
+        source: what to call the file in an error.
+
+    Raises:
+        InputError: the file, the place in it and what to do.
+    """
+    document = parse_document(text, ClicksDocument, source=source)
+    refuse_repeated_ids([click.id for click in document.clicks], source=source, place="clicks")
+    return tuple(
+        sorted(
+            ReflectorClick(
+                image_time=time_from_parts(click.image_time.sec, click.image_time.nanosec),
+                id=click.id,
+                u_px=click.pixel_px[0],
+                v_px=click.pixel_px[1],
+                sigma_px=click.sigma_px,
+                excluded=click.excluded,
+            )
+            for click in document.clicks
+        )
+    )
+
+
+def write_clicks(clicks: Iterable[ReflectorClick]) -> str:
+    """Write clicks as clicks-1 text in order of time: the same clicks give the same bytes."""
+    documents = [
+        ClickDocument(
+            click.id,
+            TimeDocument(*time_parts(click.image_time)),
+            (click.u_px, click.v_px),
+            sigma_px=click.sigma_px,
+            excluded=click.excluded,
+        )
+        for click in sorted(clicks, key=lambda click: (click.image_time, click.id))
+    ]
+    return json_text(msgspec.to_builtins(ClicksDocument(CLICKS_SCHEMA, documents)))
+
+
+def refuse_repeated_ids(ids: Sequence[str], *, source: str, place: str) -> None:
+    """Refuse a list in which two entries have one id.
+
+    Raises:
+        InputError: it names both places.
+    """
+    first: dict[str, int] = {}
+    for index, name in enumerate(ids):
+        if name in first:
+            places = f"{place}[{first[name]}] and {place}[{index}]"
+            raise InputError(f"{source}: {places}: both have the id {name!r}; give each its own")
+        first[name] = index

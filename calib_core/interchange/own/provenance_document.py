@@ -1,0 +1,33 @@
+"""Where a calibration comes from, in a calibration-1 file."""
+
+from calib_core.interchange.calibration_file import InputFile, Provenance
+from calib_core.interchange.own import documents
+
+__all__ = ["provenance_document", "provenance_of"]
+
+
+def provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
+    """Return what a file says of it."""
+    return documents.ProvenanceDocument(
+        inputs=[documents.InputDocument(f.name, f.size_bytes, f.sha256) for f in provenance.inputs],
+        topics=documents.TopicsDocument(provenance.radar_topic, provenance.image_topic, provenance.camera_info_topic),
+        clocks=documents.ClocksDocument(provenance.radar_clock, provenance.image_clock),
+        radar_axes=provenance.radar_axes,
+        video_start=provenance.video_start,
+        version=provenance.version,
+    )
+
+
+def provenance_of(document: documents.ProvenanceDocument) -> Provenance:
+    """Return what a file has said of it."""
+    return Provenance(
+        inputs=tuple(InputFile(f.name, f.size_bytes, f.sha256) for f in document.inputs),
+        radar_topic=document.topics.radar,
+        image_topic=document.topics.image,
+        camera_info_topic=document.topics.camera_info,
+        radar_clock=document.clocks.radar,
+        image_clock=document.clocks.image,
+        radar_axes=document.radar_axes,
+        video_start=document.video_start,
+        version=document.version,
+    )

@@ -1,0 +1,49 @@
+"""JSON Schema of our files, generated from the types: `python -m calib_core.interchange.own.schemas docs/schemas`."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from calib_core.interchange.own.documents import (
+    CALIBRATION_SCHEMA,
+    CLICKS_SCHEMA,
+    PAIRS_SCHEMA,
+    CalibrationDocument,
+    ClicksDocument,
+    PairsDocument,
+)
+from calib_core.interchange.syntax.json_text import json_text
+
+__all__ = ["schema_texts", "write_schemas"]
+
+_DOCUMENTS: dict[str, Any] = {
+    CLICKS_SCHEMA: ClicksDocument,
+    PAIRS_SCHEMA: PairsDocument,
+    CALIBRATION_SCHEMA: CalibrationDocument,
+}
+
+
+def schema_texts() -> dict[str, str]:
+    """Return the JSON Schema (2020-12) of each of our files, by the name of the schema's own file."""
+    texts = {}
+    for name, document in _DOCUMENTS.items():
+        head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": name}
+        schema = {**head, **msgspec.json.schema(document)}
+        for part, definition in schema["$defs"].items():
+            if part.endswith(("Options", "Prior")):  # settings: the reader refuses what it does not know
+                definition["additionalProperties"] = False
+        texts[f"{name.removeprefix('cocalib/')}.schema.json"] = json_text(schema)
+    return texts
+
+
+def write_schemas(folder: Path) -> None:
+    """Write every schema into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in schema_texts().items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_schemas(Path(sys.argv[1]))

@@ -1,0 +1,384 @@
+"""Algorithm 1 of the paper as printed, one public function per line (docs/paper.md has the table).
+
+Cheng, Sengupta, Cao: "3D Radar and Camera Co-Calibration". It is here to compare with: the default method does not use it.
+What the paper leaves open is in PaperOptions.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib_core.arrays import Flags, Points2, Points3, Values, Vector3, frozen_array
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import (
+    NS_PER_S,
+    Candidate,
+    Pair,
+    RadarScans,
+    ReflectorClick,
+    TimeNs,
+    Unpaired,
+    Unsolvable,
+)
+from calib_core.metrics import aed, distances, metrics_of
+from calib_core.options import CalibrationOptions, PaperOptions
+from calib_core.paper.opencv import PnPSolver, refine_lm, solve_pnp_ransac, spans_a_plane
+from calib_core.paper.paper_doubts import cautions_as_printed
+from calib_core.results import Calibration, PairResult
+
+__all__ = [
+    "ScoredPose",
+    "calibrate_as_printed",
+    "clicks_by_time",
+    "mean_position",
+    "nearest_stamp",
+    "pair_as_printed",
+    "pose_by_iterative_ransac",
+    "pose_by_sqpnp_ransac",
+    "pose_of_smaller_error",
+    "refined_on_all_pairs",
+    "solve_pairs_as_printed",
+    "static_returns_as_printed",
+    "window_around",
+    "z_score_inliers",
+]
+
+MINIMUM_PAIRS = 4
+_ROUNDING = 1e-9  # two returns have z-scores of exactly 1, up to rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScoredPose:
+    """A RANSAC pose and its mean reprojection error.
+
+    Attributes:
+        camera_from_radar: the pose.
+        inliers: (n,) RANSAC's.
+        mean_error_px: over all n pairs; NaN when the pose puts one of them behind the camera.
+    """
+
+    camera_from_radar: RigidTransform
+    inliers: Flags
+    mean_error_px: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inliers", frozen_array(self.inliers, (None,), dtype=np.bool_))
+
+
+def clicks_by_time(clicks: Iterable[ReflectorClick]) -> tuple[ReflectorClick, ...]:
+    """Algorithm 1, line 1: list the clicked pixels with the recorded stamps of their frames, by time.
+
+    The stamp is the frame's own, never "frame number over frame rate" of a video made from the recording.
+    """
+    return tuple(sorted(clicks))
+
+
+def static_returns_as_printed(scans: RadarScans, options: PaperOptions) -> RadarScans:
+    """Algorithm 1, line 2: keep the returns with velocity = 0 and range < 20 m; scans left empty go too.
+
+    The range is computed from x, y, z, for common drivers leave the message's own range at 0. A return without position or
+    velocity (NaN) is dropped here, whole: its click stays with the returns that remain.
+    """
+    range_m = np.linalg.norm(scans.points_radar_m, axis=1)
+    with np.errstate(invalid="ignore"):
+        keep = (np.abs(scans.doppler_mps) <= options.max_speed_mps) & (range_m < options.max_range_m)
+    counts = np.bincount(scans.scan_of_return()[keep], minlength=len(scans))
+    return RadarScans(
+        times_ns=scans.times_ns[counts > 0],
+        first_return=np.concatenate([[0], np.cumsum(counts[counts > 0])]),
+        points_radar_m=scans.points_radar_m[keep],
+        doppler_mps=scans.doppler_mps[keep],
+        snr_db=scans.snr_db[keep],
+        sigma_polar=scans.sigma_polar[keep],
+    )
+
+
+def nearest_stamp(static: RadarScans, image_time: TimeNs) -> TimeNs:
+    """Algorithm 1, line 3: find the radar stamp nearest to the click's.
+
+    Raises:
+        ValueError: there are no scans.
+    """
+    return TimeNs(int(static.times_ns[static.nearest(image_time)]))
+
+
+def window_around(static: RadarScans, radar_time: TimeNs, options: PaperOptions) -> RadarScans:
+    """Algorithm 1, line 4: take the returns of the 3 s around that stamp."""
+    if options.window == "whole-second":
+        second = int(radar_time) // NS_PER_S * NS_PER_S
+        return static.between(TimeNs(second - NS_PER_S), TimeNs(second + NS_PER_S))
+    half_ns = round(options.window_s * NS_PER_S / 2)
+    return static.between(TimeNs(radar_time - half_ns), TimeNs(radar_time + half_ns))
+
+
+def z_score_inliers(points_radar_m: Points3, options: PaperOptions) -> Flags:
+    """Algorithm 1, line 5: keep the returns whose z-score is small on x, on y and on z: (n,).
+
+    z = (value - mean) / standard deviation, divided by N as SciPy's zscore does; an axis without spread rejects nothing.
+    """
+    keep = np.ones(len(points_radar_m), dtype=np.bool_)
+    judged = keep
+    for axis in range(3):
+        values = points_radar_m[judged, axis]
+        passed = np.zeros_like(keep)
+        passed[judged] = np.abs(_z_scores(values)) <= options.z_score_threshold + _ROUNDING
+        keep = keep & passed
+        if options.z_score_axes == "in-turn":
+            judged = keep
+    return keep
+
+
+def mean_position(points_radar_m: Points3, inliers: Flags) -> Vector3:
+    """Algorithm 1, line 6: average the inliers: the click's radar position (3,) [m].
+
+    The mean of a window that holds two things lies between them. That is what the paper prints, and what is done here.
+    """
+    return np.asarray(points_radar_m[inliers].mean(axis=0), dtype=np.float64)
+
+
+def pose_by_iterative_ransac(
+    points_radar_m: Points3, pixels_px: Points2, camera: Camera, options: PaperOptions
+) -> ScoredPose | None:
+    """Algorithm 1, line 7: solve PnP by RANSAC with the iterative solver; None where RANSAC finds nothing."""
+    return _pose_by_ransac(points_radar_m, pixels_px, camera, options, "iterative")
+
+
+def pose_by_sqpnp_ransac(
+    points_radar_m: Points3, pixels_px: Points2, camera: Camera, options: PaperOptions
+) -> ScoredPose | None:
+    """Algorithm 1, line 8: solve PnP by RANSAC with SQPnP; None where RANSAC finds nothing."""
+    return _pose_by_ransac(points_radar_m, pixels_px, camera, options, "sqpnp")
+
+
+def pose_of_smaller_error(iterative: ScoredPose | None, sqpnp: ScoredPose | None) -> ScoredPose | None:
+    """Algorithm 1, line 9: take the pose with the smaller mean reprojection error; of two equal ones, the iterative."""
+    if iterative is None or sqpnp is None:
+        return iterative or sqpnp
+    first, second = (np.inf if np.isnan(pose.mean_error_px) else pose.mean_error_px for pose in (iterative, sqpnp))
+    return iterative if first <= second else sqpnp
+
+
+def refined_on_all_pairs(
+    points_radar_m: Points3, pixels_px: Points2, camera: Camera, camera_from_radar: RigidTransform
+) -> RigidTransform | None:
+    """Algorithm 1, line 10: refine by Levenberg-Marquardt on ALL pairs, RANSAC's outliers included, as printed."""
+    return refine_lm(points_radar_m, pixels_px, camera, camera_from_radar)
+
+
+def pair_as_printed(click: ReflectorClick, static: RadarScans, options: CalibrationOptions) -> Pair | Unpaired:
+    """Algorithm 1, lines 3 to 6 for one click: its pair, or why it has none.
+
+    Args:
+        click: one click.
+        static: what line 2 kept.
+        options: the paper's, and the largest time gap to a scan, which the paper does not give.
+    """
+    if not len(static):
+        return _unpaired(click, "no-static-return", "no radar return passes the velocity and range filter", options)
+    radar_time = nearest_stamp(static, click.image_time)
+    gap_s = abs(int(radar_time) - int(click.image_time)) / NS_PER_S
+    if gap_s > options.locating.max_time_gap_s:
+        return _unpaired(click, "no-static-return", f"the nearest static radar return is {gap_s:.2f} s away", options)
+    window = window_around(static, radar_time, options.paper)
+    inliers = z_score_inliers(window.points_radar_m, options.paper)
+    if not inliers.any():
+        return Unpaired(
+            id=click.id,
+            code="no-z-score-inlier",
+            reason=f"none of the {len(inliers)} returns in the window is within "
+            f"{options.paper.z_score_threshold:g} standard deviations on all three axes",
+            hint="raise the z-score threshold, or use the default method",
+        )
+    snr_db = window.snr_db[inliers]
+    position = Candidate(
+        position_radar_m=mean_position(window.points_radar_m, inliers),
+        sigma_polar=np.full(3, np.nan),
+        covariance_m2=np.full((3, 3), np.nan),
+        returns=int(inliers.sum()),
+        scans=len(np.unique(window.scan_of_return()[inliers])),
+        snr_db=float(snr_db[np.isfinite(snr_db)].mean()) if np.isfinite(snr_db).any() else float("nan"),
+    )
+    return Pair(
+        id=click.id,
+        pixel_px=np.array([click.u_px, click.v_px]),
+        candidates=(position,),
+        sigma_px=click.sigma_px,
+        image_time=click.image_time,
+        radar_time=radar_time,
+    )
+
+
+def calibrate_as_printed(
+    clicks: Iterable[ReflectorClick], scans: RadarScans, camera: Camera, options: CalibrationOptions
+) -> Calibration | Unsolvable:
+    """Run Algorithm 1, lines 1 to 10. The order of the clicks does not matter.
+
+    Args:
+        clicks: excluded ones take no part, but appear in the result.
+        scans: of the radar, as recorded.
+        camera: intrinsics.
+        options: `paper` holds what the paper leaves open.
+    """
+    ordered = clicks_by_time(clicks)
+    static = static_returns_as_printed(scans, options.paper)
+    found = [pair_as_printed(click, static, options) for click in ordered]
+    unpaired = tuple(pair for pair in found if isinstance(pair, Unpaired))
+    outcome = _solved(
+        [pair for pair in found if isinstance(pair, Pair)],
+        camera,
+        options,
+        excluded=frozenset(click.id for click in ordered if click.excluded),
+        unpaired=unpaired,
+    )
+    return replace(outcome, unpaired=unpaired) if isinstance(outcome, Unsolvable) else outcome
+
+
+def solve_pairs_as_printed(
+    pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, excluded: frozenset[str] = frozenset()
+) -> Calibration | Unsolvable:
+    """Run Algorithm 1, lines 7 to 10, on pairs made elsewhere; of a pair's radar positions, the first one counts.
+
+    Args:
+        pairs: in any order; results come by image time, pairs without a time in the order given.
+        camera: intrinsics.
+        options: `paper` holds what the paper leaves open.
+        excluded: ids of pairs that take no part, but appear in the result.
+    """
+    return _solved(pairs, camera, options, excluded=excluded, unpaired=())
+
+
+def _solved(
+    pairs: Sequence[Pair],
+    camera: Camera,
+    options: CalibrationOptions,
+    *,
+    excluded: frozenset[str],
+    unpaired: tuple[Unpaired, ...],
+) -> Calibration | Unsolvable:
+    ordered = sorted(pairs, key=lambda pair: pair.image_time or 0)  # stable: pairs without a time stay as given
+    used = sorted(
+        (pair for pair in pairs if pair.id not in excluded), key=lambda pair: (pair.image_time or 0, pair.id)
+    )  # whatever order they come in, RANSAC draws the same samples
+    if len(used) < MINIMUM_PAIRS:
+        return _too_few(len(used), len(ordered) - len(used), len(unpaired))
+    points_radar_m = np.stack([pair.candidates[0].position_radar_m for pair in used])
+    pixels_px = np.stack([pair.pixel_px for pair in used])
+    if not spans_a_plane(points_radar_m):
+        return _in_one_line(len(used))
+    iterative = pose_by_iterative_ransac(points_radar_m, pixels_px, camera, options.paper)
+    sqpnp = pose_by_sqpnp_ransac(points_radar_m, pixels_px, camera, options.paper)
+    better = pose_of_smaller_error(iterative, sqpnp)
+    if better is None:
+        return _no_consensus(len(used), options.paper)
+    camera_from_radar = refined_on_all_pairs(points_radar_m, pixels_px, camera, better.camera_from_radar)
+    if camera_from_radar is None:
+        return Unsolvable(
+            "refinement-diverged",
+            "Levenberg-Marquardt on all pairs left the finite numbers",
+            "exclude the pairs with the largest residuals, or use the default method",
+        )
+    inliers = frozenset(pair.id for pair, inlier in zip(used, better.inliers, strict=True) if inlier)
+    results = tuple(_result(pair, camera, camera_from_radar, pair.id in inliers, excluded) for pair in ordered)
+    distances_px = np.sort([result.distance_px for result in results if not result.excluded])
+    return Calibration(
+        camera_from_radar=camera_from_radar,
+        covariance=np.full((6, 6), np.nan),
+        camera=camera,
+        metrics=metrics_of(distances_px[np.isfinite(distances_px)]),
+        pairs=results,
+        unpaired=unpaired,
+        cautions=cautions_as_printed(
+            [pair.id for pair in used],
+            points_radar_m,
+            pixels_px,
+            camera,
+            camera_from_radar,
+            better.inliers,
+            options,
+        ),
+        options=options,
+        iterative_px=float("nan") if iterative is None else iterative.mean_error_px,
+        sqpnp_px=float("nan") if sqpnp is None else sqpnp.mean_error_px,
+    )
+
+
+def _result(
+    pair: Pair, camera: Camera, camera_from_radar: RigidTransform, inlier: bool, excluded: frozenset[str]
+) -> PairResult:
+    point_radar_m = pair.candidates[0].position_radar_m
+    return PairResult(
+        id=pair.id,
+        pixel_px=pair.pixel_px,
+        projected_px=camera.project(camera_from_radar @ point_radar_m[None])[0],
+        point_radar_m=point_radar_m,
+        inlier=inlier,
+        excluded=pair.id in excluded,
+        image_time=pair.image_time,
+    )
+
+
+def _pose_by_ransac(
+    points_radar_m: Points3, pixels_px: Points2, camera: Camera, options: PaperOptions, solver: PnPSolver
+) -> ScoredPose | None:
+    solution = solve_pnp_ransac(
+        points_radar_m,
+        pixels_px,
+        camera,
+        solver,
+        threshold_px=options.ransac_threshold_px,
+        iterations=options.ransac_iterations,
+        confidence=options.ransac_confidence,
+    )
+    if solution is None:
+        return None
+    projected_px = camera.project(solution.camera_from_radar @ points_radar_m)
+    return ScoredPose(solution.camera_from_radar, solution.inliers, aed(distances(projected_px, pixels_px)))
+
+
+def _z_scores(values: Values) -> Values:
+    if not len(values):
+        return values
+    spread = float(values.std())
+    return (values - values.mean()) / spread if spread > 0.0 else np.zeros_like(values)
+
+
+def _unpaired(click: ReflectorClick, code: str, reason: str, options: CalibrationOptions) -> Unpaired:
+    return Unpaired(
+        id=click.id,
+        code=code,
+        reason=reason,
+        hint=f"Algorithm 1 keeps speeds up to {options.paper.max_speed_mps:g} m/s and ranges below "
+        f"{options.paper.max_range_m:g} m: click where the reflector stands still inside the radar recording, "
+        "or raise these two options",
+    )
+
+
+def _too_few(used: int, excluded: int, unpaired: int) -> Unsolvable:
+    aside = [text for count, text in ((excluded, "excluded"), (unpaired, "without a radar position")) if count]
+    counts = [count for count in (excluded, unpaired) if count]
+    rest = "".join(f", {count} more {text}" for count, text in zip(counts, aside, strict=True))
+    return Unsolvable(
+        "too-few-pairs",
+        f"{used} of {MINIMUM_PAIRS} pairs{rest}",
+        f"click the reflector at {MINIMUM_PAIRS - used} more placements at least; 10 to 20 spread over the picture are better",
+    )
+
+
+def _in_one_line(used: int) -> Unsolvable:
+    return Unsolvable(
+        "points-in-one-line",
+        f"the radar positions of all {used} pairs lie at one place or on one line",
+        "place the reflector to the left and to the right, near and far",
+    )
+
+
+def _no_consensus(used: int, options: PaperOptions) -> Unsolvable:
+    return Unsolvable(
+        "no-consensus",
+        f"RANSAC finds no pose that brings enough of the {used} pairs within {options.ransac_threshold_px:g} px, "
+        "neither with the iterative solver nor with SQPnP",
+        "raise the RANSAC threshold to about three times the pixel noise (radar angles alone make 10 to 20 px), "
+        "or use the default method, which needs no threshold",
+    )

@@ -1,0 +1,1 @@
+"""Camera messages: intrinsics, images and video."""

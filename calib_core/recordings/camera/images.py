@@ -1,0 +1,225 @@
+"""Camera images: recorded JPEG and PNG passed through, raw pixels converted and encoded once."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from calib_core.errors import MessageError
+from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, mended_jpeg, png_size
+from calib_core.recordings.camera.packets import Packet, packet_of, require_codec
+from calib_core.recordings.camera.raw_pixels import READABLE, check_size, converted_pixels, raw_pixels, stretched
+from calib_core.recordings.messages.decoding import Message, decode
+from calib_core.recordings.messages.definitions import Definition
+
+__all__ = [
+    "EncodedImage",
+    "ImageLayout",
+    "encoded_pixels",
+    "is_compressed_image",
+    "is_packet",
+    "is_picture",
+    "is_raw_image",
+]
+
+_RAW_NAMES = frozenset({"height", "width", "encoding", "step", "data"})
+_COMPRESSED_NAMES = frozenset({"format", "data"})
+_PACKET_NAMES = frozenset({"encoding", "pts", "flags", "data"})
+_JPEG_QUALITY = 95
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedImage:
+    """A frame as a file.
+
+    Attributes:
+        data: the bytes of the file.
+        format: "jpeg" or "png".
+        width_px: columns.
+        height_px: rows.
+    """
+
+    data: bytes
+    format: Literal["jpeg", "png"]
+    width_px: int
+    height_px: int
+
+
+def is_raw_image(definition: Definition) -> bool:
+    """Tell whether a message is laid out as sensor_msgs/Image."""
+    return definition.names >= _RAW_NAMES
+
+
+def is_compressed_image(definition: Definition) -> bool:
+    """Tell whether a message is laid out as sensor_msgs/CompressedImage."""
+    return definition.names >= _COMPRESSED_NAMES and not is_raw_image(definition)
+
+
+def is_packet(definition: Definition) -> bool:
+    """Tell whether a message is laid out as the packets of ffmpeg_image_transport: one frame of a video."""
+    return definition.names >= _PACKET_NAMES and not is_raw_image(definition)
+
+
+def is_picture(definition: Definition) -> bool:
+    """Tell whether a message is laid out as any of them."""
+    return is_raw_image(definition) or is_compressed_image(definition) or is_packet(definition)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImageLayout:
+    """Reads the images of one topic; errors begin with the topic's name."""
+
+    definition: Definition
+    topic: str
+
+    @property
+    def compressed(self) -> bool:
+        """Tell whether messages hold files rather than pixels."""
+        return not is_raw_image(self.definition)
+
+    def check(self, payload: bytes) -> None:
+        """Refuse a topic by its first message, without decoding the picture.
+
+        Raises:
+            MessageError: the encoding cannot be read; the text says which would.
+        """
+        packet = self.packet(payload)
+        if packet is None:
+            self.size_px(payload)
+            return
+        try:
+            require_codec(packet)
+        except MessageError as error:
+            raise self._refused(str(error)) from error
+
+    def packet(self, payload: bytes) -> Packet | None:
+        """Return the piece of video a message holds; None for one that holds a picture of its own.
+
+        Raises:
+            MessageError: the message cannot be read.
+        """
+        if is_raw_image(self.definition):
+            return None
+        return packet_of(self._message(payload))
+
+    def recorded_as(self, payload: bytes) -> str:
+        """Return what a message holds, for people: "jpeg", "png", "raw bgr8", "h264 video".
+
+        Raises:
+            MessageError: the message cannot be read.
+        """
+        message = self._message(payload)
+        if not self.compressed:
+            return f"raw {message.text('encoding')}"
+        packet = packet_of(message)
+        return f"{packet.codec} video" if packet else self._file(message).format
+
+    def size_px(self, payload: bytes) -> tuple[int, int]:
+        """Return width and height without decoding the picture.
+
+        Raises:
+            MessageError: the message cannot be read.
+        """
+        message = self._message(payload)
+        if self.compressed:
+            file = self._file(message)
+            return file.width_px, file.height_px
+        try:
+            pixels = raw_pixels(message)
+        except MessageError as error:
+            raise self._refused(str(error)) from error
+        return pixels.shape[1], pixels.shape[0]
+
+    def encoded(self, payload: bytes) -> EncodedImage:
+        """Return the frame as a file: the recorded one, or raw pixels encoded as JPEG.
+
+        Raises:
+            MessageError: the message cannot be read.
+        """
+        message = self._message(payload)
+        if self.compressed:
+            return self._file(message)
+        return encoded_pixels(self._converted(message))
+
+    def picture(self, payload: bytes) -> np.ndarray:
+        """Return the frame's pixels: uint8 (h, w, 3), blue first.
+
+        Raises:
+            MessageError: the message cannot be read.
+        """
+        message = self._message(payload)
+        if not self.compressed:
+            return self._converted(message)
+        import cv2
+
+        file = self._file(message)
+        flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+        picture = cv2.imdecode(np.frombuffer(file.data, dtype=np.uint8), flags)
+        if picture is None:
+            raise self._refused(f"a {file.format} picture of {len(file.data)} bytes is damaged; choose another frame")
+        return np.asarray(picture)
+
+    def _converted(self, message: Message) -> np.ndarray:
+        try:
+            return converted_pixels(message)
+        except MessageError as error:
+            raise self._refused(str(error)) from error
+
+    def _refused(self, why: str) -> MessageError:
+        return MessageError(f"topic {self.topic}: {why}")
+
+    def _message(self, payload: bytes) -> Message:
+        try:
+            return decode(self.definition, payload)
+        except MessageError as error:
+            raise self._refused(str(error)) from error
+
+    def _file(self, message: Message) -> EncodedImage:
+        """Take out the recorded file; what it is, its first bytes say and not the field 'format'."""
+        data = message.octets("data").tobytes()
+        said = message.text("format")
+        if "compressedDepth" in said:
+            raise self._refused(
+                f"'{said}' is a depth image, not a picture; choose a colour or grey image topic: {READABLE}"
+            )
+        try:
+            if data.startswith(JPEG_MAGIC):
+                data, width, height = mended_jpeg(data)
+                check_size(width, height)
+                return EncodedImage(data, "jpeg", width, height)
+            if data.startswith(PNG_MAGIC):
+                return self._png(data, said)
+        except MessageError as error:
+            raise self._refused(str(error)) from error
+        kind = "qoi" if data.startswith(b"qoif") else said or data[:4].hex() or "nothing"
+        raise self._refused(f"the encoding '{kind}' cannot be read; record or convert it to jpeg or png: {READABLE}")
+
+    def _png(self, data: bytes, said: str) -> EncodedImage:
+        width, height, bits, colour = png_size(data)
+        check_size(width, height)
+        if bits != 16 or colour != 0:
+            return EncodedImage(data, "png", width, height)
+        if "16UC1" in said or "mono16" not in said:
+            raise MessageError(
+                f"'{said}' is a PNG of 16-bit grey, a depth or raw image without an agreed brightness; "
+                f"convert it to mono8: {READABLE}"
+            )
+        import cv2
+
+        pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+        if pixels is None:
+            raise MessageError(f"a png picture of {len(data)} bytes is damaged; choose another frame")
+        eight = cv2.imencode(".png", stretched(np.asarray(pixels)))[1].tobytes()
+        return EncodedImage(eight, "png", width, height)
+
+
+def encoded_pixels(picture: np.ndarray) -> EncodedImage:
+    """Encode pixels as JPEG, fine enough to click in."""
+    import cv2
+
+    settings = [
+        cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY,
+        cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
+    ]  # fmt: skip
+    _, data = cv2.imencode(".jpg", picture, settings)
+    return EncodedImage(data.tobytes(), "jpeg", picture.shape[1], picture.shape[0])

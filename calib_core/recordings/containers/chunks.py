@@ -1,0 +1,310 @@
+"""Chunked containers: what ROS 1 bags and MCAP files share.
+
+Messages lie one after another in chunks, packed or not. Unpacked chunks are kept in a cache bounded in bytes; of
+chunks stored as they are, only the bytes asked for are read.
+"""
+
+import threading
+import zlib
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.errors import RecordingError
+from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
+from calib_core.recordings.containers.files import FileBytes
+from calib_core.recordings.containers.gathering import gather_far, gather_heads
+from calib_core.recordings.containers.index_cache import cache_of
+from calib_core.recordings.containers.kept_indexes import KeptIndex, heads_from, index_from, keep_heads, keep_index
+from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
+from calib_core.results import Caution
+
+__all__ = ["CACHE_BYTES", "FIRST_CHUNKS", "MAX_MESSAGE_BYTES", "ChannelFilter", "Chunk", "ChunkedSource"]
+
+ChannelFilter: TypeAlias = Callable[[Channel], bool]
+CACHE_BYTES = 64 * 2**20
+FIRST_CHUNKS = 16
+"""Where the beginning of a file is enough, so many chunks are looked at, and as many more until all that is wanted is in them."""
+
+_FEW_MESSAGES = 64
+_FAR_BYTES = 4096
+_MAX_CHECKED_BYTES = 1 << 24
+MAX_MESSAGE_BYTES = 1 << 28
+"""No message of a sensor is larger; one that claims to be is damaged or made to harm."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Where one chunk's bytes lie.
+
+    Attributes:
+        position: of its first byte in the file.
+        stored_bytes: its size in the file.
+        size_bytes: its size unpacked.
+        compression: "none", "bz2", "lz4" or "zstd".
+    """
+
+    position: int
+    stored_bytes: int
+    size_bytes: int
+    compression: str
+
+    @property
+    def packed(self) -> bool:
+        """Tell whether it has to be unpacked."""
+        return self.compression not in ("", "none")
+
+
+class ChunkedSource:
+    """Read messages out of chunks. A subclass opens the file and knows how a message record begins.
+
+    Args:
+        file: the file.
+        whole: all of it is looked into; what is found out about a part is not kept in the cache.
+    """
+
+    format_name = "chunked file"
+    lead_bytes = 0
+    """How many bytes of a record come before the message, in the usual case."""
+
+    def __init__(self, file: FileBytes, *, whole: bool = True) -> None:
+        self.file = file
+        self.chunks: list[Chunk] = []
+        self.channels: tuple[Channel, ...] = ()
+        self.cautions: tuple[Caution, ...] = file.cautions
+        self.indexes: dict[int, MessageIndex] = {}
+        self.counts: Mapping[int, int] = {}
+        """How many messages each channel has, as far as the file says so."""
+        self.recovered = False
+        """The file was not closed; its chunks may be cut off."""
+        self._cache: OrderedDict[int, bytes] = OrderedDict()
+        self._cache_bytes = 0
+        self._damaged_chunks: dict[int, str] = {}
+        self._checked: dict[int, bool] = {}
+        self._lock = threading.Lock()
+        self._kept = cache_of(file) if whole else None
+
+    def restore(self) -> bool:
+        """Take what opening finds out from the cache; False where it is not there."""
+        kept = index_from(self._kept) if self._kept is not None else None
+        if kept is None:
+            return False
+        self.channels = kept.channels
+        places = zip(kept.chunks.tolist(), kept.compressions, strict=True)
+        self.chunks = [Chunk(position, stored, size, name) for (position, stored, size), name in places]
+        try:
+            for channel, index in kept.indexes.items():
+                self.note_index(channel, index)
+        except RecordingError:
+            self.channels, self.chunks, self.indexes = (), [], {}
+            return False
+        return True
+
+    def keep(self) -> None:
+        """Put what opening found out into the cache, if the file is sound."""
+        if self._kept is None or self.recovered or self.cautions:
+            return
+        places = [(chunk.position, chunk.stored_bytes, chunk.size_bytes) for chunk in self.chunks]
+        names = tuple(chunk.compression for chunk in self.chunks)
+        table = np.array(places, dtype=np.int64).reshape(-1, 3)
+        keep_index(self._kept, KeptIndex(self.channels, table, names, self.indexes))
+
+    @property
+    def path(self) -> Path:
+        """Where the file lies."""
+        return self.file.path
+
+    @property
+    def size_bytes(self) -> int:
+        """How large the file is."""
+        return self.file.size_bytes
+
+    @property
+    def container(self) -> str:
+        """Name the format and its compression."""
+        kinds = sorted({chunk.compression for chunk in self.chunks if chunk.packed})
+        return f"{self.format_name}, {' and '.join(kinds)}" if kinds else self.format_name
+
+    def index(self, channel_id: int) -> MessageIndex:
+        """Tell where the messages of a channel lie."""
+        empty = np.zeros(0, dtype=np.int64)
+        return self.indexes.get(channel_id, MessageIndex(empty, empty, empty))
+
+    def note_index(self, channel_id: int, index: MessageIndex) -> None:
+        """Keep the index of a channel.
+
+        Raises:
+            RecordingError: it points out of the chunks.
+        """
+        sizes = np.array([chunk.size_bytes for chunk in self.chunks], dtype=np.float64)
+        wrong = (index.offset < 0) | (index.offset >= sizes[index.chunk])
+        if wrong.any():
+            raise RecordingError(
+                f"{self.path}: {np.count_nonzero(wrong)} of {len(index)} index entries point past the end of their chunk; "
+                "the file is damaged: copy it again"
+            )
+        self.indexes[channel_id] = index
+
+    def close(self) -> None:
+        """Close the file and drop the cache."""
+        self.file.close()
+        with self._lock:
+            self._cache.clear()
+            self._cache_bytes = 0
+
+    @property
+    def later_cautions(self) -> tuple[Caution, ...]:
+        """Chunks found since that are not as they were written."""
+        with self._lock:
+            bad = sorted(chunk for chunk, sound in self._checked.items() if not sound)
+        if not bad:
+            return ()
+        inside = sum(int(np.isin(index.chunk, bad).sum()) for index in self.indexes.values())
+        return (
+            Caution(
+                "checksum",
+                f"{self.path.name}: {len(bad)} of its chunks read so far, with {inside} messages, do not have the checksum "
+                f"they were written with; the first is at byte {self.chunks[bad[0]].position}. Their messages are used as "
+                "they are, and may be wrong",
+                "copy the file again from its source; until then do not trust clicks and scans of that time",
+            ),
+        )
+
+    def checksum(self, chunk: int) -> int:
+        """Return the CRC-32 that a chunk's unpacked bytes should have; 0 where the file has none."""
+        return 0
+
+    def _check(self, chunk: int, data: bytes) -> None:
+        """Compare a whole unpacked chunk with its checksum, and note how it came out."""
+        wanted = self.checksum(chunk)
+        sound = wanted == 0 or zlib.crc32(data) == wanted
+        with self._lock:
+            self._checked[chunk] = sound
+
+    def _check_stored(self, chunk: int) -> None:
+        """Check a chunk that is stored as it is, once; those too large to be read beside a message are passed over."""
+        where = self.chunks[chunk]
+        if where.packed or self.recovered or chunk in self._checked:
+            return
+        if where.stored_bytes > _MAX_CHECKED_BYTES or self.checksum(chunk) == 0:
+            with self._lock:
+                self._checked[chunk] = True
+            return
+        self._check(chunk, self.file.up_to(where.position, where.stored_bytes))
+
+    def read(self, chunk: int, offset: int) -> bytes:
+        """Read one message whole."""
+        self._check_stored(chunk)
+        try:
+            start, length = self.locate(chunk, offset)
+        except RecordingError as error:
+            raise RecordingError(self.fault_of(chunk) or str(error)) from error
+        if length > MAX_MESSAGE_BYTES:
+            raise RecordingError(f"{self.path}: a message that claims {length} bytes is refused as damaged")
+        data = self.piece(chunk, start, length)
+        if len(data) != length:
+            raise RecordingError(
+                self.fault_of(chunk)
+                or f"{self.path}: a message of {length} bytes at byte {start} of chunk {chunk} runs past the chunk's end; "
+                "the file is damaged: copy it again"
+            )
+        return data
+
+    def room(self, chunk: int) -> int:
+        """Return how many bytes a chunk has; messages cannot reach past them."""
+        return self.chunks[chunk].size_bytes
+
+    def locate(self, chunk: int, offset: int) -> tuple[int, int]:
+        """Return where in the chunk the message itself begins, and its length."""
+        raise NotImplementedError
+
+    def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Tell which records (n, lead_bytes) have their message at lead_bytes, and how long the messages are."""
+        raise NotImplementedError
+
+    def piece(self, chunk: int, offset: int, size: int) -> bytes:
+        """Return at most size bytes from offset of the unpacked chunk."""
+        where = self.chunks[chunk]
+        if not where.packed:
+            return self.file.up_to(where.position + offset, min(size, where.size_bytes - offset))
+        return self.unpacked(chunk)[offset : offset + size]
+
+    def unpacked(self, chunk: int) -> bytes:
+        """Return a whole chunk, from the cache where it is still there."""
+        with self._lock:
+            if chunk in self._cache:
+                self._cache.move_to_end(chunk)
+                return self._cache[chunk]
+        data = self._unpack(chunk)
+        with self._lock:
+            if chunk not in self._cache:
+                self._cache[chunk] = data
+                self._cache_bytes += len(data)
+            while self._cache_bytes > CACHE_BYTES and len(self._cache) > 1:
+                _, dropped = self._cache.popitem(last=False)
+                self._cache_bytes -= len(dropped)
+        return data
+
+    def _unpack(self, chunk: int) -> bytes:
+        """Unpack a chunk; of a damaged one return what comes before the damage, and remember what is wrong."""
+        where = self.chunks[chunk]
+        place = f"{self.path}: chunk {chunk} at byte {where.position}"
+        refuse_bomb(where.stored_bytes, where.size_bytes, where=place)
+        data = self.file.at(where.position, where.stored_bytes)
+        if self.recovered:
+            return unpack_what_is_there(data, where.compression, where.size_bytes)
+        try:
+            whole = unpack(data, where.compression, where.size_bytes, where=place)
+        except RecordingError as error:
+            with self._lock:
+                self._damaged_chunks[chunk] = str(error)
+            return unpack_what_is_there(data, where.compression, where.size_bytes)
+        self._check(chunk, whole)
+        return whole
+
+    def fault_of(self, chunk: int) -> str:
+        """Say what is wrong with a chunk that was unpacked; "" where nothing is."""
+        with self._lock:
+            return self._damaged_chunks.get(chunk, "")
+
+    def in_memory(self, chunk: int, *, keep: bool) -> bytes | None:
+        """Return a packed chunk unpacked, and keep it in the cache if asked to; None for one stored as it is."""
+        if not self.chunks[chunk].packed:
+            return None
+        if keep:
+            return self.unpacked(chunk)
+        with self._lock:
+            cached = self._cache.get(chunk)
+        return cached if cached is not None else self._unpack(chunk)
+
+    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
+        """Read the first bytes of many messages, in the order of the index."""
+        cache = self._kept if keep else None
+        found = heads_from(cache, index, size)
+        if found is None:
+            places = self._far_places(index, size)
+            found = (
+                gather_far(self, self.file, index, places, size)
+                if places is not None
+                else gather_heads(self, index, size)
+            )
+            keep_heads(cache, index, size, found)
+        return found
+
+    def _far_places(self, index: MessageIndex, size: int) -> TimesNs | None:
+        """Return where in the file messages lie that are stored as they are, far from one another; None for others."""
+        if len(index) < _FEW_MESSAGES:
+            return None
+        used = np.unique(index.chunk)
+        if any(self.chunks[number].packed for number in used.tolist()):
+            return None
+        starts = np.zeros(len(self.chunks), dtype=np.int64)
+        starts[used] = [self.chunks[number].position for number in used.tolist()]
+        places: TimesNs = starts[index.chunk] + index.offset
+        far = np.diff(np.sort(places)) > self.lead_bytes + size + _FAR_BYTES
+        return places if np.count_nonzero(far) > 0.5 * len(places) else None

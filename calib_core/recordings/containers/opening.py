@@ -1,0 +1,278 @@
+"""From paths to open files: folders expanded, contents told by their first bytes."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeAlias
+
+from calib_core.errors import RecordingError
+from calib_core.recordings.containers.chunks import ChannelFilter
+from calib_core.recordings.containers.files import FileBytes
+from calib_core.recordings.containers.mcap import mcap
+from calib_core.recordings.containers.rosbag1.rosbag1 import Rosbag1Source
+from calib_core.recordings.containers.sources import Source
+from calib_core.recordings.containers.sqlite import sqlite_bag
+from calib_core.recordings.containers.whole_files import packing_of, unpacked_file
+from calib_core.results import Caution
+
+__all__ = ["open_beginnings", "open_sources"]
+
+_SUFFIXES = (".bag", ".mcap", ".db3")
+_MORE_SUFFIXES = (".active", ".zstd", ".zst", ".gz", ".bz2", ".lz4")
+_METADATA = "metadata.yaml"
+_MAX_METADATA_BYTES = 1 << 24
+_FIRST_ROWS = 500
+_FIRST_BYTES = 1 << 19  # where the first picture usually lies
+_LAST_BYTES = 1 << 16  # most of what a file says about itself
+_KINDS = (
+    "ROS 1 .bag, ROS 2 .mcap and .db3 files and their folders can be opened, and folders of pictures or radar files, "
+    "radar CSV and videos"
+)
+_PACKED_MESSAGES = re.compile(r"^\s*compression_mode:\s*['\"]?message", re.IGNORECASE | re.MULTILINE)
+_PACKED = {b"PK\x03\x04": ("zip", "unzip"), b"\xfd7zXZ": ("xz", "unxz")}
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """A file to open.
+
+    Attributes:
+        path: where it lies.
+        packed: each of its messages is compressed by itself.
+        expendable: it is one of several in a folder; the others are opened without it.
+        count: how many messages it should hold; None where its folder does not tell.
+        cautions: what its folder says about it.
+    """
+
+    path: Path
+    packed: bool = False
+    expendable: bool = False
+    count: int | None = None
+    cautions: tuple[Caution, ...] = ()
+
+
+_AnySource: TypeAlias = Rosbag1Source | mcap.McapSource | sqlite_bag.SqliteSource
+
+
+def open_sources(paths: Sequence[Path]) -> tuple[Source, ...]:
+    """Open every recording file that the paths name or hold.
+
+    Raises:
+        RecordingError: a path holds nothing that can be read.
+    """
+    files: dict[Path, _Found] = {}
+    for path in paths:
+        for found in _files(path):
+            files.setdefault(found.path.resolve(), found)
+    sources: list[_AnySource] = []
+    refused: list[RecordingError] = []
+    try:
+        for found in files.values():
+            opened = _open_or_refusal(found)
+            if isinstance(opened, RecordingError):
+                refused.append(opened)
+            else:
+                sources.append(opened)
+        if not sources:
+            raise refused[0]
+    except RecordingError:
+        for source in sources:
+            source.close()
+        raise
+    sources[0].cautions = (*sources[0].cautions, *map(_left_out, refused))
+    return tuple(sources)
+
+
+def open_beginnings(paths: Sequence[Path], first_of: ChannelFilter) -> Iterator[Source]:
+    """Open recording files one after another, each only as far as its beginning; the caller closes each.
+
+    Files packed as a whole are passed over, and what is no recording of ROS.
+
+    Args:
+        paths: as for open_sources.
+        first_of: the channels whose beginnings are wanted.
+
+    Raises:
+        RecordingError: a file is damaged, or has no index.
+    """
+    for path in paths:
+        for found in _files(path):
+            file = FileBytes(found.path)
+            try:
+                source = _beginning(file, first_of, packed=found.packed)
+            except RecordingError:
+                file.close()
+                raise
+            if source is None:
+                file.close()
+            else:
+                yield source
+
+
+def _beginning(file: FileBytes, first_of: ChannelFilter, *, packed: bool) -> "_AnySource | None":
+    file.expect([(0, _FIRST_BYTES), (max(0, file.size_bytes - _LAST_BYTES), file.size_bytes)])
+    head = file.up_to(0, 16)
+    if head.startswith(b"#ROSBAG V"):
+        return Rosbag1Source(file, first_of=first_of)
+    if head.startswith(mcap.MAGIC):
+        return mcap.McapSource(file, first_of=first_of)
+    if head == sqlite_bag.MAGIC:
+        return sqlite_bag.SqliteSource(file, packed=packed, first_rows=_FIRST_ROWS)
+    return None
+
+
+def _open_or_refusal(found: _Found) -> "_AnySource | RecordingError":
+    """Open a file; of an expendable one return why it cannot be opened."""
+    try:
+        return _open(found)
+    except RecordingError as error:
+        if not found.expendable:
+            raise
+        return error
+
+
+def _left_out(error: RecordingError) -> Caution:
+    return Caution(
+        "file-left-out",
+        f"one file of the folder cannot be opened and is left out: {error}",
+        "the other files of the folder are used; copy this one again if you need its time",
+    )
+
+
+def _files(path: Path) -> list[_Found]:
+    """Return the files a path stands for."""
+    if not path.is_dir():
+        return [_Found(path, _packed_messages(path.parent / _METADATA, path))]
+    if (path / _METADATA).is_file():
+        return _from_metadata(path)
+    found = [_Found(file) for file in sorted(path.iterdir()) if _is_recording(file)]
+    for folder in sorted(path.iterdir()):
+        if folder.is_dir() and (folder / _METADATA).is_file():
+            found.extend(_from_metadata(folder))
+    if not found:
+        raise RecordingError(f"{path}: the folder holds no recording (.bag, .mcap, .db3 or metadata.yaml); {_KINDS}")
+    return [replace(file, expendable=True) for file in found] if len(found) > 1 else found
+
+
+def _is_recording(file: Path) -> bool:
+    """Tell by its name whether a file is a recording: x.bag, x.bag.active, x_0.db3.zstd."""
+    *_, inner, last = ("", "", *file.suffixes)
+    return file.is_file() and (last in _SUFFIXES or (last in _MORE_SUFFIXES and inner in _SUFFIXES))
+
+
+def _metadata(path: Path) -> dict[str, object]:
+    """Read the part of a metadata.yaml that matters; empty where it is damaged or something else."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        content = YAML(typ="safe", pure=True).load(path) if path.stat().st_size <= _MAX_METADATA_BYTES else None
+    except (YAMLError, OSError, UnicodeDecodeError):
+        return {}
+    information = content.get("rosbag2_bagfile_information") if isinstance(content, dict) else None
+    return information if isinstance(information, dict) else {}
+
+
+def _from_metadata(folder: Path) -> list[_Found]:
+    """Return the files that a folder's metadata.yaml lists, and those that it should list."""
+    information = _metadata(folder / _METADATA)
+    listed = information.get("relative_file_paths")
+    names = [Path(str(name)).name for name in listed] if isinstance(listed, list) else []
+    there = {name: other for name in names if (other := _under_any_name(folder, name)) is not None}
+    missing = [name for name in names if name not in there]
+    if missing and not there:
+        raise RecordingError(
+            f"{folder}: metadata.yaml lists {missing[0]}, which is not there; copy the whole folder, or give the files that are"
+        )
+    paths = list(there.values()) or sorted(file for file in folder.iterdir() if _is_recording(file))
+    if not paths:
+        raise RecordingError(f"{folder}: metadata.yaml lists no files and there are none; copy the whole folder")
+    packed = str(information.get("compression_mode", "")).upper() == "MESSAGE"
+    found = [_Found(path, packed, expendable=len(paths) > 1) for path in paths]
+    counts = _counts(information, names)
+    found = [replace(file, count=counts.get(name)) for file, name in zip(found, there, strict=True)] if there else found
+    if missing:
+        found[0] = replace(found[0], cautions=(_missing(folder, missing, counts),))
+    return found
+
+
+def _missing(folder: Path, missing: list[str], counts: dict[str, int]) -> Caution:
+    lost = sum(counts.get(name, 0) for name in missing)
+    return Caution(
+        "missing-file",
+        f"{folder.name}: metadata.yaml lists {', '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} not there"
+        + (f": {lost} messages are missing" if lost else ""),
+        "copy the whole folder if you need that time",
+    )
+
+
+def _under_any_name(folder: Path, name: str) -> Path | None:
+    """Find a listed file, also if it was unpacked or packed since."""
+    names = [name, *(name.removesuffix(suffix) for suffix in _MORE_SUFFIXES), *(name + s for s in _MORE_SUFFIXES)]
+    return next((folder / other for other in names if (folder / other).is_file()), None)
+
+
+def _counts(information: dict[str, object], names: list[str]) -> dict[str, int]:
+    """Return how many messages each file should hold, as far as the metadata tells."""
+    files = information.get("files")
+    counts = {}
+    for file in files if isinstance(files, list) else []:
+        if isinstance(file, dict) and type(count := file.get("message_count")) is int:
+            counts[Path(str(file.get("path", ""))).name] = count
+    total = information.get("message_count")
+    if len(names) == 1 and type(total) is int:
+        counts.setdefault(names[0], total)
+    return counts
+
+
+def _packed_messages(metadata: Path, path: Path) -> bool:
+    if path.suffix != ".db3" or not metadata.is_file():
+        return False
+    return bool(_PACKED_MESSAGES.search(metadata.read_text(encoding="utf-8", errors="replace")))
+
+
+def _open(found: _Found) -> "_AnySource":
+    file = FileBytes(found.path, cautions=found.cautions)
+    try:
+        head = file.up_to(0, 16)
+        if (kind := packing_of(head)) is not None:
+            file = unpacked_file(file, kind)
+            head = file.up_to(0, 16)
+        source = _source(file, head, packed=found.packed)
+    except RecordingError:
+        file.close()
+        raise
+    count = sum(len(source.index(channel.id)) for channel in source.channels) if found.count else 0
+    if found.count and count < found.count:
+        source.cautions = (*source.cautions, _too_few(found, count))
+    return source
+
+
+def _source(file: FileBytes, head: bytes, *, packed: bool) -> "_AnySource":
+    if head.startswith(b"#ROSBAG V"):
+        return Rosbag1Source(file)
+    if head.startswith(mcap.MAGIC):
+        return mcap.McapSource(file)
+    if head == sqlite_bag.MAGIC:
+        return sqlite_bag.SqliteSource(file, packed=packed)
+    raise RecordingError(f"{file.path}: {_what_is_it(head)}")
+
+
+def _too_few(found: _Found, count: int) -> Caution:
+    return Caution(
+        "messages-missing",
+        f"metadata.yaml counts {found.count} messages in {found.path.name}, but {count} are in it",
+        "check that what you need is there; copy the file again from its source",
+    )
+
+
+def _what_is_it(head: bytes) -> str:
+    if not head:
+        return (
+            "the file is empty (0 bytes): the recorder was killed or the disk was full; record again or copy it again"
+        )
+    for magic, (name, command) in _PACKED.items():
+        if head.startswith(magic):
+            return f"the file is compressed as a whole with {name}; unpack it first: {command}"
+    return f"not a recording (it begins with {head[:8]!r}); {_KINDS}"

@@ -1,0 +1,1 @@
+"""ROS messages: definitions parsed, values read from bytes."""

@@ -1,0 +1,259 @@
+"""Messages from bytes: ROS 1 serialisation and CDR, read by walking over the definition.
+
+A run of values whose places are fixed is read by NumPy in one go, so a list of a thousand radar returns costs no more
+Python than a list of one.
+"""
+
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NoReturn, TypeAlias
+
+import numpy as np
+
+from calib_core.arrays import Values
+from calib_core.errors import MessageError
+from calib_core.recordings.messages.definitions import PRIMITIVES, Definition, Field
+from calib_core.recordings.messages.placing import Place, TypesKey, element_layout, structure, walk
+
+__all__ = ["Message", "Pin", "Value", "decode", "fixed_part", "payload_byte_order"]
+
+Value: TypeAlias = "int | float | str | Message | np.ndarray | list[Any]"
+_STRINGS = ("string", "wstring")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Message:
+    """A decoded message: values by field name. Lists of fixed-size messages are structured arrays."""
+
+    type: str
+    values: Mapping[str, Value]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.values
+
+    def __getitem__(self, name: str) -> Value:
+        return self.values[name]
+
+    def whole(self, name: str) -> int:
+        """Return an integer field."""
+        value = self._field(name)
+        return value if isinstance(value, int) else self._refuse(name, "an integer")
+
+    def text(self, name: str) -> str:
+        """Return a string field."""
+        value = self._field(name)
+        return value if isinstance(value, str) else self._refuse(name, "a string")
+
+    def message(self, name: str) -> "Message":
+        """Return a nested message."""
+        value = self._field(name)
+        return value if isinstance(value, Message) else self._refuse(name, "a message")
+
+    def array(self, name: str) -> np.ndarray:
+        """Return an array of numbers as recorded."""
+        value = self._field(name)
+        return value if isinstance(value, np.ndarray) else self._refuse(name, "an array of numbers")
+
+    def octets(self, name: str) -> np.ndarray:
+        """Return an array of bytes."""
+        value = self.array(name)
+        return value.view(np.uint8) if value.dtype.itemsize == 1 or not len(value) else self._refuse(name, "bytes")
+
+    def numbers(self, name: str, count: int) -> Values:
+        """Return an array of so many numbers."""
+        value = self.array(name)
+        if len(value) != count or value.dtype.names is not None:
+            self._refuse(name, f"{count} numbers")
+        with np.errstate(invalid="ignore"):  # damaged bytes may hold signalling NaN
+            return value.astype(np.float64)
+
+    def messages(self, name: str) -> "list[Message]":
+        """Return a list of messages that are not of fixed size; empty for an empty list of any."""
+        value = self._field(name)
+        fits = isinstance(value, list) and all(isinstance(element, Message) for element in value)
+        return value if isinstance(value, list) and fits else self._refuse(name, "a list of messages")
+
+    def count(self, name: str) -> int:
+        """Return how many elements an array holds."""
+        value = self._field(name)
+        return len(value) if isinstance(value, list | np.ndarray) else self._refuse(name, "an array")
+
+    def _field(self, name: str) -> Value:
+        return self.values[name] if name in self.values else self._refuse(name, "a field of it")
+
+    def _refuse(self, name: str, what: str) -> NoReturn:
+        raise MessageError(f"a {self.type} message has a layout of its own: {name} is not {what}; it cannot be used")
+
+    def number(self, path: str) -> float:
+        """Return a single number; path is dotted."""
+        try:
+            return float(_at(self, path.split(".")))
+        except (KeyError, TypeError, ValueError):
+            return self._refuse(path, "a number")
+
+    def column(self, name: str, path: str) -> np.ndarray:
+        """Return one number, or one fixed array, of each message in a list: (n,) or (n, k); path is dotted."""
+        value = self._field(name)
+        if isinstance(value, np.ndarray) and path in (value.dtype.names or ()):
+            with np.errstate(invalid="ignore"):  # damaged bytes may hold signalling NaN
+                return value[path].astype(np.float64)
+        if not isinstance(value, list):
+            self._refuse(name, f"a list with {path}")
+        return np.array([_at(element, path.split(".")) for element in value], dtype=np.float64)
+
+
+def _at(element: Any, parts: list[str]) -> Any:
+    for part in parts:
+        element = element[part]
+    return element
+
+
+def payload_byte_order(payload: bytes, definition: Definition) -> str:
+    """Return "<" or ">" as the message itself says.
+
+    Raises:
+        MessageError: an encapsulation that is not plain CDR.
+    """
+    if definition.encoding == "ros1":
+        return "<"
+    if len(payload) < 4 or payload[0] != 0 or payload[1] not in (0, 1):
+        raise MessageError(
+            f"a {definition.type} message begins with {payload[:4].hex() or 'nothing'}, which is not plain CDR (0000 or 0001); "
+            "record it with the default serialisation of ROS 2"
+        )
+    return "<" if payload[1] else ">"
+
+
+def decode(definition: Definition, payload: bytes) -> Message:
+    """Decode one message.
+
+    Raises:
+        MessageError: the bytes do not fit the definition.
+    """
+    reader = _Reader(payload, payload_byte_order(payload, definition), definition)
+    try:
+        return reader.message(definition.type)
+    except (struct.error, ValueError, UnicodeDecodeError) as error:
+        raise _misfit(definition, payload, error) from error
+
+
+def _misfit(definition: Definition, payload: bytes, error: Exception) -> MessageError:
+    return MessageError(
+        f"a {definition.type} message of {len(payload)} bytes does not fit its definition ({error}); "
+        "it is damaged, or the recording carries another version's definition"
+    )
+
+
+class _Reader:
+    """A cursor over one message."""
+
+    def __init__(self, data: bytes, order: str, definition: Definition) -> None:
+        self.data = data
+        self.order = order
+        self.definition = definition
+        self.aligned = definition.encoding == "cdr"
+        self.origin = 4 if self.aligned else 0
+        self.place = self.origin
+
+    def align(self, size: int) -> None:
+        if self.aligned:
+            self.place += -(self.place - self.origin) % size
+
+    def number(self, kind: str) -> Any:
+        code = PRIMITIVES[kind]
+        size = int(code[1])
+        self.align(size)
+        value = np.frombuffer(self.data, dtype=self.order + code, count=1, offset=self.place)[0].item()
+        self.place += size
+        return value
+
+    def whole32(self) -> int:
+        self.align(4)
+        value: int = struct.unpack_from(self.order + "I", self.data, self.place)[0]
+        self.place += 4
+        return value
+
+    def string(self, kind: str) -> str:
+        length = self.whole32()
+        size = length * (2 if kind == "wstring" else 1)
+        raw = self.data[self.place : self.place + size]
+        if len(raw) < size:
+            raise ValueError(f"a string of {length} characters runs past the end")
+        self.place += size
+        if kind == "wstring":
+            return raw.decode("utf-16-le" if self.order == "<" else "utf-16-be", "replace")
+        return (raw[:-1] if self.aligned and raw.endswith(b"\0") else raw).decode("utf-8", "replace")
+
+    def message(self, name: str) -> Message:
+        return Message(name, {field.name: self.value(field) for field in self.definition.types[name]})
+
+    def value(self, field: Field) -> Value:
+        if field.count is not None:
+            return self.array(field)
+        if field.type in PRIMITIVES:
+            number: Value = self.number(field.type)
+            return number
+        return self.string(field.type) if field.type in _STRINGS else self.message(field.type)
+
+    def array(self, field: Field) -> Value:
+        count = field.count or self.whole32()
+        if count > len(self.data):
+            raise ValueError(f"{field.name} claims {count} elements in a message of {len(self.data)} bytes")
+        if not count:
+            return np.zeros(0) if field.type in PRIMITIVES else []
+        layout = element_layout(
+            field.type, (self.place - self.origin) % 8, self.order, self.aligned, TypesKey(self.definition)
+        )
+        if layout is None:
+            single = Field(field.name, field.type)
+            return [self.value(single) for _ in range(count)]
+        first = self.place + layout.lead_bytes
+        values = np.ndarray((count,), layout.element, self.data, first, (layout.stride_bytes,))
+        self.place = first + layout.stride_bytes * (count - 1) + layout.element.itemsize
+        return values
+
+
+@dataclass(frozen=True, slots=True)
+class Pin:
+    """Where a string's length lies in a message, and what it is: with all of them equal, all numbers lie where they did."""
+
+    offset: int
+    length: bytes
+
+
+def fixed_part(definition: Definition, payload: bytes) -> tuple[np.dtype[Any], tuple[Pin, ...]]:
+    """Lay out the numbers after the header, up to the first array of varying length, as they lie in this message.
+
+    Messages whose strings are as long as the pins say all have this layout.
+
+    Raises:
+        MessageError: the bytes do not fit the definition.
+    """
+    try:
+        return _fixed_part(definition, payload)
+    except (struct.error, ValueError) as error:
+        raise _misfit(definition, payload, error) from error
+
+
+def _fixed_part(definition: Definition, payload: bytes) -> tuple[np.dtype[Any], tuple[Pin, ...]]:
+    reader = _Reader(payload, payload_byte_order(payload, definition), definition)
+    first, *rest = definition.fields
+    reader.value(first)
+    places: list[Place] = []
+    pins = [Pin(12, payload[12:16])] if first.type == "std_msgs/Header" else []
+    end = reader.place
+    for field in rest:
+        if field.type == "string" and field.count is None:
+            reader.align(4)
+            pins.append(Pin(reader.place, payload[reader.place : reader.place + 4]))
+            reader.value(field)
+            continue
+        begin = reader.place - reader.origin
+        found, after, whole = walk(definition.types, (field,), begin, reader.aligned)
+        places.extend((name, code, at + reader.origin) for name, code, at in found)
+        reader.place = after + reader.origin
+        end = reader.place if found else end
+        if not whole:
+            break
+    return structure(places, reader.order, end), tuple(pin for pin in pins if pin.offset < end)

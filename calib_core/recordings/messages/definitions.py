@@ -1,0 +1,240 @@
+"""Message definitions: the text a recording carries, parsed into fields. Nothing of it is ever executed."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+
+from calib_core.errors import MessageError
+from calib_core.recordings.containers.sources import Channel, Encoding
+from calib_core.recordings.messages.known_definitions import KNOWN_DEFINITIONS
+
+__all__ = ["PRIMITIVES", "Definition", "Field", "definition_of", "parse_definition", "short_type"]
+
+PRIMITIVES: Mapping[str, str] = {
+    "bool": "u1", "byte": "u1", "char": "u1", "octet": "u1",
+    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+    "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+"""NumPy's name of each fixed-size type."""
+
+_FIELD = re.compile(
+    r"^(?P<type>[A-Za-z]\w*(?:/\w+){0,2})(?:<=(?P<bound>\d+))?(?P<array>\[(?:<=)?(?P<count>\d*)\])?\s+"
+    r"(?P<name>[A-Za-z]\w*)(?P<rest>\s.*|=.*|)$"
+)
+_SEPARATOR = re.compile(r"^={3,}\s*$", re.MULTILINE)
+_MAX_TEXT = 1 << 20
+_MAX_FIXED = 1 << 24
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One field of a message.
+
+    Attributes:
+        name: as the definition has it.
+        type: a primitive, "string", "wstring", or the short name of another message ("std_msgs/Header").
+        count: None for a single value, 0 for an array of any length, else the fixed length.
+    """
+
+    name: str
+    type: str
+    count: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """A message type and all types it is made of.
+
+    Attributes:
+        type: short name, "package/Type".
+        types: the fields of each type by short name.
+        encoding: how messages of it are laid out.
+    """
+
+    type: str
+    types: Mapping[str, tuple[Field, ...]]
+    encoding: Encoding
+
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """The fields of the message itself."""
+        return self.types[self.type]
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names of the message's own fields."""
+        return frozenset(field.name for field in self.fields)
+
+    def field(self, name: str) -> Field:
+        """Return one of the message's own fields."""
+        return next(field for field in self.fields if field.name == name)
+
+    @property
+    def stamp_offset(self) -> int | None:
+        """Where the first 8 bytes of time lie in a message, None where it begins with none."""
+        first = self.fields[0].type if self.fields else ""
+        if first == "std_msgs/Header" or (first in ("time", "builtin_interfaces/Time") and self.encoding == "cdr"):
+            return 4  # after the sequence number (ROS 1), or after the encapsulation (CDR)
+        return 0 if first == "time" else None
+
+
+def short_type(name: str) -> str:
+    """Return "package/Type" for "package/msg/Type" and for what is short already."""
+    return name.replace("/msg/", "/")
+
+
+def definition_of(channel: Channel) -> Definition:
+    """Parse a channel's definition, or take the well-known one of that name where the recording has none.
+
+    Raises:
+        MessageError: there is none, it cannot be understood, or the encoding is not one of ROS.
+    """
+    if channel.encoding not in ("ros1", "cdr"):
+        raise MessageError(
+            f"topic {channel.topic}: messages are encoded as '{channel.encoding}'; only ros1 and cdr can be read: "
+            "record it through ROS, or convert it"
+        )
+    encoding: Encoding = "ros1" if channel.encoding == "ros1" else "cdr"
+    name = short_type(channel.type)
+    text, form = channel.definition, channel.definition_format
+    if form == "":
+        if name not in KNOWN_DEFINITIONS:
+            raise MessageError(
+                f"topic {channel.topic}: the recording has no definition of {channel.type}, and it is not one we know; "
+                "convert the recording where that package is installed (ros2 bag convert to mcap writes definitions)"
+            )
+        text, form = KNOWN_DEFINITIONS[name], "msg"
+    try:
+        return parse_definition(name, text, encoding, form=form)
+    except MessageError as error:
+        raise MessageError(f"topic {channel.topic}: {error}") from error
+
+
+@cache
+def parse_definition(name: str, text: str, encoding: Encoding, *, form: str = "msg") -> Definition:
+    """Parse a definition with the definitions it depends on below it.
+
+    Args:
+        name: short name of the message.
+        text: the concatenated definitions, separated by lines of "=".
+        encoding: "ros1" or "cdr".
+        form: "msg" or "idl".
+
+    Raises:
+        MessageError: the text is not such a definition.
+    """
+    if len(text) > _MAX_TEXT:
+        raise MessageError(f"the definition of {name} is {len(text)} characters long; over {_MAX_TEXT} is refused")
+    types: dict[str, tuple[Field, ...]] = dict(_built_in(encoding))
+    types.update(_parse_idl(name, text) if form == "idl" else _parse_sections(name, text))
+    types = {owner: _resolve(owner, fields, types) for owner, fields in types.items()}
+    definition = Definition(name, types, encoding)
+    _check(definition, name, ())
+    return definition
+
+
+def _built_in(encoding: Encoding) -> dict[str, tuple[Field, ...]]:
+    if encoding == "ros1":
+        return {
+            "time": (Field("sec", "uint32"), Field("nanosec", "uint32")),
+            "duration": (Field("sec", "int32"), Field("nanosec", "int32")),
+            "std_msgs/Header": (Field("seq", "uint32"), Field("stamp", "time"), Field("frame_id", "string")),
+        }
+    stamp = (Field("sec", "int32"), Field("nanosec", "uint32"))
+    return {
+        "builtin_interfaces/Time": stamp,
+        "builtin_interfaces/Duration": stamp,
+        "std_msgs/Header": (Field("stamp", "builtin_interfaces/Time"), Field("frame_id", "string")),
+    }
+
+
+def _parse_sections(name: str, text: str) -> dict[str, tuple[Field, ...]]:
+    types: dict[str, tuple[Field, ...]] = {}
+    for number, section in enumerate(_SEPARATOR.split(text)):
+        owner, body = name, section
+        if number:
+            head, _, body = section.strip().partition("\n")
+            if not head.startswith("MSG:"):
+                raise MessageError(f"the definition of {name} has a section that begins with {head[:40]!r}, not MSG:")
+            owner = short_type(head[4:].strip())
+        types[owner] = tuple(_parse_fields(owner, body))
+    return types
+
+
+def _parse_fields(owner: str, body: str) -> list[Field]:
+    fields = []
+    for line in body.splitlines():
+        text = line.split("#", 1)[0].strip() if "=" not in line.split("#", 1)[0] else line.strip()
+        if not text:
+            continue
+        match = _FIELD.match(text)
+        if not match:
+            raise MessageError(f"the definition of {owner} has a line that is no field: {text[:60]!r}")
+        rest = match["rest"].strip()
+        if rest.startswith("=") and not rest.startswith("=="):
+            continue  # a constant takes no room in a message
+        count = None if match["array"] is None else 0 if "<=" in match["array"] else int(match["count"] or 0)
+        if match["array"] is not None and match["count"] and "<=" not in match["array"] and count == 0:
+            continue  # a fixed array of nothing takes no room either
+        fields.append(Field(match["name"], short_type(match["type"]), count))
+    return fields
+
+
+def _parse_idl(name: str, text: str) -> dict[str, tuple[Field, ...]]:
+    """Parse OMG IDL through rosbags' grammar, which yields plain tuples."""
+    from rosbags.typesys import get_types_from_idl
+    from rosbags.typesys.base import TypesysError
+
+    types: dict[str, tuple[Field, ...]] = {}
+    try:
+        for section in _SEPARATOR.split(text):
+            body = re.sub(r"^\s*IDL:.*$", "", section, flags=re.MULTILINE)
+            for owner, (_, fields) in get_types_from_idl(body).items() if body.strip() else ():
+                types[short_type(owner)] = tuple(_field_from_rosbags(*field) for field in fields)
+    except TypesysError as error:
+        why = " ".join(str(error).split())
+        raise MessageError(f"the definition of {name} is not valid IDL ({why})") from error
+    if name not in types:
+        raise MessageError(f"the IDL text does not define {name}")
+    return types
+
+
+def _field_from_rosbags(name: str, description: tuple[int, object]) -> Field:
+    kind, inner = description  # 1 base, 2 name, 3 fixed array, 4 sequence
+    if kind == 1:
+        return Field(name, str(inner[0] if isinstance(inner, tuple) else inner))
+    if kind == 2:
+        return Field(name, short_type(str(inner)))
+    assert isinstance(inner, tuple)
+    element = _field_from_rosbags(name, inner[0])
+    return Field(name, element.type, int(inner[1]) if int(kind) == 3 else 0)
+
+
+def _resolve(owner: str, fields: tuple[Field, ...], types: Mapping[str, tuple[Field, ...]]) -> tuple[Field, ...]:
+    """Give every nested type its short name: a bare name is of the same package, Header of std_msgs."""
+    resolved = []
+    for field in fields:
+        kind = field.type
+        if kind not in PRIMITIVES and kind not in ("string", "wstring") and kind not in types:
+            package = owner.partition("/")[0]
+            kind = "std_msgs/Header" if kind == "Header" else f"{package}/{kind}"
+            if "/" in field.type or kind not in types:
+                kind = _known(field.type if "/" in field.type else kind, owner)
+        resolved.append(Field(field.name, kind, field.count))
+    return tuple(resolved)
+
+
+def _known(kind: str, owner: str) -> str:
+    raise MessageError(f"the definition of {owner} uses {kind}, which the recording does not define")
+
+
+def _check(definition: Definition, name: str, above: tuple[str, ...]) -> None:
+    """Refuse types that contain themselves and arrays too long to be true."""
+    if name in above or len(above) > 32:
+        raise MessageError(f"the definition of {definition.type} contains itself at {name}")
+    for field in definition.types[name]:
+        if (field.count or 0) > _MAX_FIXED:
+            raise MessageError(f"the definition of {name} has a fixed array of {field.count} elements; it is refused")
+        if field.type in definition.types:
+            _check(definition, field.type, (*above, name))

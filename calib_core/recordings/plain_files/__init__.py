@@ -1,0 +1,1 @@
+"""Recordings that are no ROS container: pictures, CSV, radar files and videos."""

@@ -1,0 +1,1 @@
+"""Radar messages, whatever their layout, as scans."""

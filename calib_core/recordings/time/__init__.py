@@ -1,0 +1,1 @@
+"""The clocks of a recording, and times as people write them."""

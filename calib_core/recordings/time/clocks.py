@@ -1,0 +1,207 @@
+"""Which of the two clocks of a recording to trust: the stamp in the message, or the recorder's.
+
+Header stamps are the time of measurement and the default. They are left for the receive times where they cannot be
+right, and then the other sensor must not silently stay on another clock.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.measurements import NS_PER_S
+from calib_core.recordings.time.calendar import span_text
+from calib_core.results import Caution
+
+__all__ = ["Clock", "ClockChoice", "Stamps", "choose_clock", "choose_clocks", "header_fault"]
+
+Clock = Literal["auto", "header", "receive"]
+_YEAR_2000_NS = 946_684_800 * NS_PER_S
+_MANY = 0.01
+_AGREE_NS = NS_PER_S
+_BLOCK = 11
+_FEW_BLOCKS = 0.05
+_FEWEST_BLOCKS, _MOST_BLOCKS = 4, 1000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stamps:
+    """Both clocks of one topic, message by message in the order received.
+
+    Attributes:
+        topic: its name.
+        receive_ns: (n,) the recorder's clock.
+        header_ns: (n,) the stamps in the messages; None where they carry none.
+    """
+
+    topic: str
+    receive_ns: TimesNs
+    header_ns: TimesNs | None
+
+    @property
+    def offset_ns(self) -> float:
+        """By how much receiving usually lags the stamp [ns]."""
+        assert self.header_ns is not None
+        return float(np.median(self.receive_ns - self.header_ns))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClockChoice:
+    """The clock each topic goes by.
+
+    Attributes:
+        clocks: "header" or "receive", topic by topic in the order asked.
+        cautions: what a person must know about it.
+    """
+
+    clocks: tuple[Literal["header", "receive"], ...]
+    cautions: tuple[Caution, ...]
+
+
+def header_fault(stamps: Stamps) -> str | None:
+    """Say why the header stamps of a topic cannot be used, in words that follow its name; None where they can."""
+    header, n = stamps.header_ns, len(stamps.receive_ns)
+    if header is None:
+        return "carries no stamps"
+    if n == 0:
+        return None
+    zero = int(np.count_nonzero(header == 0))
+    if zero == n:
+        return f"has stamps that are all zero ({n} messages)"
+    if n > 1 and np.all(header == header[0]):
+        return f"has the same stamp in all of its {n} messages"
+    if zero > _MANY * n:
+        return f"has {zero} of {n} stamps that are zero"
+    if _ancient(header) and not _ancient(stamps.receive_ns):
+        seconds = float(np.median(header)) / NS_PER_S
+        return f"has stamps from the year 1970 ({seconds:.3f} s), counted from the start of a device and not as a date"
+    return _disorder(header[header != 0])
+
+
+def _ancient(times_ns: TimesNs) -> bool:
+    return bool(np.median(times_ns) < _YEAR_2000_NS)
+
+
+def _disorder(header: TimesNs) -> str | None:
+    steps = np.diff(header)
+    back = int(np.count_nonzero(steps < 0))
+    worst_s = -float(steps.min(initial=0)) / NS_PER_S
+    if back > max(1, _MANY * len(steps)) or worst_s > 1.0:
+        return f"has {back} stamps of {len(header)} that go backwards, by up to {worst_s:.3f} s"
+    return None
+
+
+def choose_clocks(radar: Stamps, camera: Stamps, wish: Clock = "auto") -> ClockChoice:
+    """Choose the clock of both sensors so that their times can be compared.
+
+    Args:
+        radar: the radar's stamps; for drivers that send one message per return, message by message.
+        camera: the camera's.
+        wish: "auto", or the clock a person asked for.
+    """
+    if wish != "auto":
+        return ClockChoice((wish, wish), ())
+    both = (radar, camera)
+    faults = tuple(header_fault(stamps) for stamps in both)
+    if faults == (None, None) or (_from_boot(radar) and _from_boot(camera) and _near(radar, camera)):
+        return _both_usable(radar, camera)
+    cautions = [_fell_back(stamps, fault) for stamps, fault in zip(both, faults, strict=True) if fault]
+    for number, (sound, fault) in enumerate(zip(both, faults, strict=True)):
+        if fault is None and len(sound.receive_ns):
+            lag_s = sound.offset_ns / NS_PER_S
+            if abs(lag_s) <= 1.0:
+                clocks: tuple[Literal["header", "receive"], ...] = ("receive", "header")
+                return ClockChoice(clocks if number else clocks[::-1], tuple(cautions))
+            cautions.append(_mixed(f"the stamps of {sound.topic} are {span_text(lag_s)} away from receive time"))
+    return ClockChoice(("receive", "receive"), tuple(cautions))
+
+
+def _from_boot(stamps: Stamps) -> bool:
+    """Tell whether stamps are sound but count from 1970: simulated time, or a machine without a date."""
+    if stamps.header_ns is None or not len(stamps.header_ns) or not stamps.header_ns.any():
+        return False
+    constant = len(stamps.header_ns) > 1 and bool(np.all(stamps.header_ns == stamps.header_ns[0]))
+    return _ancient(stamps.header_ns) and not constant and _disorder(stamps.header_ns) is None
+
+
+def _near(radar: Stamps, camera: Stamps) -> bool:
+    return abs(radar.offset_ns - camera.offset_ns) <= _AGREE_NS
+
+
+def _both_usable(radar: Stamps, camera: Stamps) -> ClockChoice:
+    if not (len(radar.receive_ns) and len(camera.receive_ns)):
+        return ClockChoice(("header", "header"), ())
+    if _near(radar, camera):
+        worst_s = _parting_s(radar, camera)
+        if worst_s <= _AGREE_NS / NS_PER_S:
+            return ClockChoice(("header", "header"), ())
+        parting = (
+            f"the stamps of {radar.topic} and {camera.topic} part during the recording, by up to {span_text(worst_s)}"
+        )
+        return ClockChoice(("receive", "receive"), (_mixed(parting),))
+    assert radar.header_ns is not None
+    assert camera.header_ns is not None
+    if not _overlap(radar.receive_ns, camera.receive_ns) and _overlap(radar.header_ns, camera.header_ns):
+        return ClockChoice(("header", "header"), ())
+    apart_s = (radar.offset_ns - camera.offset_ns) / NS_PER_S
+    return ClockChoice(
+        ("receive", "receive"),
+        (_mixed(f"the stamps of {radar.topic} and {camera.topic} are on clocks {span_text(apart_s)} apart"),),
+    )
+
+
+def _parting_s(radar: Stamps, camera: Stamps) -> float:
+    """Return by how much the delays of both differ at worst [s], for more than a few messages; 0 in short recordings.
+
+    A clock that is set or drifts on the way does that to one of them; the recorder's own clock does it to both alike.
+    """
+    (at_ns, lag_s), (other_ns, other_s) = _calm_lags(radar), _calm_lags(camera)
+    if min(len(at_ns), len(other_ns)) < _FEWEST_BLOCKS:
+        return 0.0
+    apart_s = np.abs(lag_s - np.interp(at_ns, other_ns, other_s))
+    return float(np.quantile(apart_s, 1.0 - _FEW_BLOCKS))
+
+
+def _calm_lags(stamps: Stamps) -> tuple[np.ndarray, np.ndarray]:
+    """Return times of receiving [ns] and median delays [s] of eleven messages each, in a thousand places at most."""
+    assert stamps.header_ns is not None
+    dated = np.flatnonzero(stamps.header_ns)
+    blocks = len(dated) // _BLOCK
+    begins = np.linspace(0, blocks - 1, min(blocks, _MOST_BLOCKS)).astype(np.int64) * _BLOCK
+    rows = dated[begins[:, None] + np.arange(_BLOCK)]
+    received = stamps.receive_ns[rows]
+    lags_s = (received - stamps.header_ns[rows]) / NS_PER_S
+    return received[:, _BLOCK // 2].astype(np.float64), np.median(lags_s, axis=1)
+
+
+def _overlap(a: TimesNs, b: TimesNs) -> bool:
+    return bool(a.min() <= b.max() and b.min() <= a.max())
+
+
+def _mixed(why: str) -> Caution:
+    return Caution(
+        "mixed-clocks",
+        f"{why}, so receive times are used for both sensors",
+        "receive times include the delay of the drivers: stand still longer at each placement, or choose the clock yourself "
+        "(--clock header or --clock receive)",
+    )
+
+
+def _fell_back(stamps: Stamps, fault: str) -> Caution:
+    return Caution(
+        "stamps-unusable",
+        f"{stamps.topic} {fault}; the time of receiving is used instead",
+        "receive times include the delay of the driver: stand still longer at each placement, and have the driver fill in "
+        "header.stamp next time",
+    )
+
+
+def choose_clock(stamps: Stamps, wish: Clock = "auto") -> ClockChoice:
+    """Choose the clock of a topic that stands alone."""
+    if wish != "auto":
+        return ClockChoice((wish,), ())
+    fault = header_fault(stamps)
+    if fault is None or _from_boot(stamps):
+        return ClockChoice(("header",), ())
+    return ClockChoice(("receive",), (_fell_back(stamps, fault),))
