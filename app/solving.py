@@ -17,7 +17,7 @@ from app.resources import version
 from app.session import Outcome, Solved
 from calib_core.arrays import TimesNs
 from calib_core.association.pairing import pair_clicks
-from calib_core.calibrate import calibrate, calibrate_pairs
+from calib_core.calibration import calibrate, calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError, InputError
 from calib_core.interchange import (

@@ -7,6 +7,7 @@ from jaxtyping import Bool, Float64, Int64
 
 __all__ = [
     "Flags",
+    "Indices",
     "Matrix23",
     "Matrix33",
     "Matrix66",
@@ -29,6 +30,10 @@ Points3: TypeAlias = Float64[np.ndarray, "n 3"]
 Values: TypeAlias = Float64[np.ndarray, "n"]
 Flags: TypeAlias = Bool[np.ndarray, "n"]
 TimesNs: TypeAlias = Int64[np.ndarray, "n"]
+"""Stamps, nanoseconds since the epoch."""
+
+Indices: TypeAlias = Int64[np.ndarray, "n"]
+"""Places in another array: rows, owners, offsets."""
 
 
 def frozen_array(values: Any, shape: tuple[int | None, ...], *, dtype: Any = np.float64) -> Any:

@@ -5,9 +5,10 @@ from typing import NewType
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Points3, TimesNs, Values, Vector2, Vector3, frozen_array
+from calib_core.arrays import Indices, Matrix33, Points3, TimesNs, Values, Vector2, Vector3, frozen_array
 
 __all__ = [
+    "MIN_PAIRS",
     "NS_PER_S",
     "Candidate",
     "Pair",
@@ -25,6 +26,9 @@ TimeNs = NewType("TimeNs", int)
 """Nanoseconds since the epoch. Never a float: a float64 of today is off by up to 128 ns."""
 
 NS_PER_S = 1_000_000_000
+
+MIN_PAIRS = 4
+"""The fewest pairs that fix a pose: three leave up to four poses; the fourth decides."""
 
 
 def time_from_parts(sec: int, nanosec: int) -> TimeNs:
@@ -90,7 +94,7 @@ class RadarScan:
         return len(self.points_radar_m)
 
 
-def _no_first_return() -> TimesNs:
+def _no_first_return() -> Indices:
     return np.zeros(1, dtype=np.int64)
 
 
@@ -108,7 +112,7 @@ class RadarScans:
     """
 
     times_ns: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    first_return: TimesNs = field(default_factory=_no_first_return)
+    first_return: Indices = field(default_factory=_no_first_return)
     points_radar_m: Points3 = field(default_factory=lambda: np.zeros((0, 3)))
     doppler_mps: Values = field(default_factory=lambda: np.zeros(0))
     snr_db: Values = field(default_factory=lambda: np.zeros(0))
@@ -186,7 +190,7 @@ class RadarScans:
             sigma_polar=self.sigma_polar[low:high],
         )
 
-    def scan_of_return(self) -> TimesNs:
+    def scan_of_return(self) -> Indices:
         """Return, for each row, the index of the scan that owns it: (n,)."""
         return np.repeat(np.arange(len(self), dtype=np.int64), np.diff(self.first_return))
 

@@ -8,11 +8,11 @@ from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 
-__all__ = ["Calibration", "Caution", "CheckPoint", "Metrics", "PairResult"]
+__all__ = ["Calibration", "CheckPoint", "DataWarning", "Metrics", "PairResult"]
 
 
 @dataclass(frozen=True, slots=True)
-class Caution:
+class DataWarning:
     """Something about the data that a person must decide on.
 
     Attributes:
@@ -121,7 +121,7 @@ class Calibration:
         metrics: the figures.
         pairs: in order of image time, excluded ones included.
         unpaired: clicks that found no radar position.
-        cautions: what a person must know before using it.
+        warnings: what a person must know before using it.
         options: what it was solved with.
         noise_scale: estimated over assumed standard deviation of (click, range, azimuth, elevation); ones where not estimated.
         covariance_quantile: the factor on covariance whose ellipsoid holds 95 % for 6 degrees of freedom.
@@ -135,7 +135,7 @@ class Calibration:
     metrics: Metrics
     pairs: tuple[PairResult, ...]
     unpaired: tuple[Unpaired, ...]
-    cautions: tuple[Caution, ...]
+    warnings: tuple[DataWarning, ...]
     options: CalibrationOptions
     noise_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     covariance_quantile: float = 12.591587243743977

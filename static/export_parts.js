@@ -1,5 +1,5 @@
 // @ts-check
-/** Parts of the export panel: the text with its comments set apart, the pose in numbers, the cautions. */
+/** Parts of the export panel: the text with its comments set apart, the pose in numbers, the warnings. */
 
 import { icon, make } from "./notices.js";
 
@@ -28,16 +28,16 @@ export function numbers(preview) {
   return table;
 }
 
-/** What the solve warns of. @param {import("./messages.js").CautionRow[]} rows */
-export function cautionBox(rows) {
+/** What the solve warns of. @param {import("./messages.js").WarningRow[]} rows */
+export function warningBox(rows) {
   if (!rows.length) return [];
-  const title = rows.length === 1 ? "One caution comes with this calibration" : `${rows.length} cautions come with this calibration`;
+  const title = rows.length === 1 ? "One warning comes with this calibration" : `${rows.length} warnings come with this calibration`;
   const items = rows.map((row) => {
     const item = make("li", "", row.message);
     item.dataset.hint = row.hint;
     return item;
   });
-  return [make("div", "with-cautions", [make("strong", "", [icon("caution"), title]), make("ul", "", items)])];
+  return [make("div", "with-warnings", [make("strong", "", [icon("warning"), title]), make("ul", "", items)])];
 }
 
 const RECTIFIED = "cocalib-rectified";

@@ -1,14 +1,14 @@
 // @ts-check
 /** The export panel: every format with its text before it is saved, which way it carries points, and the clicks. */
 
-import { cautionBox, lines, numbers, rectifiedBox } from "./export_parts.js";
+import { warningBox, lines, numbers, rectifiedBox } from "./export_parts.js";
 import { frameDrawing } from "./frames.js";
 import { icon, make, toast } from "./notices.js";
 import { send } from "./socket.js";
 import { on, state } from "./state.js";
 
 /** @typedef {{key: string, label: string, takes_parent: boolean, takes_rectified: boolean}} Format */
-/** What the server says about a format: ExportPreview in app/web/channel/exports.py. @typedef {Record<string, any>} Preview */
+/** What the server says about a format: ExportPreview in app/web/channel/export_preview.py. @typedef {Record<string, any>} Preview */
 const KEPT = "cocalib-export";
 const CLICKS = "clicks";
 const PARENT = ["x", "y", "z", "qx", "qy", "qz", "qw"];
@@ -185,7 +185,7 @@ function drawPreview(preview) {
     frameDrawing(preview),
     numbers(preview),
     make("div", `check ${preview.check_is_good ? "good" : "bad"}`, [make("b", "", preview.check_is_good ? "✓" : "!"), make("span", "", preview.check)]),
-    ...cautionBox(preview.cautions),
+    ...warningBox(preview.warnings),
   );
 }
 
@@ -206,7 +206,7 @@ function drawReason(reason) {
   const inParent = takesParent() && reason.includes("parent");
   parent.hidden = !inParent;
   rectified.row.hidden = !(takesRectified() && reason.includes("rectified"));
-  text.replaceChildren(make("div", "reason", [icon("caution"), make("span", "", reason.trim())]));
+  text.replaceChildren(make("div", "reason", [icon("warning"), make("span", "", reason.trim())]));
   notes.replaceChildren();
   side.replaceChildren();
   fileName.value = "";

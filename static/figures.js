@@ -1,12 +1,12 @@
 // @ts-check
-/** Metrics, pose and cautions, as the server worded them. */
+/** Metrics, pose and warnings, as the server worded them. */
 
 import { icon, make } from "./notices.js";
 import { on, state } from "./state.js";
 
 /** @typedef {import("./messages.js").Figure} Figure */
 const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));
-const cautions = /** @type {HTMLElement} */ (document.getElementById("cautions"));
+const warnings = /** @type {HTMLElement} */ (document.getElementById("warnings"));
 const posePage = /** @type {HTMLElement} */ (document.getElementById("page-pose"));
 /** What stands in the strip before there is anything to say: nothing jumps when it arrives. @type {[string, string][]} */
 const EMPTY = [
@@ -16,7 +16,7 @@ const EMPTY = [
   ["rms", "RMS"],
   ["inliers", "pairs that agree"],
 ];
-/** Cautions that the person has opened stay open. @type {Set<string>} */
+/** Warnings that the person has opened stay open. @type {Set<string>} */
 const openCodes = new Set(["unsolvable"]);
 export const poseTable = make("table", "", []);
 const poseHead = make("div", "pose-head", "");
@@ -24,7 +24,7 @@ const apartTable = make("table", "", []);
 const apart = make("div", "apart", []);
 const adviceLine = make("p", "advice", "");
 const axesLine = make("p", "advice axes", "Along and about the radar's axes: x forward, y left, z up. All angles 0: the camera looks along x.");
-let cautionText = "";
+let warningText = "";
 
 export function startFigures() {
   const pose = make("div", "pose", [poseTable, axesLine, adviceLine]);
@@ -42,7 +42,7 @@ function draw() {
   adviceLine.textContent = view.advice?.words ?? "";
   drawReference(view);
   const failure = view.stage === "unsolvable" ? [{ code: "unsolvable", message: view.status, hint: view.hint }] : [];
-  drawCautions([...failure, ...(state.recording?.cautions ?? []), ...view.cautions]);
+  drawWarnings([...failure, ...(state.recording?.warnings ?? []), ...view.warnings]);
 }
 
 /** Where the pose comes from while it is a file's, and how far the solved one lies from it. @param {import("./messages.js").View} view */
@@ -72,20 +72,20 @@ function row(figure) {
   return line;
 }
 
-/** @param {import("./messages.js").CautionRow[]} rows */
-function drawCautions(rows) {
+/** @param {import("./messages.js").WarningRow[]} rows */
+function drawWarnings(rows) {
   const text = JSON.stringify(rows);
-  if (text === cautionText) return;
-  cautionText = text;
-  cautions.replaceChildren(
-    ...rows.map((caution) => {
-      const box = make("details", "caution", [
-        make("summary", "", [icon("caution"), make("span", "", caution.message)]),
-        make("div", "hint", caution.hint),
+  if (text === warningText) return;
+  warningText = text;
+  warnings.replaceChildren(
+    ...rows.map((warning) => {
+      const box = make("details", "warning", [
+        make("summary", "", [icon("warning"), make("span", "", warning.message)]),
+        make("div", "hint", warning.hint),
       ]);
-      box.dataset.code = caution.code;
-      box.open = openCodes.has(caution.code);
-      box.ontoggle = () => (box.open ? openCodes.add(caution.code) : openCodes.delete(caution.code));
+      box.dataset.code = warning.code;
+      box.open = openCodes.has(warning.code);
+      box.ontoggle = () => (box.open ? openCodes.add(warning.code) : openCodes.delete(warning.code));
       return box;
     }),
   );

@@ -17,7 +17,7 @@ const COLOURS = ["var(--axis-x)", "var(--axis-y)", "var(--axis-z)"];
 
 /**
  * Draw both frames. The directions of the axes are the solved ones; the places are not to scale.
- * @param {Record<string, any>} preview ExportPreview of app/web/channel/exports.py
+ * @param {Record<string, any>} preview ExportPreview of app/web/channel/export_preview.py
  */
 export function frameDrawing(preview) {
   const svg = shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "frames", role: "img" });

@@ -40,11 +40,11 @@ export interface Figure {
   value: string;
   unit: string;
   hint: string;
-  level: "plain" | "good" | "caution";
+  level: "plain" | "good" | "warning";
 }
 
 /** Something a person must decide on. */
-export interface CautionRow {
+export interface WarningRow {
   code: string;
   message: string;
   hint: string;
@@ -136,7 +136,7 @@ export interface View {
   clicks: ClickRow[];
   metrics: Figure[];
   pose: Figure[];
-  cautions: CautionRow[];
+  warnings: WarningRow[];
   options: CalibrationOptions;
   residual_limit_px: number | null;
   advice: Advice | null;
@@ -204,7 +204,7 @@ export interface RecordingNote {
   frame_times: StampColumns;
   start: Stamp;
   radar: StampColumns;
-  cautions: CautionRow[];
+  warnings: WarningRow[];
   sensors: SensorNote[];
   session: SessionNote;
   version: string;

@@ -88,7 +88,7 @@ export function nextDeed() {
   }
   const left = state.placements.filter((placement) => !isClicked(placement)).length;
   if (left) return [`${left} placement${left > 1 ? "s" : ""} left: `, { key: "N" }, " goes to the next"];
-  if (!state.placements.length || !view?.has_calibration || view.cautions.length) return null;
+  if (!state.placements.length || !view?.has_calibration || view.warnings.length) return null;
   return ["Every placement is clicked: ", { key: "E" }, " exports the calibration"];
 }
 
@@ -103,5 +103,5 @@ export function nextWords() {
   const words = deed.map((word) => (typeof word === "string" ? word : word.key)).join("");
   if (view.stage !== "solved") return words;
   const told = view.status.includes("pairs agree") ? words.replace(/^\d+ of \d+ pairs agree: /, "") : words;
-  return [told, view.cautions.length || words.startsWith("Every") ? view.hint : ""].filter(Boolean).join("  ·  ");
+  return [told, view.warnings.length || words.startsWith("Every") ? view.hint : ""].filter(Boolean).join("  ·  ");
 }

@@ -38,7 +38,7 @@ class PictureRecording:
     radar_frame: str = "radar"
     camera_frame: str = "camera_optical"
     topics: tuple[Any, ...] = ()
-    cautions: tuple[Any, ...] = ()
+    warnings: tuple[Any, ...] = ()
     paths: tuple[Path, ...] = ()
     radar_times: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 

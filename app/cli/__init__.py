@@ -10,15 +10,15 @@ from typing import Annotated, Any
 
 import tyro
 
-from app.cli.exporting import Check, Export
-from app.cli.filming import Video
-from app.cli.importing import Import
-from app.cli.inspecting import Info
-from app.cli.opening import Demo, Open
-from app.cli.printing import refuse
-from app.cli.simulating import Simulate
-from app.cli.solving import Solve
+from app.cli.export import Check, Export
+from app.cli.import_file import Import
+from app.cli.info import Info
+from app.cli.open import Demo, Open
+from app.cli.output import refuse
+from app.cli.simulate import Simulate
+from app.cli.solve import Solve
 from app.cli.usage import read_command
+from app.cli.video import Video
 from calib_core.errors import CalibrationError
 
 __all__ = ["run"]

@@ -1,14 +1,13 @@
 """What the screen shows, as a value: `view(session)` is pure, and every client draws the same View."""
 
-from app.view.drawing import view
-from app.view.drawn import Advice, CautionRow, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View
+from app.view.build import view
+from app.view.model import Advice, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View, WarningRow
 from app.view.reference import Reference, shown_calibration
 from app.view.summary import summary_lines
 from app.view.wording import sentence
 
 __all__ = [
     "Advice",
-    "CautionRow",
     "ClickRow",
     "ClickState",
     "Ellipse",
@@ -17,6 +16,7 @@ __all__ = [
     "Reference",
     "Stage",
     "View",
+    "WarningRow",
     "sentence",
     "shown_calibration",
     "summary_lines",

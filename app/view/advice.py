@@ -4,8 +4,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.view.drawn import Advice
-from calib_core.advice.guidance import next_placement
+from app.view.model import Advice
+from calib_core.advice.next_placement import next_placement
 from calib_core.results import Calibration
 
 __all__ = ["advice_for"]
@@ -15,7 +15,7 @@ _WORTH_SAYING = 0.05
 
 @lru_cache(maxsize=4)
 def advice_for(calibration: Calibration) -> Advice | None:
-    """Say where the next placement pays most; None where calib_core.advice.guidance knows no place, as in the paper's method.
+    """Say where the next placement pays most; None where it knows no place, as in the paper's method.
 
     Worked out once per calibration: a View is asked for more often than there is a new answer.
     """

@@ -5,10 +5,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.view.digits import plain, with_sigma
-from app.view.drawn import Figure
+from app.view.click_rows import ellipse_of
+from app.view.model import Figure
 from app.view.mounting import mounting_of
-from app.view.rows import ellipse_of
+from app.view.number_format import plain, with_sigma
 from calib_core.advice.angle_map import AngleMap, learn_angle_map
 from calib_core.results import Calibration
 
@@ -53,7 +53,7 @@ def _held_out_figure(calibration: Calibration) -> Figure:
     figure = _figure("held_out_aed", "held-out AED", metrics.held_out_aed_px, hint)
     if metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px:
         warning = "It is well above AED, so the pose leans on single pairs: add placements."
-        return replace(figure, hint=f"{hint} {warning}", level="caution")
+        return replace(figure, hint=f"{hint} {warning}", level="warning")
     return figure
 
 

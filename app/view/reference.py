@@ -6,8 +6,8 @@ from functools import lru_cache
 import numpy as np
 
 from app.session import Session
-from app.view.digits import plain, with_sigma
-from app.view.drawn import Figure
+from app.view.model import Figure
+from app.view.number_format import plain, with_sigma
 from calib_core.interchange import CalibrationFile, Comparison, PixelDifference, compare, imported
 from calib_core.results import Calibration
 
@@ -83,7 +83,7 @@ def _pixels(at: PixelDifference) -> Figure:
         "px",
         f"How far apart the two project what is {at.distance_m:g} m away: root mean square over the image, "
         f"{plain(at.max_px)} px at most.{expected}",
-        "caution" if known and at.rms_px > 3 * at.sigma_px else "plain",
+        "warning" if known and at.rms_px > 3 * at.sigma_px else "plain",
     )
 
 

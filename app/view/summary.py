@@ -1,8 +1,8 @@
 """A calibration in a few lines of text, for the command line: the same figures as on the page."""
 
-from app.view.digits import plain
-from app.view.drawn import Figure
 from app.view.figures import metric_figures, pose_figures
+from app.view.model import Figure
+from app.view.number_format import plain
 from app.view.wording import sentence
 from calib_core.results import Calibration
 
@@ -10,7 +10,7 @@ __all__ = ["summary_lines"]
 
 
 def summary_lines(calibration: Calibration) -> tuple[str, ...]:
-    """Return the figures, one per line and aligned, then the pairs that disagree and the cautions."""
+    """Return the figures, one per line and aligned, then the pairs that disagree and the warnings."""
     figures = (*metric_figures(calibration), *pose_figures(calibration))
     width = max(len(figure.label) for figure in figures)
     lines = [_line(figure, width) for figure in figures]
@@ -19,7 +19,7 @@ def summary_lines(calibration: Calibration) -> tuple[str, ...]:
         for pair in calibration.pairs
         if not pair.inlier and not pair.excluded
     ]
-    lines += [f"caution: {sentence(caution.message)} {sentence(caution.hint)}" for caution in calibration.cautions]
+    lines += [f"warning: {sentence(warning.message)} {sentence(warning.hint)}" for warning in calibration.warnings]
     lines += [f"unpaired: {row.id}: {sentence(row.reason)} {sentence(row.hint)}" for row in calibration.unpaired]
     return tuple(lines)
 

@@ -5,9 +5,9 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.association.locating import candidate_at
-from calib_core.estimation.evidence import CameraBelief
-from calib_core.estimation.uncertainty import pose_jacobian
+from calib_core.association.clustering import candidate_at
+from calib_core.estimation.covariance import pose_jacobian
+from calib_core.estimation.measurement_model import CameraPrior
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
 from calib_core.radar import covariance_from_sigma_polar
@@ -127,7 +127,8 @@ def bound_of(
     radar = covariance_from_sigma_polar(points, np.tile(profile.sigma_polar, (len(points), 1)))
     spread = d_point @ radar @ np.swapaxes(d_point, 1, 2) + profile.sigma_px**2 * np.eye(2)
     information = (np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(spread, jacobian)).sum(axis=0)
-    to_centre = CameraBelief(np.zeros(3), 1.0, measured=True).rows(pose)[1]  # d centre / d (dt, dtheta), sigma 1 m
+    one_metre = CameraPrior(np.zeros(3), 1.0, measured=True)
+    to_centre = one_metre.rows(pose)[1]  # d centre / d (dt, dtheta)
     if tape_m is not None:
         information = information + to_centre.T @ to_centre / tape_m**2
     covariance = np.linalg.inv(information)

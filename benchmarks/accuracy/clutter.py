@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.accuracy.cases import tape_measured
 from benchmarks.accuracy.figures import MET, MISSED, Measured, at_least, at_most, column, fewest, share, summed_up
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
-from calib_core.calibrate import calibrate
+from calib_core.calibration import calibrate
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.paper.algorithm_1 import pair_as_printed, static_returns_as_printed

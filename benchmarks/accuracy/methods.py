@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.accuracy.cases import Case, options_of
-from calib_core.calibrate import calibrate_pairs
+from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import RigidTransform
 from calib_core.options import CalibrationOptions
-from calib_core.paper.opencv import refine_lm, solve_pnp
+from calib_core.paper.pnp import refine_lm, solve_pnp
 from calib_core.results import Calibration
 from calib_core.synthetic import NOISE_PROFILES, SimulatedPairs
 

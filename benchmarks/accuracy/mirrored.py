@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.accuracy.cases import Case, draw, tape_measured
 from benchmarks.accuracy.figures import MET, MISSED, column, fewest, share, summed_up
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
-from calib_core.calibrate import calibrate_pairs
+from calib_core.calibration import calibrate_pairs
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, SolvingOptions
 from calib_core.results import Calibration
@@ -70,7 +70,7 @@ def _turned(pair: Pair, signs: np.ndarray) -> Pair:
 def _caught(simulated: SimulatedPairs, options: CalibrationOptions) -> float:
     """Return 1 where the outcome names mirrored axes."""
     outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
-    named = [one.code for one in outcome.cautions] if isinstance(outcome, Calibration) else [outcome.code]
+    named = [one.code for one in outcome.warnings] if isinstance(outcome, Calibration) else [outcome.code]
     return float(_CODE in named)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from benchmarks.accuracy.figures import MET, MISSED
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
-from calib_core.association.locating import candidate_at
-from calib_core.calibrate import calibrate_pairs
+from calib_core.association.clustering import candidate_at
+from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Pair

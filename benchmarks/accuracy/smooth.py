@@ -12,7 +12,7 @@ from benchmarks.accuracy.figures import Measured, at_most, column, fewest, summe
 from benchmarks.accuracy.methods import as_printed, best_threshold_px
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
 from calib_core.advice.angle_map import learn_angle_map
-from calib_core.calibrate import calibrate_pairs
+from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import RigidTransform
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.accuracy.cases import Case, options_of
 from benchmarks.accuracy.methods import PEERS, available
 from benchmarks.speed.rows import Row, Table
-from calib_core.calibrate import calibrate_pairs
+from calib_core.calibration import calibrate_pairs
 from calib_core.measurements import Pair
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 
@@ -38,7 +38,7 @@ def measure_solving() -> Table:
         "Solving",
         "Simulated pairs of a TI-like radar in a field, 10 % of them wrong, one core; medians of processor "
         "time, which other programs disturb least. "
-        "The default solve includes noise levels, covariance, leave-one-out, the test for mirrored axes and every caution; "
+        "The default solve includes noise levels, covariance, leave-one-out, the test for mirrored axes and every warning; "
         "the others return a pose, and are given the best pixel threshold."
         + (f" Not installed here: {', '.join(missing)}." if missing else ""),
         tuple(rows),
@@ -50,7 +50,7 @@ def _ours(pairs: tuple[Pair, ...], simulated: SimulatedPairs, case: Case) -> Cal
 
 
 def _one_click_off() -> Callable[[], object]:
-    """Move one click of twenty right pairs: pairs under suspicion are left out in earnest, which takes fits of their own."""
+    """Move one click of twenty right pairs: pairs under suspected are left out in earnest, which takes fits of their own."""
     case = Case("ti", 20, tape_m=None)
     simulated = simulate_pairs(20, rng=np.random.default_rng(20), noise="ti")
     first, *others = simulated.pairs

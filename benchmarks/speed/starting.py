@@ -20,7 +20,7 @@ def measure_starting(sample: Path) -> Table:
     python = [sys.executable, "-c"]
     jobs = {
         "`import numpy`": [*python, "import numpy"],
-        "`import calib_core.calibrate`": [*python, "import calib_core.calibrate"],
+        "`import calib_core.calibration`": [*python, "import calib_core.calibration"],
         "`cocalib --version`": [*command, "--version"],
         "`cocalib info` on the sample": [*command, "info", *bags],
         "`cocalib solve` on the sample, 20 clicks": [*command, "solve", *bags, "--clicks", str(sample / "clicks.json")],

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib_core.association.clustering import candidates_of, clusters_of, clusters_wanted, scores_of, window_around
 from calib_core.association.gating import static_returns
-from calib_core.association.locating import candidates_of, clusters_of, clusters_wanted, scores_of, window_around
 from calib_core.measurements import NS_PER_S, Pair, RadarScans, ReflectorClick, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points3, TimesNs, Values, Vector3, frozen_array
+from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3, frozen_array
 from calib_core.association.gating import static_returns
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
@@ -93,10 +93,10 @@ class _Grid:
 
     times_s: Values
     times_ns: TimesNs
-    cells: TimesNs
-    keys: TimesNs
-    first: TimesNs
-    scan: TimesNs
+    cells: Indices
+    keys: Indices
+    first: Indices
+    scan: Indices
     cosines: Points3
     points_radar_m: Points3
     snr_db: Values
@@ -121,7 +121,7 @@ class _Grid:
             snr_db=static.snr_db[order],
         )
 
-    def around(self, cell: TimesNs) -> TimesNs:
+    def around(self, cell: Indices) -> Indices:
         """Return the rows of a cell and of its 26 neighbours."""
         keys = _keys(cell + _NEIGHBOURS)
         places = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
@@ -134,7 +134,7 @@ _U_CELLS = 64  # u and w lie in -1 to 1: 51 and 26 cells, and a margin for neigh
 _W_CELLS = 64
 
 
-def _keys(cells: TimesNs) -> TimesNs:
+def _keys(cells: Indices) -> Indices:
     return (cells[..., 0] * _U_CELLS + cells[..., 1] + _U_CELLS // 2) * _W_CELLS + cells[..., 2] + _W_CELLS // 2
 
 
@@ -213,7 +213,7 @@ def _dwell_of(grid: _Grid, seed: _Seed, min_dwell_s: float) -> _Dwell | None:
     return _judged(grid, members, span)
 
 
-def _span(grid: _Grid, members: TimesNs, within_s: float) -> tuple[int, int] | None:
+def _span(grid: _Grid, members: Indices, within_s: float) -> tuple[int, int] | None:
     """Return the first and last scan of the unbroken presence around a time; None where there is none."""
     shown = np.unique(grid.scan[members])
     if not len(shown):
@@ -226,7 +226,7 @@ def _span(grid: _Grid, members: TimesNs, within_s: float) -> tuple[int, int] | N
     return int(shown[first]), int(shown[last])
 
 
-def _judged(grid: _Grid, members: TimesNs, span: tuple[int, int]) -> _Dwell | None:
+def _judged(grid: _Grid, members: Indices, span: tuple[int, int]) -> _Dwell | None:
     """Measure how steadily a dwell is seen and how new it is; None where it is clutter or chance."""
     shown = np.unique(grid.scan[members])
     inside = (shown >= span[0]) & (shown <= span[1])

@@ -8,34 +8,34 @@ from calib_core.interchange.calibration_file import (
     Provenance,
     choose_check_point,
 )
-from calib_core.interchange.cameras.cameras import camera_info_text, read_camera, read_camera_file
-from calib_core.interchange.check.checking import CheckReport, Verdict, check
-from calib_core.interchange.check.comparing import Comparison, PixelDifference, compare
-from calib_core.interchange.check.explaining import Finding
-from calib_core.interchange.check.pair_evidence import PairEvidence, read_pair_evidence, read_pair_evidence_file
+from calib_core.interchange.cameras.files import camera_info_text, read_camera, read_camera_file
+from calib_core.interchange.check.comparison import Comparison, PixelDifference, compare
+from calib_core.interchange.check.explanation import CheckResult
+from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
+from calib_core.interchange.check.report import CheckReport, Verdict, check
 from calib_core.interchange.contents import contents_text
 from calib_core.interchange.exporting import ExportBytes, ExportText, export
-from calib_core.interchange.formats.formats import FORMATS, Format, format_named
+from calib_core.interchange.formats.registry import FORMATS, Format, format_named
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.importing import imported, read_any, read_any_file
 from calib_core.interchange.own.calibration_json import calibration_text, read_calibration, write_calibration
-from calib_core.interchange.own.clicks import read_clicks, write_clicks
-from calib_core.interchange.own.pairs import PairsFile, read_pairs, write_pairs
+from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
+from calib_core.interchange.own.pairs_json import PairsFile, read_pairs, write_pairs
 from calib_core.interchange.parent_pose import parent_pose
 
 __all__ = [
     "FORMATS",
     "CalibrationFile",
+    "CheckPairs",
     "CheckReport",
+    "CheckResult",
     "Comparison",
     "ExportBytes",
     "ExportText",
-    "Finding",
     "Format",
     "FrameNames",
     "ImportedCalibration",
     "InputFile",
-    "PairEvidence",
     "PairsFile",
     "PixelDifference",
     "Provenance",
@@ -59,9 +59,9 @@ __all__ = [
     "read_calibration",
     "read_camera",
     "read_camera_file",
+    "read_check_pairs",
+    "read_check_pairs_file",
     "read_clicks",
-    "read_pair_evidence",
-    "read_pair_evidence_file",
     "read_pairs",
     "write_calibration",
     "write_clicks",

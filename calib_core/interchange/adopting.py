@@ -5,10 +5,10 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance, choose_check_point
-from calib_core.interchange.check.checking import check
+from calib_core.interchange.check.report import check
 from calib_core.interchange.imported import TRUTH_FORMAT, ImportedCalibration
 from calib_core.options import CalibrationOptions
-from calib_core.results import Calibration, Caution, Metrics
+from calib_core.results import Calibration, DataWarning, Metrics
 
 __all__ = ["adopt", "adopted_calibration"]
 
@@ -47,14 +47,14 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
 
     Args:
         found: what `read_any` returned.
-        source: its name, for error messages and for the caution.
+        source: its name, for error messages and for the warning.
         camera: the intrinsics to look through.
 
     Raises:
         InputError: the file contradicts itself, or misses its own check point.
     """
     _refuse_wrong(found, source, camera)
-    assumed = tuple(Caution("assumed", note, "make sure that it is so") for note in found.notes)
+    assumed = tuple(DataWarning("assumed", note, "make sure that it is so") for note in found.notes)
     return Calibration(
         camera_from_radar=found.camera_from_radar,
         covariance=found.file.calibration.covariance if found.file else np.full((6, 6), _UNKNOWN),
@@ -62,13 +62,13 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
         metrics=Metrics(_UNKNOWN, _UNKNOWN, _UNKNOWN, 0),
         pairs=(),
         unpaired=(),
-        cautions=(*assumed, _taken_over(found, source)),
+        warnings=(*assumed, _taken_over(found, source)),
         options=CalibrationOptions(),
     )
 
 
-def _taken_over(found: ImportedCalibration, source: str) -> Caution:
-    return Caution(
+def _taken_over(found: ImportedCalibration, source: str) -> DataWarning:
+    return DataWarning(
         "imported",
         f"taken over from {source} ({found.format}): its pairs are not known, nor what it was made from",
         "check it: cocalib open RECORDING --calibration FILE, and click the reflector",
@@ -80,6 +80,6 @@ def _refuse_wrong(found: ImportedCalibration, source: str, camera: Camera | None
         raise InputError(
             f"{source}: is what a simulation holds for true, no calibration; compare with it: cocalib check FILE --against"
         )
-    for finding in check(found, camera=camera).findings:
-        if finding.level == "error":
-            raise InputError(f"{source}: {finding.message}; {finding.hint}")
+    for result in check(found, camera=camera).results:
+        if result.level == "error":
+            raise InputError(f"{source}: {result.message}; {result.hint}")

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from calib_core.interchange.exporting import ExportBytes, ExportText
-from calib_core.interchange.syntax.archives import unpack
 from calib_core.interchange.syntax.mat_file import load_mat
+from calib_core.interchange.syntax.zip_archives import unpack
 
 __all__ = ["contents_text"]
 

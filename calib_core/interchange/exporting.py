@@ -6,7 +6,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.formats.formats import FORMATS, Format, format_named
+from calib_core.interchange.formats.registry import FORMATS, Format, format_named
 
 __all__ = ["ExportBytes", "ExportText", "export"]
 

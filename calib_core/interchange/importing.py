@@ -8,23 +8,23 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.cameras.camera_fields import find_cameras
-from calib_core.interchange.formats.array_formats import read_matlab, read_matrix, read_numpy
-from calib_core.interchange.formats.colmap_format import read_colmap
-from calib_core.interchange.formats.dataset_formats import read_kitti, read_nuscenes
-from calib_core.interchange.formats.driveworks_format import is_rig, read_driveworks
-from calib_core.interchange.formats.foxglove_format import read_foxglove
-from calib_core.interchange.formats.opencv_format import read_opencv
-from calib_core.interchange.formats.ros_formats import read_launch_python, read_launch_xml, read_tf2_command
-from calib_core.interchange.formats.urdf_format import read_urdf
-from calib_core.interchange.formats.yaml_formats import read_autoware, read_kalibr, read_transform_stamped
+from calib_core.interchange.cameras.fields import find_cameras
+from calib_core.interchange.formats.colmap import read_colmap
+from calib_core.interchange.formats.datasets import read_kitti, read_nuscenes
+from calib_core.interchange.formats.driveworks import is_rig, read_driveworks
+from calib_core.interchange.formats.foxglove import read_foxglove
+from calib_core.interchange.formats.matrices import read_matlab, read_matrix, read_numpy
+from calib_core.interchange.formats.opencv import read_opencv
+from calib_core.interchange.formats.ros import read_launch_python, read_launch_xml, read_tf2_command
+from calib_core.interchange.formats.urdf import read_urdf
+from calib_core.interchange.formats.yaml_files import read_autoware, read_kalibr, read_transform_stamped
 from calib_core.interchange.imported import TRUTH_FORMAT, ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.calibration_json import calibration_file_of, kept_results, transform_of
 from calib_core.interchange.own.documents import CalibrationDocument, TransformDocument
-from calib_core.interchange.syntax.archives import unpack
 from calib_core.interchange.syntax.opencv_xml import load_opencv_xml, parse_xml
 from calib_core.interchange.syntax.strict_json import checked, json_value, parse_document
 from calib_core.interchange.syntax.yaml_text import load_yaml
+from calib_core.interchange.syntax.zip_archives import unpack
 
 __all__ = ["imported", "read_any", "read_any_file"]
 

@@ -24,8 +24,8 @@ from calib_core.measurements import (
 )
 from calib_core.metrics import aed, distances, metrics_of
 from calib_core.options import CalibrationOptions, PaperOptions
-from calib_core.paper.opencv import PnPSolver, refine_lm, solve_pnp_ransac, spans_a_plane
-from calib_core.paper.paper_doubts import cautions_as_printed
+from calib_core.paper.checks import warnings_as_printed
+from calib_core.paper.pnp import PnPSolver, refine_lm, solve_pnp_ransac, spans_a_plane
 from calib_core.results import Calibration, PairResult
 
 __all__ = [
@@ -289,7 +289,7 @@ def _solved(
         metrics=metrics_of(distances_px[np.isfinite(distances_px)]),
         pairs=results,
         unpaired=unpaired,
-        cautions=cautions_as_printed(
+        warnings=warnings_as_printed(
             [pair.id for pair in used],
             points_radar_m,
             pixels_px,

@@ -1,8 +1,8 @@
 """Recordings: ROS 1 and ROS 2 files in, radar scans, images and intrinsics out. Only here are containers known."""
 
-from calib_core.recordings.beginning import first_picture
 from calib_core.recordings.camera.images import EncodedImage
-from calib_core.recordings.describing import clock_lines, describe
+from calib_core.recordings.description import clock_lines, describe
+from calib_core.recordings.first_picture import first_picture
 from calib_core.recordings.recording import InputFile, Recording, inspect_recording, open_recording, require_files
 from calib_core.recordings.selection import RecordingOptions
 from calib_core.recordings.summary import RecordingSummary, recording_summary

@@ -1,4 +1,4 @@
-"""Put a recording together: topics chosen, clocks chosen, streams built, cautions gathered."""
+"""Put a recording together: topics chosen, clocks chosen, streams built, warnings gathered."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,23 +13,23 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import TimeNs
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.camera.images import ImageLayout
-from calib_core.recordings.camera.recorded_camera import recorded_camera
+from calib_core.recordings.camera.recorded_intrinsics import recorded_camera
 from calib_core.recordings.camera.video_stream import about_video, image_stream
 from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.messages.decoding import Message
-from calib_core.recordings.radar.radar_axes import parse_radar_axes
-from calib_core.recordings.radar.radar_checks import about_claims
-from calib_core.recordings.radar.radar_layouts import layouts_of_parts
-from calib_core.recordings.radar.radar_lists import PointLayout
-from calib_core.recordings.radar.radar_stream import RadarStream
+from calib_core.recordings.radar.axes import parse_radar_axes
+from calib_core.recordings.radar.checks import about_claims
+from calib_core.recordings.radar.layouts import layouts_of_parts
+from calib_core.recordings.radar.list_messages import PointLayout
+from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.stamping import StampedTopic, read_stamps
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
 from calib_core.recordings.time.clocks import ClockChoice, Stamps, choose_clock, choose_clocks
 from calib_core.recordings.topics import Rhythm, Topic, TopicSummary, join_topics
 from calib_core.recordings.usages import Usage, usage_of
-from calib_core.results import Caution
+from calib_core.results import DataWarning
 
 __all__ = ["Assembly", "assemble"]
 
@@ -47,7 +47,7 @@ class Assembly:
     radar: RadarStream | None
     images: ImageStream | None
     camera: Camera | None
-    cautions: tuple[Caution, ...]
+    warnings: tuple[DataWarning, ...]
 
 
 def assemble(
@@ -66,7 +66,7 @@ def assemble(
     """
     name = " + ".join(str(path) for path in paths)
     topics, repeated = join_topics(sources)
-    cautions = [caution for source in sources for caution in source.cautions] + list(repeated)
+    warnings = [warning for source in sources for warning in source.warnings] + list(repeated)
     if not any(len(topic) for topic in topics) and require:
         raise RecordingError(f"{name}: holds no messages; was the recorder told which topics to record?")
     axes = None if options.radar_axes is None else parse_radar_axes(options.radar_axes)
@@ -74,15 +74,15 @@ def assemble(
     selection = select(inventory, options, require)
     selection, stamped, lost = _stamped(selection, inventory)
     clocks, stamps, about_choice = _clocks(stamped, options)
-    cautions.extend([*lost, *about_choice])
+    warnings.extend([*lost, *about_choice])
     heads = {name: both.heads for name, both in stamped.items()}
     radar = _radar_stream(selection.radar, inventory, stamps, heads)
     images = _image_stream(selection.image, inventory, stamps)
-    cautions.extend(check_overlap(name, radar, images, required=len(require) == 2))
+    warnings.extend(check_overlap(name, radar, images, required=len(require) == 2))
     diagnoses = _diagnoses(stamped, (radar, images), clocks, options)
-    cautions.extend(about_clocks(list(diagnoses.values())))
+    warnings.extend(about_clocks(list(diagnoses.values())))
     camera, about_camera = recorded_camera(selection.camera_info, images)
-    cautions.extend(
+    warnings.extend(
         [*about_camera, *about_radar(radar), *about_claims(radar), *about_images(images), *about_video(images)]
     )
     return Assembly(
@@ -95,16 +95,18 @@ def assemble(
         radar=radar,
         images=images,
         camera=camera,
-        cautions=tuple(cautions),
+        warnings=tuple(warnings),
     )
 
 
-def _stamped(selection: Selection, inventory: Inventory) -> tuple[Selection, Mapping[str, StampedTopic], list[Caution]]:
+def _stamped(
+    selection: Selection, inventory: Inventory
+) -> tuple[Selection, Mapping[str, StampedTopic], list[DataWarning]]:
     """Read the stamps of the topics in use; leave out messages that cannot be read, and say so."""
     used = [topic for topic in (selection.radar, selection.image) if topic is not None]
     stamped = read_stamps([(topic, _head_bytes(inventory.usages[topic.name])) for topic in used])
     by_name = {topic.name: both for topic, both in zip(used, stamped, strict=True)}
-    lost = [caution for topic in used for caution in about_lost(topic.name, len(topic), by_name[topic.name])]
+    lost = [warning for topic in used for warning in about_lost(topic.name, len(topic), by_name[topic.name])]
     radar = by_name[selection.radar.name].topic if selection.radar else None
     image = by_name[selection.image.name].topic if selection.image else None
     return replace(selection, radar=radar, image=image), by_name, lost
@@ -116,7 +118,7 @@ def _head_bytes(usage: Usage) -> int:
 
 def _clocks(
     stamped: Mapping[str, StampedTopic], options: RecordingOptions
-) -> tuple[Mapping[str, Literal["header", "receive"]], Mapping[str, TimesNs], tuple[Caution, ...]]:
+) -> tuple[Mapping[str, Literal["header", "receive"]], Mapping[str, TimesNs], tuple[DataWarning, ...]]:
     """Choose the clock of the topics in use, the radar first; return clock and times by topic."""
     read = [Stamps(name, both.topic.receive_ns, both.header_ns) for name, both in stamped.items()]
     if options.clock == "header":
@@ -129,7 +131,7 @@ def _clocks(
         choice = choose_clock(read[0], options.clock) if read else ClockChoice((), ())
     clocks = dict(zip(stamped, choice.clocks, strict=True))
     stamps = {both.topic: _times(both, clock) for both, clock in zip(read, choice.clocks, strict=True)}
-    return clocks, stamps, choice.cautions
+    return clocks, stamps, choice.warnings
 
 
 def _diagnoses(

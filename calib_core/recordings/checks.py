@@ -6,17 +6,17 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.camera.image_stream import ImageStream
-from calib_core.recordings.radar.radar_stream import RadarStream
+from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.stamping import StampedTopic
-from calib_core.recordings.time.calendar import utc
-from calib_core.results import Caution
+from calib_core.recordings.time.dates import utc
+from calib_core.results import DataWarning
 
 __all__ = ["about_images", "about_lost", "about_radar", "check_overlap"]
 
 _SAMPLED_SCANS = 12
 
 
-def about_lost(name: str, count: int, stamped: StampedTopic) -> list[Caution]:
+def about_lost(name: str, count: int, stamped: StampedTopic) -> list[DataWarning]:
     """Say how many messages of a topic are lost.
 
     Raises:
@@ -27,7 +27,7 @@ def about_lost(name: str, count: int, stamped: StampedTopic) -> list[Caution]:
     if not len(stamped.topic):
         raise MessageError(f"topic {name}: none of its {count} messages can be read: {stamped.fault}")
     return [
-        Caution(
+        DataWarning(
             "unreadable-messages",
             f"{stamped.lost} of {count} messages of {name} cannot be read and are left out: {stamped.fault}",
             "if they are many, copy the file again from its source",
@@ -35,7 +35,9 @@ def about_lost(name: str, count: int, stamped: StampedTopic) -> list[Caution]:
     ]
 
 
-def check_overlap(name: str, radar: RadarStream | None, images: ImageStream | None, *, required: bool) -> list[Caution]:
+def check_overlap(
+    name: str, radar: RadarStream | None, images: ImageStream | None, *, required: bool
+) -> list[DataWarning]:
     """Compare the intervals of both sensors.
 
     Args:
@@ -60,22 +62,22 @@ def check_overlap(name: str, radar: RadarStream | None, images: ImageStream | No
     hint = "give recordings made together; if only the clocks differ, try --clock receive or --clock header"
     if required:
         raise RecordingError(f"{name}: {what}; {hint}")
-    return [Caution("no-overlap", what, hint)]
+    return [DataWarning("no-overlap", what, hint)]
 
 
 def _interval(times_ns: TimesNs) -> str:
     return f"{utc(TimeNs(int(times_ns[0])))} to {utc(TimeNs(int(times_ns[-1])))}"
 
 
-def about_radar(radar: RadarStream | None) -> list[Caution]:
+def about_radar(radar: RadarStream | None) -> list[DataWarning]:
     """Say what is odd about the radar, from a dozen of its scans."""
     if radar is None:
         return []
     name, layout = radar.topic.name, radar.layout
-    cautions = []
+    warnings = []
     if layout.lidar_like:
-        cautions.append(
-            Caution(
+        warnings.append(
+            DataWarning(
                 "looks-like-lidar",
                 f"{name} looks like a lidar: {layout.description}",
                 "choose the radar with --radar-topic, or give the file that has it",
@@ -84,22 +86,22 @@ def about_radar(radar: RadarStream | None) -> list[Caution]:
     height = radar.sample(_SAMPLED_SCANS).points_radar_m[:, 2]
     height = height[np.isfinite(height)]
     if len(height) > 1 and np.all(height == height[0]):
-        cautions.append(
-            Caution(
+        warnings.append(
+            DataWarning(
                 "flat-radar",
                 f"{name} gives every return the same height ({height[0]:g} m): it measures no elevation",
                 "put the reflector's centre at the radar's height at every placement, and measure the camera position",
             )
         )
-    return cautions
+    return warnings
 
 
-def about_images(images: ImageStream | None) -> list[Caution]:
+def about_images(images: ImageStream | None) -> list[DataWarning]:
     """Say how many images were left out because of their stamps."""
     if images is None or not images.repeated:
         return []
     return [
-        Caution(
+        DataWarning(
             "repeated-stamps",
             f"{images.repeated} images of {images.topic.name} have the stamp of another; the first of each is shown",
             "nothing to do, unless they are many: then the camera driver stamps wrongly; try --clock receive",

@@ -18,11 +18,11 @@ from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.containers.sources import Source
-from calib_core.recordings.plain_files.plain_opening import files_behind, open_plain_sources
-from calib_core.recordings.plain_files.video_files import VIDEO_SUFFIXES
+from calib_core.recordings.plain_files.opening import files_behind, open_plain_sources
+from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.topics import TopicSummary
-from calib_core.results import Caution
+from calib_core.results import DataWarning
 
 __all__ = ["InputFile", "Recording", "inspect_recording", "open_recording", "require_files"]
 
@@ -122,14 +122,14 @@ class Recording:
         return next((topic.clock for topic in self.topics if topic.name == name), None)
 
     @property
-    def cautions(self) -> tuple[Caution, ...]:
+    def warnings(self) -> tuple[DataWarning, ...]:
         """What a person must know; messages found unreadable and damage found so far are counted in."""
-        found = (*self._assembly.cautions, *(late for source in self.sources for late in source.later_cautions))
+        found = (*self._assembly.warnings, *(late for source in self.sources for late in source.later_warnings))
         radar = self._assembly.radar
         if radar is None or not radar.unreadable:
             return found
         row, why = next(iter(sorted(radar.unreadable.items())))
-        unreadable = Caution(
+        unreadable = DataWarning(
             "unreadable-messages",
             f"{len(radar.unreadable)} radar messages could not be read and count as empty; the first is number {row}: {why}",
             "if they are many, copy the file again from its source",
@@ -188,7 +188,7 @@ class Recording:
             raise RecordingError(f"{self.name}: the recording is closed")
 
     def camera(self) -> Camera | None:
-        """Return the intrinsics the recording carries; None where it has none that can be used (see cautions)."""
+        """Return the intrinsics the recording carries; None where it has none that can be used (see warnings)."""
         return self._assembly.camera
 
     def radar_scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:

@@ -2,15 +2,16 @@
 
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs, time_parts
+from calib_core.recordings.other_clocks import spare_clocks
 from calib_core.recordings.recording import Recording
-from calib_core.recordings.spare_clocks import spare_clocks
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.topics import Rhythm, TopicSummary
-from calib_core.results import Caution
+from calib_core.results import DataWarning
 
 __all__ = [
     "CameraSummary",
@@ -130,9 +131,8 @@ class CameraSummary:
     distortion: tuple[float, ...] | None
 
 
-@dataclass(frozen=True, slots=True)
-class RecordingSummary:
-    """Everything `cocalib info` knows.
+class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "cautions"}):
+    """Everything `cocalib info` knows. In its JSON the warnings keep the key under which scripts read them: "cautions".
 
     Attributes:
         files: as opened.
@@ -143,7 +143,7 @@ class RecordingSummary:
         topics: by name.
         radar: None where there is none.
         camera: None where there is none.
-        cautions: what a person must know.
+        warnings: what a person must know.
     """
 
     files: tuple[FileSummary, ...]
@@ -154,7 +154,7 @@ class RecordingSummary:
     topics: tuple[TopicReport, ...]
     radar: RadarSummary | None
     camera: CameraSummary | None
-    cautions: tuple[Caution, ...]
+    warnings: tuple[DataWarning, ...]
 
 
 def recording_summary(recording: Recording) -> RecordingSummary:
@@ -173,7 +173,7 @@ def recording_summary(recording: Recording) -> RecordingSummary:
         topics=tuple(_report(topic, spare.get(topic.name)) for topic in recording.topics),
         radar=_radar(recording),
         camera=_camera(recording),
-        cautions=recording.cautions,
+        warnings=recording.warnings,
     )
 
 

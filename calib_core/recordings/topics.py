@@ -6,13 +6,13 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.arrays import TimesNs
+from calib_core.arrays import Indices, TimesNs
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex, Source
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import Definition, definition_of
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, between_islands
-from calib_core.results import Caution
+from calib_core.results import DataWarning
 
 __all__ = ["Rhythm", "Topic", "TopicKind", "TopicSummary", "join_topics", "read_heads"]
 
@@ -101,10 +101,10 @@ class Topic:
 
     name: str
     parts: tuple[tuple[Source, Channel], ...]
-    part: TimesNs
+    part: Indices
     receive_ns: TimesNs
-    chunk: TimesNs
-    offset: TimesNs
+    chunk: Indices
+    offset: Indices
     repeated: int = 0
 
     def __len__(self) -> int:
@@ -195,7 +195,7 @@ def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int, *, keep: b
     return found
 
 
-def join_topics(sources: tuple[Source, ...]) -> tuple[tuple[Topic, ...], tuple[Caution, ...]]:
+def join_topics(sources: tuple[Source, ...]) -> tuple[tuple[Topic, ...], tuple[DataWarning, ...]]:
     """Join the channels of all files by topic, and say where files repeat one another."""
     found: dict[str, list[tuple[Source, Channel]]] = {}
     for source in sources:
@@ -206,12 +206,12 @@ def join_topics(sources: tuple[Source, ...]) -> tuple[tuple[Topic, ...], tuple[C
     if not repeated:
         return topics, ()
     where = ", ".join(topic.name for topic in topics if topic.repeated)
-    caution = Caution(
+    warning = DataWarning(
         "repeated-messages",
         f"{repeated} messages of {where} are in several of the files; each is used once",
         "give each recording once: a folder that also holds a converted copy counts twice",
     )
-    return topics, (caution,)
+    return topics, (warning,)
 
 
 def _join(name: str, parts: tuple[tuple[Source, Channel], ...]) -> Topic:

@@ -7,8 +7,8 @@ from calib_core.errors import MessageError, RecordingError
 from calib_core.recordings.camera.camera_info import is_camera_info
 from calib_core.recordings.camera.images import ImageLayout, is_picture
 from calib_core.recordings.messages.definitions import Definition
-from calib_core.recordings.radar.radar_axes import RadarAxes
-from calib_core.recordings.radar.radar_layouts import RadarLayout, recognise
+from calib_core.recordings.radar.axes import RadarAxes
+from calib_core.recordings.radar.layouts import RadarLayout, recognise
 from calib_core.recordings.topics import Topic, TopicKind
 
 __all__ = ["Usage", "usage_of"]

@@ -179,14 +179,14 @@ def test_copy_puts_the_text_on_the_clipboard(solved: Driver) -> None:
     assert read_any(copied).format == "matrix"
 
 
-def test_cautions_of_the_calibration_stand_beside_the_text(page: Driver, truth: Any) -> None:
+def test_warnings_of_the_calibration_stand_beside_the_text(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 4)
-    cautions = page.view["cautions"]
+    warnings = page.view["warnings"]
     page.page.click("#export")
     page.until(f"document.querySelector('{DIALOG} .frames')")
-    assert cautions
-    for row in cautions:
-        expect(page.page.locator(f"{DIALOG} .with-cautions")).to_contain_text(row["message"])
+    assert warnings
+    for row in warnings:
+        expect(page.page.locator(f"{DIALOG} .with-warnings")).to_contain_text(row["message"])
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (1440, 900)])

@@ -68,7 +68,7 @@ def test_a_placement_can_be_marked_without_a_mouse(page: Driver, truth: Any) -> 
     assert (last["u_px"], last["v_px"]) == pytest.approx(guess)
 
 
-def test_a_failure_of_the_papers_method_stands_in_the_caution_box(page: Driver, truth: Any) -> None:
+def test_a_failure_of_the_papers_method_stands_in_the_warning_box(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 9)
     page.page.click("#tab-options")
     assert page.page.locator('[data-path="paper.ransac_threshold_px"]').is_hidden()
@@ -81,7 +81,7 @@ def test_a_failure_of_the_papers_method_stands_in_the_caution_box(page: Driver, 
     page.until("__cocalib.state.view.options.paper.ransac_threshold_px === 0.05")
     page.settle()
     assert page.view["stage"] == "unsolvable"
-    box = page.text('#cautions [data-code="unsolvable"]')
+    box = page.text('#warnings [data-code="unsolvable"]')
     assert page.view["status"] in box
     assert page.view["hint"] in box
     assert page.text('[data-method="default"]').lower() in page.view["hint"]

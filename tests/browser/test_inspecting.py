@@ -13,7 +13,7 @@ from tests.browser.driving import Driver
 pytestmark = pytest.mark.browser
 
 
-def test_clocks_axes_and_cautions_of_the_recording_are_on_the_page(
+def test_clocks_axes_and_warnings_of_the_recording_are_on_the_page(
     open_page: Callable[..., Driver], project_root: Path, tmp_path: Path
 ) -> None:
     folder = project_root / "sample_data" / "rooftop"
@@ -33,7 +33,7 @@ def test_clocks_axes_and_cautions_of_the_recording_are_on_the_page(
             page.until("document.body.innerText.includes('because it was asked for with --clock receive')")
             page.until("document.body.innerText.includes('axes as told: x forward, y left, z up')")
             page.until("document.body.innerText.includes('after the stamp')")
-            box = page.text('#cautions [data-code="not-closed"]')
+            box = page.text('#warnings [data-code="not-closed"]')
             assert "whole messages were found by reading all of it" in box
         finally:
             running.close()
@@ -42,6 +42,6 @@ def test_clocks_axes_and_cautions_of_the_recording_are_on_the_page(
 
 def test_a_recording_without_fault_stays_silent(page: Driver) -> None:
     assert "time of receiving" not in page.text("#recording-topics")
-    assert page.page.locator("#cautions *").count() == 0
+    assert page.page.locator("#warnings *").count() == 0
     page.page.locator("#recording-topics .fact").nth(1).hover()
     page.until("document.body.innerText.includes('because the stamps are sound')")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from app import resources
-from app.cli import opening
+from app.cli import open as opening
 from calib_core.geometry import rotation_angle_rad
 from tests.cli.conftest import Made
 

@@ -36,7 +36,7 @@ from calib_core.paper.algorithm_1 import (
     window_around,
     z_score_inliers,
 )
-from calib_core.paper.opencv import project_points, refine_lm, solve_pnp_ransac
+from calib_core.paper.pnp import project_points, refine_lm, solve_pnp_ransac
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from calib_core.synthetic.pairs import study_camera
@@ -398,7 +398,7 @@ def test_algorithm_1_reports_aed_and_cdsd_over_all_pairs_and_claims_no_uncertain
     assert result.metrics.cdsd_px == pytest.approx(cdsd(lengths))
     assert np.isnan(result.metrics.held_out_aed_px)
     assert np.isnan(result.covariance).all()
-    assert [caution.code for caution in result.cautions] == ["residuals-too-large"]  # two pairs in twenty are wrong
+    assert [warning.code for warning in result.warnings] == ["residuals-too-large"]  # two pairs in twenty are wrong
     assert result.iterative_px > 0.0
     assert result.sqpnp_px > 0.0
     assert all(np.isnan(pair.outlier_probability) for pair in result.pairs)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from calib_core.calibrate import calibrate_pairs
+from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Pair, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions

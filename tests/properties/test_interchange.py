@@ -295,10 +295,10 @@ def test_a_slip_is_never_passed_over(pose, edit):
 
     report = check(wrong, against=right)
 
-    explained = [finding for finding in report.findings if finding.level == "error"]
+    explained = [result for result in report.results if result.level == "error"]
     assert not report.ok
     assert explained
-    assert all(finding.code not in ("check-point-missed", "disagrees") for finding in explained)
+    assert all(result.code not in ("check-point-missed", "disagrees") for result in explained)
 
 
 @settings(max_examples=40, deadline=None)

@@ -1,4 +1,4 @@
-"""Every mistake planted in every format that can hold it, at random poses: a check finds it and calls it by its name."""
+"""Every slip planted in every format that can hold it, at random poses: a check finds it and calls it by its name."""
 
 import dataclasses
 import json
@@ -26,8 +26,8 @@ from calib_core.interchange import (
     read_any,
 )
 from calib_core.interchange.calibration_file import choose_check_point
-from calib_core.interchange.check.mistakes import suspicions
-from calib_core.interchange.syntax.archives import pack, unpack
+from calib_core.interchange.check.slips import suspected_slips
+from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, Metrics
 
@@ -127,14 +127,14 @@ def found(data: bytes, file: CalibrationFile, name: str, *, by_other: bool) -> t
     report = check(wrong, against=imported(file) if by_other else None)
     right = file.calibration.camera_from_radar.as_matrix()
     explaining = set()
-    for suspicion in takewhile(lambda one: len(one.mistakes) == 1, suspicions(wrong.pose)):
+    for suspected in takewhile(lambda one: len(one.slips) == 1, suspected_slips(wrong.pose)):
         try:
-            undone = suspicion.pose.camera_from_radar().as_matrix()
+            undone = suspected.pose.camera_from_radar().as_matrix()
         except ValueError:
             continue
         if np.abs(undone - right).max() < 1e-6:
-            explaining.add(suspicion.mistakes[0].code)
-    return [finding.code for finding in report.findings if finding.level == "error"], explaining
+            explaining.add(suspected.slips[0].code)
+    return [result.code for result in report.results if result.level == "error"], explaining
 
 
 @pytest.mark.parametrize("slip", SLIPS)

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calib_core.association.locating import candidate_at
-from calib_core.calibrate import calibrate_pairs
+from calib_core.association.clustering import candidate_at
+from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
-from calib_core.estimation.uncertainty import pose_jacobian
+from calib_core.estimation.covariance import pose_jacobian
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, NoiseOptions
-from calib_core.paper.opencv import refine_lm, solve_pnp_ransac
+from calib_core.paper.pnp import refine_lm, solve_pnp_ransac
 from calib_core.results import Calibration
 
 pytestmark = pytest.mark.real

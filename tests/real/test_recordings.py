@@ -44,7 +44,7 @@ def test_the_road_recording_opens_in_every_container(road, name):
         assert camera is not None
         assert camera.model == "plumb_bob"
         np.testing.assert_allclose(camera.matrix_px, [[2117.87, 0, 950.144], [0, 2121.65, 588.036], [0, 0, 1]])
-        assert [caution.code for caution in recording.cautions] == ["flat-radar"]
+        assert [warning.code for warning in recording.warnings] == ["flat-radar"]
 
 
 @pytest.mark.parametrize("name", ROAD)
@@ -73,7 +73,7 @@ def test_the_readers_agree_with_rosbags_message_by_message(road, name):
 def test_the_folder_of_all_three_copies_is_one_recording_and_says_so(road):
     with open_recording(road) as recording:
         assert len(recording.radar_times) == len(recording.image_times) == 7
-        assert "repeated-messages" in [caution.code for caution in recording.cautions]
+        assert "repeated-messages" in [warning.code for warning in recording.warnings]
 
 
 def test_a_lidar_cloud_with_holes_and_mixed_types_is_read(shared_data):
@@ -85,7 +85,7 @@ def test_a_lidar_cloud_with_holes_and_mixed_types_is_read(shared_data):
         assert recording.radar_frame == "luminar_lidar"
         # stamps of March 2020 in a bag received in November: the stamps hold
         assert int(scans.times_ns[0]) == 1_583_971_570_015_299_642
-        assert [caution.code for caution in recording.cautions] == ["looks-like-lidar"]
+        assert [warning.code for warning in recording.warnings] == ["looks-like-lidar"]
         assert "looks like a lidar" in describe(recording)
 
 
@@ -95,7 +95,7 @@ def test_raw_camera_images_go_by_their_stamps_of_another_year(shared_data):
         assert recording.image(0).shape == (480, 640, 3)
         frame = recording.image_bytes(0)
         assert (frame.format, frame.width_px, frame.height_px) == ("jpeg", 640, 480)
-        assert recording.cautions == ()
+        assert recording.warnings == ()
 
 
 @pytest.mark.parametrize(

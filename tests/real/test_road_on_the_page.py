@@ -33,7 +33,7 @@ def published_calibration(folder: Path) -> tuple[Calibration, np.ndarray]:
         metrics=Metrics(aed_px=float("nan"), cdsd_px=float("nan"), rms_px=float("nan"), n=0),
         pairs=(),
         unpaired=(),
-        cautions=(),
+        warnings=(),
         options=CalibrationOptions(),
     )
     return calibration, matrix

@@ -5,8 +5,8 @@ A session is a folder, `NAME.cocalib-session/`, with `journal.jsonl` (one line p
 """
 
 from app.session.file.errors import SessionFileError
-from app.session.file.keeping import Restored, SessionFile, open_session_file, set_aside
-from app.session.file.places import recording_session_folder, user_session_folder
+from app.session.file.folders import recording_session_folder, user_session_folder
+from app.session.file.session_file import Restored, SessionFile, open_session_file, set_aside
 
 __all__ = [
     "Restored",

@@ -7,7 +7,7 @@ import msgspec
 
 from app.session import RecordingFacts, Stamp
 from app.session.file.errors import SessionFileError
-from app.session.file.forms import StampForm
+from app.session.file.step_json import StampForm
 from calib_core.measurements import TimeNs
 
 __all__ = ["SCHEMA", "RecordingForm", "recording_form", "require_same_recording"]

@@ -13,8 +13,8 @@ import msgspec
 
 from app.session import History, RecordingFacts, Step, advance
 from app.session.file.errors import SessionFileError
-from app.session.file.forms import StepForm, form_of_step, step_from_form
 from app.session.file.identity import SCHEMA, RecordingForm, recording_form, require_same_recording
+from app.session.file.step_json import StepForm, form_of_step, step_from_form
 from app.whole_file import write_whole
 from calib_core.errors import CalibrationError
 

@@ -8,8 +8,8 @@ import msgspec
 from app.option_changes import options_from_tree
 from app.session import ClicksImported, OptionsChanged, RecordingFacts, Session, Step
 from app.session.file.errors import SessionFileError
-from app.session.file.forms import ClickForm, click_from_form, form_of_click
 from app.session.file.identity import SCHEMA, RecordingForm, recording_form, require_same_recording
+from app.session.file.step_json import ClickForm, click_from_form, form_of_click
 from app.whole_file import write_whole
 
 __all__ = ["read_snapshot", "snapshot_axes", "write_snapshot"]

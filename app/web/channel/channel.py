@@ -12,7 +12,7 @@ from app.view import sentence
 from app.web.channel.hub import Hub
 from app.web.channel.newest import NewestWins
 from app.web.channel.outbox import Outbox
-from app.web.channel.survey import placements_at
+from app.web.channel.radar_survey import placements_at
 from app.web.frames import Frame
 from app.web.messages import (
     CursorMoved,

@@ -10,9 +10,9 @@ from typing import Protocol
 
 from app.resources import version
 from app.session import Stamp
-from app.view import CautionRow, View, sentence
+from app.view import View, WarningRow, sentence
 from app.web.channel.outbox import Outbox
-from app.web.channel.survey import Survey, survey_of
+from app.web.channel.radar_survey import Survey, survey_of
 from app.web.frames import EncodedPicture, FrameStore
 from app.web.messages import (
     Outgoing,
@@ -31,7 +31,7 @@ from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
 from calib_core.measurements import RadarScans, TimeNs
 from calib_core.recordings import TopicSummary, clock_lines
-from calib_core.results import Caution
+from calib_core.results import DataWarning
 
 __all__ = ["Hub", "PageRecording", "Tab"]
 
@@ -51,7 +51,7 @@ class PageRecording(Protocol):
     @property
     def topics(self) -> Sequence[TopicSummary]: ...  # noqa: D102
     @property
-    def cautions(self) -> Sequence[Caution]: ...  # noqa: D102
+    def warnings(self) -> Sequence[DataWarning]: ...  # noqa: D102
     @property
     def image_times(self) -> TimesNs: ...  # noqa: D102
     @property
@@ -156,9 +156,9 @@ class Hub:
             frame_times=StampColumns.of(facts.image_times),
             start=Stamp.of(TimeNs(int(facts.image_times[0]))),
             radar=StampColumns.of(recording.radar_times),
-            cautions=tuple(
-                CautionRow(row.code, sentence(row.message), sentence(row.hint))
-                for row in (*restored.cautions, *recording.cautions)
+            warnings=tuple(
+                WarningRow(row.code, sentence(row.message), sentence(row.hint))
+                for row in (*restored.warnings, *recording.warnings)
             ),
             sensors=(
                 _sensor("radar", recording.radar_topic, recording.topics),

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from app.option_changes import changes_from_tree
 from app.session import OptionsEdited, Step
-from app.session.file import forms
+from app.session.file import step_json as forms
 from calib_core.errors import InputError
 
 __all__ = [

@@ -9,7 +9,7 @@ import msgspec
 
 from app.option_changes import OptionGroup, option_groups
 from app.session import Stamp
-from app.view import CautionRow, View
+from app.view import View, WarningRow
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S
 
@@ -112,7 +112,7 @@ class RecordingNote:
         frame_times: the stamp of every frame.
         start: the stamp of the first frame.
         radar: the stamp of every radar scan.
-        cautions: what is odd about the recording.
+        warnings: what is odd about the recording.
         sensors: how the radar and the camera are read.
         session: where the work is kept.
         version: of the program.
@@ -127,7 +127,7 @@ class RecordingNote:
     frame_times: StampColumns
     start: Stamp
     radar: StampColumns
-    cautions: tuple[CautionRow, ...]
+    warnings: tuple[WarningRow, ...]
     sensors: tuple[SensorNote, ...]
     session: SessionNote
     version: str

@@ -15,13 +15,12 @@ import msgspec
 from app.session import Session
 from app.solving import RecordingSource, calibration_text
 from app.view import sentence
-from app.view.drawing import MIN_PLACEMENTS
-from app.web.channel.exports import NoPreview, export_preview, exported, format_rows
-from app.web.channel.survey import Survey
+from app.web.channel.export_preview import NoPreview, export_preview, exported, format_rows
+from app.web.channel.radar_survey import Survey
 from app.workspace import Workspace
 from calib_core.errors import CalibrationError
 from calib_core.interchange import FORMATS, CalibrationFile, read_calibration
-from calib_core.measurements import Unsolvable
+from calib_core.measurements import MIN_PAIRS, Unsolvable
 from calib_core.results import Calibration
 
 __all__ = ["Reply", "Routes", "refusal"]
@@ -221,7 +220,7 @@ def _viser_page() -> Reply:
 
 
 def _why_none(session: Session) -> str:
-    if session.needs_solving and len(session.clicks) >= MIN_PLACEMENTS:
+    if session.needs_solving and len(session.clicks) >= MIN_PAIRS:
         return "The newest change is still being solved; in a moment the calibration is there."
     if session.is_solved and isinstance(session.outcome, Unsolvable):
         return f"{sentence(session.outcome.reason)} {sentence(session.outcome.hint)}"

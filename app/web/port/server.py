@@ -22,8 +22,8 @@ from app.web.channel.channel import Channel, Socket
 from app.web.channel.hub import Hub, PageRecording
 from app.web.frames import EncodedPicture
 from app.web.port import guard as doors
-from app.web.port.hook import ProcessRequest, SocketHandler, start_viser
 from app.web.port.routes import Reply, Routes, refusal
+from app.web.port.viser_hook import ProcessRequest, SocketHandler, start_viser
 from app.web.port.waiting import WaitingRoom
 from app.web.view3d.scene import FIELD_OF_VIEW_RAD, LOOK_AT, STAND_AT, TabScene
 from app.workspace import Workspace

@@ -10,7 +10,7 @@ from app.session import Session
 from app.view import Reference, View, shown_calibration
 from app.web.frames import Frame
 from app.web.radar_sight import still_returns
-from app.web.view3d.scene_shapes import (
+from app.web.view3d.shapes import (
     DARK,
     LIGHT,
     ellipsoids,

@@ -26,7 +26,7 @@ from calib_core.interchange.own.unknown_results import unknown_results, with_unk
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import json_object, parse_document
 from calib_core.measurements import ReflectorClick, TimeNs, Unpaired, time_from_parts, time_parts
-from calib_core.results import Calibration, Caution, CheckPoint, Metrics, PairResult
+from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics, PairResult
 
 __all__ = [
     "COVARIANCE_CONVENTION",
@@ -98,7 +98,7 @@ def write_calibration(file: CalibrationFile) -> str:
         noise_scale=documents.NoiseScaleDocument(*calibration.noise_scale),
         radar_angle_map=angle_map_document(file.angle_map),
         paper=documents.PaperDocument(_known(calibration.iterative_px), _known(calibration.sqpnp_px)),
-        warnings=[documents.WarningDocument(c.code, c.message, c.hint) for c in calibration.cautions],
+        warnings=[documents.WarningDocument(c.code, c.message, c.hint) for c in calibration.warnings],
         unpaired=[documents.UnpairedDocument(u.id, u.code, u.reason, u.hint) for u in calibration.unpaired],
         pairs=[_pair_document(pair) for pair in calibration.pairs],
         camera=camera_document(calibration.camera),
@@ -158,7 +158,7 @@ def calibration_file_of(
         metrics=_metrics(document.metrics),
         pairs=tuple(_pair(pair) for pair in document.pairs),
         unpaired=tuple(Unpaired(u.id, u.code, u.reason, u.hint) for u in document.unpaired),
-        cautions=tuple(Caution(c.code, c.message, c.hint) for c in document.warnings),
+        warnings=tuple(DataWarning(c.code, c.message, c.hint) for c in document.warnings),
         options=document.options,
         noise_scale=(scale.click, scale.range, scale.azimuth, scale.elevation),
         covariance_quantile=_number(document.covariance_quantile),

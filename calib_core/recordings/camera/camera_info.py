@@ -8,7 +8,7 @@ from calib_core.arrays import Matrix33
 from calib_core.camera import Camera, CameraModel
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.messages.definitions import Definition
-from calib_core.results import Caution
+from calib_core.results import DataWarning
 
 __all__ = ["CameraReading", "camera_from_info", "is_camera_info"]
 
@@ -21,7 +21,7 @@ class CameraReading:
     """What a CameraInfo says: a camera, or why there is none, and what a person must know."""
 
     camera: Camera | None
-    cautions: tuple[Caution, ...] = ()
+    warnings: tuple[DataWarning, ...] = ()
 
 
 def is_camera_info(definition: Definition) -> bool:
@@ -39,7 +39,7 @@ def camera_from_info(message: Message, *, topic: str, rectified: bool = False) -
 
     Args:
         message: a decoded CameraInfo.
-        topic: its name, for the cautions.
+        topic: its name, for the warnings.
         rectified: the image topic is a rectified one, so P holds and nothing is distorted.
     """
     upper = "K" in message
@@ -66,7 +66,7 @@ def camera_from_info(message: Message, *, topic: str, rectified: bool = False) -
 
 def _none(topic: str, code: str, what: str) -> CameraReading:
     hint = "give the intrinsics with --camera FILE, or find them with cocalib intrinsics"
-    return CameraReading(None, (Caution(code, f"{topic} {what}", hint),))
+    return CameraReading(None, (DataWarning(code, f"{topic} {what}", hint),))
 
 
 def _model(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np.ndarray] | str":

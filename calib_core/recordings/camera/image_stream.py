@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from calib_core.arrays import TimesNs, frozen_array
+from calib_core.arrays import Indices, TimesNs, frozen_array
 from calib_core.recordings.camera.images import EncodedImage, ImageLayout
 from calib_core.recordings.topics import Topic
 
@@ -31,7 +31,7 @@ class ImageStream:
     topic: Topic
     layouts: Sequence[ImageLayout]
     times_ns: TimesNs
-    row: TimesNs
+    row: Indices
     repeated: int = field(default=0)
 
     @classmethod

@@ -7,8 +7,8 @@ import numpy as np
 
 from calib_core.errors import MessageError
 from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, mended_jpeg, png_size
-from calib_core.recordings.camera.packets import Packet, packet_of, require_codec
 from calib_core.recordings.camera.raw_pixels import READABLE, check_size, converted_pixels, raw_pixels, stretched
+from calib_core.recordings.camera.video_packets import Packet, packet_of, require_codec
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import Definition
 

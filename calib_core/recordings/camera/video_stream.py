@@ -10,9 +10,9 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.camera.images import EncodedImage, ImageLayout, encoded_pixels
-from calib_core.recordings.camera.packets import Packet, PacketDecoder
+from calib_core.recordings.camera.video_packets import Packet, PacketDecoder
 from calib_core.recordings.topics import Topic
-from calib_core.results import Caution
+from calib_core.results import DataWarning
 
 __all__ = ["VideoStream", "about_video", "image_stream"]
 
@@ -84,12 +84,12 @@ def image_stream(topic: Topic, layouts: Sequence[ImageLayout], stamps_ns: TimesN
     )  # fmt: skip
 
 
-def about_video(images: ImageStream | None) -> list[Caution]:
+def about_video(images: ImageStream | None) -> list[DataWarning]:
     """Say how many frames of a video cannot be decoded because it was joined midway."""
     if not isinstance(images, VideoStream) or not images.before_key:
         return []
     return [
-        Caution(
+        DataWarning(
             "video-before-key",
             f"the first {images.before_key} frames of {images.topic.name} come before its first key frame and are left out",
             "nothing to do, unless a placement is there: then let the encoder send key frames more often",

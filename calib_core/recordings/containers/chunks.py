@@ -14,15 +14,15 @@ from typing import TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import TimesNs
+from calib_core.arrays import Indices
 from calib_core.errors import RecordingError
+from calib_core.recordings.containers.cached_indexes import KeptIndex, heads_from, index_from, keep_heads, keep_index
 from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
-from calib_core.recordings.containers.files import FileBytes
-from calib_core.recordings.containers.gathering import gather_far, gather_heads
 from calib_core.recordings.containers.index_cache import cache_of
-from calib_core.recordings.containers.kept_indexes import KeptIndex, heads_from, index_from, keep_heads, keep_index
+from calib_core.recordings.containers.message_heads import gather_far, gather_heads
+from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
-from calib_core.results import Caution
+from calib_core.results import DataWarning
 
 __all__ = ["CACHE_BYTES", "FIRST_CHUNKS", "MAX_MESSAGE_BYTES", "ChannelFilter", "Chunk", "ChunkedSource"]
 
@@ -76,7 +76,7 @@ class ChunkedSource:
         self.file = file
         self.chunks: list[Chunk] = []
         self.channels: tuple[Channel, ...] = ()
-        self.cautions: tuple[Caution, ...] = file.cautions
+        self.warnings: tuple[DataWarning, ...] = file.warnings
         self.indexes: dict[int, MessageIndex] = {}
         self.counts: Mapping[int, int] = {}
         """How many messages each channel has, as far as the file says so."""
@@ -107,7 +107,7 @@ class ChunkedSource:
 
     def keep(self) -> None:
         """Put what opening found out into the cache, if the file is sound."""
-        if self._kept is None or self.recovered or self.cautions:
+        if self._kept is None or self.recovered or self.warnings:
             return
         places = [(chunk.position, chunk.stored_bytes, chunk.size_bytes) for chunk in self.chunks]
         names = tuple(chunk.compression for chunk in self.chunks)
@@ -158,7 +158,7 @@ class ChunkedSource:
             self._cache_bytes = 0
 
     @property
-    def later_cautions(self) -> tuple[Caution, ...]:
+    def later_warnings(self) -> tuple[DataWarning, ...]:
         """Chunks found since that are not as they were written."""
         with self._lock:
             bad = sorted(chunk for chunk, sound in self._checked.items() if not sound)
@@ -166,7 +166,7 @@ class ChunkedSource:
             return ()
         inside = sum(int(np.isin(index.chunk, bad).sum()) for index in self.indexes.values())
         return (
-            Caution(
+            DataWarning(
                 "checksum",
                 f"{self.path.name}: {len(bad)} of its chunks read so far, with {inside} messages, do not have the checksum "
                 f"they were written with; the first is at byte {self.chunks[bad[0]].position}. Their messages are used as "
@@ -296,7 +296,7 @@ class ChunkedSource:
             keep_heads(cache, index, size, found)
         return found
 
-    def _far_places(self, index: MessageIndex, size: int) -> TimesNs | None:
+    def _far_places(self, index: MessageIndex, size: int) -> Indices | None:
         """Return where in the file messages lie that are stored as they are, far from one another; None for others."""
         if len(index) < _FEW_MESSAGES:
             return None
@@ -305,6 +305,6 @@ class ChunkedSource:
             return None
         starts = np.zeros(len(self.chunks), dtype=np.int64)
         starts[used] = [self.chunks[number].position for number in used.tolist()]
-        places: TimesNs = starts[index.chunk] + index.offset
+        places: Indices = starts[index.chunk] + index.offset
         far = np.diff(np.sort(places)) > self.lead_bytes + size + _FAR_BYTES
         return places if np.count_nonzero(far) > 0.5 * len(places) else None

@@ -17,7 +17,7 @@ from tempfile import NamedTemporaryFile
 
 import numpy as np
 
-from calib_core.recordings.containers.files import FileBytes
+from calib_core.recordings.containers.positioned_reads import FileBytes
 
 __all__ = ["SMALLEST_FILE_BYTES", "FileCache", "cache_folder", "cache_of"]
 

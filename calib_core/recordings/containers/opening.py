@@ -8,13 +8,13 @@ from typing import TypeAlias
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.containers.chunks import ChannelFilter
-from calib_core.recordings.containers.files import FileBytes
-from calib_core.recordings.containers.mcap import mcap
-from calib_core.recordings.containers.rosbag1.rosbag1 import Rosbag1Source
+from calib_core.recordings.containers.compressed_files import packing_of, unpacked_file
+from calib_core.recordings.containers.mcap import reader as mcap
+from calib_core.recordings.containers.positioned_reads import FileBytes
+from calib_core.recordings.containers.rosbag1.reader import Rosbag1Source
 from calib_core.recordings.containers.sources import Source
-from calib_core.recordings.containers.sqlite import sqlite_bag
-from calib_core.recordings.containers.whole_files import packing_of, unpacked_file
-from calib_core.results import Caution
+from calib_core.recordings.containers.sqlite import reader as sqlite_bag
+from calib_core.results import DataWarning
 
 __all__ = ["open_beginnings", "open_sources"]
 
@@ -42,14 +42,14 @@ class _Found:
         packed: each of its messages is compressed by itself.
         expendable: it is one of several in a folder; the others are opened without it.
         count: how many messages it should hold; None where its folder does not tell.
-        cautions: what its folder says about it.
+        warnings: what its folder says about it.
     """
 
     path: Path
     packed: bool = False
     expendable: bool = False
     count: int | None = None
-    cautions: tuple[Caution, ...] = ()
+    warnings: tuple[DataWarning, ...] = ()
 
 
 _AnySource: TypeAlias = Rosbag1Source | mcap.McapSource | sqlite_bag.SqliteSource
@@ -80,7 +80,7 @@ def open_sources(paths: Sequence[Path]) -> tuple[Source, ...]:
         for source in sources:
             source.close()
         raise
-    sources[0].cautions = (*sources[0].cautions, *map(_left_out, refused))
+    sources[0].warnings = (*sources[0].warnings, *map(_left_out, refused))
     return tuple(sources)
 
 
@@ -132,8 +132,8 @@ def _open_or_refusal(found: _Found) -> "_AnySource | RecordingError":
         return error
 
 
-def _left_out(error: RecordingError) -> Caution:
-    return Caution(
+def _left_out(error: RecordingError) -> DataWarning:
+    return DataWarning(
         "file-left-out",
         f"one file of the folder cannot be opened and is left out: {error}",
         "the other files of the folder are used; copy this one again if you need its time",
@@ -193,13 +193,13 @@ def _from_metadata(folder: Path) -> list[_Found]:
     counts = _counts(information, names)
     found = [replace(file, count=counts.get(name)) for file, name in zip(found, there, strict=True)] if there else found
     if missing:
-        found[0] = replace(found[0], cautions=(_missing(folder, missing, counts),))
+        found[0] = replace(found[0], warnings=(_missing(folder, missing, counts),))
     return found
 
 
-def _missing(folder: Path, missing: list[str], counts: dict[str, int]) -> Caution:
+def _missing(folder: Path, missing: list[str], counts: dict[str, int]) -> DataWarning:
     lost = sum(counts.get(name, 0) for name in missing)
-    return Caution(
+    return DataWarning(
         "missing-file",
         f"{folder.name}: metadata.yaml lists {', '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} not there"
         + (f": {lost} messages are missing" if lost else ""),
@@ -233,7 +233,7 @@ def _packed_messages(metadata: Path, path: Path) -> bool:
 
 
 def _open(found: _Found) -> "_AnySource":
-    file = FileBytes(found.path, cautions=found.cautions)
+    file = FileBytes(found.path, warnings=found.warnings)
     try:
         head = file.up_to(0, 16)
         if (kind := packing_of(head)) is not None:
@@ -245,7 +245,7 @@ def _open(found: _Found) -> "_AnySource":
         raise
     count = sum(len(source.index(channel.id)) for channel in source.channels) if found.count else 0
     if found.count and count < found.count:
-        source.cautions = (*source.cautions, _too_few(found, count))
+        source.warnings = (*source.warnings, _too_few(found, count))
     return source
 
 
@@ -259,8 +259,8 @@ def _source(file: FileBytes, head: bytes, *, packed: bool) -> "_AnySource":
     raise RecordingError(f"{file.path}: {_what_is_it(head)}")
 
 
-def _too_few(found: _Found, count: int) -> Caution:
-    return Caution(
+def _too_few(found: _Found, count: int) -> DataWarning:
+    return DataWarning(
         "messages-missing",
         f"metadata.yaml counts {found.count} messages in {found.path.name}, but {count} are in it",
         "check that what you need is there; copy the file again from its source",

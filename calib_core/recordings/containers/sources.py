@@ -7,8 +7,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from calib_core.arrays import TimesNs
-from calib_core.results import Caution
+from calib_core.arrays import Indices, TimesNs
+from calib_core.results import DataWarning
 
 __all__ = ["Channel", "Encoding", "Heads", "MessageIndex", "Source"]
 
@@ -47,14 +47,14 @@ class MessageIndex:
     """
 
     receive_ns: TimesNs
-    chunk: TimesNs
-    offset: TimesNs
+    chunk: Indices
+    offset: Indices
 
     def __len__(self) -> int:
         return len(self.receive_ns)
 
     @classmethod
-    def sorted_from(cls, receive_ns: TimesNs, chunk: TimesNs, offset: TimesNs) -> "MessageIndex":
+    def sorted_from(cls, receive_ns: TimesNs, chunk: Indices, offset: Indices) -> "MessageIndex":
         """Sort by receive time; messages of one instant keep the order of the file."""
         order = np.lexsort((offset, chunk, receive_ns))
         return cls(receive_ns[order], chunk[order], offset[order])
@@ -75,7 +75,7 @@ class Heads:
     """
 
     rows: np.ndarray
-    lengths: TimesNs
+    lengths: Indices
     fault: str = ""
 
 
@@ -108,12 +108,12 @@ class Source(Protocol):
         ...
 
     @property
-    def cautions(self) -> tuple[Caution, ...]:
+    def warnings(self) -> tuple[DataWarning, ...]:
         """What opening it brought to light."""
         ...
 
     @property
-    def later_cautions(self) -> tuple[Caution, ...]:
+    def later_warnings(self) -> tuple[DataWarning, ...]:
         """What reading it has brought to light since."""
         ...
 

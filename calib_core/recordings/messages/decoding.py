@@ -14,7 +14,7 @@ import numpy as np
 from calib_core.arrays import Values
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition, Field
-from calib_core.recordings.messages.placing import Place, TypesKey, element_layout, structure, walk
+from calib_core.recordings.messages.field_offsets import Place, TypesKey, element_layout, structure, walk
 
 __all__ = ["Message", "Pin", "Value", "decode", "fixed_part", "payload_byte_order"]
 

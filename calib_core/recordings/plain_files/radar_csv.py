@@ -12,8 +12,8 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import TimeNs
-from calib_core.recordings.plain_files.plain_messages import cloud_channel, cloud_message
-from calib_core.recordings.plain_files.plain_source import PlainSource, topic_of
+from calib_core.recordings.plain_files.messages import cloud_channel, cloud_message
+from calib_core.recordings.plain_files.source import PlainSource, topic_of
 from calib_core.recordings.time.written_times import TimeUnit, read_time
 
 __all__ = ["CSV_EXAMPLE", "csv_columns", "open_radar_csv"]

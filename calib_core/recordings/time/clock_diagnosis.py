@@ -8,9 +8,9 @@ import numpy as np
 
 from calib_core.arrays import TimesNs, Values
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings.time.calendar import span_text
 from calib_core.recordings.time.clocks import Clock, Stamps, header_fault
-from calib_core.results import Caution
+from calib_core.recordings.time.dates import span_text
+from calib_core.results import DataWarning
 
 __all__ = ["ClockDiagnosis", "about_clocks", "between_islands", "diagnose"]
 
@@ -215,14 +215,14 @@ def _with_delay(found: ClockDiagnosis, header_ns: TimesNs, receive_ns: TimesNs) 
     )
 
 
-def about_clocks(found: Sequence[ClockDiagnosis]) -> list[Caution]:
+def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
     """Say what in the clocks can spoil a calibration."""
-    cautions = []
+    warnings = []
     for one in found:
         by_stamps = one.chosen == "header"
         if by_stamps and one.jumps:
-            cautions.append(
-                Caution(
+            warnings.append(
+                DataWarning(
                     "clock-jumps",
                     f"the stamps of {one.topic} jump against receive time, {_counted(one.jumps, 'time', 'times')} and by up to "
                     f"{span_text(one.largest_jump_s)}: its clock was set during the recording, or the driver hung",
@@ -230,8 +230,8 @@ def about_clocks(found: Sequence[ClockDiagnosis]) -> list[Caution]:
                 )
             )
         if by_stamps and abs(one.drift_s) > _DRIFT_S:
-            cautions.append(
-                Caution(
+            warnings.append(
+                DataWarning(
                     "clock-drift",
                     f"the stamps of {one.topic} drift against receive time by {abs(one.drift_s) * 1e3:.0f} ms in all "
                     f"({abs(one.drift_ppm or 0):.0f} ppm): its clock is not kept in step with the recorder's",
@@ -239,12 +239,12 @@ def about_clocks(found: Sequence[ClockDiagnosis]) -> list[Caution]:
                 )
             )
         if one.islands > 1:
-            cautions.append(
-                Caution(
+            warnings.append(
+                DataWarning(
                     "islands",
                     f"{one.topic} comes in {one.islands} stretches with up to {span_text(one.longest_gap_s)} of nothing between "
                     f"them: {span_text(one.covered_s)} of data in all",
                     "click only where both sensors have data; if the stretches should be one, files may be missing",
                 )
             )
-    return cautions
+    return warnings

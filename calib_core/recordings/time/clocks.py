@@ -11,8 +11,8 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings.time.calendar import span_text
-from calib_core.results import Caution
+from calib_core.recordings.time.dates import span_text
+from calib_core.results import DataWarning
 
 __all__ = ["Clock", "ClockChoice", "Stamps", "choose_clock", "choose_clocks", "header_fault"]
 
@@ -52,11 +52,11 @@ class ClockChoice:
 
     Attributes:
         clocks: "header" or "receive", topic by topic in the order asked.
-        cautions: what a person must know about it.
+        warnings: what a person must know about it.
     """
 
     clocks: tuple[Literal["header", "receive"], ...]
-    cautions: tuple[Caution, ...]
+    warnings: tuple[DataWarning, ...]
 
 
 def header_fault(stamps: Stamps) -> str | None:
@@ -106,15 +106,15 @@ def choose_clocks(radar: Stamps, camera: Stamps, wish: Clock = "auto") -> ClockC
     faults = tuple(header_fault(stamps) for stamps in both)
     if faults == (None, None) or (_from_boot(radar) and _from_boot(camera) and _near(radar, camera)):
         return _both_usable(radar, camera)
-    cautions = [_fell_back(stamps, fault) for stamps, fault in zip(both, faults, strict=True) if fault]
+    warnings = [_fell_back(stamps, fault) for stamps, fault in zip(both, faults, strict=True) if fault]
     for number, (sound, fault) in enumerate(zip(both, faults, strict=True)):
         if fault is None and len(sound.receive_ns):
             lag_s = sound.offset_ns / NS_PER_S
             if abs(lag_s) <= 1.0:
                 clocks: tuple[Literal["header", "receive"], ...] = ("receive", "header")
-                return ClockChoice(clocks if number else clocks[::-1], tuple(cautions))
-            cautions.append(_mixed(f"the stamps of {sound.topic} are {span_text(lag_s)} away from receive time"))
-    return ClockChoice(("receive", "receive"), tuple(cautions))
+                return ClockChoice(clocks if number else clocks[::-1], tuple(warnings))
+            warnings.append(_mixed(f"the stamps of {sound.topic} are {span_text(lag_s)} away from receive time"))
+    return ClockChoice(("receive", "receive"), tuple(warnings))
 
 
 def _from_boot(stamps: Stamps) -> bool:
@@ -179,8 +179,8 @@ def _overlap(a: TimesNs, b: TimesNs) -> bool:
     return bool(a.min() <= b.max() and b.min() <= a.max())
 
 
-def _mixed(why: str) -> Caution:
-    return Caution(
+def _mixed(why: str) -> DataWarning:
+    return DataWarning(
         "mixed-clocks",
         f"{why}, so receive times are used for both sensors",
         "receive times include the delay of the drivers: stand still longer at each placement, or choose the clock yourself "
@@ -188,8 +188,8 @@ def _mixed(why: str) -> Caution:
     )
 
 
-def _fell_back(stamps: Stamps, fault: str) -> Caution:
-    return Caution(
+def _fell_back(stamps: Stamps, fault: str) -> DataWarning:
+    return DataWarning(
         "stamps-unusable",
         f"{stamps.topic} {fault}; the time of receiving is used instead",
         "receive times include the delay of the driver: stand still longer at each placement, and have the driver fill in "

@@ -13,7 +13,7 @@ from calib_core.recordings import RecordingSummary, describe, inspect_recording,
 START_NS = 1_700_000_000 * NS_PER_S
 
 
-def test_the_text_names_files_times_topics_radar_camera_and_cautions(ros1, write, plain, jpeg, cloud_points):
+def test_the_text_names_files_times_topics_radar_camera_and_warnings(ros1, write, plain, jpeg, cloud_points):
     rows = plain(ros1, jpeg)
     points = cloud_points(4)
     points["z"] = 0
@@ -49,7 +49,7 @@ camera    /camera/image/compressed, frame 'camera': 20 images at 10.0 Hz, longes
           plumb_bob from /camera/camera_info: fx 500.00 fy 510.00 cx 319.50 cy 239.50 px; \
 distortion -0.1, 0.02, 0.001, -0.002, 0.003
 
-caution   /radar/points gives every return the same height (0 m): it measures no elevation.
+warning   /radar/points gives every return the same height (0 m): it measures no elevation.
           put the reflector's centre at the radar's height at every placement, and measure the camera position. [flat-radar]"""
     )
 

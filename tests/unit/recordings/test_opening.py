@@ -34,7 +34,7 @@ def test_every_container_gives_the_same_scans_frames_and_camera(container, conta
         camera = recording.camera()
         assert camera is not None
         assert (camera.model, camera.matrix_px[0, 0]) == ("plumb_bob", 500.0)
-        assert recording.cautions == ()
+        assert recording.warnings == ()
 
 
 def test_a_folder_a_data_file_and_a_suffix_that_lies_open_alike(ros2, write, plain, jpeg, tmp_path):
@@ -69,10 +69,10 @@ def test_the_same_messages_in_two_files_are_used_once_and_said(ros1, ros2, write
     paths = [write(ros1, plain(ros1, jpeg)), write(ros2, plain(ros2, jpeg))]
     with open_recording(paths) as recording:
         assert len(recording.radar_times) == 20
-        assert [caution.code for caution in recording.cautions] == ["repeated-messages"]
+        assert [warning.code for warning in recording.warnings] == ["repeated-messages"]
         assert (
             "60 messages of /camera/camera_info, /camera/image/compressed, /radar/points"
-            in recording.cautions[0].message
+            in recording.warnings[0].message
         )
 
 
@@ -224,7 +224,7 @@ def test_sensors_without_a_time_in_common_are_refused_with_both_intervals(ros, w
     assert "/camera/image/compressed (2023-11-15 22:13:20.050 UTC to 2023-11-15 22:13:21.950 UTC)" in text
     assert "no time in common: 86398.1 s apart" in text
     with inspect_recording([radar, camera]) as recording:
-        assert [caution.code for caution in recording.cautions] == ["no-overlap"]
+        assert [warning.code for warning in recording.warnings] == ["no-overlap"]
 
 
 def test_a_damaged_definition_of_another_topic_harms_nothing(ros1, write, plain, jpeg):

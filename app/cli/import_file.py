@@ -1,0 +1,74 @@
+"""`cocalib import`, and the calibration that `cocalib open --calibration` shows: a calibration that somebody else wrote."""
+
+import hashlib
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from app.cli.flags import File, NewFile
+from app.cli.output import write_whole
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+
+if TYPE_CHECKING:
+    from app.view import Reference
+
+__all__ = ["Import", "camera_in", "reference_from"]
+
+
+@dataclass(frozen=True, slots=True)
+class Import:
+    """Turn a calibration of any known format into cocalib/calibration-1 JSON."""
+
+    calibration: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    """A calibration in any format that export writes, whoever wrote it."""
+    out: NewFile
+    """Where the calibration-1 JSON goes."""
+    camera: File = None
+    """Intrinsics, where the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+
+    def run(self) -> int:
+        """Write the calibration; return the exit code."""
+        from calib_core.interchange import InputFile, Provenance, adopt, read_any_file, read_camera_file
+        from calib_core.interchange import write_calibration as write
+
+        found = read_any_file(self.calibration)
+        camera = read_camera_file(self.camera) if self.camera else None
+        data = self.calibration.read_bytes()
+        origin = InputFile(self.calibration.name, len(data), hashlib.sha256(data).hexdigest())
+        file = adopt(found, str(self.calibration), camera=camera, provenance=Provenance(inputs=(origin,)))
+        for note in found.notes:
+            print(f"note: {note}", file=sys.stderr)
+        write_whole(self.out, write(file))
+        print(f"{self.calibration.name} read as {found.format}; written to {self.out}")
+        return 0
+
+
+def camera_in(path: Path, width_px: int, height_px: int) -> Camera | None:
+    """Return the camera in a calibration file if it is one of this image size, else None.
+
+    Raises:
+        InputError: the file holds no calibration.
+    """
+    from calib_core.interchange import read_any_file
+
+    camera = read_any_file(path).camera
+    fits = camera is not None and (camera.width_px, camera.height_px) == (width_px, height_px)
+    return camera if fits else None
+
+
+def reference_from(path: Path, camera: Camera | None) -> "Reference":
+    """Return the calibration in a file, to be looked at through the camera of the recording.
+
+    Raises:
+        InputError: it holds no calibration, contradicts itself or misses its own check point.
+    """
+    from app.view import Reference
+    from calib_core.interchange import adopted_calibration, read_any_file
+
+    if camera is None:
+        raise InputError(f"{path}: there are no intrinsics to look at this calibration through; give --camera FILE")
+    return Reference(path.name, adopted_calibration(read_any_file(path), str(path), camera=camera))

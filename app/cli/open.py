@@ -1,0 +1,233 @@
+"""`cocalib demo` and `cocalib open`: the page."""
+
+import dataclasses
+import hashlib
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from app.cli.flags import (
+    CameraPosition,
+    File,
+    Folder,
+    MeasuredCamera,
+    Options,
+    Recordings,
+    Switch,
+    TopicFlags,
+    Topics,
+)
+from app.cli.import_file import camera_in, reference_from
+from app.cli.output import read_text, required_camera
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.options import CalibrationOptions
+from calib_core.recordings import Recording, RecordingOptions
+
+if TYPE_CHECKING:
+    from app.web.port.serving import Service
+
+__all__ = ["Demo", "Open"]
+
+_RECORDING_SUFFIXES = (".bag", ".mcap", ".db3")
+_LARGE_BYTES = 1_000_000_000
+"""Files of this size together are hardly open before the page is: it comes first."""
+_SOON_S = 0.2
+"""Smaller ones are usually open after this, and then the page never sees them opened [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServingFlags:
+    """Where the page is served."""
+
+    host: Annotated[str, tyro.conf.arg(metavar="ADDRESS")] = "127.0.0.1"
+    """Address to bind; anything but loopback lets other machines in, who then need the token."""
+    port: int = 8080
+    """Port; the next free one when it is taken, and 0 takes any."""
+    token: Annotated[str | None, tyro.conf.arg(metavar="TOKEN", help_behavior_hint="")] = None
+    """The token to ask for; without it, one is made and printed in the link."""
+    no_browser: Switch = False
+    """Print the link and do not open a browser."""
+
+
+@dataclass(frozen=True, slots=True)
+class Demo:
+    """Open the sample recording in the browser."""
+
+    session: Folder = None
+    """Folder of the session; without it, one in your user folder, kept from run to run."""
+    fresh: Switch = False
+    """Begin without the clicks of the last time; they are kept beside."""
+    serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
+
+    def run(self) -> int:
+        """Serve until Ctrl+C; return the exit code."""
+        from app.resources import sample_folder
+        from app.session.file import user_session_folder
+
+        sample = sample_folder() / "rooftop"
+        bags = (sample / "radar.bag", sample / "camera.bag")
+        return _serve(
+            bags,
+            session=self.session or user_session_folder(f"demo-{_digest(bags)}"),
+            fresh=self.fresh,
+            serving=self.serving,
+            name="the sample recording",
+        )
+
+
+def _digest(files: Sequence[Path]) -> str:
+    """Return a few letters that tell one sample from that of another version: a session belongs to one recording."""
+    content = hashlib.sha256()
+    for file in files:
+        content.update(file.read_bytes())
+    return content.hexdigest()[:8]
+
+
+@dataclass(frozen=True, slots=True)
+class Open:
+    """Calibrate your own recording in the browser."""
+
+    recording: Recordings
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
+    camera: File = None
+    """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    calibration: File = None
+    """A calibration to look at, in any format: shown until the clicks give one of their own, then compared with it."""
+    clicks: File = None
+    """Clicks that a new session begins with (cocalib/clicks-1 JSON)."""
+    session: Folder = None
+    """Folder of the session; without it, beside the recording where that can be written, else in your user folder."""
+    fresh: Switch = False
+    """Begin without the clicks of the last time; they are kept beside."""
+    measured: CameraPosition = field(default_factory=MeasuredCamera)
+    topics: Topics = field(default_factory=TopicFlags)
+    options: Options = field(default_factory=CalibrationOptions)
+    serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
+
+    def run(self) -> int:
+        """Serve until Ctrl+C; return the exit code."""
+        from app.session.file import recording_session_folder
+        from calib_core.recordings import require_files
+
+        paths = require_files(self.recording)
+        return _serve(
+            paths,
+            session=self.session or recording_session_folder(paths),
+            fresh=self.fresh,
+            serving=self.serving,
+            name=paths[0].name,
+            camera_file=self.camera,
+            clicks_file=self.clicks,
+            calibration_file=self.calibration,
+            topics=self.topics,
+            options=self.measured.over(self.options),
+        )
+
+
+def _serve(
+    paths: Sequence[Path],
+    *,
+    session: Path,
+    fresh: Switch,
+    serving: ServingFlags,
+    name: str,
+    camera_file: Path | None = None,
+    clicks_file: Path | None = None,
+    calibration_file: Path | None = None,
+    topics: RecordingOptions | None = None,
+    options: CalibrationOptions | None = None,
+) -> int:
+    """Open everything, serve until Ctrl+C, close everything.
+
+    Raises:
+        CalibrationError: the recording, the intrinsics, the clicks or the session cannot be used.
+    """
+    from app.resources import check_installation
+    from app.session import OptionsChanged
+    from app.session.file import set_aside
+    from app.view import sentence
+    from app.web.port.address import require_address, require_token
+    from app.workspace import open_workspace
+    from calib_core.recordings import open_recording
+
+    check_installation()
+    require_address(serving.host, serving.port)
+    require_token(serving.token)
+    _require_given(camera_file, calibration_file, clicks_file)
+    topics = topics or RecordingOptions()
+    with _service(paths, topics, serving, name) as service, ExitStack() as stack:
+        recording = stack.enter_context(open_recording(paths, topics))
+        camera = _camera(recording, camera_file, calibration_file)
+        reference = reference_from(calibration_file, camera) if calibration_file else None
+        if fresh and (kept := set_aside(session)) is not None:
+            print(f"The session of the last time is kept in {kept}")
+        workspace = open_workspace(recording, camera=camera, session_folder=session, name=name, reference=reference)
+        stack.callback(workspace.close)
+        for warning in workspace.restored.warnings:
+            print(f"{sentence(warning.message)} {sentence(warning.hint)}")
+        if options is not None and options != CalibrationOptions():
+            workspace.dispatch(OptionsChanged(options))
+        if clicks_file is not None and workspace.restored.steps == 0:
+            workspace.import_clicks(read_text(clicks_file), source=str(clicks_file))
+        elif clicks_file is not None:
+            print(f"The session goes on as it was; {clicks_file} was not taken in again (--fresh begins anew)")
+        service.serve(workspace, recording)
+    return 0
+
+
+def _service(paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str) -> "Service":
+    """Return what serves; a large recording is served, to be waited for, before it is open."""
+    from app.web.messages import Opening
+    from app.web.port.server import ServerOptions
+    from app.web.port.serving import Service
+    from calib_core.recordings import first_picture
+
+    size_bytes = sum(map(_size_bytes, paths))
+    size = f" ({size_bytes / 1e9:.1f} GB)" if size_bytes >= _LARGE_BYTES / 10 else ""
+    return Service(
+        ServerOptions(**dataclasses.asdict(serving)),
+        Opening(name, f"Opening {name}{size}: reading its index and times…"),
+        partial(first_picture, paths, topics),
+        let_in_after_s=0.0 if size_bytes >= _LARGE_BYTES else _SOON_S,
+    )
+
+
+def _size_bytes(path: Path) -> int:
+    """Return the size of a file, or of the recording files in a folder; 0 where that cannot be told."""
+    try:
+        if path.is_dir():
+            return sum(inside.stat().st_size for inside in path.iterdir() if inside.suffix in _RECORDING_SUFFIXES)
+        return path.stat().st_size
+    except OSError:  # opening the recording tells what is wrong
+        return 0
+
+
+def _require_given(*files: Path | None) -> None:
+    """Refuse files that are not there before anything is read or served.
+
+    Raises:
+        InputError: a file is missing.
+    """
+    for path in files:
+        if path is not None and not path.exists():
+            raise InputError(f"{path}: no such file; check the path")
+
+
+def _camera(recording: Recording, camera_file: Path | None, calibration_file: Path | None) -> Camera:
+    """Return the intrinsics: the file's, else the recording's, else those in the calibration that is to be looked at.
+
+    Raises:
+        InputError: there are none.
+    """
+    if camera_file is None and calibration_file is not None and recording.camera() is None:
+        picture = recording.image_bytes(0)
+        found = camera_in(calibration_file, picture.width_px, picture.height_px)
+        if found is not None:
+            return found
+    return required_camera(recording, camera_file)

@@ -1,0 +1,36 @@
+"""`cocalib simulate`: recordings whose truth is known."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from app.cli.flags import Simulation, SimulationFlags
+from app.cli.output import progress_bar
+from calib_core.errors import InputError
+from calib_core.synthetic import Container
+
+__all__ = ["Simulate"]
+
+
+@dataclass(frozen=True, slots=True)
+class Simulate:
+    """Record a scene that was never there: radar, camera, and the truth about both (truth.json)."""
+
+    out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")]
+    """Folder to write to; made when missing, and must be empty."""
+    containers: tuple[Container, ...] = ("ros1",)
+    """What to write: ros1 (radar.bag and camera.bag), mcap, db3."""
+    options: Simulation = field(default_factory=SimulationFlags)
+
+    def run(self) -> int:
+        """Write the recording; return the exit code."""
+        from calib_core.synthetic import simulate, write_recording
+
+        if self.out.exists() and (not self.out.is_dir() or any(self.out.iterdir())):
+            raise InputError(f"{self.out}: not an empty folder; nothing was written")
+        with progress_bar("rendering frames") as progress:
+            paths = write_recording(simulate(self.options), self.out, containers=self.containers, progress=progress)
+        print("\n".join(str(path) for path in paths))
+        return 0

@@ -1,0 +1,108 @@
+"""`cocalib solve`: a calibration without a browser."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.cli.flags import CameraPosition, File, MeasuredCamera, Options, Recordings, TopicFlags, Topics
+from app.cli.output import explain_unsolvable, read_text, required_camera, seconds_text, write_whole
+from app.view import summary_lines
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
+
+if TYPE_CHECKING:
+    from calib_core.recordings import Recording
+
+__all__ = ["Solve"]
+
+
+@dataclass(frozen=True, slots=True)
+class Solve:
+    """Solve a calibration from a recording and its clicks, or from a file of pairs.
+
+    The same clicks give the same bytes as the page's download.
+    """
+
+    recording: Recordings = ()
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
+    clicks: File = None
+    """Clicks in this recording (cocalib/clicks-1 JSON)."""
+    pairs: File = None
+    """Pairs of radar positions and pixels (cocalib/pairs-1 JSON), instead of a recording."""
+    camera: File = None
+    """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    out: File = None
+    """Where the calibration goes (cocalib/calibration-1 JSON); without it, to stdout."""
+    measured: CameraPosition = field(default_factory=MeasuredCamera)
+    topics: Topics = field(default_factory=TopicFlags)
+    options: Options = field(default_factory=CalibrationOptions)
+
+    def run(self) -> int:
+        """Solve, write the calibration, print its summary; return the exit code."""
+        if self.pairs is not None and (self.recording or self.clicks):
+            raise InputError("solve takes a recording with --clicks, or --pairs, not both")
+        if self.pairs is not None:
+            return self._solve_pairs(self.pairs)
+        if not self.recording:
+            raise InputError("solve needs a recording and --clicks CLICKS.json, or --pairs PAIRS.json")
+        if self.clicks is None:
+            raise InputError("solve needs the clicks of this recording: --clicks CLICKS.json (the page exports them)")
+        return self._solve_recording(self.clicks)
+
+    def _solve_recording(self, clicks_path: Path) -> int:
+        from app.solving import calibration_text, solve_clicks
+        from calib_core.interchange import read_clicks
+        from calib_core.recordings import open_recording
+
+        clicks = read_clicks(read_text(clicks_path), source=str(clicks_path))
+        with open_recording(self.recording, self.topics) as recording:
+            camera = required_camera(recording, self.camera)
+            _require_inside(clicks, recording, camera, source=clicks_path)
+            outcome = solve_clicks(recording, clicks, camera, self.measured.over(self.options))
+            if isinstance(outcome, Unsolvable):
+                return explain_unsolvable(outcome)
+            return self._deliver(outcome, calibration_text(outcome, recording))
+
+    def _solve_pairs(self, path: Path) -> int:
+        from app.solving import calibration_text_of_pairs, solve_pairs
+
+        text = read_text(path)
+        outcome = solve_pairs(text, source=str(path), options=self.measured.over(self.options))
+        if isinstance(outcome, Unsolvable):
+            return explain_unsolvable(outcome)
+        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name=path.name))
+
+    def _deliver(self, calibration: Calibration, text: str) -> int:
+        if self.out is None:
+            print(text, end="")
+            return 0
+        write_whole(self.out, text)
+        print("\n".join([*summary_lines(calibration), f"written to {self.out}"]))
+        return 0
+
+
+def _require_inside(clicks: Sequence[ReflectorClick], recording: "Recording", camera: Camera, *, source: Path) -> None:
+    """Refuse clicks that cannot have been made in this recording.
+
+    Raises:
+        InputError: names the first such click.
+    """
+    first, last = int(recording.image_times[0]), int(recording.image_times[-1])
+    for click in clicks:
+        if not first <= click.image_time <= last:
+            raise InputError(
+                f"{source}: click {click.id} at {seconds_text(click.image_time)} lies outside the recording, "
+                f"whose frames run from {seconds_text(TimeNs(first))} to {seconds_text(TimeNs(last))}; "
+                "give the clicks of this recording"
+            )
+        if not camera.in_image(np.array([[click.u_px, click.v_px]]))[0]:
+            raise InputError(
+                f"{source}: click {click.id} at ({click.u_px:g}, {click.v_px:g}) px lies outside the image of "
+                f"{camera.width_px} x {camera.height_px} px"
+            )

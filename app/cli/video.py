@@ -1,0 +1,35 @@
+"""`cocalib video`: the camera of a recording as a video file."""
+
+from dataclasses import dataclass, field
+
+from app.cli.flags import NewFile, Recordings, TopicFlags, Topics
+from app.cli.output import progress_bar, seconds_text
+
+__all__ = ["Video"]
+
+
+@dataclass(frozen=True, slots=True)
+class Video:
+    """Write the camera's frames into a video, each at its recorded time; recorded JPEG is not encoded again."""
+
+    recording: Recordings
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
+    out: NewFile
+    """Video to write: .mp4 or .mov (times to a microsecond), or .mkv (to a millisecond)."""
+    topics: Topics = field(default_factory=TopicFlags)
+
+    def run(self) -> int:
+        """Write the video; return the exit code."""
+        from calib_core.recordings import open_recording, write_video
+
+        with (
+            open_recording(self.recording, self.topics, require=("image",)) as recording,
+            progress_bar("writing frames") as progress,
+        ):
+            written = write_video(recording, self.out, progress=progress)
+        print(f"{self.out}: {written.frames} frames, {written.duration_s:.3f} s, from {seconds_text(written.start)}")
+        if written.other_size:
+            print(f"{written.other_size} frames of another size than the first are left out")
+        if written.unreadable:
+            print(f"{written.unreadable} frames cannot be read and are left out: {written.fault}")
+        return 0

@@ -1,0 +1,137 @@
+"""From the session to the View, in one pure call."""
+
+from app.session import History, RecordingFacts, Session
+from app.view.advice import advice_for
+from app.view.click_rows import click_rows
+from app.view.figures import metric_figures, pose_figures, residual_limit_px
+from app.view.model import Stage, View, WarningRow
+from app.view.reference import Reference, comparison_figures, reference_words, shown_calibration
+from app.view.wording import sentence
+from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
+from calib_core.results import Calibration
+
+__all__ = ["view"]
+
+"""Fewer pairs than this give no pose."""
+
+
+def view(history: History, facts: RecordingFacts, reference: Reference | None = None) -> View:
+    """Say everything there is to draw about the session of now.
+
+    Args:
+        history: the session with what can be undone and redone.
+        facts: the recording's frames.
+        reference: a calibration to look at; None without one.
+    """
+    session = history.present
+    outcome = session.outcome
+    calibration = outcome if isinstance(outcome, Calibration) else None
+    shown = shown_calibration(session, reference)
+    stage = _stage(session)
+    status, hint = _words(session, stage, reference)
+    return View(
+        revision=session.revision,
+        stage=stage,
+        status=status,
+        hint=hint,
+        solving=session.needs_solving,
+        solved_revision=session.outcome_revision if outcome is not None else -1,
+        can_undo=bool(history.past),
+        can_redo=bool(history.future),
+        has_calibration=calibration is not None,
+        method=session.options.method,
+        clicks=click_rows(session, facts),
+        metrics=metric_figures(calibration) if calibration else (),
+        pose=pose_figures(shown) if shown else (),
+        warnings=_warnings(calibration) if calibration else (),
+        options=session.options,
+        residual_limit_px=residual_limit_px(calibration) if calibration else None,
+        advice=advice_for(calibration) if calibration else None,
+        reference=reference.name if reference else "",
+        comparison=comparison_figures(reference, calibration) if reference and calibration else (),
+    )
+
+
+def _stage(session: Session) -> Stage:
+    if not session.clicks:
+        return "collecting"
+    if session.needs_solving:
+        return "solving"
+    if isinstance(session.outcome, Calibration):
+        return "solved"
+    return "collecting" if _waits_for_clicks(session) else "unsolvable"
+
+
+def _missing(session: Session) -> int:
+    """How many placements are missing before a solve can be tried; those that the radar did not see do not count."""
+    unseen = {row.id for row in _unpaired(session)}
+    usable = sum(not click.excluded and click.id not in unseen for click in session.clicks)
+    return max(0, MIN_PAIRS - usable)
+
+
+def _unpaired(session: Session) -> tuple[Unpaired, ...]:
+    """Clicks of now that found no radar position, as far as the newest answer knows."""
+    here = {click.id for click in session.clicks}
+    return tuple(row for row in session.outcome.unpaired if row.id in here) if session.outcome else ()
+
+
+def _waits_for_clicks(session: Session) -> bool:
+    """Whether more placements are all that is missing, as far as the newest answer knows."""
+    blocked = isinstance(session.outcome, Unsolvable) and session.outcome.code != "too-few-pairs"
+    return _missing(session) > 0 and not blocked
+
+
+def _words(session: Session, stage: Stage, reference: Reference | None) -> tuple[str, str]:
+    """Return the status line and the next thing to do."""
+    missing, outcome = _missing(session), session.outcome
+    if reference is not None and _waits_for_clicks(session) and not isinstance(outcome, Calibration):
+        return reference_words(session, reference), _still_missing(session, missing)
+    if _waits_for_clicks(session):
+        return f"{missing} more placement{'s' if missing > 1 else ''} needed", _next_click(session)
+    if stage == "solving":
+        return "Solving…", ""
+    if isinstance(outcome, Unsolvable):
+        return sentence(outcome.reason), sentence(outcome.hint)
+    if isinstance(outcome, Calibration):
+        return _agreement(outcome), _next_step(outcome)
+    return "", ""
+
+
+def _still_missing(session: Session, missing: int) -> str:
+    """Say what a calibration of one's own takes beyond the reference, once there is a click."""
+    if _unpaired(session):
+        return _next_click(session)
+    return f"{missing} more placement{'s' if missing > 1 else ''} for a new calibration." if session.clicks else ""
+
+
+def _next_step(calibration: Calibration) -> str:
+    """Return what the first warning asks for; without warnings, the best next place."""
+    if calibration.warnings:
+        return sentence(calibration.warnings[0].hint)
+    advice = advice_for(calibration)
+    return advice.words if advice else ""
+
+
+def _next_click(session: Session) -> str:
+    unpaired = _unpaired(session)
+    if not unpaired:
+        return (
+            "Step to a frame in which the reflector stands still, and click its centre: "
+            "the inner corner, where its three sheets meet."
+        )
+    count = "The click" if len(session.clicks) == 1 else f"{len(unpaired)} of {len(session.clicks)} clicks"
+    return f"{count} found no radar position: {unpaired[0].reason}. {sentence(unpaired[0].hint)}"
+
+
+def _agreement(calibration: Calibration) -> str:
+    used = [pair for pair in calibration.pairs if not pair.excluded]
+    agreeing = sum(pair.inlier for pair in used)
+    if agreeing == len(used):
+        return f"Solved: all {len(used)} pairs agree"
+    return f"Solved: {agreeing} of {len(used)} pairs agree"
+
+
+def _warnings(calibration: Calibration) -> tuple[WarningRow, ...]:
+    return tuple(
+        WarningRow(warning.code, sentence(warning.message), sentence(warning.hint)) for warning in calibration.warnings
+    )

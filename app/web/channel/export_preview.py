@@ -1,0 +1,203 @@
+"""What the export panel shows of one format: the file's text, what its numbers are, and the proof that it reads back."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+from urllib.parse import parse_qs
+
+from app.view import WarningRow, sentence
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+from calib_core.interchange import (
+    FORMATS,
+    CalibrationFile,
+    CheckReport,
+    ExportBytes,
+    ExportText,
+    check,
+    contents_text,
+    export,
+    format_named,
+    imported,
+    parent_pose,
+    read_any,
+)
+
+__all__ = [
+    "ExportPreview",
+    "FormatRow",
+    "NoPreview",
+    "export_preview",
+    "exported",
+    "format_rows",
+    "parent_in",
+    "rectified_in",
+]
+
+_PARENT = "parent_from_radar"
+_RECTIFIED = "rectified"
+
+
+@dataclass(frozen=True, slots=True)
+class FormatRow:
+    """One line of the list of formats.
+
+    Attributes:
+        key: what `--to` takes.
+        label: one line for people.
+        takes_parent: the radar can be posed in a third frame.
+        takes_rectified: a person may have to say that the pictures are rectified.
+    """
+
+    key: str
+    label: str
+    takes_parent: bool
+    takes_rectified: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ExportPreview:
+    """One format, before it is saved.
+
+    Attributes:
+        key: of the format.
+        file_name: what to call the file: recording, then format.
+        text: the file, or what is in it where it is binary.
+        is_binary: the file itself is no text.
+        size_bytes: of the file.
+        numbers: what the file's numbers are.
+        notes: what a person must know who uses it.
+        is_for_rectified: it is written only because the pictures are said to be rectified.
+        carries: which way the pose in the file carries points, as it is read back.
+        axes: of the camera frame whose pose the file states: optical, or its body frame.
+        check: what `cocalib check` says about the file.
+        check_is_good: whether it found nothing wrong.
+        radar_frame: name of the radar's frame.
+        camera_frame: name of the camera's optical frame.
+        rotation: camera_from_radar, by rows.
+        translation_m: of camera_from_radar.
+        quaternion_xyzw: of camera_from_radar.
+        warnings: what the solve warns of.
+    """
+
+    key: str
+    file_name: str
+    text: str
+    is_binary: bool
+    size_bytes: int
+    numbers: str
+    notes: tuple[str, ...]
+    is_for_rectified: bool
+    carries: Literal["camera_from_radar", "radar_from_camera"]
+    axes: Literal["optical", "link"]
+    check: str
+    check_is_good: bool
+    radar_frame: str
+    camera_frame: str
+    rotation: tuple[tuple[float, ...], ...]
+    translation_m: tuple[float, ...]
+    quaternion_xyzw: tuple[float, ...]
+    warnings: tuple[WarningRow, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NoPreview:
+    """There is nothing to save yet: why, and what to do."""
+
+    reason: str
+
+
+def format_rows() -> tuple[FormatRow, ...]:
+    """Return the list of formats."""
+    return tuple(
+        FormatRow(form.name, form.title, form.write_in_parent is not None, form.is_for_rectified) for form in FORMATS
+    )
+
+
+def parent_in(query: str) -> RigidTransform | None:
+    """Return the radar's pose in a third frame as an address gives it, `parent_from_radar=x,y,z,qx,qy,qz,qw`, if it does.
+
+    Raises:
+        InputError: it is not seven numbers, or no pose.
+    """
+    given = parse_qs(query).get(_PARENT)
+    if not given:
+        return None
+    try:
+        numbers = [float(word) for word in given[-1].split(",")]
+    except ValueError:
+        raise InputError(f"{_PARENT}: {given[-1]!r} is not seven numbers") from None
+    return parent_pose(numbers)
+
+
+def rectified_in(query: str) -> bool:
+    """Tell whether an address says that the pictures are rectified, `rectified=1`.
+
+    Raises:
+        InputError: it says something else about it.
+    """
+    given = parse_qs(query, keep_blank_values=True).get(_RECTIFIED, ["0"])[-1]
+    if given not in ("0", "1"):
+        raise InputError(f"{_RECTIFIED}: {given!r} is neither 1 nor 0; 1 says that the pictures are rectified")
+    return given == "1"
+
+
+def exported(file: CalibrationFile, key: str, query: str) -> ExportText | ExportBytes:
+    """Write a calibration in a format, with the pose and the word about the pictures that the address may hold.
+
+    Raises:
+        InputError: the format cannot carry this calibration, or has no third frame.
+    """
+    return export(file, key, parent_from_radar=parent_in(query), rectified=rectified_in(query))
+
+
+def export_preview(file: CalibrationFile, key: str, query: str, recording_name: str) -> ExportPreview:
+    """Show a calibration in a format before it is saved.
+
+    Args:
+        file: the calibration.
+        key: of the format.
+        query: of the address; it may pose the radar in a third frame, and say that the pictures are rectified.
+        recording_name: what the person calls the recording.
+
+    Raises:
+        InputError: the format cannot carry this calibration, or has no third frame.
+    """
+    written, form = exported(file, key, query), format_named(key)
+    report = check(read_any(written.data, written.file_name), against=imported(file))
+    pose = file.calibration.camera_from_radar
+    wxyz = quaternion_wxyz_from_matrix(pose.rotation).tolist()
+    warnings = file.calibration.warnings
+    return ExportPreview(
+        key=key,
+        file_name=f"{_slug(recording_name)}_{written.file_name}",
+        text=contents_text(written),
+        is_binary=isinstance(written, ExportBytes),
+        size_bytes=len(written.data),
+        numbers=sentence(form.numbers),
+        notes=tuple(sentence(note) for note in written.notes),
+        is_for_rectified=form.is_for_rectified and file.calibration.camera.is_distorted,
+        carries=report.imported.pose.direction,
+        axes=report.imported.pose.axes,
+        check=_read_back(report),
+        check_is_good=report.ok,
+        radar_frame=file.frames.radar,
+        camera_frame=file.frames.camera,
+        rotation=tuple(tuple(row) for row in pose.rotation.tolist()),
+        translation_m=tuple(pose.translation_m.tolist()),
+        quaternion_xyzw=(*wxyz[1:], wxyz[0]),
+        warnings=tuple(WarningRow(row.code, sentence(row.message), sentence(row.hint)) for row in warnings),
+    )
+
+
+def _read_back(report: CheckReport) -> str:
+    """Say in one line what reading the file back has shown."""
+    first = report.results[0]
+    return "Read back: the pose is the one solved." if first.code == "agrees" else f"Read back: {first.message}."
+
+
+def _slug(name: str) -> str:
+    """Return a recording's name as the beginning of a file's: letters, digits and underscores."""
+    stem = Path(name).stem if re.search(r"\.\w{2,6}$", name) else name
+    return re.sub(r"\W+", "_", stem.removeprefix("the ")).strip("_") or "recording"

@@ -1,0 +1,132 @@
+"""What the radar alone tells about the whole recording: where the reflector stood still, and how much there was to see."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.web.messages import PlacementRow
+from calib_core.arrays import TimesNs
+from calib_core.association.gating import static_returns
+from calib_core.association.placements import Placement, find_placements
+from calib_core.measurements import NS_PER_S, RadarScans
+from calib_core.options import GatingOptions
+from calib_core.recordings.radar.scan_stream import join_scans
+
+__all__ = ["Activity", "Survey", "placements_at", "survey_of"]
+
+_MOST_SLICES = 800
+_MOST_STATIC_RETURNS = 1_000_000
+"""In one stretch: more than an hour of 25 static returns in each of 10 scans a second; searching it takes some 200 MB."""
+
+
+@dataclass(frozen=True, slots=True)
+class Activity:
+    """How many returns there are in each slice of time, from the first frame on.
+
+    Attributes:
+        step_s: length of a slice [s].
+        returns: mean number of returns per scan; 0 where there is no scan.
+    """
+
+    step_s: float
+    returns: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Survey:
+    """The radar's view of the whole recording.
+
+    Attributes:
+        placements: where the reflector stood still, those without a frame left out.
+        rows: the same as the page shows them.
+        activity: of the radar.
+    """
+
+    placements: tuple[Placement, ...]
+    rows: tuple[PlacementRow, ...]
+    activity: Activity
+
+
+def survey_of(windows: Iterable[RadarScans], image_times: TimesNs, options: GatingOptions) -> Survey:
+    """Survey a whole recording.
+
+    Memory stays bounded: of each window only the static returns are kept, and a recording with more of them than fit is
+    searched one stretch after another.
+
+    Args:
+        windows: all scans, in order of time.
+        image_times: (m,) stamps of the frames [ns], ascending.
+        options: which returns can be the reflector.
+    """
+    activity = _ActivitySum(image_times)
+    seen = [
+        (placement, row)
+        for stretch in _stretches(map(activity.note, windows), options)
+        for placement in find_placements(stretch, options)
+        if (row := _row(placement, image_times)) is not None
+    ]
+    return Survey(tuple(pair[0] for pair in seen), tuple(pair[1] for pair in seen), activity.total())
+
+
+def _stretches(windows: Iterable[RadarScans], options: GatingOptions) -> Iterator[RadarScans]:
+    """Yield the static returns of a recording; in several pieces where they are too many."""
+    pieces: list[RadarScans] = []
+    for window in windows:
+        pieces.append(static_returns(window, options))
+        if sum(len(piece.points_radar_m) for piece in pieces) > _MOST_STATIC_RETURNS:
+            yield join_scans(pieces)
+            pieces = []
+    yield join_scans(pieces)
+
+
+def _row(placement: Placement, image_times: TimesNs) -> PlacementRow | None:
+    """Return the line of a placement, with the frame nearest to its middle; None when no frame shows it."""
+    first, last = np.searchsorted(image_times, [placement.start, placement.end])
+    if first >= last:
+        return None
+    middle = (int(placement.start) + int(placement.end)) // 2
+    frame = int(first + np.argmin(np.abs(image_times[first:last] - middle)))
+    origin = int(image_times[0])
+    return PlacementRow(
+        start_s=(int(placement.start) - origin) / NS_PER_S,
+        end_s=(int(placement.end) - origin) / NS_PER_S,
+        frame=frame,
+        range_m=float(np.linalg.norm(placement.position_radar_m)),
+        score=placement.score,
+    )
+
+
+class _ActivitySum:
+    """Adds up scans and returns by slices of time.
+
+    Args:
+        image_times: (m,) stamps of the frames [ns], ascending.
+    """
+
+    def __init__(self, image_times: TimesNs) -> None:
+        length_s = max((int(image_times[-1]) - int(image_times[0])) / NS_PER_S, 1e-3)
+        self._slices = max(1, min(_MOST_SLICES, int(length_s / 0.25)))
+        self._step_s = length_s / self._slices
+        self._origin = image_times[0]
+        self._returns, self._scans = np.zeros(self._slices), np.zeros(self._slices, dtype=np.int64)
+
+    def note(self, scans: RadarScans) -> RadarScans:
+        """Add some scans; return them."""
+        place = ((scans.times_ns - self._origin) / NS_PER_S // self._step_s).astype(np.int64)
+        inside = (place >= 0) & (place < self._slices)
+        counts = np.diff(scans.first_return)[inside]
+        self._returns += np.bincount(place[inside], weights=counts, minlength=self._slices)
+        self._scans += np.bincount(place[inside], minlength=self._slices)
+        return scans
+
+    def total(self) -> Activity:
+        """Return the mean number of returns per scan in each slice."""
+        return Activity(self._step_s, tuple(np.round(self._returns / np.maximum(self._scans, 1), 2).tolist()))
+
+
+def placements_at(survey: Survey | None, time: int) -> Sequence[Placement]:
+    """Return the placements that a moment [ns] lies in."""
+    if survey is None:
+        return ()
+    return [placement for placement in survey.placements if placement.start <= time <= placement.end]

@@ -1,0 +1,176 @@
+"""What a person must know before using a calibration: each doubt with its figures, and what to do about it.
+
+A check says nothing when all is well. The texts are for people; the codes are for programs and stay as they are.
+"""
+
+import numpy as np
+
+from calib_core.arrays import Vector3
+from calib_core.association.clustering import CLUSTER_SCALE
+from calib_core.diagnostics.intrinsics import intrinsics
+from calib_core.diagnostics.pairs import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
+from calib_core.diagnostics.pose import assumed_axes, camera_position, mirrored_axes, two_poses
+from calib_core.diagnostics.solved_fit import SolvedFit
+from calib_core.estimation.unmeasured_elevation import is_flat
+from calib_core.geometry import skew
+from calib_core.radar import cartesian_from_polar, direction_cosines
+from calib_core.results import DataWarning
+
+__all__ = ["warnings_of"]
+
+_NARROW_CONDITION = 5e5
+_WEAK_ROTATION_RAD = np.deg2rad(2.0)
+_WEAK_POSITION_M = 0.15
+_NOISE_EXCESS = 2.5
+_NOTABLE_GROWTH = 2.5
+_FEW_INLIERS = 8
+
+
+def warnings_of(findings: SolvedFit) -> tuple[DataWarning, ...]:
+    """Run every check; the gravest come first."""
+    checks = (
+        mirrored_axes,
+        two_poses,
+        camera_position,
+        _flat_radar,
+        _many_outliers,
+        _few_inliers,
+        intrinsics,
+        _noise_excess,
+        _smooth_angle_errors,
+        _weak_geometry,
+        _same_places,
+        ambiguous_candidates,
+        contradicted_pairs,
+        decisive_pair,
+        assumed_axes,
+    )
+    return tuple(warning for check in checks for warning in check(findings))
+
+
+def _flat_radar(fit: SolvedFit) -> list[DataWarning]:
+    """Say which parts of the pose the pairs fix, and which rest on where the reflector is thought to stand."""
+    if not is_flat(fit.measurements):
+        return []
+    position_cm, turn_deg = _sigmas_in_radar_axes(fit)
+    fixed = (
+        f"ranges and azimuths fix forward ± {position_cm[0]:.0f} cm, left ± {position_cm[1]:.0f} cm and the turn about the "
+        f"radar's up axis ± {turn_deg[2]:.1f} deg; up ± {position_cm[2]:.0f} cm and the turns about left ± {turn_deg[1]:.1f}"
+        f" and forward ± {turn_deg[0]:.1f} deg rest on the clicks' rows and on a guess at how high the reflector stood"
+    )
+    return [
+        DataWarning(
+            "flat-radar",
+            f"every radar position has elevation 0: this radar measures none, and the true ones are unknown. One sigma: {fixed}",
+            "measure the camera position, and put the reflector's centre at the radar's height at every placement: then the pose "
+            "is better than stated; for a radar that measures elevation, look why it is missing",
+        )
+    ]
+
+
+def _sigmas_in_radar_axes(fit: SolvedFit) -> tuple[Vector3, Vector3]:
+    """Return one sigma of the camera centre [cm], and of the rotation [deg], about forward, left and up."""
+    pose = fit.refined.camera_from_radar
+    turned = pose.rotation.T
+    centre = np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1)
+    covariance = fit.uncertainty.covariance
+    position_m = np.sqrt(np.diag(centre @ covariance @ centre.T))
+    return 100.0 * position_m, np.rad2deg(np.sqrt(np.diag(turned @ covariance[3:, 3:] @ turned.T)))
+
+
+def _many_outliers(fit: SolvedFit) -> list[DataWarning]:
+    outliers = [name for name, inlier in zip(fit.ids, fit.inliers, strict=True) if not inlier]
+    if len(outliers) <= 0.35 * len(fit.ids):
+        return []
+    return [
+        DataWarning(
+            "many-outliers",
+            f"{len(outliers)} of {len(fit.ids)} pairs do not fit: {listed(outliers)}",
+            "look at each: was the reflector clicked, did it rest, do both recordings run on one clock?",
+        )
+    ]
+
+
+def _few_inliers(fit: SolvedFit) -> list[DataWarning]:
+    count = int(fit.inliers.sum())
+    if count >= _FEW_INLIERS:
+        return []
+    return [
+        DataWarning(
+            "few-pairs",
+            f"only {count} pairs carry the pose; a wrong one among them could not be told, nor a wrong noise level",
+            "add placements: ten or more, near and far, on both sides",
+        )
+    ]
+
+
+def _noise_excess(fit: SolvedFit) -> list[DataWarning]:
+    degrees = 2 * int(fit.inliers.sum()) - 6
+    if degrees < 6 or fit.chi2_per_degree < 1.0 + 4.0 * np.sqrt(2.0 / degrees) or fit.chi2_per_degree < _NOISE_EXCESS:
+        return []
+    return [
+        DataWarning(
+            "residuals-too-large",
+            f"residuals are {np.sqrt(fit.chi2_per_degree):.1f} times what the assumed noise explains "
+            f"(chi2 / degrees of freedom {fit.chi2_per_degree:.1f})",
+            "check that the intrinsics belong to this camera, lens and image size; then the assumed radar noise",
+        )
+    ]
+
+
+def _smooth_angle_errors(fit: SolvedFit) -> list[DataWarning]:
+    if fit.uncertainty.growth < _NOTABLE_GROWTH or is_flat(fit.measurements):
+        return []
+    return [
+        DataWarning(
+            "smooth-angle-errors",
+            "neighbouring placements share their residuals: the radar's angles are off by an amount that changes slowly with "
+            f"direction; the stated rotation uncertainty is {fit.uncertainty.growth:.1f} times wider for it",
+            "more placements will not average it away: correct the radar's angles by radar_angle_map of the calibration, or "
+            "calibrate them; the stated uncertainty allows for it",
+        )
+    ]
+
+
+def _weak_geometry(fit: SolvedFit) -> list[DataWarning]:
+    sigma = np.sqrt(np.diag(fit.uncertainty.covariance))
+    rotation_rad, position_m = float(np.linalg.norm(sigma[3:])), float(np.linalg.norm(sigma[:3]))
+    narrow = fit.uncertainty.condition > _NARROW_CONDITION and not fit.measurements.prior.measured
+    if rotation_rad <= _WEAK_ROTATION_RAD and position_m <= _WEAK_POSITION_M and not narrow:
+        return []
+    range_m, azimuth_rad, _ = fit.measurements.polar[fit.refined.rows[fit.inliers]].T
+    hint = "place the reflector near (2 to 3 m) and far, at both edges of the picture"
+    if not fit.measurements.prior.measured:
+        hint = "measure the camera position with a tape: it helps most; and " + hint
+    return [
+        DataWarning(
+            "weak-geometry",
+            f"the pose is uncertain: {np.rad2deg(rotation_rad):.1f} deg and {100 * position_m:.0f} cm (one sigma); "
+            f"placements span {range_m.min():.1f} to {range_m.max():.1f} m and {np.rad2deg(np.ptp(azimuth_rad)):.0f} deg",
+            hint,
+        )
+    ]
+
+
+def _places(fit: SolvedFit) -> int:
+    """Count the distinct places among the inlier placements, by the radar's own resolution."""
+    centres = (
+        direction_cosines(cartesian_from_polar(fit.measurements.polar[fit.refined.rows[fit.inliers]])) / CLUSTER_SCALE
+    )
+    apart = sum(((axis[:, None] - axis) ** 2 for axis in centres.T), start=np.zeros((len(centres), len(centres))))
+    first_close = (apart <= 1.0).argmax(axis=1)  # at the latest the place itself
+    return int((first_close == np.arange(len(centres))).sum())
+
+
+def _same_places(fit: SolvedFit) -> list[DataWarning]:
+    count, places = int(fit.inliers.sum()), _places(fit)
+    if places > 0.7 * count:
+        return []
+    return [
+        DataWarning(
+            "repeated-placements",
+            f"{count} pairs show only {places} places; a radar repeats its error at the same place, so the stated "
+            "uncertainty is too small",
+            "move the reflector between clicks; more clicks of one placement add little",
+        )
+    ]

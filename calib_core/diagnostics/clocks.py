@@ -1,0 +1,155 @@
+"""Do both sensors run on one clock? What static placements can say about it, and what they cannot.
+
+While the reflector rests, radar and camera see the same whatever the clocks say: an offset that leaves every click inside its
+dwell does no harm, and nothing in the pairs shows it. What shows is a click whose reflector the radar does not see at that
+moment, but sees from a little later on, or saw until a little earlier. One such click may be a hasty person; several, all to
+the same side, are a clock, or a habit with the same effect. With [a_i, b_i] the dwell about click i by the radar's stamps,
+counted from the click, an offset s of the radar's stamps puts a_i <= s <= b_i.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Points3, TimesNs, Values
+from calib_core.association.clustering import CLUSTER_SCALE
+from calib_core.association.gating import static_returns
+from calib_core.measurements import NS_PER_S, RadarScans
+from calib_core.options import GatingOptions
+from calib_core.radar import direction_cosines
+from calib_core.results import Calibration, DataWarning, PairResult
+
+__all__ = ["ClockOffset", "clock_offset", "clocks"]
+
+_LEAST_OUTSIDE = 3
+_LEAST_SHARE = 0.25  # of the clicks with a dwell that lie outside of it
+_MOST_OTHER_SIDE = 0.1  # of those, to the other side
+_TOLERANCE_S = 0.3  # a reflector that is being put down, a scan or two that miss it
+_LARGEST_GAP_S = 0.7  # a longer silence ends a dwell
+_SHORTEST_DWELL_S = 0.5
+_REACH = 1.5  # steps of CLUSTER_SCALE from the candidate to a return of the same reflector
+_STEP_S = 0.05
+_AROUND_S = 4.0  # as far as the scans around a click reach by default
+
+
+@dataclass(frozen=True, slots=True)
+class ClockOffset:
+    """By how much the radar's stamps seem ahead of the camera's.
+
+    Attributes:
+        least_s: smallest offset that puts the most clicks inside their dwells; negative: the radar's stamps lag.
+        most_s: the largest, no farther than the scans around the clicks reach.
+        outside: ids of the clicks that lie outside their dwell.
+        clicks: how many clicks have a dwell.
+    """
+
+    least_s: float
+    most_s: float
+    outside: tuple[str, ...]
+    clicks: int
+
+    @property
+    def nearest_s(self) -> float:
+        """The smaller of the two bounds: what the offset is at least."""
+        return self.least_s if abs(self.least_s) < abs(self.most_s) else self.most_s
+
+
+def clocks(calibration: Calibration, scans: RadarScans) -> list[DataWarning]:
+    """InfluentialPair that both sensors run on one clock: clicks lie before, or after, their dwells by the radar's stamps.
+
+    Args:
+        calibration: whose inlier pairs tell which return was the reflector.
+        scans: around the clicks, as the calibration got them.
+    """
+    offset = clock_offset(calibration.pairs, scans, calibration.options.gating)
+    if offset is None:
+        return []
+    late = offset.nearest_s > 0
+    seen, against, when = (
+        ("after", "ahead of", "has rested a while") if late else ("before", "behind", "has just been set down")
+    )
+    return [
+        DataWarning(
+            "clock-bias-suspected",
+            f"the radar sees the reflector only {seen} the moment of {len(offset.outside)} of {offset.clicks} clicks "
+            f"({', '.join(offset.outside[:6])}): its stamps seem {abs(offset.nearest_s):.1f} s or more {against} the camera's",
+            f"compare both clocks (cocalib info), or click where the reflector {when}; if the clicks are at fault, click in the "
+            "middle of each dwell",
+        )
+    ]
+
+
+def clock_offset(pairs: Sequence[PairResult], scans: RadarScans, gating: GatingOptions) -> ClockOffset | None:
+    """Find the offset that several clicks outside their dwells agree on; None where they do not, or there are none."""
+    dwells = _dwells(pairs, scans, gating)
+    if not len(dwells.ids):
+        return None
+    late, early = dwells.starts_s > _TOLERANCE_S, dwells.ends_s < -_TOLERANCE_S
+    outside = late if late.sum() >= early.sum() else early
+    count, other = int(outside.sum()), int((late | early).sum() - outside.sum())
+    if count < max(_LEAST_OUTSIDE, _LEAST_SHARE * len(outside)) or other > _MOST_OTHER_SIDE * count:
+        return None
+    least_s, most_s = dwells.agreed_s()
+    if least_s <= _TOLERANCE_S and most_s >= -_TOLERANCE_S:
+        return None
+    return ClockOffset(least_s, most_s, tuple(np.asarray(dwells.ids)[outside].tolist()), len(dwells.ids))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Dwells:
+    """From when to when the radar sees the reflector of each click, counted from the click.
+
+    Attributes:
+        ids: of the clicks.
+        starts_s: (n,).
+        ends_s: (n,).
+    """
+
+    ids: tuple[str, ...]
+    starts_s: Values
+    ends_s: Values
+
+    def agreed_s(self) -> tuple[float, float]:
+        """Return the span of offsets that puts the most clicks inside their dwells."""
+        tried = np.arange(self.starts_s.min(), self.ends_s.max() + _STEP_S, _STEP_S)
+        inside = (self.starts_s[:, None] <= tried) & (tried <= self.ends_s[:, None])
+        best = tried[inside.sum(axis=0) == inside.sum(axis=0).max()]
+        return float(best[0]), float(best[-1])
+
+
+def _dwells(pairs: Sequence[PairResult], scans: RadarScans, gating: GatingOptions) -> _Dwells:
+    static = static_returns(scans, gating)
+    steps = direction_cosines(static.points_radar_m) / CLUSTER_SCALE
+    found = []
+    for pair in pairs:
+        if pair.inlier and pair.image_time is not None:
+            dwell = _dwell(static, steps, direction_cosines(pair.point_radar_m) / CLUSTER_SCALE, pair.image_time)
+            found.extend([] if dwell is None else [(pair.id, *dwell)])
+    ids, starts, ends = zip(*found, strict=True) if found else ((), (), ())
+    return _Dwells(ids, np.array(starts), np.array(ends))
+
+
+def _dwell(static: RadarScans, steps: Points3, place: Values, click_ns: int) -> tuple[float, float] | None:
+    """Return the unbroken presence at a place that lies nearest to a click [s from it]; None where it is too short."""
+    rows = _rows_around(static, click_ns)
+    near = ((steps[rows] - place) ** 2).sum(axis=1) <= _REACH**2
+    owners = np.searchsorted(static.first_return, np.flatnonzero(near) + rows.start, side="right") - 1
+    seen_s: Values = (np.unique(static.times_ns[owners]) - click_ns) / NS_PER_S
+    if not len(seen_s):
+        return None
+    breaks = np.flatnonzero(np.diff(seen_s) > _LARGEST_GAP_S)
+    starts, ends = seen_s[np.concatenate([[0], breaks + 1])], seen_s[np.append(breaks, len(seen_s) - 1)]
+    long = ends - starts >= _SHORTEST_DWELL_S
+    if not long.any():
+        return None
+    away = np.where(long, np.maximum(np.maximum(starts, -ends), 0.0), np.inf)
+    nearest = int(np.argmin(away))
+    return float(starts[nearest]), float(ends[nearest])
+
+
+def _rows_around(static: RadarScans, click_ns: int) -> slice:
+    times: TimesNs = static.times_ns
+    reach_ns = int(_AROUND_S * NS_PER_S)
+    first, last = np.searchsorted(times, [click_ns - reach_ns, click_ns + reach_ns])
+    return slice(int(static.first_return[first]), int(static.first_return[last]))

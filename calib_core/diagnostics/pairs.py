@@ -1,0 +1,98 @@
+"""Pairs a person must look at: more than one radar position suits them, the others contradict them, or nothing checks them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calib_core.arrays import Values
+from calib_core.diagnostics.solved_fit import SolvedFit
+from calib_core.estimation.gnc import associate, log_odds_of
+from calib_core.results import DataWarning
+
+__all__ = ["ambiguous_candidates", "contradicted_pairs", "decisive_pair", "listed"]
+
+_AMBIGUOUS_MARGIN = 4.0
+_DECISIVE_LOSS = 8.0  # of certainty, in the direction that suffers most
+_LEAST_PAIRS = 6
+
+
+def ambiguous_candidates(fit: SolvedFit) -> list[DataWarning]:
+    """Name the pairs where a second candidate explains the click nearly as well as the chosen one."""
+    if fit.measurements.one_to_one:
+        return []
+    measurements, owner = fit.refined.measurements, fit.refined.measurements.owner
+    margins = np.full(len(measurements), np.inf)
+    cost = _candidate_costs(fit)
+    for i in np.flatnonzero(fit.inliers):
+        own = np.sort(cost[owner == i])
+        if len(own) > 1:
+            margins[i] = own[1] - own[0]
+    doubtful = [fit.ids[i] for i in np.flatnonzero(margins < _AMBIGUOUS_MARGIN)]
+    if not doubtful:
+        return []
+    return [
+        DataWarning(
+            "uncertain-association",
+            f"more than one radar position suits the click of {listed(doubtful)}",
+            "look at the radar view there; exclude the pair if the chosen return is not the reflector",
+        )
+    ]
+
+
+def _candidate_costs(fit: SolvedFit) -> np.ndarray:
+    measurements = fit.refined.measurements
+    each = measurements.candidates_apart()
+    rows, model = associate(each, fit.refined.camera_from_radar)
+    return -2.0 * log_odds_of(each, model, each.log_score[rows], 0.5)
+
+
+def contradicted_pairs(fit: SolvedFit) -> list[DataWarning]:
+    """Name the pairs that the pose leans on and the others contradict."""
+    return [
+        DataWarning(
+            "doubtful-pair",
+            f"without {fit.ids[doubt.pair]} the camera moves {50 * doubt.camera_move_m:.0f} cm, and the other pairs predict it "
+            f"{doubt.standard_deviations:.1f} standard deviations from its click; the stated pose lies midway between the one "
+            "with it and the one without, and its uncertainty allows for both",
+            f"look at the click of {fit.ids[doubt.pair]}; correct it, exclude it, or add placements near it",
+        )
+        for doubt in fit.doubts
+    ]
+
+
+def decisive_pair(fit: SolvedFit) -> list[DataWarning]:
+    """Name the pair that some direction of the pose hangs on: a mistake in it would go unseen, however large it is."""
+    if fit.inliers.sum() < _LEAST_PAIRS:
+        return []
+    loss = _losses(fit)
+    most = int(np.argmax(loss))
+    if loss[most] < _DECISIVE_LOSS or any(doubt.pair == most for doubt in fit.doubts):
+        return []
+    return [
+        DataWarning(
+            "one-pair-decides",
+            f"part of the pose hangs on {fit.ids[most]} alone: without it, that part would be {loss[most]:.0f} times less "
+            "certain, so the other pairs cannot tell whether its click is right",
+            f"look at the click of {fit.ids[most]} again, and add a placement near it",
+        )
+    ]
+
+
+def _losses(fit: SolvedFit) -> Values:
+    """Return (n,) how many times less certain the pose is without each pair, in the direction that suffers most.
+
+    Leaving out w J^T J of the information H turns the variance along a direction from v into v / (1 - h); the largest h is
+    the largest eigenvalue of w J H^-1 J^T.
+    """
+    refined = fit.refined
+    inverse = np.linalg.inv(fit.uncertainty.information)
+    jacobian = refined.model.pose_jacobian
+    share = refined.weights[:, None, None] * (jacobian @ inverse @ np.swapaxes(jacobian, 1, 2))
+    largest = np.linalg.eigvalsh(share)[:, -1]
+    return np.asarray(np.where(fit.inliers, 1.0 / np.sqrt(np.maximum(1.0 - largest, 1e-9)), 0.0))
+
+
+def listed(names: Sequence[str]) -> str:
+    """Name the first six, and count the rest."""
+    shown = ", ".join(names[:6])
+    return shown if len(names) <= 6 else f"{shown} and {len(names) - 6} more"

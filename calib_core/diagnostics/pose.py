@@ -1,0 +1,149 @@
+"""Is it this pose at all? Mirrored axes, a second pose as likely, and a camera where it cannot be."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from calib_core.diagnostics.solved_fit import SolvedFit
+from calib_core.estimation.covariance import pose_covariance
+from calib_core.estimation.errors_in_variables import fit_errors_in_variables
+from calib_core.estimation.gnc import GncSolution
+from calib_core.estimation.mirror_test import MIRRORED_GAIN, NOT_MIRRORED_GAIN
+from calib_core.estimation.unmeasured_elevation import is_flat
+from calib_core.geometry import RigidTransform
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
+from calib_core.results import DataWarning
+
+__all__ = ["assumed_axes", "camera_position", "mirrored_axes", "two_poses"]
+
+_ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
+_OTHER_POSE_RAD = np.deg2rad(5.0)
+_OTHER_POSE_SIGMAS = 6.0
+_FAR_CAMERA = 3.0
+_CONTRADICTION_SIGMAS = 4.0
+_SUSPICIOUS_NOISE = 1.6
+_PLANE_ROUNDS = 6
+_ONE_IN_A_HUNDRED = 2.33
+
+
+def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
+    """InfluentialPair the radar's axes: mirrored ones are likelier, or as likely."""
+    if fit.mirror_gain > MIRRORED_GAIN:
+        return [
+            DataWarning(
+                "mirrored-axes",
+                "pairs and expected camera position agree better when one radar axis is mirrored "
+                f"(log-likelihood ratio {fit.mirror_gain / 2:.1f}): the radar's axes look left-handed",
+                "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) where the "
+                "positions come from; do not use this pose",
+            )
+        ]
+    if fit.mirror_gain > NOT_MIRRORED_GAIN:
+        return [
+            DataWarning(
+                "handedness-open",
+                "a mirrored radar axis would explain the pairs about as well: all placements lie near one plane",
+                "measure the camera position with a tape, or add placements at other heights (a tripod)",
+            )
+        ]
+    return []
+
+
+def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
+    """Say that the choice between the two hands is not the pairs' own, where it passes for clear."""
+    said = fit.mirror_gain > NOT_MIRRORED_GAIN or is_flat(fit.measurements)
+    if said or fit.measurements.prior.measured or _heights_decide(fit):
+        return []
+    return [
+        DataWarning(
+            "handedness-assumed",
+            "the placements lie near one plane, where mirrored radar axes fit as well: that none is mirrored rests on the "
+            f"camera being within about {fit.measurements.prior.sigma_m:g} m of the radar",
+            "measure the camera position (0.3 m is enough for this), or add placements at other heights (a tripod)",
+        )
+    ]
+
+
+def _heights_decide(fit: SolvedFit) -> bool:
+    """Tell whether the placements leave every plane so far that the pairs alone rule mirrored axes out.
+
+    Mirrored axes and a turned camera are a reflection in some plane; it moves a placement by twice its height h above that
+    plane. So twice the log-likelihood falls by about sum (2 h / sigma)^2 with the true heights, by 4 (chi2 - (n - 3)) with
+    measured ones, and the noise of that is asked to matter in one set of a hundred only.
+    """
+    measurements, rows = fit.refined.measurements, fit.refined.rows[fit.inliers]
+    points = cartesian_from_polar(measurements.polar[rows])
+    covariances = covariance_from_sigma_polar(points, measurements.sigma_polar[rows])
+    weights, chi2 = np.ones(len(points)), np.inf
+    for _ in range(_PLANE_ROUNDS):
+        offsets = points - (weights @ points) / weights.sum()
+        normal = np.linalg.svd(offsets * np.sqrt(weights)[:, None])[2][2]
+        weights = 1.0 / np.einsum("i,nij,j->n", normal, covariances, normal)
+        chi2 = min(chi2, float(weights @ (offsets @ normal) ** 2))
+    redundancy = max(len(points) - 3, 1)
+    return 4.0 * (chi2 - redundancy) > MIRRORED_GAIN + 4.0 * _ONE_IN_A_HUNDRED * np.sqrt(2.0 * redundancy)
+
+
+def two_poses(fit: SolvedFit) -> list[DataWarning]:
+    """InfluentialPair the choice between two poses that explain the pairs about alike (a plane seen from afar has two)."""
+    best = fit.alternatives[0]
+    for other in fit.alternatives[1:]:
+        error = other.camera_from_radar.error_from(fit.refined.camera_from_radar)
+        apart_rad = float(np.linalg.norm(error[3:]))
+        sigmas = float(np.sqrt(error @ fit.uncertainty.information @ error))
+        if other.cost - best.cost < _ALMOST_AS_LIKELY and apart_rad > _OTHER_POSE_RAD and sigmas > _OTHER_POSE_SIGMAS:
+            return [
+                DataWarning(
+                    "two-poses",
+                    f"another pose, {np.rad2deg(apart_rad):.0f} deg away, explains the pairs almost as well",
+                    "measure the camera position with a tape, or add placements nearer and farther than the present ones",
+                )
+            ]
+    return []
+
+
+def camera_position(fit: SolvedFit) -> list[DataWarning]:
+    """InfluentialPair a camera position that contradicts the tape measure, or is much farther away than expected."""
+    if fit.measurements.prior.measured:
+        return _contradicted_position(fit)
+    prior = fit.measurements.prior
+    away_m = float(np.linalg.norm(_camera_centre(fit.refined.camera_from_radar) - prior.position_m))
+    if away_m <= _FAR_CAMERA * prior.sigma_m:
+        return []
+    return [
+        DataWarning(
+            "camera-far-away",
+            f"the camera comes out {away_m:.1f} m from the radar; about {prior.sigma_m:g} m was expected",
+            "if the sensors are really that far apart, say so (nominal distance); otherwise suspect axes or intrinsics",
+        )
+    ]
+
+
+def _contradicted_position(fit: SolvedFit) -> list[DataWarning]:
+    """Compare the measured camera position with the one the pairs find on their own.
+
+    A position stated with a small sigma wins over the pairs and only makes the residuals large; so it is set free.
+    """
+    prior = fit.measurements.prior
+    if fit.chi2_per_degree < _SUSPICIOUS_NOISE:
+        return []
+    start = GncSolution(fit.refined.camera_from_radar, 0.0, float(fit.refined.noise_scale.max()))
+    alone = fit_errors_in_variables(replace(fit.measurements, prior=prior.weakened()), start, estimate_scale=True)
+    away_m = _camera_centre(alone.camera_from_radar) - prior.position_m
+    centre_jacobian = prior.rows(alone.camera_from_radar)[1] * prior.sigma_m
+    doubt = centre_jacobian @ pose_covariance(alone).covariance @ centre_jacobian.T + prior.sigma_m**2 * np.eye(3)
+    sigmas = float(np.sqrt(away_m @ np.linalg.solve(doubt, away_m)))
+    if sigmas < _CONTRADICTION_SIGMAS:
+        return []
+    return [
+        DataWarning(
+            "camera-position-contradicted",
+            f"on their own the pairs put the camera {100 * np.linalg.norm(away_m):.0f} cm from where it was measured, "
+            f"{sigmas:.1f} standard deviations",
+            "measure again from the radar's antennas to the lens: forward, left, up; or state a larger uncertainty",
+        )
+    ]
+
+
+def _camera_centre(camera_from_radar: RigidTransform) -> np.ndarray:
+    return camera_from_radar.inverse().translation_m

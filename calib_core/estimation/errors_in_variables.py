@@ -1,0 +1,216 @@
+"""The final fit: errors in variables, with a mixture that says which pairs to believe and how large the noise really is.
+
+Pose and true reflector positions mu are estimated together, by expectation-maximisation over
+
+    sum_i w_i [ |z_i - pi(R p(mu_i) + t)|^2_C + |m_i - mu_i|^2_V ] + |c - c0|^2 / sigma_c^2,
+
+the mu_i eliminated exactly (equation (2) of `measurement_model`). Plain PnP takes the noisy m_i for the truth; its bias does not
+shrink with more pairs. w_i is the probability that pair i is no outlier: neither a click anywhere on the image nor a slip,
+which lies near where it should, but several times farther off than noise explains. Each pair is judged by what the others
+predict of it (`leave_one_out_prediction`): judged by a fit and a noise level that it has bent itself, a wrong pair passes.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calib_core.arrays import Indices, Matrix66, Values
+from calib_core.estimation.gnc import GncSolution, associate, log_odds_of, normal_equations
+from calib_core.estimation.leave_one_out_prediction import (
+    COMPONENTS,
+    PSEUDO_SHARED,
+    LeaveOneOutPrediction,
+    NoiseParts,
+    Symmetric,
+    noise_parts,
+    predict_left_out,
+    shrunk_scales,
+)
+from calib_core.estimation.linearization import Linearization, MeasurementPlanes
+from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.geometry import RigidTransform
+
+__all__ = ["ErrorsInVariablesFit", "fit_errors_in_variables"]
+
+_MOST_ROUNDS = 80
+_ROUNDS_BEFORE_SCALES = 3
+_ROUNDS_PER_WEIGHING = 3  # weights settle long before noise scales do
+_TOLERANCES = (1e-8, 1e-6)  # of a step in standard deviations of the pose, and of a relative change of the noise scales
+_COARSE_TOLERANCES = (0.02, 0.02)
+_STEADIEST = 0.95  # ratio of one change of the noise scales to the one before, beyond which none is foretold
+_PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # pseudo-counts of the inlier share
+_SLIP_SHARE = 0.01  # of the pairs that are no outliers anywhere on the image
+_SLIP_FACTOR = 5.0  # how many times noisier a slip is
+_LEAST_PAIRS_FOR_SCALES = 5.0
+_NEAR = 6.0  # standard deviations beyond which a pair says nothing about its own true position
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ErrorsInVariablesFit:
+    """The fit at its optimum.
+
+    Attributes:
+        camera_from_radar: the pose.
+        rows: (n,) the chosen candidate row of each pair.
+        weights: (n,) probability that the pair is an inlier.
+        measurements: the measurements with the estimated noise.
+        model: the linear model at the optimum, whitened by that noise.
+        noise_scale: (4,) estimated over assumed sigma of (click, range, azimuth, elevation).
+        degrees_of_freedom: that went into the noise scales, the assumed sigmas' own included; 0 where not estimated.
+        inlier_share: prior probability of an inlier, estimated.
+    """
+
+    camera_from_radar: RigidTransform
+    rows: Indices
+    weights: Values
+    measurements: PairMeasurements
+    model: Linearization
+    noise_scale: Values
+    degrees_of_freedom: float
+    inlier_share: float
+
+
+@dataclass(slots=True)
+class _State:
+    """Where the rounds stand; lives only inside `fit_errors_in_variables`."""
+
+    pose: RigidTransform
+    polar: np.ndarray | None
+    """(3, n) true positions"""
+    rows: Indices
+    measured: MeasurementPlanes
+    """of those rows, with the noise of the round"""
+    scale: Values
+    share: float
+    weights: Values = field(default_factory=lambda: np.zeros(0))
+    change: Values = field(default_factory=lambda: np.zeros(4))
+    """of the logarithm of the scales in the round before"""
+
+    def rescale(self, scale: Values, *, foretell: bool) -> float:
+        """Take new noise scales; return by how much they differ from the old ones, relatively.
+
+        Their changes shrink by a steady ratio q from round to round, at times slowly. To foretell adds what all later
+        rounds would, q / (1 - q) times the change (Aitken); it saves rounds and moves no fixed point.
+        """
+        change = np.log(scale / self.scale)
+        ratio = float(change @ self.change) / max(float(self.change @ self.change), 1e-300)
+        if foretell and 0.0 < ratio < _STEADIEST:
+            scale = scale * np.exp(change * (ratio / (1.0 - ratio)))
+        self.scale, self.change = scale, change
+        return float(np.abs(change).max())
+
+
+def fit_errors_in_variables(
+    measurements: PairMeasurements, start: GncSolution, *, estimate_scale: bool, coarse: bool = False
+) -> ErrorsInVariablesFit:
+    """Fit pose, true positions, inlier probabilities and, if wanted, the noise level.
+
+    Args:
+        measurements: all pairs with the assumed noise.
+        start: where graduated non-convexity ended.
+        estimate_scale: estimate variance components once there are enough pairs.
+        coarse: stop when pose and noise level are known to a few hundredths of a standard deviation.
+    """
+    tolerances = _COARSE_TOLERANCES if coarse else _TOLERANCES
+    rows = associate(measurements, start.camera_from_radar)[0]
+    scale = np.full(4, start.noise_scale)
+    noisy = measurements.scaled(scale)
+    state = _State(start.camera_from_radar, None, rows, noisy.measured(rows), scale, 0.8)
+    state.weights = _first_weights(noisy, state)
+    degrees = 0.0
+    for round_ in range(_MOST_ROUNDS):
+        noisy = measurements.scaled(state.scale)
+        weigh = round_ <= _ROUNDS_BEFORE_SCALES or round_ % _ROUNDS_PER_WEIGHING == 0
+        model, parts = _expect(noisy, state, weigh=weigh, scaled=degrees > 0.0)
+        step, hessian = _maximise(noisy, state, model)
+        moved = 0.0
+        if estimate_scale and round_ >= _ROUNDS_BEFORE_SCALES and state.weights.sum() >= _LEAST_PAIRS_FOR_SCALES:
+            scale, degrees = _variance_components(state, model, parts, hessian)
+            moved = state.rescale(scale, foretell=round_ % _ROUNDS_PER_WEIGHING == 2)
+        settled = step < tolerances[0] and moved < tolerances[1]
+        if settled and round_ > _ROUNDS_BEFORE_SCALES and (weigh or coarse):
+            break
+    noisy = measurements.scaled(state.scale)
+    model, _ = _expect(noisy, state, weigh=True, scaled=degrees > 0.0)
+    return ErrorsInVariablesFit(state.pose, state.rows, state.weights, noisy, model, state.scale, degrees, state.share)
+
+
+def _first_weights(measurements: PairMeasurements, state: _State) -> Values:
+    """Weigh pairs by their plain residuals, there being no fit yet that could predict."""
+    odds = log_odds_of(measurements, _model(measurements, state), measurements.log_score[state.rows], state.share)
+    return _probability(odds)
+
+
+def _probability(odds: Values) -> Values:
+    return np.asarray(1.0 / (1.0 + np.exp(np.minimum(-odds, 500.0))))
+
+
+def _expect(
+    measurements: PairMeasurements, state: _State, *, weigh: bool, scaled: bool
+) -> tuple[Linearization, NoiseParts]:
+    """Associate candidates and, if so told, weigh pairs at the present pose, each by the others (E-step)."""
+    if not measurements.one_to_one:
+        rows = associate(measurements, state.pose)[0]
+        if state.polar is not None:
+            state.polar = np.where(rows == state.rows, state.polar, measurements.polar[rows].T)
+        state.rows = rows
+    state.measured = measurements.measured(state.rows)
+    model = _model(measurements, state)
+    parts = noise_parts(measurements, model, measurements.sigma_polar[state.rows])
+    if not weigh:
+        return model, parts
+    predicted = predict_left_out(measurements, state.pose, model, state.weights, parts, state.scale if scaled else None)
+    state.weights = _probability(_log_odds(measurements, state, model, predicted))
+    inliers, count = state.weights.sum(), len(state.weights)
+    state.share = float((inliers + _PRIOR_INLIERS) / (count + _PRIOR_INLIERS + _PRIOR_OUTLIERS))
+    return model, parts
+
+
+def _log_odds(
+    measurements: PairMeasurements, state: _State, model: Linearization, predicted: LeaveOneOutPrediction
+) -> Values:
+    """Return log odds (n,) of an inlier against a slip or an outlier anywhere on the image."""
+    area_px2 = measurements.camera.width_px * measurements.camera.height_px
+    prior = np.log(state.share) - np.log1p(-state.share) + measurements.log_score[state.rows]
+    anywhere = -prior + 0.5 * model.log_determinant - np.log(area_px2)
+    slip = np.log(_SLIP_SHARE) - np.log1p(-_SLIP_SHARE) + predicted.log_density(_SLIP_FACTOR)
+    return np.asarray(predicted.log_density() - np.logaddexp(anywhere, slip))
+
+
+def _model(measurements: PairMeasurements, state: _State) -> Linearization:
+    pose = state.pose
+    return state.measured.linearize(measurements.camera, pose.rotation, pose.translation_m, state.polar)
+
+
+def _maximise(measurements: PairMeasurements, state: _State, model: Linearization) -> tuple[float, Matrix66]:
+    """Step pose and true positions (M-step); return the step's length in standard deviations, and the Hessian."""
+    hessian, gradient = normal_equations(measurements, state.pose, model, state.weights)
+    scale = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
+    step = np.linalg.solve(hessian / np.outer(scale, scale) + 1e-12 * np.eye(6), gradient / scale) / scale
+    longest = max(float(np.linalg.norm(step[3:])) / 0.2, float(np.linalg.norm(step[:3])) / 1.0, 1.0)
+    step = step / longest
+    state.pose = state.pose.perturbed(step)
+    # mu = m + V J^T S^-1 (e - J_pose step), from the eliminated equations
+    left = model.planes[0] - (step @ model.planes[1:7].reshape(6, -1)).reshape(2, -1)
+    pull = (model.planes[7:] * left).sum(axis=1)
+    near = left[0] ** 2 + left[1] ** 2 < _NEAR**2
+    polar = state.measured.polar
+    state.polar = np.where(near, polar + state.measured.sigma_polar**2 * pull, polar)
+    return float(np.sqrt(max(step @ hessian @ step, 0.0))), hessian
+
+
+def _variance_components(
+    state: _State, model: Linearization, parts: NoiseParts, hessian: Matrix66
+) -> tuple[Values, float]:
+    """Update the four noise scales from residuals and their redundancy numbers.
+
+    With P = W^T (I - w J_pose H^-1 J_pose^T) W, component k with covariance Q_k of the residual has
+    q_k = e^T S^-1 Q_k S^-1 e and redundancy r_k = tr(P Q_k); its variance changes by q_k / r_k.
+    """
+    weights, jacobian = state.weights, model.planes[1:7]
+    back = (np.linalg.inv(hessian) @ jacobian.reshape(6, -1)).reshape(jacobian.shape)
+    taken = parts.squared_lengths(Symmetric.between(jacobian, back))
+    redundant = ((parts.planes**2).sum(axis=1) - weights * taken) @ weights
+    squares = (parts.along**2 @ weights) @ COMPONENTS
+    redundant = np.maximum(redundant @ COMPONENTS, 0.0)
+    return shrunk_scales(squares * state.scale**2, redundant), float(redundant.sum()) + PSEUDO_SHARED

@@ -1,0 +1,197 @@
+"""Which pairs agree, and on what pose: graduated non-convexity on whitened residuals, candidates associated on the way.
+
+Residuals are whitened by S = C + J V J^T, so one radius in standard deviations serves every radar, range and lens; a
+threshold in pixels cannot. The radius of the Geman-McClure loss shrinks from "nearly least squares" to "nearly a vote".
+All starts take their steps together, as one batch of arrays: for a few dozen pairs, the calls are what costs time.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Indices, Values
+from calib_core.estimation.linearization import Linearization, MeasurementPlanes
+from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.geometry import RigidTransform, rotations_exp
+
+__all__ = ["GncSolution", "associate", "log_odds_of", "mixture_cost", "normal_equations", "solve_gnc"]
+
+RADII = (12.0, 8.0, 5.5, 4.0, 3.0)
+"""Of the Geman-McClure loss, in standard deviations, one after the other."""
+
+_STEPS_PER_RADIUS = 2
+_INLIER_SHARE = 0.8
+_SAME_POSE = 0.25  # squared distance, in standard deviations
+_NOISE_SCALES = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0)
+_SCALE_PENALTY = 4.0  # how much better a larger noise level must explain the pairs than the assumed one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GncSolution:
+    """A pose that a set of pairs agrees on.
+
+    Attributes:
+        camera_from_radar: the pose.
+        cost: twice the negative log-likelihood of pose and pairs under the inlier / outlier mixture.
+        noise_scale: by how much the assumed noise must grow for the residuals to look like noise; at least 1.
+    """
+
+    camera_from_radar: RigidTransform
+    cost: float
+    noise_scale: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Poses:
+    """Poses as arrays: camera_from_radar rotations (..., 3, 3) and translations (..., 3)."""
+
+    rotations: np.ndarray
+    translations_m: np.ndarray
+
+    @classmethod
+    def of(cls, poses: Sequence[RigidTransform]) -> "_Poses":
+        return cls(np.array([one.rotation for one in poses]), np.array([one.translation_m for one in poses]))
+
+    def perturbed(self, steps: np.ndarray) -> "_Poses":
+        return _Poses(rotations_exp(steps[:, 3:]) @ self.rotations, self.translations_m + steps[:, :3])
+
+    def some(self, which: Sequence[int]) -> "_Poses":
+        return _Poses(self.rotations[which], self.translations_m[which])
+
+    def transforms(self) -> list[RigidTransform]:
+        u, _, vt = np.linalg.svd(self.rotations)  # the nearest rotation: steps round a little off
+        return [RigidTransform(r, t) for r, t in zip(u @ vt, self.translations_m, strict=True)]
+
+
+def solve_gnc(
+    measurements: PairMeasurements, starts: Sequence[RigidTransform], *, estimate_scale: bool
+) -> tuple[GncSolution, ...]:
+    """Refine every start by graduated non-convexity; the most likely pose first.
+
+    Args:
+        measurements: the pairs.
+        starts: poses to begin at.
+        estimate_scale: allow a larger noise than assumed.
+    """
+    if not starts:
+        return ()
+    scales = _NOISE_SCALES if estimate_scale else _NOISE_SCALES[:1]
+    poses = _graduated(measurements, _Poses.of(starts))
+    costs = _mixture_costs(measurements, poses, scales)
+    best = costs.argmin(axis=1)
+    found = [
+        GncSolution(pose, float(costs[i, k]), scales[k])
+        for i, (pose, k) in enumerate(zip(poses.transforms(), best.tolist(), strict=True))
+    ]
+    return tuple(sorted(found, key=lambda one: one.cost))
+
+
+def _graduated(measurements: PairMeasurements, poses: _Poses) -> _Poses:
+    """Follow the shrinking radius from all starts at once; of those that end in the same pose only the first stays."""
+    measured = _of_candidates(measurements)
+    for radius in RADII:
+        for _ in range(_STEPS_PER_RADIUS):
+            _, model = _associated(measurements, measured, poses)
+            weights = (1.0 + model.squared / radius**2) ** -2.0
+            hessians, gradients = _normal_equations(measurements, poses, model, weights)
+            poses = poses.perturbed(_damped(hessians, gradients))
+    return poses.some(_distinct(poses, hessians))
+
+
+def _distinct(poses: _Poses, hessians: np.ndarray) -> list[int]:
+    """Return the starts that no earlier one has come to as well."""
+    kept: list[int] = []
+    for i in range(len(hessians)):
+        turned = poses.rotations[kept] @ poses.rotations[i].T
+        sines = 0.5 * (np.swapaxes(turned, 1, 2) - turned)[:, (1, 2, 0), (2, 0, 1)]  # the rotation vector, where small
+        errors = np.concatenate([poses.translations_m[kept] - poses.translations_m[i], sines], axis=1)
+        near = np.trace(turned, axis1=1, axis2=2) > 1.0  # less than a quarter turn apart
+        if not (near & (((errors @ hessians[i]) * errors).sum(axis=1) < _SAME_POSE)).any():
+            kept.append(i)
+    return kept
+
+
+def associate(measurements: PairMeasurements, pose: RigidTransform) -> tuple[Indices, Linearization]:
+    """Choose for each pair the candidate row that explains its pixel best: rows (n,) and the model of those rows.
+
+    The choice maximises log score + log N(e; 0, S).
+    """
+    return _associated(measurements, _of_candidates(measurements), _Poses(pose.rotation, pose.translation_m))
+
+
+def _of_candidates(measurements: PairMeasurements) -> MeasurementPlanes:
+    """Return every candidate row with its pair's click."""
+    each = measurements if measurements.one_to_one else measurements.candidates_apart()
+    return each.measured(np.arange(len(each.polar)))
+
+
+def _associated(
+    measurements: PairMeasurements, candidates: MeasurementPlanes, poses: _Poses
+) -> tuple[Indices, Linearization]:
+    """Associate at each pose: rows (..., n), and their model."""
+    model = candidates.linearize(measurements.camera, poses.rotations, poses.translations_m)
+    count = len(measurements.polar)
+    if measurements.one_to_one:
+        return np.arange(count), model
+    cost = model.squared + model.log_determinant - 2.0 * measurements.log_score
+    first = measurements.first[:-1]
+    cheapest = np.minimum.reduceat(cost, first, axis=-1)[..., measurements.owner] == cost
+    rows = np.minimum.reduceat(np.where(cheapest, np.arange(count), count), first, axis=-1)  # of equals, the first
+    return rows, model.rows(rows)
+
+
+def normal_equations(
+    measurements: PairMeasurements, pose: RigidTransform, model: Linearization, weights: Values
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the Gauss-Newton Hessian (6, 6) and the descent direction's right-hand side (6,), prior included."""
+    return _normal_equations(measurements, _Poses(pose.rotation, pose.translation_m), model, weights)
+
+
+def _normal_equations(
+    measurements: PairMeasurements, poses: _Poses, model: Linearization, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return Hessians (..., 6, 6) and right-hand sides (..., 6): both are in the product of (residual, Jacobian) rows."""
+    rows = model.planes[..., :7, :, :] * np.sqrt(weights)[..., None, None, :]
+    rows = rows.reshape(*rows.shape[:-2], -1)
+    product = rows @ np.swapaxes(rows, -1, -2)
+    prior_hessian, prior_gradient = measurements.prior.information(poses.rotations, poses.translations_m)
+    return product[..., 1:, 1:] + prior_hessian, product[..., 1:, 0] + prior_gradient
+
+
+def _damped(hessians: np.ndarray, gradients: np.ndarray) -> np.ndarray:
+    """Solve for steps (s, 6), held to 0.5 rad and 2 m, with a whiff of damping where the pairs leave a direction open."""
+    scale = np.sqrt(np.maximum(np.diagonal(hessians, axis1=1, axis2=2), 1e-12))
+    scaled = hessians / (scale[:, :, None] * scale[:, None, :]) + 1e-9 * np.eye(6)
+    steps = np.linalg.solve(scaled, (gradients / scale)[:, :, None])[:, :, 0] / scale
+    turns, shifts = np.linalg.norm(steps[:, 3:], axis=1), np.linalg.norm(steps[:, :3], axis=1)
+    return np.asarray(steps / np.maximum(np.maximum(turns / 0.5, shifts / 2.0), 1.0)[:, None])
+
+
+def log_odds_of(measurements: PairMeasurements, model: Linearization, log_score: Values, inlier_share: float) -> Values:
+    """Return log odds (n,) of inlier against outlier: normal noise against a click anywhere on the image."""
+    return np.asarray(_log_odds(measurements, model.squared + model.log_determinant, log_score, inlier_share))
+
+
+def _log_odds(
+    measurements: PairMeasurements, deviance: np.ndarray, log_score: np.ndarray, inlier_share: float
+) -> np.ndarray:
+    """Return the same from the squared distance plus log det S."""
+    area_px2 = measurements.camera.width_px * measurements.camera.height_px
+    prior = np.log(inlier_share) - np.log1p(-inlier_share)
+    return np.asarray(log_score - 0.5 * deviance + (prior - np.log(2.0 * np.pi) + np.log(area_px2)))
+
+
+def mixture_cost(measurements: PairMeasurements, pose: RigidTransform) -> float:
+    """Return twice the negative log-likelihood of the mixture, against "all are outliers", with what is known of the camera."""
+    return float(_mixture_costs(measurements, _Poses.of([pose]), (1.0,))[0, 0])
+
+
+def _mixture_costs(measurements: PairMeasurements, poses: _Poses, scales: Sequence[float]) -> np.ndarray:
+    """Return the costs (s, k) if all noise were larger by each scale: S grows by its square, log det S by 4 log scale."""
+    rows, model = _associated(measurements, _of_candidates(measurements), poses)
+    factors = np.array(scales)[:, None]
+    deviance = model.squared[:, None, :] / factors**2 + model.log_determinant[:, None, :] + 4.0 * np.log(factors)
+    odds = _log_odds(measurements, deviance, measurements.log_score[rows][..., None, :], _INLIER_SHARE)
+    costs = -2.0 * np.logaddexp(0.0, odds).sum(axis=-1) + _SCALE_PENALTY * (factors[:, 0] > 1.0)
+    return np.asarray(costs + measurements.prior.costs(poses.rotations, poses.translations_m)[:, None])

@@ -1,0 +1,119 @@
+"""Pairs that the pose leans on and the others contradict.
+
+A wrong pair that few others check is not far enough from their prediction to be counted out: near the camera and at the
+edge of the picture, the pose follows it. Each pair is tested against the prediction of the others, and of the chance of a
+false alarm each gets a share by its leverage: doubt goes where a mistake would cost.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib_core.arrays import Matrix66, Values
+from calib_core.estimation.covariance import PoseCovariance, pose_covariance
+from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
+from calib_core.estimation.gnc import GncSolution, associate
+from calib_core.estimation.leave_one_out_prediction import noise_parts, predict_left_out, tail_chance
+from calib_core.estimation.measurement_model import PairMeasurements
+
+__all__ = ["InfluentialPair", "average_over_influential_pairs", "find_influential_pairs"]
+
+_LEVEL = 0.055  # of a false alarm in a whole set of pairs
+_LARGEST_SHARE = 0.25  # of that level that goes to one pair
+_SCREENING = 4.0  # how much more lenient the test by one Newton step is
+_MOST_REFITS = 2
+_LEAST_PAIRS = 8.0  # fewer cannot check one another
+_LEAST_MOVE = 2.0  # standard deviations: a pair that moves the pose less does little harm
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InfluentialPair:
+    """One pair, and the fit without it.
+
+    Attributes:
+        pair: its index in the measurements.
+        move: (6,) by how much the pose moves without it, (dt, dtheta) [m, rad].
+        camera_move_m: how far the camera centre moves.
+        standard_deviations: how far the pair lies from what the others predict.
+    """
+
+    pair: int
+    move: Values
+    camera_move_m: float
+    standard_deviations: float
+
+
+def find_influential_pairs(
+    measurements: PairMeasurements, refined: ErrorsInVariablesFit, information: Matrix66
+) -> tuple[InfluentialPair, ...]:
+    """Find the pairs in doubt; those that looked so at first are left out in earnest.
+
+    Args:
+        measurements: all pairs with the assumed noise.
+        refined: their fit.
+        information: (6, 6) of all pairs.
+    """
+    inliers = refined.weights > 0.5
+    if refined.weights.sum() < _LEAST_PAIRS:
+        return ()
+    scale = refined.noise_scale if refined.degrees_of_freedom > 0 else None
+    parts = noise_parts(refined.measurements, refined.model, refined.measurements.sigma_polar[refined.rows])
+    one = predict_left_out(
+        refined.measurements, refined.camera_from_radar, refined.model, refined.weights, parts, scale
+    )
+    levels = _LEVEL * np.where(inliers, _shares(refined, information), 0.0)
+    chances = tail_chance(one.squared(), one.degrees_of_freedom)
+    suspects = np.flatnonzero(chances < _SCREENING * levels)
+    worst = suspects[np.argsort(chances[suspects] / levels[suspects], kind="stable")][:_MOST_REFITS]
+    doubts = [_left_out(measurements, refined, int(pair)) for pair in worst]
+    return tuple(
+        doubt
+        for doubt, chance in doubts
+        if chance < levels[doubt.pair] and doubt.move @ information @ doubt.move > _LEAST_MOVE**2
+    )
+
+
+def _shares(refined: ErrorsInVariablesFit, information: Matrix66) -> Values:
+    """Share out the level by the square of each pair's leverage w tr(J H^-1 J^T), to none too much."""
+    jacobian = refined.model.pose_jacobian
+    leverage = refined.weights * ((jacobian @ np.linalg.inv(information)) * jacobian).sum(axis=(1, 2))
+    return np.minimum(leverage**2 / (leverage**2).sum(), _LARGEST_SHARE)
+
+
+def _left_out(
+    measurements: PairMeasurements, refined: ErrorsInVariablesFit, pair: int
+) -> tuple[InfluentialPair, float]:
+    """Fit all pairs but one and predict that one; with the chance of a residual as large."""
+    others = measurements.some(np.delete(np.arange(len(measurements)), pair))
+    start = GncSolution(refined.camera_from_radar, 0.0, 1.0)
+    fit = fit_errors_in_variables(others, start, estimate_scale=refined.degrees_of_freedom > 0)
+    own = measurements.some(np.array([pair])).scaled(fit.noise_scale)
+    model = associate(own, fit.camera_from_radar)[1]
+    residual, jacobian = model.residual[0], model.pose_jacobian[0]
+    spread = np.eye(2) + jacobian @ pose_covariance(fit).covariance @ jacobian.T
+    squared = float(residual @ np.linalg.solve(spread, residual))
+    before, after = (one.camera_from_radar.inverse().translation_m for one in (refined, fit))
+    doubt = InfluentialPair(
+        pair=pair,
+        move=fit.camera_from_radar.error_from(refined.camera_from_radar),
+        camera_move_m=float(np.linalg.norm(after - before)),
+        standard_deviations=float(np.sqrt(squared)),
+    )
+    degrees = fit.degrees_of_freedom if fit.degrees_of_freedom > 0 else np.inf
+    return doubt, float(tail_chance(np.array([squared]), np.array([degrees]))[0])
+
+
+def average_over_influential_pairs(
+    refined: ErrorsInVariablesFit, uncertainty: PoseCovariance, doubts: Sequence[InfluentialPair]
+) -> tuple[ErrorsInVariablesFit, PoseCovariance]:
+    """Put the pose midway between the one with each doubtful pair and the one without it, and state both as likely.
+
+    Of two values m apart that are equally likely, the middle has the smallest expected squared error, m m^T / 4.
+    """
+    if not doubts:
+        return refined, uncertainty
+    move = np.sum([0.5 * doubt.move for doubt in doubts], axis=0)
+    covariance = uncertainty.covariance + sum(0.25 * np.outer(doubt.move, doubt.move) for doubt in doubts)
+    moved = replace(refined, camera_from_radar=refined.camera_from_radar.perturbed(move))
+    return moved, replace(uncertainty, covariance=covariance)

@@ -1,0 +1,293 @@
+"""How well the other pairs predict each pair: whether to believe it must not be asked of a fit it has bent itself.
+
+A pair with much leverage pulls the pose to itself, and one with a large residual raises the noise level that judges it.
+Both hide it. So pair i is judged by the pose and the noise that the others give, each by one Newton step from the fit of
+all. With H the information, w the weights, J and e whitened as in `measurement_model`,
+
+    P = (H - w_i J_i^T J_i)^-1,    d = P (g - w_i J_i^T e_i),    e_i - J_i d ~ N(0, S_i + J_i P J_i^T),      (4)
+
+g being the gradient of all pairs, and S_i built from the noise scales that the others have at the pose moved by d. No
+matrix is inverted per pair: with C = H^-1, B = C J^T, G = J C J^T and N = (I - w G)^-1, which is 2 x 2, Woodbury's
+identity gives
+
+    P = C + w B N B^T,    J P = N J C,    J P J^T = N G.                                                     (5)
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Values
+from calib_core.estimation.gnc import normal_equations
+from calib_core.estimation.linearization import Linearization
+from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.geometry import RigidTransform
+
+__all__ = [
+    "COMPONENTS",
+    "PSEUDO_SHARED",
+    "LeaveOneOutPrediction",
+    "NoiseParts",
+    "Symmetric",
+    "noise_parts",
+    "predict_left_out",
+    "shrunk_scales",
+    "tail_chance",
+]
+
+PSEUDO_REDUNDANCY = 6.0
+"""Pseudo-degrees of freedom that pull each noise scale to what it leans on."""
+
+PSEUDO_SHARED = 4.0
+"""The same of the level that range, azimuth and elevation share."""
+
+COMPONENTS = np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=np.float64)
+"""Which of (click, range, azimuth, elevation) each of the five columns of noise belongs to."""
+
+_SCALE_LIMITS = (0.1, 12.0)
+_MANY_DEGREES = 1e9  # as good as infinite
+_OWN_SHARE = 0.999  # of its own information that a pair loses; with all of it, four pairs leave nothing to invert
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NoiseParts:
+    """The whitened noise of each pair taken apart: S = sum of its columns' squares.
+
+    Attributes:
+        planes: (5, 2, n) W Q^(1/2) of click u, click v, range, azimuth, elevation; they add up to the identity.
+        along: (5, n) residual along each.
+    """
+
+    planes: np.ndarray
+    along: np.ndarray
+
+    @property
+    def columns(self) -> np.ndarray:
+        """The same pair by pair: (n, 2, 5)."""
+        return np.asarray(self.planes.T)
+
+    def squared_lengths(self, matrix: "Symmetric") -> np.ndarray:
+        """Return c^T M c (5, n) of every column c, for a symmetric M per pair."""
+        u, v = self.planes[:, 0], self.planes[:, 1]
+        return np.asarray(u * u * matrix.uu + 2.0 * (u * v) * matrix.uv + v * v * matrix.vv)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Symmetric:
+    """A symmetric 2 x 2 matrix for each pair, by its entries (n,)."""
+
+    uu: Values
+    uv: Values
+    vv: Values
+
+    @classmethod
+    def between(cls, jacobian: np.ndarray, back: np.ndarray) -> "Symmetric":
+        """Return J C J^T from J (6, 2, n) and C J^T (6, 2, n)."""
+        uu, vv = (jacobian * back).sum(axis=0)
+        return cls(uu, (jacobian[:, 0] * back[:, 1]).sum(axis=0), vv)
+
+    def determinant(self) -> Values:
+        """Return the determinants (n,)."""
+        return np.asarray(self.uu * self.vv - self.uv * self.uv)
+
+    def distance(self, residual: np.ndarray) -> Values:
+        """Return r^T M^-1 r (n,) of residuals (2, n)."""
+        u, v = residual
+        return np.asarray((self.vv * u * u - 2.0 * self.uv * u * v + self.uu * v * v) / self.determinant())
+
+    def of(self, vectors: np.ndarray) -> np.ndarray:
+        """Return M r (2, n)."""
+        u, v = vectors
+        return np.array([self.uu * u + self.uv * v, self.uv * u + self.vv * v])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LeaveOneOutPrediction:
+    """What the other pairs say about each pair, whitened by the noise of all.
+
+    Attributes:
+        residual_planes: (2, n) under the pose of the others.
+        noise: S by the noise of the others.
+        doubt: J P J^T, what the others leave open.
+        degrees_of_freedom: (n,) behind that noise; infinite where it was not estimated.
+    """
+
+    residual_planes: np.ndarray
+    noise: Symmetric
+    doubt: Symmetric
+    degrees_of_freedom: Values
+
+    @property
+    def residual(self) -> np.ndarray:
+        """The same pair by pair: (n, 2)."""
+        return np.asarray(self.residual_planes.T)
+
+    def squared(self, noise_factor: float = 1.0) -> Values:
+        """Return the squared Mahalanobis distance (n,) of the residual, the pair's own noise larger by a factor."""
+        return self._spread(noise_factor).distance(self.residual_planes)
+
+    def log_density(self, noise_factor: float = 1.0) -> Values:
+        """Return the logarithm (n,) of Student's density of the whitened residual, the pair's own noise larger by a factor.
+
+        In two dimensions it is (1 + T^2 / nu)^(-(nu + 2) / 2) / (2 pi sqrt(det)); with nu infinite the normal one.
+        """
+        spread, nu = self._spread(noise_factor), np.minimum(self.degrees_of_freedom, _MANY_DEGREES)
+        tail = (nu + 2.0) / 2.0 * np.log1p(spread.distance(self.residual_planes) / nu)
+        return np.asarray(-tail - 0.5 * np.log(spread.determinant()) - np.log(2.0 * np.pi))
+
+    def _spread(self, noise_factor: float) -> Symmetric:
+        noise, doubt, factor = self.noise, self.doubt, noise_factor**2
+        return Symmetric(factor * noise.uu + doubt.uu, factor * noise.uv + doubt.uv, factor * noise.vv + doubt.vv)
+
+
+def tail_chance(squared: Values, degrees_of_freedom: Values) -> Values:
+    """Return the probability (n,) of a squared distance as large or larger in two dimensions: 2 F(2, nu), or chi-square.
+
+    Args:
+        squared: (n,) Mahalanobis distances.
+        degrees_of_freedom: (n,) nu; infinite where the noise is known.
+    """
+    nu = np.minimum(degrees_of_freedom, _MANY_DEGREES)
+    return np.asarray(np.exp(-0.5 * nu * np.log1p(squared / nu)))
+
+
+def noise_parts(measurements: PairMeasurements, model: Linearization, sigma_polar: np.ndarray) -> NoiseParts:
+    """Take the whitened noise of each pair apart.
+
+    Args:
+        measurements: with the noise that whitened the model.
+        model: at the present pose.
+        sigma_polar: (n, 3) of the chosen candidates.
+    """
+    planes = np.empty((5, *model.planes.shape[1:]))
+    planes[0] = model.whitening_planes[:2] * measurements.sigma_px  # the first column of W, which is triangular
+    planes[1, 0], planes[1, 1] = 0.0, model.whitening_planes[2] * measurements.sigma_px
+    np.multiply(model.planes[7:], sigma_polar.T[:, None, :], out=planes[2:])
+    return NoiseParts(planes, (planes * model.planes[0]).sum(axis=1))
+
+
+def predict_left_out(
+    measurements: PairMeasurements,
+    pose: RigidTransform,
+    model: Linearization,
+    weights: Values,
+    parts: NoiseParts,
+    scale: Values | None,
+) -> LeaveOneOutPrediction:
+    """Predict each pair from the others.
+
+    Args:
+        measurements: with the noise that whitened the model.
+        pose: the present one.
+        model: at that pose.
+        weights: (n,) of all pairs.
+        parts: of the noise.
+        scale: (4,) estimated over assumed noise; None where the noise is as assumed.
+    """
+    hessian, gradient = normal_equations(measurements, pose, model, weights)
+    residual, jacobian = model.planes[0], model.planes[1:7]
+    inverse = np.linalg.inv(hessian + 1e-12 * np.diag(np.diag(hessian)))
+    back = (inverse @ jacobian.reshape(6, -1)).reshape(jacobian.shape)  # B
+    reach = Symmetric.between(jacobian, back)  # G
+    own = _OWN_SHARE * weights
+    freed = _freed(reach, own)  # N
+    # C (g - w J^T e), seen at the pair by J, and what P makes of it
+    aim = (inverse @ gradient)[:, None] - weights * (back * residual).sum(axis=1)
+    seen = freed.of((jacobian * aim[:, None]).sum(axis=0))
+    left = residual - seen
+    doubt = Symmetric(
+        freed.uu * reach.uu + freed.uv * reach.uv,
+        freed.uu * reach.uv + freed.uv * reach.vv,
+        freed.uv * reach.uv + freed.vv * reach.vv,
+    )
+    grown, degrees = np.ones((len(weights), 4)), np.full(len(weights), np.inf)
+    if scale is not None:
+        moves = aim + (back * (own * seen)).sum(axis=1)
+        others = _Others(parts, weights, jacobian, moves, left, doubt, inverse, back, _scaled_by(freed, own))
+        found, degrees = _scales_of_others(others, scale)
+        grown = found / scale
+    return LeaveOneOutPrediction(left, _noise(parts, grown, model), doubt, degrees)
+
+
+def _freed(reach: Symmetric, weights: Values) -> Symmetric:
+    """Return N = (I - w G)^-1."""
+    uu, uv, vv = 1.0 - weights * reach.uu, weights * reach.uv, 1.0 - weights * reach.vv
+    determinant = uu * vv - uv * uv
+    return Symmetric(vv / determinant, uv / determinant, uu / determinant)
+
+
+def _scaled_by(matrix: Symmetric, factors: Values) -> Symmetric:
+    return Symmetric(factors * matrix.uu, factors * matrix.uv, factors * matrix.vv)
+
+
+def _noise(parts: NoiseParts, grown: np.ndarray, model: Linearization) -> Symmetric:
+    """Put the columns together again, each larger by what its scale (n, 4) has grown by."""
+    planes = parts.planes * (COMPONENTS @ grown.T)[:, None, :]
+    uu, vv = (planes**2).sum(axis=0)
+    uv = (planes[:, 0] * planes[:, 1]).sum(axis=0)
+    unseen = model.whitening_planes[0] == 0.0
+    return Symmetric(np.where(unseen, 1.0, uu), uv, np.where(unseen, 1.0, vv))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Others:
+    """What the noise scales without each pair are made of; letters as in equation (5)."""
+
+    parts: NoiseParts
+    weights: Values
+    jacobian: np.ndarray
+    """(6, 2, n)"""
+    moves: np.ndarray
+    """(6, n) d"""
+    left: np.ndarray
+    """(2, n) e - J d"""
+    doubt: Symmetric
+    inverse: np.ndarray
+    """(6, 6) C"""
+    back: np.ndarray
+    """(6, 2, n) B"""
+    freed: Symmetric
+    """w N"""
+
+
+def _scales_of_others(o: _Others, scale: Values) -> tuple[np.ndarray, Values]:
+    """Return the noise scales (n, 4) without each pair, at the pose without it, and their degrees of freedom (n,)."""
+    columns, along, weights = o.parts.planes, o.parts.along, o.weights
+    jacobian = (columns[:, None] * o.jacobian).sum(axis=2)  # of the residual along each column, (5, 6, n)
+    turned = np.swapaxes(jacobian, 1, 2)
+    weighted = jacobian * weights
+    linear = (weighted @ along[:, :, None])[:, :, 0]
+    quadratic, taken = weighted @ turned, (weighted * weights) @ turned  # (5, 6, 6)
+    own = (columns * o.left).sum(axis=1) ** 2
+    bent = (_by_component(quadratic) @ o.moves * o.moves).sum(axis=1)
+    squares = COMPONENTS.T @ ((weights * along**2).sum(axis=1, keepdims=True) - 2.0 * linear @ o.moves - weights * own)
+    squares = np.maximum(squares + bent, 0.0)
+    lengths = weights * (columns**2).sum(axis=1)
+    lost = COMPONENTS.T @ (lengths.sum(axis=1, keepdims=True) - lengths + weights**2 * o.parts.squared_lengths(o.doubt))
+    redundant = np.maximum(lost - _traces(_by_component(taken), o), 0.0).T
+    return shrunk_scales(squares.T * scale**2, redundant), redundant.sum(axis=1) + PSEUDO_SHARED
+
+
+def _by_component(five: np.ndarray) -> np.ndarray:
+    """Add up what belongs to the same of (click, range, azimuth, elevation): (5, ...) to (4, ...)."""
+    return np.concatenate([five[:1] + five[1:2], five[2:]])
+
+
+def _traces(taken: np.ndarray, o: _Others) -> np.ndarray:
+    """Return tr(P T) (4, n) of each T (4, 6, 6): tr(C T) + tr(w N B^T T B)."""
+    through = (taken @ o.back.reshape(6, -1)).reshape(4, *o.back.shape)  # T B
+    straight = (o.back * through).sum(axis=1)  # (4, 2, n)
+    across = (o.back[:, 0] * through[:, :, 1]).sum(axis=1)
+    plain = np.trace(o.inverse @ taken, axis1=1, axis2=2)[:, None]
+    return np.asarray(plain + o.freed.uu * straight[:, 0] + o.freed.vv * straight[:, 1] + 2.0 * o.freed.uv * across)
+
+
+def shrunk_scales(squares: np.ndarray, redundant: np.ndarray) -> np.ndarray:
+    """Turn sums of squares (..., 4), in assumed sigmas, into scales, each leaning on what is known better than itself.
+
+    The click leans on its assumed sigma; range, azimuth and elevation lean on the level they share, and that on 1.
+    """
+    shared = (squares[..., 1:].sum(axis=-1) + PSEUDO_SHARED) / (redundant[..., 1:].sum(axis=-1) + PSEUDO_SHARED)
+    towards = np.stack([np.ones_like(shared), shared, shared, shared], axis=-1)
+    variance = (squares + PSEUDO_REDUNDANCY * towards) / (redundant + PSEUDO_REDUNDANCY)
+    return np.clip(np.sqrt(variance), *_SCALE_LIMITS)

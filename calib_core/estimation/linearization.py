@@ -1,0 +1,191 @@
+"""The linear model of clicks and radar positions about a pose, whitened: what every solver stage shares.
+
+A pair is a pixel z with covariance C = sigma_px^2 I, and a measured polar position m = (range, azimuth, elevation) with
+covariance V = diag(sigma_polar^2). With pi the projection and p(mu) the Cartesian position of polar mu, the model is
+
+    z = pi(R p(mu) + t) + noise(C),    m = mu + noise(V).                                                  (1)
+
+Linearization at a true position mu, with J = d pi / d mu and e = z - pi(R p(mu) + t) - J (m - mu), the unknown positions
+drop out (the Schur complement of the joint problem):
+
+    e ~ N(0, S),    S = C + J V J^T.                                                                       (2)
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Indices, Points2, Points3, Values
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
+from calib_core.radar import position_planes
+
+__all__ = ["Linearization", "MeasurementPlanes", "linearize", "with_respect_to_pose"]
+
+_FAR = 1e6  # whitened residual of a position the camera cannot see
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasurementPlanes:
+    """What was measured of n pairs, as planes: one row per coordinate, along which NumPy is quick.
+
+    Attributes:
+        pixels_px: (2, n) clicks.
+        sigma_px: (n,) or a single number.
+        polar: (3, n) range [m], azimuth, elevation [rad].
+        sigma_polar: (3, n).
+    """
+
+    pixels_px: np.ndarray
+    sigma_px: Values
+    polar: np.ndarray
+    sigma_polar: np.ndarray
+
+    def linearize(
+        self, camera: Camera, rotations: np.ndarray, translations_m: np.ndarray, at_polar: np.ndarray | None = None
+    ) -> "Linearization":
+        """Linearise and whiten the projection about one pose or many.
+
+        Args:
+            camera: the intrinsics.
+            rotations: (..., 3, 3) of camera_from_radar, the leading axes those of any batch.
+            translations_m: (..., 3).
+            at_polar: (3, n) the true positions mu to linearize at; None takes the measured ones.
+        """
+        position_m, turning = position_planes(self.polar if at_polar is None else at_polar)
+        turned_m = rotations @ position_m
+        projected_px, d_point = camera.project_planes(turned_m + translations_m[..., None])
+        d_polar = (rotations @ turning.reshape(3, -1)).reshape(*rotations.shape[:-2], *turning.shape)
+        # residual, d pixel / d (dt, dtheta), d pixel / d polar, one under the other
+        rows = np.empty((*rotations.shape[:-2], 10, *self.pixels_px.shape))
+        np.subtract(self.pixels_px, projected_px, out=rows[..., 0, :, :])
+        rows[..., 1:4, :, :] = d_point
+        _cross(turned_m, d_point, out=rows[..., 4:7, :, :])
+        to_polar = rows[..., 7:, :, :]
+        np.einsum("...irn,...ikn->...krn", d_point, d_polar, out=to_polar)
+        if at_polar is not None:
+            rows[..., 0, :, :] -= (to_polar * (self.polar - at_polar)[:, None, :]).sum(axis=-3)
+        return _whitened(rows, self.sigma_px, self.sigma_polar)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linearization:
+    """Equation (2) at one pose or many, whitened by W with W S W^T = I: plain least squares is then maximum likelihood.
+
+    The properties without "planes" in their name are of a single pose.
+
+    Attributes:
+        planes: (..., 10, 2, n) W e; W d pixel / d (dt, dtheta), 6 of them; W d pixel / d polar, 3.
+        whitening_planes: (..., 3, n) the entries 00, 10 and 11 of W, which is triangular.
+        log_determinant: (..., n) of S.
+    """
+
+    planes: np.ndarray
+    whitening_planes: np.ndarray
+    log_determinant: np.ndarray
+
+    @property
+    def residual(self) -> Points2:
+        """W e: (n, 2)."""
+        return np.asarray(self.planes[0].T)
+
+    @property
+    def pose_jacobian(self) -> np.ndarray:
+        """W d pixel / d (dt, dtheta): (n, 2, 6)."""
+        return np.asarray(self.planes[1:7].T)
+
+    @property
+    def point_jacobian(self) -> np.ndarray:
+        """W d pixel / d polar: (n, 2, 3)."""
+        return np.asarray(self.planes[7:].T)
+
+    @property
+    def whitening(self) -> np.ndarray:
+        """W: (n, 2, 2); zeros where the camera does not see the position."""
+        whitening = np.zeros((self.whitening_planes.shape[-1], 2, 2))
+        whitening[:, 0, 0], whitening[:, 1, 0], whitening[:, 1, 1] = self.whitening_planes
+        return whitening
+
+    @property
+    def squared(self) -> np.ndarray:
+        """Squared Mahalanobis distance of each residual: (..., n)."""
+        return np.asarray(self.planes[..., 0, 0, :] ** 2 + self.planes[..., 0, 1, :] ** 2)
+
+    def rows(self, rows: Indices) -> "Linearization":
+        """Take rows (..., n) of the last axis, for each pose its own."""
+        return Linearization(
+            np.take_along_axis(self.planes, rows[..., None, None, :], axis=-1),
+            np.take_along_axis(self.whitening_planes, rows[..., None, :], axis=-1),
+            np.take_along_axis(self.log_determinant, rows, axis=-1),
+        )
+
+
+def linearize(
+    camera_from_radar: RigidTransform,
+    camera: Camera,
+    *,
+    pixels_px: Points2,
+    sigma_px: Values,
+    polar: Points3,
+    sigma_polar: Points3,
+    at_polar: Points3 | None = None,
+) -> Linearization:
+    """Linearise and whiten the projection of measured positions about a pose.
+
+    Args:
+        camera_from_radar: the pose.
+        camera: the intrinsics.
+        pixels_px: (n, 2) clicks.
+        sigma_px: (n,).
+        polar: (n, 3) measured range [m], azimuth, elevation [rad].
+        sigma_polar: (n, 3).
+        at_polar: (n, 3) the true positions mu to linearize at; None takes the measured ones.
+    """
+    measured = MeasurementPlanes(pixels_px.T, sigma_px, polar.T, sigma_polar.T)
+    at = None if at_polar is None else at_polar.T
+    return measured.linearize(camera, camera_from_radar.rotation, camera_from_radar.translation_m, at)
+
+
+def _cross(turned_m: np.ndarray, d_point: np.ndarray, out: np.ndarray) -> None:
+    """Write d pixel / d theta (..., 3, 2, n): with R = Exp(dtheta) R_hat, a row j of d pixel / d point gives R p x j."""
+    x, y, z = (turned_m[..., axis, None, :] for axis in range(3))
+    a, b, c = (d_point[..., axis, :, :] for axis in range(3))
+    out[..., 0, :, :] = y * c - z * b
+    out[..., 1, :, :] = z * a - x * c
+    out[..., 2, :, :] = x * b - y * a
+
+
+def with_respect_to_pose(d_point: np.ndarray, turned_m: Points3) -> np.ndarray:
+    """Turn d pixel / d camera point (n, 2, 3) into d pixel / d (dt, dtheta) (n, 2, 6).
+
+    Args:
+        d_point: (n, 2, 3) [px/m].
+        turned_m: (n, 3) R p, the points in camera axes before the translation.
+    """
+    planes = np.empty((6, 2, len(turned_m)))
+    planes[:3] = d_point.T
+    _cross(turned_m.T, planes[:3], out=planes[3:])
+    return np.asarray(planes.T)
+
+
+def _whitened(rows: np.ndarray, sigma_px: Values, sigma_polar: np.ndarray) -> Linearization:
+    """Multiply rows (..., 10, 2, n) by W, W S W^T = I for S = C + J V J^T, from the Cholesky factor of the 2 x 2."""
+    noisy = rows[..., 7:, :, :] * sigma_polar[:, None, :]
+    u, v = noisy[..., 0, :], noisy[..., 1, :]
+    click = sigma_px**2
+    a = np.sqrt((u * u).sum(axis=-2) + click)
+    b = (u * v).sum(axis=-2) / a
+    c = np.sqrt((v * v).sum(axis=-2) + click - b * b)
+    whitening = np.stack([1.0 / a, -b / (a * c), 1.0 / c], axis=-2)
+    whiten_u, whiten_uv, whiten_v = (whitening[..., None, entry, :] for entry in range(3))
+    log_determinant = 2.0 * np.log(a * c)
+    planes = np.empty_like(rows)
+    np.multiply(rows[..., 0, :], whiten_u, out=planes[..., 0, :])
+    planes[..., 1, :] = rows[..., 1, :] * whiten_v + rows[..., 0, :] * whiten_uv
+    unseen = ~np.isfinite(planes[..., 0, :, :]).all(axis=-2)
+    if unseen.any():
+        np.copyto(planes, 0.0, where=unseen[..., None, None, :])
+        np.copyto(planes[..., 0, :, :], _FAR, where=unseen[..., None, :])
+        np.copyto(whitening, 0.0, where=unseen[..., None, :])
+        np.copyto(log_determinant, 0.0, where=unseen)
+    return Linearization(planes, whitening, log_determinant)

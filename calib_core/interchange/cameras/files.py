@@ -1,0 +1,115 @@
+"""Read a camera from whatever file people have, and write ROS's camera_info YAML."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.interchange.cameras.fields import FoundCamera, find_cameras
+from calib_core.interchange.syntax.opencv_xml import load_opencv_xml
+from calib_core.interchange.syntax.strict_json import json_object
+from calib_core.interchange.syntax.yaml_text import load_yaml, numbers_text, quoted
+
+__all__ = ["camera_info_text", "read_camera", "read_camera_file"]
+
+_MAX_BYTES = 512 * 1024 * 1024
+_LOOKED_FOR = (
+    "looked for camera_matrix and image_width (ROS, OpenCV), cam0 with intrinsics (Kalibr), K and D (CameraInfo), "
+    "model and matrix_px (cocalib)"
+)
+
+
+def read_camera(
+    text: str, source: str = "camera", *, name: str | None = None, image_size_px: tuple[int, int] | None = None
+) -> Camera:
+    """Read a camera from ROS camera_info YAML, OpenCV FileStorage YAML or XML, Kalibr camchain, or JSON of ours.
+
+    Args:
+        text: the file's content.
+        source: what to call the file in an error.
+        name: which one, where the file holds several ("cam1", "M2"); None where it holds one.
+        image_size_px: width and height, used where the file does not tell them.
+
+    Raises:
+        InputError: what was looked for, what was found, what to do.
+    """
+    content = _load(text, source=source)
+    cameras = find_cameras(content, source=source) if isinstance(content, dict) else ()
+    if not cameras:
+        found = ", ".join(map(str, list(content)[:12])) if isinstance(content, dict) else type(content).__name__
+        raise InputError(f"{source}: no camera in it: {_LOOKED_FOR}; found {found or 'nothing'}")
+    return _chosen(cameras, name, source=source).camera(image_size_px=image_size_px, source=source)
+
+
+def read_camera_file(path: str | Path, *, image_size_px: tuple[int, int] | None = None) -> Camera:
+    """Read a camera from a file; "file.yml#cam1" says which one where it holds several.
+
+    Raises:
+        InputError: the file cannot be read, or holds no camera.
+    """
+    file, name = Path(path), None
+    if not file.exists() and "#" in str(path):
+        head, _, name = str(path).rpartition("#")
+        file = Path(head)
+    try:
+        if file.stat().st_size > _MAX_BYTES:
+            raise InputError(f"{file}: too large for a camera file; is it the right one?")
+        text = file.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: not a text file; {_LOOKED_FOR}") from None
+    return read_camera(text, str(file), name=name, image_size_px=image_size_px)
+
+
+def camera_info_text(camera: Camera, name: str = "camera") -> str:
+    """Write ROS's camera_info YAML (camera_calibration): what image pipelines and `--camera` read."""
+    distortion = camera.distortion.tolist() or [0.0] * 5
+    if camera.model == "plumb_bob":
+        distortion = [*distortion, 0.0][:5]
+    model = "plumb_bob" if camera.model == "pinhole" else camera.model
+    projection = np.hstack([camera.matrix_px, np.zeros((3, 1))])
+    return "\n".join(
+        [
+            f"image_width: {camera.width_px}",
+            f"image_height: {camera.height_px}",
+            f"camera_name: {quoted(name)}",
+            *_ros_matrix("camera_matrix", camera.matrix_px),
+            f"distortion_model: {model}",
+            *_ros_matrix("distortion_coefficients", np.array([distortion])),
+            *_ros_matrix("rectification_matrix", np.eye(3)),
+            *_ros_matrix("projection_matrix", projection),
+            "",
+        ]
+    )
+
+
+def _ros_matrix(key: str, matrix: np.ndarray) -> list[str]:
+    rows, columns = matrix.shape
+    return [f"{key}:", f"  rows: {rows}", f"  cols: {columns}", f"  data: [{numbers_text(matrix.ravel())}]"]
+
+
+def _load(text: str, *, source: str) -> Any:
+    start = text.lstrip("\ufeff \t\r\n")[:1]
+    if not start:
+        raise InputError(f"{source}: empty; {_LOOKED_FOR}")
+    if start == "{":
+        return json_object(text, source=source)
+    if start == "<":
+        return load_opencv_xml(text, source=source)
+    return load_yaml(text, source=source)
+
+
+def _chosen(cameras: tuple[FoundCamera, ...], name: str | None, *, source: str) -> FoundCamera:
+    names = [camera.name for camera in cameras]
+    if name is not None:
+        if name not in names:
+            raise InputError(f"{source}: no camera {name!r} in it; it holds {', '.join(names)}")
+        return cameras[names.index(name)]
+    if len(cameras) > 1:
+        raise InputError(
+            f"{source}: holds {len(cameras)} cameras; say which: {', '.join(f'{source}#{n}' for n in names)}"
+        )
+    return cameras[0]

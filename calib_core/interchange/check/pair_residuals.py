@@ -1,0 +1,103 @@
+"""Pairs as evidence for or against a calibration: seen through it, radar positions must come out near their pixels."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calib_core.arrays import Points2, Points3, frozen_array
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
+from calib_core.interchange.check.comparison import shown
+from calib_core.interchange.check.explanation import CheckResult, explain, explained
+from calib_core.interchange.imported import WrittenPose
+from calib_core.interchange.own.calibration_json import read_calibration
+from calib_core.interchange.own.documents import CALIBRATION_SCHEMA
+from calib_core.interchange.own.pairs_json import read_pairs
+from calib_core.interchange.syntax.strict_json import json_object
+from calib_core.measurements import MIN_PAIRS
+
+__all__ = ["CheckPairs", "by_pairs", "read_check_pairs", "read_check_pairs_file"]
+
+_NEAR = 0.03
+_CLEARLY_BETTER = 0.2
+_MAX_BYTES = 64 * 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckPairs:
+    """Radar positions and the pixels where they were seen.
+
+    Attributes:
+        points_radar_m: (n, 3), n at least 4.
+        pixels_px: (n, 2).
+        camera: the camera the pixels are of.
+    """
+
+    points_radar_m: Points3
+    pixels_px: Points2
+    camera: Camera
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points_radar_m", frozen_array(self.points_radar_m, (None, 3)))
+        object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (None, 2)))
+
+    def median_miss_px(self, camera_from_radar: RigidTransform) -> float:
+        """Return the median distance between where the points come out and their pixels; infinite behind the camera."""
+        apart = np.linalg.norm(self.camera.project(camera_from_radar @ self.points_radar_m) - self.pixels_px, axis=1)
+        return float(np.median(np.where(np.isfinite(apart), apart, np.inf)))
+
+
+def read_check_pairs_file(path: Path) -> CheckPairs:
+    """Read pairs-1, or the inliers of a calibration-1 file.
+
+    Raises:
+        InputError: the file cannot be read, is neither, or holds fewer than four pairs.
+    """
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise InputError(f"{path}: too large for a file of pairs; is it the right one?")
+        return read_check_pairs(path.read_text(encoding="utf-8-sig"), str(path))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the path") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text file; give pairs-1 or calibration-1 JSON") from None
+
+
+def read_check_pairs(text: str, source: str = "pairs") -> CheckPairs:
+    """Read pairs-1, or the inliers of a calibration-1 text.
+
+    Raises:
+        InputError: it is neither, or holds fewer than four pairs.
+    """
+    if json_object(text, source=source).get("schema") == CALIBRATION_SCHEMA:
+        calibration = read_calibration(text, source).calibration
+        camera = calibration.camera
+        inliers = [pair for pair in calibration.pairs if pair.inlier]
+        points, pixels = [pair.point_radar_m for pair in inliers], [pair.pixel_px for pair in inliers]
+    else:
+        file = read_pairs(text, source)
+        camera = file.camera
+        points = [pair.candidates[0].position_radar_m for pair in file.pairs]
+        pixels = [pair.pixel_px for pair in file.pairs]
+    if len(points) < MIN_PAIRS:
+        raise InputError(f"{source}: holds {len(points)} pairs; at least {MIN_PAIRS} are needed to judge a pose by")
+    return CheckPairs(np.array(points), np.array(pixels), camera)
+
+
+def by_pairs(pose: WrittenPose, evidence: CheckPairs) -> CheckResult:
+    """Hold a pose against pairs: near them, far from them because of a slip, or far from them."""
+    near_px = _NEAR * float(np.hypot(evidence.camera.width_px, evidence.camera.height_px))
+    missed_px = evidence.median_miss_px(pose.camera_from_radar())
+    count = len(evidence.points_radar_m)
+    where = f"{shown(missed_px)} px away or more" if np.isfinite(missed_px) else "behind the camera"
+    before = f"half of the {count} pairs come out {where}"
+    if missed_px <= near_px:
+        return CheckResult("good", "pairs-fit", f"half of the {count} pairs come out within {shown(missed_px)} px")
+    suspected = explain(pose, evidence.median_miss_px, min(near_px, _CLEARLY_BETTER * missed_px))
+    if suspected is not None:
+        return explained(suspected, before)
+    return CheckResult(
+        "error", "pairs-missed", f"{before}, and no slip explains it", "the sensors moved, or the pose is wrong"
+    )

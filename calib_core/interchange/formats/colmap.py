@@ -1,0 +1,106 @@
+"""A COLMAP text model of one image, whose world frame is the radar's."""
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.geometry import quaternion_wxyz_from_matrix
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
+from calib_core.interchange.imported import ImportedCalibration, WrittenPose
+from calib_core.interchange.own.camera_document import refuse_skew
+from calib_core.interchange.syntax.yaml_text import numbers_text
+from calib_core.interchange.syntax.zip_archives import pack, unpack
+
+__all__ = ["COLMAP_NOTES", "read_colmap", "write_colmap"]
+
+COLMAP_NOTES = (
+    "unpack it into a folder: cameras.txt, images.txt and points3D.txt; the world frame is the radar's; "
+    "COLMAP puts the centre of the top-left pixel at (0.5, 0.5), so the principal point is half a pixel larger",
+)
+_HALF_PIXEL = 0.5
+_MODELS = {"PINHOLE": "pinhole", "OPENCV": "plumb_bob", "OPENCV_FISHEYE": "equidistant"}
+
+
+def write_colmap(file: CalibrationFile) -> bytes:
+    """Write the three text files of a COLMAP model, zipped.
+
+    Raises:
+        InputError: COLMAP has no model for this camera.
+    """
+    calibration = file.calibration
+    name, parameters = _colmap_camera(calibration.camera)
+    pose = calibration.camera_from_radar
+    numbers = (*quaternion_wxyz_from_matrix(pose.rotation), *pose.translation_m)
+    said = hash_comment(statement(file, "QW QX QY QZ TX TY TZ carry radar points into the camera"))
+    size = f"{calibration.camera.width_px} {calibration.camera.height_px}"
+    image = "".join("_" if character.isspace() else character for character in file.frames.camera)
+    texts = {
+        "cameras.txt": f"{said}# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n1 {name} {size} {numbers_text(parameters, ' ')}\n",
+        "images.txt": f"{said}# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n1 {numbers_text(numbers, ' ')} 1 {image}\n\n",
+        "points3D.txt": said,
+    }
+    return pack({name: text.encode() for name, text in texts.items()})
+
+
+def _colmap_camera(camera: Camera) -> tuple[str, list[float]]:
+    k, d = camera.matrix_px, camera.distortion.tolist()
+    refuse_skew(camera, "COLMAP's models have")
+    pinhole = [k[0, 0], k[1, 1], k[0, 2] + _HALF_PIXEL, k[1, 2] + _HALF_PIXEL]
+    if camera.model == "pinhole":
+        return "PINHOLE", pinhole
+    if camera.model == "equidistant":
+        return "OPENCV_FISHEYE", pinhole + d
+    if camera.model == "plumb_bob" and not any(d[4:]):
+        return "OPENCV", pinhole + d[:4]
+    return "FULL_OPENCV", pinhole + (d + [0.0] * 8)[:8]
+
+
+def read_colmap(data: bytes, source: str) -> ImportedCalibration:
+    """Read the image of a zipped COLMAP text model and its camera.
+
+    Raises:
+        InputError: a file or a number is missing, or there are several images.
+    """
+    members = {name.rsplit("/", 1)[-1]: content for name, content in unpack(data, source=source).items()}
+    if not {"cameras.txt", "images.txt"} <= set(members):
+        raise InputError(f"{source}: no cameras.txt and images.txt in it; give a zipped COLMAP text model")
+    text = members["images.txt"].decode("utf-8", errors="replace")
+    rows = [line for line in text.splitlines() if not line.startswith("#")]  # two per image, the second may be empty
+    count = sum(1 for line in rows[::2] if line.strip())
+    if count > 1:
+        raise InputError(f"{source}: images.txt: holds {count} images; keep the one that is meant")
+    image, camera = _first_line(text), _first_line(members["cameras.txt"].decode("utf-8", errors="replace"))
+    numbers = floats(image[1:8], source=source, place="images.txt", length=7)
+    return ImportedCalibration(
+        "colmap",
+        WrittenPose("quaternion_wxyz", np.array(numbers[:4]), np.array(numbers[4:]), "camera_from_radar"),
+        camera=_camera(camera, source=source),
+        frames=stated_frames(text),
+        check_point=stated_check_point(text),
+    ).checked(source)
+
+
+def _first_line(text: str) -> list[str]:
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    return lines[0].split() if lines else []
+
+
+def _camera(words: list[str], *, source: str) -> Camera:
+    name = words[1] if len(words) > 1 else ""
+    if name not in (*_MODELS, "FULL_OPENCV"):
+        raise InputError(f"{source}: cameras.txt: the model {name!r} is not supported; known: {', '.join(_MODELS)}")
+    width, height, *parameters = floats(words[2:], source=source, place="cameras.txt")
+    if len(parameters) < 4:
+        raise InputError(f"{source}: cameras.txt: expected at least 4 parameters, found {len(parameters)}; correct it")
+    fx, fy, cx, cy = parameters[:4]
+    matrix = np.array([[fx, 0.0, cx - _HALF_PIXEL], [0.0, fy, cy - _HALF_PIXEL], [0.0, 0.0, 1.0]])
+    distortion = parameters[4:]
+    model = _MODELS.get(name, "rational_polynomial" if any(distortion[5:]) else "plumb_bob")
+    if model == "plumb_bob":
+        distortion = distortion[:5]
+    try:
+        return Camera(model, int(width), int(height), matrix, np.array(distortion))  # type: ignore[arg-type]
+    except ValueError as error:
+        raise InputError(f"{source}: cameras.txt: {error}; correct it") from None

@@ -1,0 +1,95 @@
+"""NVIDIA DriveWorks rig JSON: each sensor's pose in the rig, angles in degrees, every sensor with body axes."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.imported import ImportedCalibration, WrittenPose
+from calib_core.interchange.rotations import LINK_FROM_OPTICAL, rpy_from_matrix
+from calib_core.interchange.syntax.json_text import json_text
+
+__all__ = ["DRIVEWORKS_NOTES", "is_rig", "read_driveworks", "write_driveworks", "write_driveworks_in_rig"]
+
+DRIVEWORKS_NOTES = (
+    "nominalSensor2Rig_FLU is the sensor's pose in the rig: metres, roll-pitch-yaw in degrees about fixed axes, the camera with "
+    "body axes (x forward, y left, z up); the radar is the rig's origin (parent_from_radar places it elsewhere)",
+    "carries the pose only: copy the two poses into your rig, whose other fields are yours; JSON has no comments, so the check "
+    "point is only in calibration.json",
+)
+_POSE = "nominalSensor2Rig_FLU"
+_CORRECTIONS = ("correction_rig_T", "correction_sensor_R_FLU")
+
+
+def write_driveworks(file: CalibrationFile) -> str:
+    """Write rig.json with the radar at the rig's origin."""
+    return write_driveworks_in_rig(file, RigidTransform.identity())
+
+
+def write_driveworks_in_rig(file: CalibrationFile, rig_from_radar: RigidTransform) -> str:
+    """Write rig.json: a radar and a camera, each posed in the rig."""
+    rig_from_link = rig_from_radar @ file.calibration.camera_from_radar.inverse() @ LINK_FROM_OPTICAL.inverse()
+    sensors = [
+        _sensor(file.frames.radar, "radar.virtual", rig_from_radar),
+        _sensor(file.frames.camera_link, "camera.virtual", rig_from_link),
+    ]
+    return json_text({"rig": {"sensors": sensors}, "version": 7})
+
+
+def _sensor(name: str, protocol: str, rig_from_sensor: RigidTransform) -> dict[str, Any]:
+    angles_deg = np.rad2deg(rpy_from_matrix(rig_from_sensor.rotation))
+    pose = {"roll-pitch-yaw": (angles_deg + 0.0).tolist(), "t": (rig_from_sensor.translation_m + 0.0).tolist()}
+    return {"name": name, "protocol": protocol, "parameter": "", "properties": {}, _POSE: pose}
+
+
+def is_rig(content: Any) -> bool:
+    """Tell whether JSON is a rig of sensors."""
+    return isinstance(content, Mapping) and isinstance(content.get("rig"), Mapping) and "sensors" in content["rig"]
+
+
+def read_driveworks(content: Mapping[str, Any], source: str) -> ImportedCalibration:
+    """Read a rig that holds one radar and one camera, by their protocols.
+
+    Raises:
+        InputError: it holds others, a number is missing, or a pose has corrections beside it.
+    """
+    listed = content["rig"]["sensors"]
+    sensors = [sensor for sensor in listed if isinstance(sensor, Mapping)] if isinstance(listed, list) else []
+    radars, cameras = (
+        [sensor for sensor in sensors if str(sensor.get("protocol", "")).startswith(kind)]
+        for kind in ("radar", "camera")
+    )
+    if len(radars) != 1 or len(cameras) != 1:
+        raise InputError(
+            f"{source}: rig.sensors: {len(radars)} radars and {len(cameras)} cameras by protocol; keep one of each"
+        )
+    rig_from_radar, rig_from_link = (_posed(sensor, source=source) for sensor in (radars[0], cameras[0]))
+    pose, notes = rig_from_link, ["the format takes the camera's axes for body axes (x forward, y left, z up)"]
+    if np.abs(rig_from_radar.as_written().as_matrix() - np.eye(4)).max() > 0:
+        radar_from_link = rig_from_radar.as_written().inverse() @ rig_from_link.as_written()
+        pose = WrittenPose(
+            "matrix", radar_from_link.rotation, radar_from_link.translation_m, "radar_from_camera", "link"
+        )
+    return ImportedCalibration("driveworks", pose, notes=tuple(notes)).checked(source)
+
+
+def _posed(sensor: Mapping[str, Any], *, source: str) -> WrittenPose:
+    place = f"rig.sensors {sensor.get('name')!r}"
+    for key in _CORRECTIONS:
+        if key in sensor and any(_numbers(sensor[key])):
+            raise InputError(f"{source}: {place}: {key} is not zero; put the correction into {_POSE} first")
+    pose = sensor.get(_POSE)
+    if not isinstance(pose, Mapping):
+        raise InputError(f"{source}: {place}: no {_POSE}; give its pose in the rig")
+    angles_deg = floats(pose.get("roll-pitch-yaw"), source=source, place=f"{place}.roll-pitch-yaw", length=3)
+    position_m = floats(pose.get("t"), source=source, place=f"{place}.t", length=3)
+    return WrittenPose("rpy", np.deg2rad(angles_deg), np.array(position_m), "radar_from_camera", "link")
+
+
+def _numbers(value: Any) -> list[Any]:
+    inner = value.get("roll-pitch-yaw") if isinstance(value, Mapping) else value
+    return list(inner) if isinstance(inner, list) else [inner]

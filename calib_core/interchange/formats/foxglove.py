@@ -1,0 +1,89 @@
+"""Foxglove's FrameTransform and CameraCalibration messages as JSON."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.cameras.fields import find_cameras, floats
+from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
+from calib_core.interchange.own.camera_document import refuse_skew
+from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
+from calib_core.interchange.syntax.json_text import json_text
+
+__all__ = ["FOXGLOVE_NOTES", "read_foxglove", "write_foxglove"]
+
+FOXGLOVE_NOTES = (
+    "FrameTransform is the pose of the child (camera, optical) in the parent (radar), rotation named x y z w; "
+    "a message holds no comment, so the check point is only in calibration.json",
+)
+_LENSES = {"pinhole": "plumb_bob", "equidistant": "kannala_brandt"}
+
+
+def write_foxglove(file: CalibrationFile) -> str:
+    """Write one object with both messages, to publish as they are.
+
+    Raises:
+        InputError: the camera has skew, for which CameraCalibration has no place.
+    """
+    refuse_skew(file.calibration.camera, "Foxglove's CameraCalibration has")
+    radar_from_camera = file.calibration.camera_from_radar.inverse()
+    quaternion = quaternion_xyzw_from_matrix(radar_from_camera.rotation) + 0.0
+    transform = {
+        "timestamp": {"sec": 0, "nsec": 0},
+        "parent_frame_id": file.frames.radar,
+        "child_frame_id": file.frames.camera,
+        "translation": dict(zip("xyz", (radar_from_camera.translation_m + 0.0).tolist(), strict=True)),
+        "rotation": dict(zip("xyzw", quaternion.tolist(), strict=True)),
+    }
+    camera = _camera_message(file.calibration.camera, file.frames.camera)
+    return json_text({"FrameTransform": transform, "CameraCalibration": camera})
+
+
+def _camera_message(camera: Camera, frame: str) -> dict[str, Any]:
+    distortion = camera.distortion.tolist() or [0.0] * 5
+    if camera.model == "plumb_bob":
+        distortion = [*distortion, 0.0][:5]
+    return {
+        "timestamp": {"sec": 0, "nsec": 0},
+        "frame_id": frame,
+        "width": camera.width_px,
+        "height": camera.height_px,
+        "distortion_model": _LENSES.get(camera.model, camera.model),
+        "D": distortion,
+        "K": camera.matrix_px.ravel().tolist(),
+        "R": np.eye(3).ravel().tolist(),
+        "P": np.hstack([camera.matrix_px, np.zeros((3, 1))]).ravel().tolist(),
+    }
+
+
+def read_foxglove(content: Mapping[str, Any], source: str) -> ImportedCalibration:
+    """Read a FrameTransform, alone or beside a CameraCalibration.
+
+    Raises:
+        InputError: a frame's name or a number is missing.
+    """
+    message = content.get("FrameTransform", content)
+    parent, child = (str(message.get(key) or "") for key in ("parent_frame_id", "child_frame_id"))
+    if not parent or not child:
+        raise InputError(f"{source}: parent_frame_id or child_frame_id is missing; name both frames")
+    numbers = []
+    for part, keys in (("translation", "xyz"), ("rotation", "xyzw")):
+        block = message.get(part)
+        if not isinstance(block, Mapping):
+            raise InputError(f"{source}: FrameTransform.{part}: missing; add it")
+        numbers.append(
+            [floats(block.get(k), source=source, place=f"FrameTransform.{part}.{k}", length=1)[0] for k in keys]
+        )
+    roles = posed_between(parent, child, None)
+    cameras = find_cameras(content, source=source) if "CameraCalibration" in content else ()
+    return ImportedCalibration(
+        "foxglove",
+        WrittenPose("quaternion_xyzw", np.array(numbers[1]), np.array(numbers[0]), roles.direction, roles.axes),
+        camera=cameras[0].camera(image_size_px=None, source=source) if cameras else None,
+        frames=roles.frames,
+        notes=roles.notes,
+    ).checked(source)

@@ -1,0 +1,89 @@
+"""OpenCV's FileStorage YAML with camera, R and T; its keys say what comments would."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from calib_core.errors import InputError
+from calib_core.geometry import rotation_log
+from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
+from calib_core.interchange.cameras.fields import find_cameras, floats
+from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
+from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
+from calib_core.interchange.own.camera_document import refuse_skew
+from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
+
+__all__ = ["read_opencv", "write_opencv"]
+
+
+def write_opencv(file: CalibrationFile) -> str:
+    """Write a file that cv::FileStorage of OpenCV 3, 4 and 5 reads.
+
+    Raises:
+        InputError: the camera has skew, which OpenCV's projectPoints leaves out without a word.
+    """
+    calibration = file.calibration
+    camera, pose = calibration.camera, calibration.camera_from_radar
+    refuse_skew(camera, "OpenCV's camera models have")
+    distortion = camera.distortion if len(camera.distortion) else np.zeros(5)
+    model = "plumb_bob" if camera.model == "pinhole" else camera.model
+    meaning = "R and T carry radar points into the camera (as projectPoints and stereoCalibrate use them); rvec is R's"
+    check = file.check_point
+    matrices = [
+        ("camera_matrix", camera.matrix_px),
+        ("distortion_coefficients", distortion[None, :]),
+        ("R", pose.rotation),
+        ("T", pose.translation_m[:, None]),
+        ("rvec", rotation_log(pose.rotation)[:, None]),
+    ]
+    if check is not None:
+        matrices += [("check_point_radar_m", check.radar_m[:, None]), ("check_point_pixel_px", check.pixel_px[:, None])]
+    return (
+        "%YAML:1.0\n---\n"
+        + hash_comment(statement(file, meaning))
+        + f"equation: {quoted(EQUATION)}\n"
+        + f"radar_frame: {quoted(file.frames.radar)}\ncamera_frame: {quoted(file.frames.camera)}\n"
+        + f"image_width: {camera.width_px}\nimage_height: {camera.height_px}\n"
+        + f"distortion_model: {quoted(model)}\n"
+        + "".join(_matrix(key, matrix) for key, matrix in matrices)
+    )
+
+
+def _matrix(key: str, matrix: np.ndarray) -> str:
+    rows, columns = matrix.shape
+    data = numbers_text(matrix.ravel())
+    return f"{key}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {data} ]\n"
+
+
+def read_opencv(content: Mapping[str, Any], text: str, source: str) -> ImportedCalibration:
+    """Read R and T, and the camera where there is one.
+
+    Raises:
+        InputError: a number is missing.
+    """
+    rotation = floats(content["R"], source=source, place="R", length=9)
+    translation_m = floats(content["T"], source=source, place="T", length=3)
+    cameras = find_cameras(content, source=source)
+    has_size = len(cameras) == 1 and cameras[0].size_px is not None
+    frames = stated_frames(text)
+    if content.get("radar_frame") and content.get("camera_frame"):
+        frames = FrameNames(str(content["radar_frame"]), str(content["camera_frame"]))
+    notes = () if frames else ("the file does not name its frames; took R and T as p_camera = R p_radar + T",)
+    return ImportedCalibration(
+        "opencv",
+        WrittenPose("matrix", np.reshape(rotation, (3, 3)), np.array(translation_m), "camera_from_radar"),
+        camera=cameras[0].camera(image_size_px=None, source=source) if has_size else None,
+        frames=frames,
+        check_point=_check_point(content, source) or stated_check_point(text),
+        notes=notes,
+    ).checked(source)
+
+
+def _check_point(content: Mapping[str, Any], source: str) -> StatedCheckPoint | None:
+    try:
+        radar_m = floats(content["check_point_radar_m"], source=source, place="check_point_radar_m", length=3)
+        pixel_px = floats(content["check_point_pixel_px"], source=source, place="check_point_pixel_px", length=2)
+    except (KeyError, InputError):
+        return None
+    return StatedCheckPoint(np.array(radar_m), pixel_px=np.array(pixel_px))

@@ -1,0 +1,127 @@
+"""URDF: the camera's body frame in the radar frame, and the optical frame on it."""
+
+from xml.etree.ElementTree import Element
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
+from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.formats.statement import stated_check_point, stated_frames, statement, xml_comment
+from calib_core.interchange.formats.transform_choice import Ends, the_one_between
+from calib_core.interchange.imported import (
+    ImportedCalibration,
+    WrittenPose,
+    looks_like_camera,
+    looks_like_radar,
+    posed_between,
+)
+from calib_core.interchange.rotations import (
+    LINK_FROM_OPTICAL,
+    OPTICAL_RPY_RAD,
+    matrix_from_rpy,
+    rpy_from_matrix,
+)
+from calib_core.interchange.syntax.opencv_xml import parse_xml
+from calib_core.interchange.syntax.yaml_text import numbers_text
+
+__all__ = ["read_urdf", "write_urdf"]
+
+
+def write_urdf(file: CalibrationFile) -> str:
+    """Write a robot of three links; copy its two joints into yours."""
+    frames = file.frames
+    radar_from_camera = file.calibration.camera_from_radar.inverse()
+    radar_from_link = radar_from_camera @ LINK_FROM_OPTICAL.inverse()
+    links = "".join(f"  <link name={quoteattr(name)}/>\n" for name in (frames.radar, frames.camera_link, frames.camera))
+    meaning = (
+        "each origin is the pose of the child in the parent; rpy in radians about fixed axes, "
+        f"R = Rz(yaw) Ry(pitch) Rx(roll); {frames.camera_link} has body axes (x forward, y left, z up)"
+    )
+    return (
+        '<?xml version="1.0"?>\n'
+        + xml_comment(statement(file, meaning))
+        + '<robot name="radar_camera">\n'
+        + links
+        + _joint(frames.radar, frames.camera_link, radar_from_link, rpy_from_matrix(radar_from_link.rotation))
+        + _joint(frames.camera_link, frames.camera, RigidTransform.identity(), np.array(OPTICAL_RPY_RAD))
+        + "</robot>\n"
+    )
+
+
+def _joint(parent: str, child: str, parent_from_child: RigidTransform, rpy_rad: np.ndarray) -> str:
+    return (
+        f'  <joint name={quoteattr(f"{parent}_to_{child}")} type="fixed">\n'
+        f"    <parent link={quoteattr(parent)}/>\n"
+        f"    <child link={quoteattr(child)}/>\n"
+        f'    <origin xyz="{numbers_text(parent_from_child.translation_m, " ")}" rpy="{numbers_text(rpy_rad, " ")}"/>\n'
+        "  </joint>\n"
+    )
+
+
+def read_urdf(text: str, source: str) -> ImportedCalibration:
+    """Read the joint between radar and camera, and the optical joint on it where there is one.
+
+    Raises:
+        InputError: no such joint, or it is not fixed.
+    """
+    joints = [joint for joint in parse_xml(text, source=source).iter("joint") if _ends(joint) != ("", "")]
+    stated = stated_frames(text)
+    between = [joint for joint in joints if _is_between(joint, stated)]
+    if not between:
+        raise InputError(f"{source}: no joint between a radar and a camera in it; name its links so, for example radar")
+    joint = between[the_one_between([Ends(*_ends(one)) for one in between], stated, source=source)]
+    if joint.get("type") != "fixed":
+        raise InputError(f"{source}: the joint {joint.get('name')!r} is not fixed; a calibration is one fixed joint")
+    parent, child = _ends(joint)
+    roles = posed_between(parent, child, stated)
+    camera_end = child if roles.direction == "radar_from_camera" else parent
+    optical = next((j for j in joints if _ends(j)[0] == camera_end and "optical" in _ends(j)[1]), None)
+    frames, axes, notes = roles.frames, roles.axes, roles.notes
+    if optical is not None:
+        _refuse_odd_optical(optical, source=source)
+        frames, axes, notes = FrameNames(roles.frames.radar, _ends(optical)[1]), "link", ()
+    translation_m, rpy_rad = _origin(joint, source=source)
+    return ImportedCalibration(
+        format="urdf",
+        pose=WrittenPose("rpy", np.array(rpy_rad), np.array(translation_m), roles.direction, axes),
+        frames=frames,
+        check_point=stated_check_point(text),
+        notes=notes,
+    ).checked(source)
+
+
+def _ends(joint: Element) -> tuple[str, str]:
+    parent, child = joint.find("parent"), joint.find("child")
+    if parent is None or child is None:
+        return "", ""
+    return parent.get("link", ""), child.get("link", "")
+
+
+def _is_between(joint: Element, stated: FrameNames | None) -> bool:
+    names = _ends(joint)
+    if stated is not None:
+        return stated.radar in names
+    return any(map(looks_like_radar, names)) and any(map(looks_like_camera, names))
+
+
+def _origin(joint: Element, *, source: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    origin = joint.find("origin")
+    attributes = origin.attrib if origin is not None else {}
+    xyz, rpy = (
+        floats(attributes.get(key, "0 0 0").split(), source=source, place=f"origin {key}", length=3)
+        for key in ("xyz", "rpy")
+    )
+    return xyz, rpy
+
+
+def _refuse_odd_optical(joint: Element, *, source: str) -> None:
+    translation_m, rpy_rad = _origin(joint, source=source)
+    rotation = matrix_from_rpy(np.array(rpy_rad))
+    if any(translation_m) or np.abs(rotation - LINK_FROM_OPTICAL.rotation).max() > 1e-4:
+        raise InputError(
+            f"{source}: the joint {joint.get('name')!r} is not the standard optical one (rpy -pi/2 0 -pi/2, no offset); "
+            "give the pose of the optical frame itself"
+        )

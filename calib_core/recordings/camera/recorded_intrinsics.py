@@ -1,0 +1,66 @@
+"""The intrinsics a recording carries, held against its images."""
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.errors import RecordingError
+from calib_core.recordings.camera.camera_info import CameraReading, camera_from_info
+from calib_core.recordings.camera.image_stream import ImageStream
+from calib_core.recordings.topics import Topic
+from calib_core.results import DataWarning
+
+__all__ = ["recorded_camera"]
+
+
+def recorded_camera(topic: Topic | None, images: ImageStream | None) -> tuple[Camera | None, list[DataWarning]]:
+    """Read the intrinsics and hold them against the images.
+
+    Args:
+        topic: with camera info; None where there is none.
+        images: None where there are none.
+    """
+    if topic is None or not len(topic):
+        return None, []
+    try:
+        reading, other = (_reading(topic, row, images) for row in (0, len(topic) - 1))
+    except RecordingError as error:
+        return None, [DataWarning("camera-unreadable", str(error), "give the intrinsics with --camera FILE")]
+    warnings = list(reading.warnings)
+    if reading.camera is None:
+        return None, warnings
+    if other.camera is None or not np.array_equal(other.camera.matrix_px, reading.camera.matrix_px):
+        warnings.append(
+            DataWarning(
+                "camera-changes",
+                f"{topic.name} begins and ends with different intrinsics; the first are used",
+                "turn off autofocus and zoom, or give the intrinsics with --camera FILE",
+            )
+        )
+    if images is None or not len(images.times_ns):
+        return reading.camera, warnings
+    return _fitted(reading.camera, images, topic.name, warnings)
+
+
+def _reading(topic: Topic, row: int, images: ImageStream | None) -> CameraReading:
+    rectified = images is not None and "rect" in images.topic.name.rpartition("/image")[2]
+    return camera_from_info(topic.message(row), topic=topic.name, rectified=rectified)
+
+
+def _fitted(
+    camera: Camera, images: ImageStream, name: str, warnings: list[DataWarning]
+) -> tuple[Camera | None, list[DataWarning]]:
+    """Scale the camera where its images are resized; refuse it where they are of another shape."""
+    try:
+        width, height = images.size_px(0)
+    except RecordingError:
+        return camera, warnings
+    if (camera.width_px, camera.height_px) == (width, height):
+        return camera, warnings
+    sizes = f"{name} is for {camera.width_px} x {camera.height_px} pixels, the images have {width} x {height}"
+    if abs(camera.width_px * height - camera.height_px * width) <= 0.005 * camera.width_px * height:
+        scaled = camera.scaled(width / camera.width_px)
+        fitted = Camera(scaled.model, width, height, scaled.matrix_px, scaled.distortion)
+        hint = "right for resized images, wrong for cropped ones: then give the intrinsics with --camera FILE"
+        return fitted, [*warnings, DataWarning("camera-scaled", f"{sizes}: the intrinsics were scaled", hint)]
+    hint = "give the intrinsics of these images with --camera FILE"
+    return None, [*warnings, DataWarning("camera-size", f"{sizes}: the intrinsics cannot be used", hint)]

@@ -1,0 +1,255 @@
+"""MCAP files: the index from the summary; walked over where there is none."""
+
+import struct
+import zlib
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calib_core.errors import RecordingError
+from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource
+from calib_core.recordings.containers.mcap.records import (
+    CHUNK_INDEX,
+    FOOTER,
+    MAGIC,
+    MAX_RECORD_BYTES,
+    MESSAGE,
+    MESSAGE_HEAD,
+    MESSAGE_INDEX,
+    RECORD,
+    STATISTICS,
+    ChunkInfo,
+    Declarations,
+    chunk_info,
+    crc_position,
+    statistics,
+    walk,
+)
+from calib_core.recordings.containers.mcap.recovery import scan_mcap
+from calib_core.recordings.containers.positioned_reads import FileStretch, MemoryStretch
+from calib_core.recordings.containers.recovery_warnings import about_recovery
+from calib_core.recordings.containers.sources import MessageIndex
+from calib_core.results import DataWarning
+
+if TYPE_CHECKING:
+    from calib_core.recordings.containers.positioned_reads import FileBytes
+
+__all__ = ["MAGIC", "McapSource"]
+
+_INDEX_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
+_TAIL_BYTES = 37
+_PIECE_BYTES = 1 << 20
+
+
+class McapSource(ChunkedSource):
+    """One MCAP file. Opening reads its summary and one block of message indexes per chunk.
+
+    Args:
+        file: the file.
+        first_of: read only the chunks with which these channels begin, and refuse a file without an index; None reads all.
+    """
+
+    format_name = "MCAP"
+    lead_bytes = RECORD.size + MESSAGE_HEAD.size
+
+    def __init__(self, file: "FileBytes", *, first_of: ChannelFilter | None = None) -> None:
+        super().__init__(file, whole=first_of is None)
+        self._found: dict[int, list[np.ndarray]] = {}
+        self._counted = 0
+        if first_of is not None:
+            self._read_beginning(first_of)
+        elif not self.restore():
+            self._open()
+            self.keep()
+
+    # -- opening
+
+    def _open(self) -> None:
+        """Read the index, or make one."""
+        closed, indexed = True, False
+        try:
+            summary = self._summary_start()
+            closed = summary is not None
+            indexed = bool(summary) and self._read_summary(summary or 0)
+            if indexed:
+                self._note_indexes()
+        except RecordingError:
+            closed = indexed = False
+        if not indexed:
+            self._scan(closed=closed)
+        self._found.clear()
+
+    def _summary_start(self) -> int | None:
+        """Return where the summary begins, 0 for a file without one, None for a file that was not closed."""
+        tail = self.file.up_to(max(0, self.size_bytes - _TAIL_BYTES), _TAIL_BYTES)
+        if len(tail) < _TAIL_BYTES or tail[-8:] != MAGIC or tail[0] != FOOTER:
+            return None
+        start = int.from_bytes(tail[9:17], "little")
+        return start if start <= self.size_bytes - _TAIL_BYTES else None
+
+    def _damaged(self, position: int) -> RecordingError:
+        return RecordingError(
+            f"{self.path}: the record at byte {position} is damaged or cut short; repair it first: "
+            f"mcap recover {self.path.name}"
+        )
+
+    def _read_summary(self, start: int) -> bool:
+        """Read the summary and the message indexes; False where the file has to be walked over to know its messages."""
+        if not self._summary_is_sound(start):
+            raise self._damaged(start)
+        infos = self._read_chunk_infos(start)
+        self.file.expect([info.index_place for info in infos])
+        for info in infos:
+            self._read_chunk_index(info)
+        known = {channel.id for channel in self.channels}
+        count = sum(len(part) for parts in self._found.values() for part in parts)
+        complete = all(info.index_bytes > 0 for info in infos)
+        return bool(infos) and complete and known >= self._found.keys() and count >= self._counted
+
+    def _read_beginning(self, first_of: ChannelFilter) -> None:
+        """Read the indexes of the chunks with which some channels begin.
+
+        Raises:
+            RecordingError: the file has no index that says so.
+        """
+        start = self._summary_start()
+        if not start:
+            raise self._damaged(self.size_bytes - _TAIL_BYTES)
+        earliest = sorted(self._read_chunk_infos(start, first_of), key=lambda info: info.start_ns)
+        wanted = [channel.id for channel in self.channels if first_of(channel)]
+        firsts = [next((info for info in earliest if number in info.channels), None) for number in wanted]
+        for info in {info.position: info for info in firsts if info is not None}.values():
+            self._read_chunk_index(info)
+        self._note_indexes()
+
+    def _read_chunk_infos(self, start: int, first_of: ChannelFilter | None = None) -> list[ChunkInfo]:
+        """Read the summary: channels, statistics, and what it says about chunks; all, or until some channels are found."""
+        infos: list[ChunkInfo] = []
+        declared = Declarations()
+        stretch = FileStretch(self.file, start, self.size_bytes - _TAIL_BYTES - start)
+        end = 0
+        for kind, place, size in walk(stretch):
+            end = place + size
+            body = stretch.up_to(place, size) if size <= MAX_RECORD_BYTES else b""
+            if kind == CHUNK_INDEX:
+                info = chunk_info(body)
+                if info is None or not info.inside(self.size_bytes):
+                    raise self._damaged(start + place)
+                infos.append(info)
+                if first_of is not None and _shows(infos, declared, first_of):
+                    break
+            elif kind == STATISTICS:
+                self._counted, self.counts = statistics(body)
+            elif not declared.note(kind, body):
+                raise self._damaged(start + place)
+        else:
+            if end != stretch.size:
+                raise self._damaged(start + end)
+        self.channels = declared.channels
+        return infos
+
+    def _summary_is_sound(self, start: int) -> bool:
+        """Compare the summary, up to the footer's last fields, with the checksum in the footer; 0 there means none."""
+        end = self.size_bytes - len(MAGIC) - 4
+        wanted = int.from_bytes(self.file.up_to(end, 4), "little")
+        found = 0
+        for place in range(start, end if wanted else start, _PIECE_BYTES):
+            found = zlib.crc32(self.file.up_to(place, min(_PIECE_BYTES, end - place)), found)
+        return found == wanted
+
+    def _read_chunk_index(self, info: ChunkInfo) -> None:
+        """Note one chunk, and read the message indexes that follow it."""
+        number = len(self.chunks)
+        self.chunks.append(Chunk(info.data_position, info.stored_bytes, info.size_bytes, info.compression))
+        first_byte, last_byte = info.index_place
+        block = MemoryStretch(self.file.at(first_byte, last_byte - first_byte))
+        end = 0
+        for kind, first, length in walk(block):
+            end = first + length
+            if kind == MESSAGE_INDEX:
+                self._read_message_index(number, block.data[first:end], first_byte + first)
+        if end != block.size:
+            raise self._damaged(first_byte + end)
+
+    def _read_message_index(self, chunk: int, record: bytes, position: int) -> None:
+        channel, size = struct.unpack_from("<HI", record.ljust(6, b"\xff"))
+        if len(record) < 6 + size:
+            raise self._damaged(position)
+        entries = np.frombuffer(record, dtype=_INDEX_ENTRY, count=size // _INDEX_ENTRY.itemsize, offset=6)
+        times, offsets = entries["time"].astype(np.int64), entries["offset"].astype(np.int64)
+        self._found.setdefault(channel, []).append(np.stack([times, np.full_like(times, chunk), offsets], axis=1))
+
+    def _note_indexes(self) -> None:
+        for channel, parts in self._found.items():
+            columns = np.concatenate(parts)
+            self.note_index(channel, MessageIndex.sorted_from(columns[:, 0], columns[:, 1], columns[:, 2]))
+
+    def _scan(self, *, closed: bool) -> None:
+        """Walk over the file from its beginning.
+
+        Args:
+            closed: its end is in good order, so that a walk without losses needs no warning.
+        """
+        found = scan_mcap(self.file)
+        self.chunks, self.channels, self.recovered = found.chunks, found.declarations.channels, True
+        self.indexes = {}
+        self._found = {channel: [np.array(entries, dtype=np.int64)] for channel, entries in found.messages.items()}
+        known = {channel.id for channel in self.channels}
+        count = sum(map(len, found.messages.values()))
+        unknown = sum(len(entries) for channel, entries in found.messages.items() if channel not in known)
+        sound = closed and found.ended and not (found.lost_bytes or found.damaged_chunks or unknown)
+        if not sound and count == unknown:
+            raise self._damaged(len(MAGIC))
+        self._note_indexes()
+        if not sound:
+            warning = about_recovery(
+                self.path,
+                messages=count,
+                lost_bytes=found.lost_bytes,
+                tool="mcap recover",
+                damaged_chunks=found.damaged_chunks,
+                fault=found.fault,
+                unknown=unknown,
+            )
+            self.warnings = (*self.warnings, warning)
+        if count < self._counted:
+            self.warnings = (*self.warnings, self._too_few(count))
+
+    def _too_few(self, count: int) -> DataWarning:
+        return DataWarning(
+            "messages-missing",
+            f"{self.path.name} says that it holds {self._counted} messages, but {count} are in it",
+            "check that what you need is there; the rest was lost before or while the file was written",
+        )
+
+    # -- reading
+
+    def checksum(self, chunk: int) -> int:
+        """Return the CRC-32 of a chunk's unpacked records; 0 where the file has none."""
+        where = self.chunks[chunk]
+        return int.from_bytes(self.file.up_to(crc_position(where.position, where.compression), 4), "little")
+
+    def locate(self, chunk: int, offset: int) -> tuple[int, int]:
+        """Return where the message itself begins, and its length."""
+        head = self.piece(chunk, offset, RECORD.size)
+        kind, size = RECORD.unpack(head) if len(head) == RECORD.size else (0, 0)
+        if kind != MESSAGE or not MESSAGE_HEAD.size <= size <= MAX_RECORD_BYTES:
+            raise RecordingError(
+                f"{self.path}: no message where the index says (chunk {chunk}, byte {offset}); the file is damaged: "
+                f"mcap recover {self.path.name}"
+            )
+        return offset + self.lead_bytes, size - MESSAGE_HEAD.size
+
+    def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Recognise message records; all of them are alike."""
+        sizes = np.ascontiguousarray(rows[:, 1:9]).view("<i8")[:, 0] - MESSAGE_HEAD.size
+        return (rows[:, 0] == MESSAGE) & (sizes >= 0) & (sizes <= MAX_RECORD_BYTES), sizes
+
+
+def _shows(infos: list[ChunkInfo], declared: Declarations, first_of: ChannelFilter) -> bool:
+    """Tell whether some channels are known, and in the chunks seen so far."""
+    count = len(infos)
+    if count < FIRST_CHUNKS or count & (count - 1):  # looked at again whenever there are twice as many
+        return False
+    wanted = {channel.id for channel in declared.channels if first_of(channel)}
+    return bool(wanted) and wanted <= {number for info in infos for number in info.channels}

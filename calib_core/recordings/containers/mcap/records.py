@@ -1,0 +1,207 @@
+"""MCAP's records: their kinds, and what schemas, channels and chunks say."""
+
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from calib_core.recordings.containers.positioned_reads import Stretch
+from calib_core.recordings.containers.sources import Channel
+
+__all__ = [
+    "CHANNEL",
+    "CHUNK",
+    "CHUNK_INDEX",
+    "DATA_END",
+    "FOOTER",
+    "MAGIC",
+    "MAX_RECORD_BYTES",
+    "MESSAGE",
+    "MESSAGE_HEAD",
+    "MESSAGE_INDEX",
+    "RECORD",
+    "SCHEMA",
+    "STATISTICS",
+    "ChunkHead",
+    "ChunkInfo",
+    "Declarations",
+    "chunk_head",
+    "chunk_info",
+    "crc_position",
+    "statistics",
+    "string_at",
+    "walk",
+]
+
+MAGIC = b"\x89MCAP0\r\n"
+FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 2, 3, 4, 5, 6, 7, 8
+STATISTICS, DATA_END = 11, 15
+RECORD = struct.Struct("<BQ")
+MESSAGE_HEAD = struct.Struct("<HIQQ")
+MAX_RECORD_BYTES = 1 << 28
+_CHUNK_HEAD_BYTES = RECORD.size + 40  # less the name of the compression
+_MAX_INDEX_BYTES = 1 << 26
+_FORMATS = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Schema:
+    name: str
+    format: str
+    text: str
+
+
+class Declarations:
+    """The channels found so far."""
+
+    def __init__(self) -> None:
+        self._schemas: dict[int, _Schema] = {}
+        self._channels: dict[int, tuple[int, str, str]] = {}
+
+    def note(self, kind: int, body: bytes) -> bool:
+        """Note a schema or a channel; other records are passed over.
+
+        Returns:
+            False where the record is damaged.
+        """
+        try:
+            if kind == SCHEMA:
+                number = int.from_bytes(body[:2], "little")
+                name, place = string_at(body, 2)
+                encoding, place = string_at(body, place)
+                text, _ = string_at(body, place)
+                self._schemas.setdefault(number, _Schema(name, _FORMATS.get(encoding, ""), text))
+            elif kind == CHANNEL:
+                number, schema = struct.unpack_from("<HH", body)
+                topic, place = string_at(body, 4)
+                encoding, _ = string_at(body, place)
+                self._channels.setdefault(number, (schema, topic, encoding))
+        except struct.error:
+            return False
+        return True
+
+    def __len__(self) -> int:
+        return len(self._channels)
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The channels, each with its schema where there is one."""
+        return tuple(self._channel(number, *entry) for number, entry in self._channels.items())
+
+    def _channel(self, number: int, schema_number: int, topic: str, encoding: str) -> Channel:
+        schema = self._schemas.get(schema_number, _Schema("", "", ""))
+        form = schema.format if schema.text.strip() else ""
+        return Channel(number, topic, schema.name, encoding, schema.text, form)
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkHead:
+    """What comes before the records of a chunk.
+
+    Attributes:
+        size: how long it is.
+        unpacked_bytes: the size the chunk declares.
+        compression: "" for none.
+        stored_bytes: how many bytes follow.
+        checksum: CRC-32 of the unpacked bytes; 0 for none.
+    """
+
+    size: int
+    unpacked_bytes: int
+    compression: str
+    stored_bytes: int
+    checksum: int
+
+
+def chunk_head(body: bytes) -> ChunkHead | None:
+    """Read the head of a chunk's body; None where it is none."""
+    try:
+        compression, place = string_at(body, 28)
+        stored = struct.unpack_from("<Q", body, place)[0]
+    except struct.error:
+        return None
+    checksum = int.from_bytes(body[24:28], "little")
+    return ChunkHead(place + 8, int.from_bytes(body[16:24], "little"), compression, stored, checksum)
+
+
+def crc_position(position: int, compression: str) -> int:
+    """Return where a chunk's checksum lies, given where its bytes begin."""
+    return position - 16 - len(compression)
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkInfo:
+    """What the summary says about one chunk.
+
+    Attributes:
+        start_ns: log time of its first message.
+        position: of its record in the file.
+        record_bytes: size of that record.
+        channels: that have messages in it, where it is indexed.
+        index_bytes: how long the message indexes behind it are.
+        compression: "" for none.
+        stored_bytes: its size in the file.
+        size_bytes: its size unpacked.
+    """
+
+    start_ns: int
+    position: int
+    record_bytes: int
+    channels: tuple[int, ...]
+    index_bytes: int
+    compression: str
+    stored_bytes: int
+    size_bytes: int
+
+    @property
+    def data_position(self) -> int:
+        """Where its bytes begin."""
+        return self.position + _CHUNK_HEAD_BYTES + len(self.compression)
+
+    @property
+    def index_place(self) -> tuple[int, int]:
+        """Where its message indexes begin and end."""
+        begin = self.position + self.record_bytes
+        return begin, begin + self.index_bytes
+
+    def inside(self, file_bytes: int) -> bool:
+        """Tell whether it can lie in a file of this size."""
+        return self.data_position + self.stored_bytes <= file_bytes and self.index_bytes <= _MAX_INDEX_BYTES
+
+
+def chunk_info(body: bytes) -> ChunkInfo | None:
+    """Read a chunk index record; None where it is damaged."""
+    try:
+        start_ns, _, position, length, map_bytes = struct.unpack_from("<QQQQI", body)
+        channels = tuple(number for number, _ in struct.iter_unpack("<HQ", body[36 : 36 + map_bytes]))
+        index_bytes = struct.unpack_from("<Q", body, 36 + map_bytes)[0]
+        compression, place = string_at(body, 44 + map_bytes)
+        stored, size = struct.unpack_from("<QQ", body, place)
+    except struct.error:
+        return None
+    return ChunkInfo(start_ns, position, length, channels, index_bytes, compression, stored, size)
+
+
+def statistics(body: bytes) -> tuple[int, Mapping[int, int]]:
+    """Read how many messages there are, in all and by channel; nothing of what is cut off."""
+    entries = body[46 : 46 + int.from_bytes(body[42:46], "little")]
+    by_channel = dict(struct.iter_unpack("<HQ", entries[: len(entries) // 10 * 10]))
+    return int.from_bytes(body[:8], "little"), by_channel
+
+
+def walk(stretch: Stretch, place: int = 0) -> Iterator[tuple[int, int, int]]:
+    """Walk over records: kind, place of the body, size of the body; ends where a record runs past the end."""
+    while place + RECORD.size <= stretch.size:
+        kind, size = RECORD.unpack(stretch.up_to(place, RECORD.size))
+        start = place + RECORD.size
+        if size > stretch.size - start:
+            return
+        yield kind, start, size
+        place = start + size
+
+
+def string_at(data: bytes, place: int) -> tuple[str, int]:
+    """Read a length-prefixed string; return it and the place after it."""
+    length = struct.unpack_from("<I", data, place)[0]
+    if place + 4 + length > len(data):
+        raise struct.error("string runs past its record")
+    return data[place + 4 : place + 4 + length].decode("utf-8", "replace"), place + 4 + length

@@ -1,0 +1,172 @@
+"""MCAP files without a usable index: walked from the beginning, every whole message found, what is lost counted."""
+
+import re
+import zlib
+from dataclasses import dataclass, field
+
+from calib_core.errors import RecordingError
+from calib_core.recordings.containers.chunks import Chunk
+from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
+from calib_core.recordings.containers.mcap.records import (
+    CHANNEL,
+    CHUNK,
+    DATA_END,
+    FOOTER,
+    MAGIC,
+    MAX_RECORD_BYTES,
+    MESSAGE,
+    MESSAGE_HEAD,
+    RECORD,
+    SCHEMA,
+    ChunkHead,
+    Declarations,
+    chunk_head,
+    walk,
+)
+from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
+
+__all__ = ["FoundInMcap", "scan_mcap"]
+
+_CANDIDATE = re.compile(rb"[\x03-\x06][\x00-\xff]{4}\x00\x00\x00\x00")
+_COMPRESSIONS = ("", "lz4", "zstd")
+_MAX_TRIES = 20_000
+_LAST_KIND, _PRIVATE = 15, 0x80
+
+
+@dataclass(slots=True)
+class FoundInMcap:
+    """What a walk over a file found.
+
+    Attributes:
+        declarations: schemas and channels.
+        chunks: the first stands for the whole file, with the messages outside chunks.
+        messages: (log time [ns], chunk, offset) by channel.
+        ended: the end of the data was reached in good order.
+        lost_bytes: that could not be understood, in the file and in unpacked chunks.
+        damaged_chunks: that could not be unpacked whole.
+        fault: why the first of those could not.
+        tried: how often a record was looked for behind a damaged stretch; bounded.
+    """
+
+    declarations: Declarations
+    chunks: list[Chunk]
+    messages: dict[int, list[tuple[int, int, int]]] = field(default_factory=dict)
+    ended: bool = False
+    lost_bytes: int = 0
+    damaged_chunks: int = 0
+    fault: str = ""
+    tried: int = 0
+
+
+def scan_mcap(file: FileBytes) -> FoundInMcap:
+    """Walk over a file from its first record.
+
+    Args:
+        file: the file.
+    """
+    found = FoundInMcap(Declarations(), [Chunk(0, file.size_bytes, file.size_bytes, "")])
+    stretch = FileStretch(file, 0, file.size_bytes)
+    place = len(MAGIC)
+    while place + RECORD.size <= stretch.size and not found.ended:
+        kind, size = RECORD.unpack(stretch.up_to(place, RECORD.size))
+        start = place + RECORD.size
+        whole = _possible(kind) and size <= stretch.size - start
+        if kind == CHUNK and (head := chunk_head(stretch.up_to(start, 64))) and _sound(head):
+            room = min(head.stored_bytes, stretch.size - start - head.size)
+            _scan_chunk(file, start + head.size, room, head, found)
+            place = start + head.size + room
+        elif whole and not (kind == MESSAGE and size > MAX_RECORD_BYTES):
+            found.ended = kind in (DATA_END, FOOTER)
+            _note(stretch, kind, start, size, found)
+            place = start + size
+        else:
+            after = _following(stretch, place + 1, found)
+            found.lost_bytes += after - place
+            place = after
+    if not found.ended:
+        found.lost_bytes += stretch.size - min(place, stretch.size)
+    return found
+
+
+def _possible(kind: int) -> bool:
+    return 0 < kind <= _LAST_KIND or kind >= _PRIVATE
+
+
+def _sound(head: ChunkHead) -> bool:
+    return head.compression in _COMPRESSIONS and (bool(head.compression) or head.stored_bytes == head.unpacked_bytes)
+
+
+def _note(stretch: Stretch, kind: int, start: int, size: int, found: FoundInMcap, chunk: int = 0) -> None:
+    """Note a message, a schema or a channel."""
+    if kind == MESSAGE and size >= MESSAGE_HEAD.size:
+        channel, _, log_time, _ = MESSAGE_HEAD.unpack(stretch.up_to(start, MESSAGE_HEAD.size))
+        if log_time < 1 << 63:
+            found.messages.setdefault(channel, []).append((log_time, chunk, start - RECORD.size))
+    elif kind in (SCHEMA, CHANNEL) and size <= MAX_RECORD_BYTES:
+        found.declarations.note(kind, stretch.up_to(start, size))
+
+
+def _following(stretch: Stretch, start: int, found: FoundInMcap) -> int:
+    """Return where the next record begins that makes sense together with the one behind it; the end where none does."""
+    while found.tried < _MAX_TRIES:
+        place = stretch.find(_CANDIDATE, start)
+        if place < 0:
+            break
+        found.tried += 1
+        kind, size = RECORD.unpack(stretch.up_to(place, RECORD.size))
+        after = place + RECORD.size + size
+        if kind == CHUNK:
+            head = chunk_head(stretch.up_to(place + RECORD.size, 64))
+            if head is not None and _sound(head) and head.size + head.stored_bytes == size:
+                return place
+        elif after == stretch.size or (after < stretch.size and stretch.up_to(after, 1)[0] in range(1, _LAST_KIND + 1)):
+            return place
+        start = place + 1
+    return stretch.size
+
+
+def _scan_chunk(file: FileBytes, position: int, stored: int, head: ChunkHead, found: FoundInMcap) -> None:
+    """Note all whole messages of a chunk, also of one that is cut off or damaged."""
+    number = len(found.chunks)
+    size = stored
+    stretch: Stretch = FileStretch(file, position, stored)
+    if head.compression:
+        stretch = MemoryStretch(_unpacked(file, position, stored, head, found))
+        size = stretch.size
+    found.chunks.append(Chunk(position, stored, size, head.compression))
+    end = 0
+    while end + RECORD.size <= size:
+        for kind, start, length in walk(stretch, end):
+            if not _possible(kind):
+                break
+            _note(stretch, kind, start, length, found, number)
+            end = start + length
+        if end + RECORD.size > size:
+            break
+        after = _following(stretch, end + 1, found)
+        found.lost_bytes += after - end
+        end = after
+    found.lost_bytes += max(0, size - end)
+
+
+def _unpacked(file: FileBytes, position: int, stored: int, head: ChunkHead, found: FoundInMcap) -> bytes:
+    where = f"chunk at byte {position}"
+    try:
+        refuse_bomb(stored, head.unpacked_bytes, where=where)
+        if stored > MAX_RECORD_BYTES:
+            raise RecordingError(f"{where}: {stored} packed bytes in one chunk are refused as damaged")
+    except RecordingError as error:
+        found.damaged_chunks, found.fault = found.damaged_chunks + 1, found.fault or str(error)
+        found.lost_bytes += stored
+        return b""
+    data = file.up_to(position, stored)
+    try:
+        whole = unpack(data, head.compression, head.unpacked_bytes, where=where)
+    except RecordingError as error:
+        found.damaged_chunks, found.fault = found.damaged_chunks + 1, found.fault or str(error)
+    else:
+        if head.checksum and zlib.crc32(whole) != head.checksum:
+            found.damaged_chunks += 1
+            found.fault = found.fault or f"{where}: its bytes do not have the checksum they were written with"
+        return whole
+    return unpack_what_is_there(data, head.compression, head.unpacked_bytes)

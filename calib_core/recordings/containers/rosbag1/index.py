@@ -1,0 +1,181 @@
+"""Where the messages of a ROS 1 bag lie: the index block behind each of its chunks."""
+
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.recordings.containers.chunks import Chunk
+from calib_core.recordings.containers.positioned_reads import FileBytes
+from calib_core.recordings.containers.rosbag1.recovery import fields_of
+from calib_core.recordings.containers.rosbag1.tail import ChunkInfo, damaged
+from calib_core.recordings.containers.sources import MessageIndex
+
+__all__ = ["BagIndex", "read_indexes"]
+
+_CHUNK = 5
+_U32 = struct.Struct("<I")
+_ENTRY = np.dtype([("sec", "<u4"), ("nanosec", "<u4"), ("offset", "<u4")])
+_MAX_HEADER_BYTES = 1 << 24
+_MAX_INDEX_BYTES = 1 << 26
+_HEAD_BYTES = 256
+_BLOCK_BYTES = 128  # more than the head of an index record
+_AHEAD = 256
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BagIndex:
+    """Chunks, and where the messages of each connection lie in them."""
+
+    chunks: list[Chunk]
+    indexes: Mapping[int, MessageIndex]
+
+
+def read_indexes(file: FileBytes, infos: Sequence[ChunkInfo], end: int, picked: Sequence[ChunkInfo]) -> BagIndex:
+    """Read the index blocks that follow each chunk.
+
+    One read gets the block of a chunk and the head of the next one.
+
+    Args:
+        file: the bag.
+        infos: of all chunks.
+        end: where the last block ends.
+        picked: those to read.
+
+    Raises:
+        RecordingError: a chunk or a block is damaged.
+    """
+    ordered = sorted(infos, key=lambda info: info.position)
+    following = [info.position for info in ordered[1:]] + [end] * bool(ordered)
+    wanted = {info.position for info in picked}
+    places = [(info, after) for info, after in zip(ordered, following, strict=True) if info.position in wanted]
+    chunks: list[Chunk] = []
+    found: dict[int, list[tuple[int, bytes]]] = {}
+    windows = _Windows(file, [_window(info, after) for info, after in places])
+    for number, (info, after) in enumerate(places):
+        chunk = _chunk(file, info.position, windows.before(number, info.position))
+        chunks.append(chunk)
+        records = _records_of(windows, number, (chunk.position + chunk.stored_bytes, after), info)
+        if records is None:
+            raise damaged(file, chunk.position + chunk.stored_bytes)
+        for connection, entries in records:
+            found.setdefault(connection, []).append((number, entries))
+    return BagIndex(chunks, {connection: _merged(parts) for connection, parts in found.items()})
+
+
+def _block_bytes(info: ChunkInfo) -> int:
+    """Return more than the index block of a chunk takes."""
+    return min(sum(_BLOCK_BYTES + count * _ENTRY.itemsize for count in info.counts.values()), _MAX_INDEX_BYTES)
+
+
+def _window(info: ChunkInfo, following: int) -> tuple[int, int]:
+    """Guess where the block of a chunk begins, and go on past the head of the next chunk."""
+    return max(info.position, following - _block_bytes(info)), following + _HEAD_BYTES
+
+
+def _records_of(
+    windows: "_Windows", number: int, place: tuple[int, int], info: ChunkInfo
+) -> list[tuple[int, bytes]] | None:
+    """Return the entries of each connection in a chunk; None where they are damaged.
+
+    Args:
+        windows: what is read.
+        number: of the window.
+        place: where the block begins, and where the next chunk does: usually, but not always, next to it.
+        info: of the chunk.
+    """
+    room = max(0, min(place[1] - place[0], _MAX_INDEX_BYTES))
+    usual = min(_block_bytes(info), room)
+    records = _index_records(windows.piece(number, place[0], usual), _connections_in(info))
+    if usual < room and (records is None or len(records) < _connections_in(info)):
+        records = _index_records(windows.piece(number, place[0], room), _connections_in(info))
+    return records
+
+
+def _connections_in(info: ChunkInfo) -> int:
+    return sum(count > 0 for count in info.counts.values())
+
+
+class _Windows:
+    """Stretches of a file that are read one after another, the disk told about those to come.
+
+    Args:
+        file: the file.
+        places: where each begins and ends, ascending.
+    """
+
+    def __init__(self, file: FileBytes, places: Sequence[tuple[int, int]]) -> None:
+        self._file = file
+        self._places = places
+        self._last = (-1, b"")
+
+    def _read(self, number: int) -> bytes:
+        if number == 0:
+            self._file.expect(self._places[:_AHEAD])
+        if number % _AHEAD == 0:  # the disk goes on while these are read
+            self._file.expect(self._places[number + _AHEAD : number + 2 * _AHEAD])
+        begin, end = self._places[number]
+        self._last = (number, self._file.up_to(begin, end - begin))
+        return self._last[1]
+
+    def before(self, number: int, position: int) -> bytes:
+        """Return what the window before this one has from a position on; nothing where that is not in it."""
+        first, end = self._places[number - 1] if number and self._last[0] == number - 1 else (0, 0)
+        return self._last[1][position - first :] if first <= position < end else b""
+
+    def piece(self, number: int, begin: int, size: int) -> bytes:
+        """Return bytes that should be in a window; they are read by themselves where they are not."""
+        if self._last[0] != number:
+            self._read(number)
+        start = begin - self._places[number][0]
+        found = self._last[1][start : start + size] if start >= 0 else b""
+        return found if len(found) == size else self._file.at(begin, size)
+
+
+def _chunk(file: FileBytes, position: int, ahead: bytes) -> Chunk:
+    """Read a chunk's header, from bytes that are there already if they are enough."""
+    length = _U32.unpack_from(ahead)[0] if len(ahead) >= 4 else _MAX_HEADER_BYTES
+    if length + 8 > len(ahead):
+        length = _U32.unpack(file.at(position, 4))[0]
+        if length > _MAX_HEADER_BYTES:
+            raise damaged(file, position)
+        ahead = file.at(position, length + 8)
+    fields = fields_of(ahead[4 : 4 + length])
+    if fields is None or fields.get("op") != bytes([_CHUNK]):
+        raise damaged(file, position)
+    stored = _U32.unpack_from(ahead, 4 + length)[0]
+    return Chunk(
+        position + 8 + length,
+        stored,
+        int.from_bytes(fields.get("size", b""), "little"),
+        fields.get("compression", b"").decode("utf-8", "replace"),
+    )
+
+
+def _index_records(block: bytes, wanted: int) -> list[tuple[int, bytes]] | None:
+    """Return the entries of so many connections, or of fewer where the block ends; None where it is damaged or cut."""
+    records: list[tuple[int, bytes]] = []
+    place = 0
+    while place + 8 <= len(block) and len(records) < wanted:
+        length = _U32.unpack_from(block, place)[0]
+        header = block[place + 4 : place + 4 + length]
+        start = place + 8 + length
+        if start > len(block):
+            return None
+        size = _U32.unpack_from(block, start - 4)[0]
+        mark = header.find(b"conn=")
+        if b"op=\x04" in header and mark >= 0:
+            if start + size > len(block) or size % _ENTRY.itemsize:
+                return None
+            records.append((_U32.unpack_from(header, mark + 5)[0], block[start : start + size]))
+        place = start + size
+    return records
+
+
+def _merged(parts: Sequence[tuple[int, bytes]]) -> MessageIndex:
+    entries = np.frombuffer(b"".join(data for _, data in parts), dtype=_ENTRY)
+    receive_ns = entries["sec"].astype(np.int64) * 1_000_000_000 + entries["nanosec"]
+    lengths = [len(data) // _ENTRY.itemsize for _, data in parts]
+    chunk = np.repeat(np.array([number for number, _ in parts], dtype=np.int64), lengths)
+    return MessageIndex.sorted_from(receive_ns, chunk, entries["offset"].astype(np.int64))

@@ -1,0 +1,179 @@
+"""ROS 1 bags, version 2.0: the index from the file's tail, messages by position."""
+
+import re
+import struct
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calib_core.errors import RecordingError
+from calib_core.recordings.containers.chunks import ChannelFilter, ChunkedSource
+from calib_core.recordings.containers.recovery_warnings import about_recovery
+from calib_core.recordings.containers.rosbag1.index import read_indexes
+from calib_core.recordings.containers.rosbag1.recovery import fields_of, scan_bag
+from calib_core.recordings.containers.rosbag1.tail import (
+    CONNECTION,
+    ChunkInfo,
+    channel_of,
+    counts_of,
+    damaged,
+    first_chunks,
+    read_tail,
+)
+from calib_core.recordings.containers.sources import Channel, MessageIndex
+
+if TYPE_CHECKING:
+    from calib_core.recordings.containers.positioned_reads import FileBytes
+
+__all__ = ["Rosbag1Source"]
+
+_MAGIC = re.compile(rb"#ROSBAG V(\d+)\.(\d+)\n")
+_MESSAGE, _BAG_HEADER = 2, 3
+_U32 = struct.Struct("<I")
+_MESSAGE_HEADER_BYTES = 38  # conn, op and time fields, in any order
+_MAX_HEADER_BYTES = 1 << 24
+
+
+class Rosbag1Source(ChunkedSource):
+    """One ROS 1 bag. Opening reads its tail and one index block per chunk.
+
+    Args:
+        file: the bag.
+        first_of: read only the chunks with which these channels begin, and refuse a damaged bag; None reads all.
+    """
+
+    format_name = "ROS 1 bag"
+    lead_bytes = 4 + _MESSAGE_HEADER_BYTES + 4
+
+    def __init__(self, file: "FileBytes", *, first_of: ChannelFilter | None = None) -> None:
+        super().__init__(file, whole=first_of is None)
+        head = file.up_to(0, 4096)
+        magic = _MAGIC.match(head)
+        if not magic or magic.groups() != (b"2", b"0"):
+            version = ".".join(part.decode() for part in magic.groups()) if magic else "?"
+            raise RecordingError(f"{file.path}: a ROS 1 bag of version {version}; only 2.0 can be read: rosbag migrate")
+        header, after = self._record(magic.end(), _BAG_HEADER)
+        if header.get("encryptor"):
+            raise RecordingError(f"{file.path}: the bag is encrypted; decrypt it first: rosbag decrypt")
+        if self.restore():
+            return
+        try:
+            infos, end = self._read_tail(header, first_of)
+            self._read_indexes(infos, end, first_of)
+        except RecordingError as fault:
+            if first_of is not None:
+                raise
+            self._recover(after[0] + after[1], fault)
+        self.keep()
+
+    def _read_tail(self, header: Mapping[str, bytes], first_of: ChannelFilter | None) -> tuple[list[ChunkInfo], int]:
+        """Read connections and chunk infos; return the latter, and where the last chunk's messages are over."""
+        position = _number(header.get("index_pos", b""), 8)
+        if not 0 < position <= self.size_bytes:
+            raise RecordingError(
+                f"{self.path}: the bag was not closed properly and has no index (recorder killed, or copy cut short); "
+                f"repair it first: rosbag reindex {self.path.name}"
+            )
+        self.channels, infos = read_tail(self.file, position, first_of)
+        count = _number(header.get("chunk_count", b""), 4)
+        if first_of is not None and len(infos) < count:
+            last = max(infos, key=lambda info: info.position, default=None)
+            return [info for info in infos if info is not last], last.position if last else position
+        if len(infos) != count:
+            raise damaged(self.file, position)
+        return infos, position
+
+    def _read_indexes(self, infos: list[ChunkInfo], end: int, first_of: ChannelFilter | None) -> None:
+        """Read where the messages are."""
+        self.counts = counts_of(infos)
+        picked = infos if first_of is None else first_chunks(infos, [c.id for c in self.channels if first_of(c)])
+        found = read_indexes(self.file, infos, end, picked)
+        self.chunks = found.chunks
+        for connection, index in found.indexes.items():
+            self.note_index(connection, index)
+        if sum(map(len, self.indexes.values())) < sum(counts_of(picked).values()):
+            raise damaged(self.file, end)
+
+    def _recover(self, start: int, fault: RecordingError) -> None:
+        """Index a bag that has no index, or a damaged one, by walking over all of it."""
+        found = scan_bag(self.file, start)
+        self.recovered = True
+        self.chunks = found.chunks
+        channels: dict[int, Channel] = {}
+        for fields, data in found.connections.values():
+            channel = channel_of(fields, data)
+            if channel is not None:
+                channels[channel.id] = channel
+        self.channels = tuple(channels.values())
+        known = {number: entries for number, entries in found.messages.items() if number in channels}
+        if not known:
+            raise RecordingError(
+                f"{fault}; all of its {self.size_bytes} bytes were searched, and there is no whole message in them"
+            )
+        self.indexes = {}
+        for connection, entries in known.items():
+            columns = np.array(entries, dtype=np.int64)
+            self.note_index(connection, MessageIndex.sorted_from(columns[:, 0], columns[:, 1], columns[:, 2]))
+        count = sum(map(len, found.messages.values()))
+        warning = about_recovery(
+            self.path,
+            messages=count,
+            lost_bytes=found.lost_bytes,
+            tool="rosbag reindex",
+            damaged_chunks=found.damaged_chunks,
+            fault=found.fault,
+            unknown=count - sum(map(len, known.values())),
+        )
+        self.warnings = (*self.file.warnings, warning)
+
+    # -- opening
+
+    def _record(self, position: int, expected: int | None = None) -> tuple[dict[str, bytes], tuple[int, int]]:
+        """Read a record's header; return its fields, and the position and size of its data."""
+        length = _U32.unpack(self.file.at(position, 4))[0]
+        if length > _MAX_HEADER_BYTES:
+            raise damaged(self.file, position)
+        raw = self.file.at(position + 4, length + 4)
+        fields = fields_of(raw[:length])
+        if fields is None or (expected is not None and _number(fields.get("op", b""), 1) != expected):
+            raise damaged(self.file, position)
+        return fields, (position + 8 + length, _U32.unpack_from(raw, length)[0])
+
+    # -- reading
+
+    def locate(self, chunk: int, offset: int) -> tuple[int, int]:
+        """Return where the message begins; connection records in front of it are passed over."""
+        for _ in range(1000):
+            head = self.piece(chunk, offset, 256)
+            length = _U32.unpack_from(head)[0] if len(head) >= 4 else _MAX_HEADER_BYTES
+            if length < _MAX_HEADER_BYTES and length + 8 > len(head):
+                head = self.piece(chunk, offset, length + 8)
+            if length + 8 > len(head):
+                break
+            fields = fields_of(head[4 : 4 + length])
+            size = _U32.unpack_from(head, 4 + length)[0]
+            kind = _number(fields.get("op", b""), 1) if fields else 0
+            if kind == _MESSAGE:
+                return offset + 8 + length, size
+            if kind != CONNECTION:
+                break
+            offset += 8 + length + size
+        raise RecordingError(
+            f"{self.path}: no message where the index says (chunk {chunk}, byte {offset}); the bag is damaged: "
+            f"rosbag reindex {self.path.name}"
+        )
+
+    def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Recognise plain message records: a header of 38 bytes with op=2 where the first record has it."""
+        words = np.ascontiguousarray(rows[:, [0, 1, 2, 3, 42, 43, 44, 45]]).view("<u4")
+        mark = rows[0].tobytes().find(b"op=\x02")
+        usual = words[:, 0] == _MESSAGE_HEADER_BYTES
+        if mark < 0:
+            return np.zeros(len(rows), dtype=bool), words[:, 1].astype(np.int64)
+        usual &= (rows[:, mark : mark + 4] == np.frombuffer(b"op=\x02", dtype=np.uint8)).all(axis=1)
+        return usual, words[:, 1].astype(np.int64)
+
+
+def _number(value: bytes, size: int) -> int:
+    return int.from_bytes(value, "little") if len(value) == size else -1

@@ -1,0 +1,207 @@
+"""Bags without an index: what a killed recorder, a full disk or a broken copy left behind.
+
+The file is walked from its beginning. Every whole message is found, also those in a chunk that is cut off and those
+behind a damaged stretch; what is lost is counted.
+"""
+
+import re
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from calib_core.errors import RecordingError
+from calib_core.recordings.containers.chunks import Chunk
+from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
+from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
+
+__all__ = ["FoundInBag", "Record", "fields_of", "scan_bag"]
+
+_MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
+_U32 = struct.Struct("<I")
+_MAX_HEADER_BYTES = 1 << 24
+_MAX_STORED_BYTES = 1 << 28
+_MARK = re.compile(rb"op=[\x02\x05\x07]")
+_MAX_CANDIDATES = 2000
+_BACK_BYTES = 96
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One record: its header's fields, and where its data lies in what was walked."""
+
+    fields: dict[str, bytes]
+    kind: int
+    place: int
+    data_place: int
+    data_size: int
+
+    @property
+    def end(self) -> int:
+        """Where the next record begins."""
+        return self.data_place + self.data_size
+
+
+@dataclass(slots=True)
+class FoundInBag:
+    """What a walk over a bag found.
+
+    Attributes:
+        chunks: with as many bytes as are there; the first stands for the whole file, with messages outside chunks.
+        connections: the record of each, with its data.
+        messages: (receive time [ns], chunk, offset) by connection.
+        lost_bytes: that could not be understood, in the file and in unpacked chunks.
+        damaged_chunks: whose bytes could be unpacked only up to some place, or not at all.
+        fault: why the first of those could not.
+        tried: how often a record was looked for behind a damaged stretch; bounded.
+    """
+
+    chunks: list[Chunk]
+    connections: dict[int, tuple[dict[str, bytes], bytes]] = field(default_factory=dict)
+    messages: dict[int, list[tuple[int, int, int]]] = field(default_factory=dict)
+    lost_bytes: int = 0
+    damaged_chunks: int = 0
+    fault: str = ""
+    tried: int = 0
+
+
+def fields_of(raw: bytes) -> dict[str, bytes] | None:
+    """Split a record header into its name=value fields; None where it is not one."""
+    fields: dict[str, bytes] = {}
+    place = 0
+    while place + 4 <= len(raw):
+        length = _U32.unpack_from(raw, place)[0]
+        name, equals, value = raw[place + 4 : place + 4 + length].partition(b"=")
+        if not equals or place + 4 + length > len(raw):
+            return None
+        fields[name.decode("ascii", "replace")] = value
+        place += 4 + length
+    return fields if place == len(raw) else None
+
+
+def _record(stretch: Stretch, place: int) -> Record | None:
+    """Read the record at a place; None where there is none."""
+    head = stretch.up_to(place, 512)
+    if len(head) < 8:
+        return None
+    length = _U32.unpack_from(head)[0]
+    if length > min(_MAX_HEADER_BYTES, stretch.size - place - 8):
+        return None
+    if length + 8 > len(head):
+        head = stretch.up_to(place, length + 8)
+    fields = fields_of(head[4 : 4 + length]) if len(head) >= length + 8 else None
+    if not fields or len(fields.get("op", b"")) != 1:
+        return None
+    return Record(fields, fields["op"][0], place, place + 8 + length, _U32.unpack_from(head, 4 + length)[0])
+
+
+class _Walk:
+    """Go from record to record; behind a damaged stretch go on at the next record that makes sense.
+
+    Args:
+        stretch: what is walked over.
+        found: counts what is passed over, and how often a place was tried.
+        inside: of a chunk, where there are no chunks.
+    """
+
+    def __init__(self, stretch: Stretch, found: FoundInBag, *, inside: bool) -> None:
+        self._stretch = stretch
+        self._found = found
+        self._kinds = (_MESSAGE, _CONNECTION) if inside else (_MESSAGE, _CONNECTION, _CHUNK)
+
+    def records(self, place: int) -> Iterator[Record]:
+        """Yield the records from a place on; a chunk that runs past the end, or whose size is wrong, is cut."""
+        while place < self._stretch.size:
+            record = _record(self._stretch, place)
+            if record is not None and record.end <= self._stretch.size:
+                yield record
+                place = record.end
+                continue
+            following = self._next(place + 1)
+            after = following.place if following is not None else self._stretch.size
+            if record is not None and record.kind == _CHUNK:
+                yield replace(record, data_size=max(0, after - record.data_place))
+            else:
+                self._found.lost_bytes += after - place
+            place = after
+
+    def _next(self, start: int) -> Record | None:
+        """Find the next record that makes sense."""
+        while self._found.tried < _MAX_CANDIDATES:
+            mark = self._stretch.find(_MARK, start)
+            if mark < 0:
+                return None
+            self._found.tried += 1
+            for place in range(mark - 8, max(start - 1, mark - _BACK_BYTES), -1):
+                record = _record(self._stretch, place)
+                if record is not None and record.kind in self._kinds:
+                    return record
+            start = mark + 1
+        return None
+
+
+def scan_bag(file: FileBytes, start: int) -> FoundInBag:
+    """Walk over a bag from the first record after its header.
+
+    Args:
+        file: the bag.
+        start: where that record is.
+    """
+    found = FoundInBag([Chunk(0, file.size_bytes, file.size_bytes, "none")])
+    stretch = FileStretch(file, 0, file.size_bytes)
+    for record in _Walk(stretch, found, inside=False).records(start):
+        if record.kind == _CHUNK:
+            _scan_chunk(file, record, found)
+        else:
+            _note(stretch, record, 0, found)
+    return found
+
+
+def _scan_chunk(file: FileBytes, record: Record, found: FoundInBag) -> None:
+    """Note all whole messages of a chunk; a chunk whose compression is damaged gives what comes before the damage."""
+    stored = min(record.data_size, file.size_bytes - record.data_place)
+    compression = record.fields.get("compression", b"").decode("utf-8", "replace")
+    size = int.from_bytes(record.fields.get("size", b""), "little")
+    number = len(found.chunks)
+    if compression in ("none", ""):
+        stretch: Stretch = FileStretch(file, record.data_place, stored)
+        size = stored
+    else:
+        data = _unpacked(file, record, stored, compression, size, found)
+        stretch, size = MemoryStretch(data), len(data)
+    found.chunks.append(Chunk(record.data_place, stored, size, compression))
+    for inner in _Walk(stretch, found, inside=True).records(0):
+        _note(stretch, inner, number, found)
+
+
+def _note(stretch: Stretch, record: Record, chunk: int, found: FoundInBag) -> None:
+    """Note a message or a connection."""
+    if record.kind == _CONNECTION:
+        _note_connection(record, stretch.up_to(record.data_place, record.data_size), found)
+    elif record.kind == _MESSAGE and {"conn", "time"} <= record.fields.keys() and len(record.fields["time"]) == 8:
+        sec, nanosec = struct.unpack("<II", record.fields["time"])
+        connection = int.from_bytes(record.fields["conn"], "little")
+        found.messages.setdefault(connection, []).append((sec * 1_000_000_000 + nanosec, chunk, record.place))
+
+
+def _unpacked(file: FileBytes, record: Record, stored: int, compression: str, size: int, found: FoundInBag) -> bytes:
+    """Unpack a chunk as far as it goes; note what is wrong with it."""
+    where = f"chunk at byte {record.place}"
+    try:
+        refuse_bomb(stored, size, where=where)
+        if stored > _MAX_STORED_BYTES:
+            raise RecordingError(f"{where}: {stored} packed bytes in one chunk are refused as damaged")
+    except RecordingError as error:
+        found.damaged_chunks, found.fault = found.damaged_chunks + 1, found.fault or str(error)
+        found.lost_bytes += stored
+        return b""
+    data = file.up_to(record.data_place, stored)
+    try:
+        return unpack(data, compression, size, where=where)
+    except RecordingError as error:
+        found.damaged_chunks, found.fault = found.damaged_chunks + 1, found.fault or str(error)
+    return unpack_what_is_there(data, compression, size)
+
+
+def _note_connection(record: Record, data: bytes, found: FoundInBag) -> None:
+    if len(record.fields.get("conn", b"")) == 4:
+        found.connections.setdefault(int.from_bytes(record.fields["conn"], "little"), (record.fields, data))

@@ -1,0 +1,195 @@
+"""A recording in words and columns: what `cocalib info` prints."""
+
+from collections.abc import Iterable, Sequence
+
+from calib_core.recordings.recording import Recording
+from calib_core.recordings.summary import (
+    CameraSummary,
+    RadarSummary,
+    RecordingSummary,
+    Stamp,
+    TopicReport,
+    recording_summary,
+)
+from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
+from calib_core.recordings.time.dates import span_text, utc
+
+__all__ = ["clock_lines", "describe", "summary_text"]
+
+_USE = {"radar": "radar", "image": "camera", "camera-info": "intrinsics"}
+
+
+def describe(recording: Recording) -> str:
+    """Describe an open recording for people."""
+    return summary_text(recording_summary(recording))
+
+
+def summary_text(summary: RecordingSummary) -> str:
+    """Write a summary as text: one fact per line, figures with units, warnings last."""
+    lines = [
+        *_labelled(
+            "files", _columns([(f.name, size_text(f.size_bytes), f.container) for f in summary.files], right={1})
+        ),
+        *_times(summary),
+        "",
+        *_topic_table(summary.topics),
+        "",
+        *_labelled("clocks", _clocks(summary.topics)),
+        *_labelled("radar", _radar(summary.radar)),
+        *_labelled("camera", _camera(summary.camera)),
+    ]
+    if summary.warnings:
+        lines.append("")
+        for warning in summary.warnings:
+            lines.extend(_labelled("warning", [f"{warning.message}.", f"{warning.hint}. [{warning.code}]"]))
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def _labelled(label: str, lines: Iterable[str]) -> list[str]:
+    return [f"{label if not number else '':<9} {line}" for number, line in enumerate(lines)]
+
+
+def _times(summary: RecordingSummary) -> list[str]:
+    if summary.start is None or summary.end is None:
+        return _labelled("time", ["no messages"])
+    lines = [
+        f"{utc(summary.start.time)} to {utc(summary.end.time)}, {duration_text(summary.duration_s)}",
+        f"{_seconds(summary.start)} to {_seconds(summary.end)} s since 1970",
+    ]
+    counts = [topic.count for topic in summary.topics]
+    lines.append(f"{_counted(sum(counts), 'message')} in {_counted(len(counts), 'topic')}")
+    if summary.overlap_s is not None:
+        lines.append(f"radar and camera share {duration_text(summary.overlap_s)}")
+    return _labelled("time", lines)
+
+
+def _seconds(stamp: Stamp) -> str:
+    return f"{stamp.sec}.{stamp.nanosec // 1_000_000:03d}"
+
+
+def _topic_table(topics: Sequence[TopicReport]) -> list[str]:
+    if not topics:
+        return _labelled("topics", ["none"])
+    rows = [("used as", "topic", "type", "messages", "rate", "longest gap", "jitter", "stamps")]
+    for topic in topics:
+        rows.append(
+            (
+                _USE.get(topic.kind, "") if topic.chosen else "",
+                topic.name,
+                topic.type,
+                str(topic.count),
+                "" if topic.rate_hz is None else f"{topic.rate_hz:.1f} Hz",
+                "" if topic.longest_gap_s is None else f"{topic.longest_gap_s:.3f} s",
+                "" if topic.jitter_s is None else f"{topic.jitter_s * 1e3:.1f} ms",
+                {"header": "measured", "receive": "received"}[topic.clock] if topic.count else "",
+            )
+        )
+    lines = list(_columns(rows, right={3, 4, 5, 6}))
+    for topic in topics:
+        if topic.problem and topic.problem != "no messages":
+            lines.append(topic.problem if topic.name in topic.problem else f"{topic.name}: {topic.problem}")
+    return lines
+
+
+def _clocks(topics: Sequence[TopicReport]) -> list[str]:
+    """Say, topic by topic, which clock is used, why, and what is known about both."""
+    lines = []
+    for topic in topics:
+        if topic.clocks is not None:
+            first, *others = clock_lines(topic.clocks)
+            lines.append(f"{topic.name}: {'' if topic.chosen else 'not in use; '}{first}")
+            lines.extend(f"  {line}" for line in others)
+    return lines
+
+
+def clock_lines(found: ClockDiagnosis) -> tuple[str, ...]:
+    """Say which clock a topic goes by and why; in a second line, where there is something, what is known about both."""
+    used = {"header": "stamps of measurement", "receive": "times of receiving"}[found.chosen]
+    about = []
+    if found.delay_s == 0 and found.delay_jitter_s == 0:
+        about.append("the times of receiving are the same")
+    elif found.delay_s is not None:
+        about.append(f"received {_delay_text(found.delay_s)} the stamp (± {(found.delay_jitter_s or 0) * 1e3:.1f} ms)")
+    about.extend(found.remarks)
+    return (f"{used}, because {found.reason}", *(["; ".join(about)] if about else []))
+
+
+def _delay_text(delay_s: float) -> str:
+    near = abs(delay_s) < 2
+    span = f"{abs(delay_s) * 1e3:.1f} ms" if near else span_text(delay_s)
+    return f"{span} {'after' if delay_s >= 0 else 'before'}"
+
+
+def _radar(radar: RadarSummary | None) -> list[str]:
+    if radar is None:
+        return ["none that can be read"]
+    low, middle, high = radar.returns_per_scan
+    rate = "" if radar.rate_hz is None else f" at {radar.rate_hz:.1f} Hz"
+    gap = "" if radar.longest_gap_s is None else f", longest gap {radar.longest_gap_s:.3f} s"
+    sample = "" if radar.sampled_scans >= radar.scans else f", from {radar.sampled_scans} scans"
+    return [
+        f"{radar.topic}, frame '{radar.frame}': {_counted(radar.scans, 'scan')}{rate}{gap}",
+        f"returns per scan: {middle:.0f} ({low} to {high}{sample})",
+        radar.layout,
+    ]
+
+
+def _camera(camera: CameraSummary | None) -> list[str]:
+    if camera is None:
+        return ["none that can be read"]
+    rate = "" if camera.rate_hz is None else f" at {camera.rate_hz:.1f} Hz"
+    gap = "" if camera.longest_gap_s is None else f", longest gap {camera.longest_gap_s:.3f} s"
+    size = "the first cannot be read"
+    if camera.width_px is not None:
+        size = f"{camera.width_px} x {camera.height_px} px, {camera.format}"
+    return [
+        f"{camera.topic}, frame '{camera.frame}': {_counted(camera.frames, 'image')}{rate}{gap}",
+        size,
+        _intrinsics(camera),
+    ]
+
+
+def _intrinsics(camera: CameraSummary) -> str:
+    if camera.matrix_px is None or camera.distortion is None:
+        return "no usable intrinsics in the recording: give them with --camera FILE"
+    k = camera.matrix_px
+    lens = ", ".join(f"{value:.5g}" for value in camera.distortion)
+    return (
+        f"{camera.model} from {camera.camera_info_topic}: fx {k[0][0]:.2f} fy {k[1][1]:.2f} "
+        f"cx {k[0][2]:.2f} cy {k[1][2]:.2f} px" + (f"; distortion {lens}" if lens else "")
+    )
+
+
+def _columns(rows: Sequence[Sequence[str]], *, right: frozenset[int] | set[int] = frozenset()) -> Iterable[str]:
+    """Pad cells so that columns stand under one another."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)] if rows else []
+    for row in rows:
+        cells = [
+            cell.rjust(width) if number in right else cell.ljust(width)
+            for number, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        yield "  ".join(cells).rstrip()
+
+
+def size_text(size_bytes: int) -> str:
+    """Write a size with a unit that keeps it short."""
+    size = float(size_bytes)
+    for unit in ("B", "kB", "MB", "GB"):
+        if size < 1000 or unit == "GB":
+            return f"{size:.0f} {unit}" if unit == "B" else f"{size:.1f} {unit}"
+        size /= 1000
+    raise AssertionError
+
+
+def duration_text(seconds: float) -> str:
+    """Write a duration: seconds, from two minutes on with minutes before them."""
+    if seconds < 1:
+        return f"{seconds:.3f} s"
+    if seconds < 120:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(seconds, 60)
+    return f"{int(minutes)} min {rest:04.1f} s"

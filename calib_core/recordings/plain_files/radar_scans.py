@@ -1,0 +1,155 @@
+"""Radar returns from one file per scan: nuScenes .pcd and View-of-Delft .bin."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from calib_core.errors import MessageError, RecordingError
+from calib_core.measurements import TimeNs
+from calib_core.recordings.plain_files.file_stamps import stamp_files
+from calib_core.recordings.plain_files.messages import cloud_channel, cloud_message
+from calib_core.recordings.plain_files.source import PlainSource, topic_of
+
+__all__ = ["open_bin_folder", "open_pcd_folder", "points_of_bin", "points_of_pcd"]
+
+_FRAME = "radar"
+_MAX_BYTES = 1 << 28
+_HEAD_BYTES = 1 << 16
+_MAX_POINT_BYTES = 1 << 16
+_DELFT = np.dtype([(name, "<f4") for name in ("x", "y", "z", "rcs", "v_r", "v_r_compensated", "time")])
+_KINDS = {"F": "f", "I": "i", "U": "u"}
+
+
+def open_pcd_folder(folder: Path, files: Sequence[Path]) -> PlainSource:
+    """Open a folder of .pcd files, one scan each.
+
+    Raises:
+        RecordingError: the files have no times.
+    """
+    return _open(folder, files, "folder of .pcd", points_of_pcd)
+
+
+def open_bin_folder(folder: Path, files: Sequence[Path]) -> PlainSource:
+    """Open a folder of View-of-Delft .bin files, one scan each.
+
+    Raises:
+        RecordingError: the files have no times.
+    """
+    return _open(folder, files, "folder of View-of-Delft .bin", points_of_bin)
+
+
+def _open(folder: Path, files: Sequence[Path], what: str, points: Callable[[Path], np.ndarray]) -> PlainSource:
+    stamped = stamp_files(folder, files)
+
+    def message(row: int) -> bytes:
+        return cloud_message(TimeNs(int(stamped.times_ns[row])), _FRAME, points(stamped.files[row]))
+
+    return PlainSource(
+        folder,
+        sum(file.stat().st_size for file in stamped.files),
+        f"{what}, {len(stamped.files)} files",
+        cloud_channel(topic_of(folder, "radar")),
+        stamped.times_ns,
+        message,
+        stamped.warnings,
+    )
+
+
+def _content(path: Path) -> bytes:
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise MessageError(f"{path.name} has {path.stat().st_size} bytes, too many for one radar scan")
+        return path.read_bytes()
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}; is it still there?") from error
+
+
+def points_of_bin(path: Path) -> np.ndarray:
+    """Read a View-of-Delft scan: 7 float32 per return.
+
+    Raises:
+        MessageError: the size does not fit.
+    """
+    data = _content(path)
+    if len(data) % _DELFT.itemsize:
+        raise MessageError(
+            f"{path.name} has {len(data)} bytes, no multiple of {_DELFT.itemsize}: not a View-of-Delft radar file "
+            "(7 float32 per return: x y z RCS v_r v_r_compensated time)"
+        )
+    return np.frombuffer(data, dtype=_DELFT)
+
+
+def points_of_pcd(path: Path) -> np.ndarray:
+    """Read a scan in PCD version 0.7, binary or ascii.
+
+    Raises:
+        MessageError: the header is damaged, or the points are packed or fewer than it says.
+    """
+    data = _content(path)
+    head, body = _head(path, data)
+    dtype = _dtype(path, head)
+    count = _whole(path, head, "POINTS", "WIDTH")
+    kind = " ".join(head.get("DATA", ["?"]))
+    if kind == "ascii":
+        rows = body.decode("ascii", "replace").split()
+        fields = len(dtype.names or ())
+        if len(rows) < count * fields or any(dtype[name].subdtype for name in dtype.names or ()):
+            raise MessageError(f"{path.name} has {len(rows)} figures; {count * fields} are needed: the file is damaged")
+        table = np.array(rows[: count * fields], dtype=np.float64).reshape(count, fields)
+        points = np.zeros(count, dtype=dtype)
+        for number, name in enumerate(dtype.names or ()):
+            points[name] = table[:, number]
+        return points
+    if kind != "binary":
+        raise MessageError(
+            f"{path.name} holds '{kind}' data; binary and ascii can be read: convert it with pcl_convert_pcd_ascii_binary"
+        )
+    if len(body) < count * dtype.itemsize:
+        raise MessageError(
+            f"{path.name} has {len(body)} bytes of points; {count * dtype.itemsize} are needed: the file is cut short"
+        )
+    return np.frombuffer(body, dtype=dtype, count=count)
+
+
+def _head(path: Path, data: bytes) -> tuple[dict[str, list[str]], bytes]:
+    head: dict[str, list[str]] = {}
+    place = 0
+    while "DATA" not in head:
+        end = data.find(b"\n", place, _HEAD_BYTES)
+        if end < 0:
+            raise MessageError(f"{path.name} has no PCD header (no line DATA); it is damaged or something else")
+        words = data[place:end].decode("ascii", "replace").split("#")[0].split()
+        if words:
+            head[words[0].upper()] = words[1:]
+        place = end + 1
+    return head, data[place:]
+
+
+def _dtype(path: Path, head: dict[str, list[str]]) -> "np.dtype[np.void]":
+    names, sizes, kinds = (head.get(word, []) for word in ("FIELDS", "SIZE", "TYPE"))
+    counts = head.get("COUNT", ["1"] * len(names))
+    try:
+        described = [
+            (
+                f"{name}{number}" if name == "_" else name,
+                f"<{_KINDS[kind]}{int(size)}",
+                (int(count),) if count != "1" else (),
+            )
+            for number, (name, size, kind, count) in enumerate(zip(names, sizes, kinds, counts, strict=True))
+        ]
+        dtype = np.dtype(described)
+        if not 0 < dtype.itemsize <= _MAX_POINT_BYTES:
+            raise ValueError(f"a point has {dtype.itemsize} bytes")
+        return dtype
+    except (KeyError, ValueError, TypeError, OverflowError, MemoryError) as error:
+        raise MessageError(
+            f"{path.name} has a PCD header whose FIELDS, SIZE, TYPE and COUNT do not fit ({error})"
+        ) from error
+
+
+def _whole(path: Path, head: dict[str, list[str]], *names: str) -> int:
+    words = next((head[name] for name in names if head.get(name)), ["none"])
+    if not words[0].isdigit():
+        raise MessageError(f"{path.name} has a PCD header that gives no number of points")
+    return int(words[0])

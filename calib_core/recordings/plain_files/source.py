@@ -1,0 +1,108 @@
+"""A recording that is no ROS container: times in a list, messages made when they are asked for."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.errors import RecordingError
+from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
+from calib_core.recordings.plain_files.messages import header_bytes
+from calib_core.results import DataWarning
+
+__all__ = ["PlainSource", "topic_of"]
+
+_HEADER_BYTES = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlainSource:
+    """One folder or file with one topic; a Source.
+
+    Attributes:
+        path: the folder or file.
+        size_bytes: of all it holds.
+        container: for people.
+        channel: its topic.
+        times_ns: (n,) ascending.
+        message: makes the message of a row.
+        warnings: what opening it brought to light.
+        closed: called when no more is read.
+    """
+
+    path: Path
+    size_bytes: int
+    container: str
+    channel: Channel
+    times_ns: TimesNs
+    message: Callable[[int], bytes]
+    warnings: tuple[DataWarning, ...] = ()
+    closed: Callable[[], None] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse times that no message can carry.
+
+        Raises:
+            RecordingError: one is before 1970 or after 2106.
+        """
+        low, high = int(self.times_ns.min(initial=0)), int(self.times_ns.max(initial=0))
+        if low < 0 or high >= NS_PER_S << 32:
+            raise RecordingError(
+                f"{self.path}: a time is {(low if low < 0 else high) / NS_PER_S:.6g} s, outside the years 1970 to 2106; "
+                "look at its unit"
+            )
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The topic."""
+        return (self.channel,)
+
+    @property
+    def counts(self) -> Mapping[int, int]:
+        """How many messages there are."""
+        return {self.channel.id: len(self.times_ns)}
+
+    @property
+    def later_warnings(self) -> tuple[DataWarning, ...]:
+        """Nothing: what cannot be read is told message by message."""
+        return ()
+
+    def index(self, channel_id: int) -> MessageIndex:
+        """Tell where the messages lie: row by row."""
+        rows = np.arange(len(self.times_ns) if channel_id == self.channel.id else 0, dtype=np.int64)
+        return MessageIndex(self.times_ns[rows], rows, np.zeros_like(rows))
+
+    def read(self, chunk: int, offset: int) -> bytes:
+        """Make one message."""
+        return self.message(chunk)
+
+    def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
+        """Return the first bytes of many messages; for stamps alone, no file is read."""
+        rows = np.zeros((len(index), size), dtype=np.uint8)
+        lengths = np.full(len(index), max(size, _HEADER_BYTES), dtype=np.int64)
+        fault = ""
+        for place, row in enumerate(index.chunk.tolist()):
+            head = header_bytes(TimeNs(int(self.times_ns[row])), "")
+            if size > _HEADER_BYTES:
+                try:
+                    head = self.message(row)
+                    lengths[place] = len(head)
+                except RecordingError as error:
+                    lengths[place] = -1
+                    fault = fault or str(error)
+            rows[place, : min(len(head), size)] = np.frombuffer(head[:size], dtype=np.uint8)
+        return Heads(rows, lengths, fault)
+
+    def close(self) -> None:
+        """Close what is open."""
+        if self.closed is not None:
+            self.closed()
+
+
+def topic_of(path: Path, word: str) -> str:
+    """Name a topic after a folder or file."""
+    name = "".join(letter if letter.isalnum() else "_" for letter in path.stem).strip("_")
+    return f"/{name or word}/{word}"

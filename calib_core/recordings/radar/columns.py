@@ -1,0 +1,287 @@
+"""Which columns of a radar message are position, speed, amplitude and noise, whatever a driver calls them."""
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib_core.arrays import Points3, Values
+from calib_core.radar import cartesian_from_polar, polar_from_cartesian
+from calib_core.recordings.radar.axes import RadarAxes
+from calib_core.recordings.radar.noise import full_covariance, sigma_polar_from_covariance
+
+__all__ = ["ColumnPlan", "Returns", "no_returns", "plan_columns", "returns_from", "unknown"]
+
+_POSITION_PREFIXES = ("", "position", "poseposition", "poseposeposition", "pos", "point")
+_RANGES = ("range", "r", "distance", "dist", "rangem", "targetrange")
+_AZIMUTHS = ("azimuth", "azimuthangle", "azimuthrad", "azimuthdeg", "az")
+_ELEVATIONS = ("elevation", "elevationangle", "elevationrad", "elevationdeg", "el")
+_CLAIMED_AZIMUTHS = (*_AZIMUTHS, "bearing")
+_DOPPLERS = (
+    "dopplervelocity", "vdopplermps", "radialvelocity", "radialspeed", "rangerate", "dopplermps", "doppler", "vradial",
+    "velocity", "vr", "v", "speed", "speedradial", "rrate",
+)  # fmt: skip
+_AMPLITUDES = ("snrdb", "snr", "intensity", "rcs", "power", "amplitude", "magnitude")
+_VELOCITIES = (
+    ("vx", "vy", "vz"), ("velocityx", "velocityy", "velocityz"), ("relativevelocityx", "relativevelocityy", "relativevelocityz"),
+    ("twistlinearx", "twistlineary", "twistlinearz"),
+    ("twisttwistlinearx", "twisttwistlineary", "twisttwistlinearz"), ("vrelx", "vrely", "vrelz"), ("vabsx", "vaby", "vabz"),
+)  # fmt: skip
+_SIGMAS = (
+    ("rangestd", "sigmarange", "rangesigma", "distancestd"),
+    ("azimuthstd", "azimuthanglestd", "sigmaazimuth", "azimuthsigma"),
+    ("elevationstd", "elevationanglestd", "sigmaelevation", "elevationsigma"),
+)
+_INVALID_POSITION = ("invaliddistance", "invalidrange", "invalidazimuth", "invalidelevation")
+_INVALID_DOPPLER = ("invalidrangerate", "invaliddoppler", "invalidvelocity")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Returns:
+    """The returns of one scan as columns; the meaning is that of RadarScan. Columns of NaN alone may be read-only.
+
+    Attributes:
+        claimed_polar: range, azimuth and elevation as the message has them, NaN for what it has not; only where asked for.
+    """
+
+    points_radar_m: Points3
+    doppler_mps: Values
+    snr_db: Values
+    sigma_polar: Points3
+    claimed_polar: Points3 | None = None
+
+    def __len__(self) -> int:
+        return len(self.points_radar_m)
+
+
+def no_returns() -> Returns:
+    """Return a scan of nothing."""
+    return Returns(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros((0, 3)))
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnPlan:
+    """The driver's names of the columns that are used.
+
+    Attributes:
+        position: x, y and perhaps z [m]; or range [m], azimuth and perhaps elevation.
+        polar: position is polar.
+        degrees: the angles are in degrees.
+        doppler: radial speed [m/s], or None.
+        velocity: components [m/s] whose part along the line of sight is the radial speed where doppler is None.
+        amplitude: a figure in dB, or None.
+        amplitude_scale: its unit in dB.
+        sigma: standard deviations of range, azimuth and elevation; None each where there is none.
+        spoils_position: flags that say the position is not valid.
+        spoils_doppler: flags that say the speed is not valid.
+        needed: flags that are zero where there is no return.
+        azimuth_sign: 1 where azimuth is positive to the left, -1 to the right.
+        covariance: an array with the position's covariance [m^2], or None.
+        claimed: range, azimuth and elevation beside the position, or those it is made of; for finding contradictions.
+        axes: what a person says about axes and units; None for nothing.
+        decoder: the layout's name in the registry; "" for one read by its column names alone.
+        assumed: what the layout's documents leave open, as a sentence; "" for nothing.
+        shared_with_lidars: lidars have the same columns.
+        claiming: fill in Returns.claimed_polar.
+    """
+
+    position: tuple[str, ...]
+    polar: bool
+    degrees: bool = False
+    doppler: str | None = None
+    velocity: tuple[str, ...] = ()
+    amplitude: str | None = None
+    amplitude_scale: float = 1.0
+    sigma: tuple[str | None, str | None, str | None] = (None, None, None)
+    spoils_position: tuple[str, ...] = ()
+    spoils_doppler: tuple[str, ...] = ()
+    needed: tuple[str, ...] = ()
+    azimuth_sign: float = 1.0
+    covariance: str | None = None
+    claimed: tuple[str | None, str | None, str | None] = (None, None, None)
+    axes: RadarAxes | None = None
+    decoder: str = ""
+    assumed: str = ""
+    shared_with_lidars: bool = False
+    claiming: bool = False
+
+    @property
+    def looks_like_radar(self) -> bool:
+        """Tell whether more than a position and an intensity is there, as a lidar has them."""
+        if self.decoder:
+            return not self.shared_with_lidars
+        amplitude = self.amplitude is not None and _plain(self.amplitude) != "intensity"
+        return self.polar or self.doppler is not None or bool(self.velocity) or amplitude
+
+    def describe(self) -> str:
+        """Say in a few words what is read from where."""
+        words = [f"position from {', '.join(self.position)}"]
+        if self.polar:
+            side = "left" if self.azimuth_sign > 0 else "right"
+            words[0] += f" (azimuth positive to the {side}, {'degrees' if self.degrees else 'radians'})"
+        elif self.axes is None:
+            words[0] += " (forward, left, up)" if len(self.position) == 3 else " (forward, left)"
+        speed = self.doppler or ", ".join(self.velocity)
+        words.append(f"speed from {speed}" if speed else "no speed")
+        words.append(f"amplitude from {self.amplitude}" if self.amplitude else "no amplitude")
+        if any(self.sigma):
+            words.append(f"noise from {', '.join(name for name in self.sigma if name)}")
+        elif self.covariance:
+            words.append(f"noise from {self.covariance}")
+        if self.axes:
+            words.append(self.axes.describe())
+        return (f"{self.decoder}: " if self.decoder else "") + "; ".join(words)
+
+    def read_as(self, axes: RadarAxes) -> "ColumnPlan":
+        """Follow what a person says about axes and units."""
+        return replace(self, axes=axes, degrees=self.degrees if axes.degrees is None else axes.degrees)
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+_UNKNOWN = np.full(3 << 16, np.nan)
+_UNKNOWN.setflags(write=False)
+
+
+def unknown(n: int, columns: int = 0) -> np.ndarray:
+    """Return (n,) or (n, columns) NaN that cannot be written to: all of them share their memory."""
+    size = n * max(1, columns)
+    values = _UNKNOWN[:size]
+    if len(values) < size:
+        values = np.full(size, np.nan)
+        values.setflags(write=False)
+    return values.reshape(n, columns) if columns else values
+
+
+def plan_columns(names: Iterable[str]) -> ColumnPlan | None:
+    """Recognise the columns of a radar by their names; None where there is no position.
+
+    Args:
+        names: as the message spells them; nested ones dotted.
+    """
+    by_plain = {_plain(name): name for name in reversed(list(names))}
+
+    def first(candidates: Iterable[str]) -> str | None:
+        return next((by_plain[name] for name in candidates if name in by_plain), None)
+
+    position = _cartesian(by_plain)
+    polar = not position
+    degrees = False
+    if polar:
+        polar_names = (first(_RANGES), first(_AZIMUTHS), first(_ELEVATIONS))
+        if polar_names[0] is None or polar_names[1] is None:
+            return None
+        position = tuple(name for name in polar_names if name is not None)
+        degrees = _plain(position[1]).endswith("deg")
+    sets = (tuple(by_plain[name] for name in names if name in by_plain) for names in _VELOCITIES)
+    velocity = next((found for found in sets if len(found) >= 2), ())
+    doppler = first(_DOPPLERS)
+    sigma = tuple(first(candidates) for candidates in _SIGMAS)
+    return ColumnPlan(
+        position=position,
+        polar=polar,
+        degrees=degrees,
+        doppler=doppler,
+        velocity=() if doppler else velocity,
+        amplitude=first(_AMPLITUDES),
+        sigma=(sigma[0], sigma[1], sigma[2]),
+        spoils_position=tuple(by_plain[name] for name in _INVALID_POSITION if name in by_plain),
+        spoils_doppler=tuple(by_plain[name] for name in _INVALID_DOPPLER if name in by_plain),
+        claimed=(first(_RANGES), first(_CLAIMED_AZIMUTHS), first(_ELEVATIONS)),
+    )
+
+
+def _cartesian(by_plain: dict[str, str]) -> tuple[str, ...]:
+    for prefix in _POSITION_PREFIXES:
+        if f"{prefix}x" in by_plain and f"{prefix}y" in by_plain:
+            return tuple(by_plain[f"{prefix}{axis}"] for axis in "xyz" if f"{prefix}{axis}" in by_plain)
+    if "distx" in by_plain and "disty" in by_plain:
+        return by_plain["distx"], by_plain["disty"]
+    return ()
+
+
+def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
+    """Take the returns of one scan out of a message.
+
+    Args:
+        plan: which columns to use.
+        column: gives a column by the driver's name, of any number type; (n,), or (m, k) with n = m k; it is not changed.
+    """
+    with np.errstate(all="ignore"):  # damaged bytes may hold signalling NaN, and figures whose squares overflow
+        return _returns(plan, column)
+
+
+def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
+    position = _position(plan, column)
+    n = len(position)
+    amplitude = _floats(column(plan.amplitude)) if plan.amplitude else unknown(n)
+    doppler = _doppler(plan, column, position)
+    for flag in plan.spoils_doppler:
+        doppler = np.where(column(flag).reshape(-1) != 0, np.nan, doppler)
+    for flag in plan.spoils_position:
+        position[column(flag).reshape(-1) != 0] = np.nan
+    for flag in plan.needed:
+        position[column(flag).reshape(-1) == 0] = np.nan
+    if plan.axes:
+        position = position @ plan.axes.matrix.T
+    if plan.amplitude_scale != 1.0:
+        amplitude = amplitude * plan.amplitude_scale
+    claimed = _columns(plan.claimed, column, n) if plan.claiming else None
+    return Returns(position, doppler, amplitude, _sigma(plan, column, position), claimed)
+
+
+def _floats(values: np.ndarray) -> Values:
+    """Copy a column into contiguous numbers."""
+    return np.array(values, dtype=np.float64, order="C").reshape(-1)
+
+
+def _position(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Points3:
+    """Return positions in the message's own axes; angles taken as positive to the left and upwards."""
+    parts = [column(name) for name in plan.position]
+    position = np.empty((parts[0].size, 3))
+    for axis, part in enumerate(parts):
+        position[:, axis].reshape(part.shape)[...] = part
+    position[:, len(parts) :] = 0.0
+    if not plan.polar:
+        return position
+    if plan.degrees:
+        position[:, 1:] = np.radians(position[:, 1:])
+    position[:, 1] *= plan.azimuth_sign
+    return cartesian_from_polar(position)
+
+
+def _sigma(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Points3) -> Points3:
+    turn = np.eye(3) if plan.axes is None else plan.axes.matrix
+    if plan.covariance is not None:
+        covariance = full_covariance(np.asarray(column(plan.covariance), dtype=np.float64))
+        return sigma_polar_from_covariance(position, turn @ covariance @ turn.T)
+    if not any(plan.sigma):
+        return unknown(len(position), 3)
+    sigma = _columns(plan.sigma, column, len(position))
+    if plan.degrees:
+        sigma[:, 1:] = np.radians(sigma[:, 1:])
+    if not turn[2, 2]:
+        sigma[:, 1:] = np.nan  # what was azimuth is no longer about the upward axis
+    return sigma
+
+
+def _columns(names: Iterable[str | None], column: Callable[[str], np.ndarray], n: int) -> Points3:
+    found = np.full((n, 3), np.nan)
+    for place, name in enumerate(names):
+        if name is not None:
+            found[:, place] = column(name).reshape(-1)
+    return found
+
+
+def _doppler(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Points3) -> Values:
+    if plan.doppler:
+        return _floats(column(plan.doppler))
+    if not plan.velocity:
+        return unknown(len(position))
+    range_m = polar_from_cartesian(position)[:, 0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        along = sum(_floats(column(name)) * position[:, axis] for axis, name in enumerate(plan.velocity))
+        return np.asarray(along / range_m, dtype=np.float64)

@@ -1,0 +1,241 @@
+"""Radar messages that are a list of returns, targets or tracks, and drivers that send one return per message."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.recordings.messages.decoding import Message, Pin, decode, fixed_part
+from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
+from calib_core.recordings.radar.column_plans import find_decoder, plan_for
+from calib_core.recordings.radar.columns import ColumnPlan, Returns, no_returns, returns_from
+
+__all__ = ["ListLayout", "PointLayout", "first_of_scans"]
+
+_FRAME_NUMBERS = ("radar_frame_idx", "frame_idx", "frame_number", "frame_id_number", "frame_counter")
+_POINT_NUMBERS = ("point_id", "detection_id", "target_id", "index")
+_SHORTEST_CYCLE_NS = 5e6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ListLayout:
+    """Reads messages of a header and one list: radar_msgs, Ainstein, Continental, object lists."""
+
+    definition: Definition
+    list_name: str
+    plan: ColumnPlan
+
+    one_per_message = False
+    lidar_like = False
+
+    @classmethod
+    def recognise(cls, definition: Definition) -> "ListLayout | None":
+        """Find the one list whose elements have a position and something only a radar has."""
+        for field in definition.fields:
+            if field.count != 0 or field.type not in definition.types:
+                continue
+            plan = plan_for("list", *leaf_names(definition, field.type))
+            if plan is not None and plan.looks_like_radar:
+                return cls(definition, field.name, plan)
+        return None
+
+    @property
+    def description(self) -> str:
+        """Say what is read."""
+        return f"list '{self.list_name}': {self.plan.describe()}"
+
+    def returns(self, payload: bytes) -> Returns:
+        """Read one list.
+
+        Raises:
+            MessageError: the bytes do not fit the definition.
+        """
+        message = decode(self.definition, payload)
+        if not message.count(self.list_name):
+            return no_returns()
+        return returns_from(self.plan, lambda name: message.column(self.list_name, name))
+
+    def with_plan(self, plan: ColumnPlan) -> "ListLayout":
+        """Read by another plan."""
+        return replace(self, plan=plan)
+
+
+def leaf_names(definition: Definition, kind: str, prefix: str = "") -> tuple[list[str], list[str]]:
+    """Return the dotted names of all single numbers of a type, and of all fixed arrays and strings."""
+    numbers: list[str] = []
+    others: list[str] = []
+    for field in definition.types[kind]:
+        if field.type in PRIMITIVES or field.type == "string":
+            single = field.count is None and field.type in PRIMITIVES
+            if single or field.count != 0:
+                (numbers if single else others).append(prefix + field.name)
+        elif field.count is None:
+            more = leaf_names(definition, field.type, f"{prefix}{field.name}.")
+            numbers.extend(more[0])
+            others.extend(more[1])
+    return numbers, others
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointLayout:
+    """Reads drivers that publish every return as a message of its own (ti_mmwave_rospkg and its forks).
+
+    Attributes:
+        frame_number: the field that numbers scans, or None.
+        point_number: the field that numbers returns within a scan, or None.
+        pins: where the lengths of the strings in front of the last number lie, and what they are in the first message.
+    """
+
+    definition: Definition
+    plan: ColumnPlan
+    dtype: np.dtype[Any]
+    frame_number: str | None
+    point_number: str | None
+    pins: tuple[Pin, ...]
+
+    one_per_message = True
+    lidar_like = False
+
+    @classmethod
+    def recognise(cls, definition: Definition, payload: bytes) -> "PointLayout | None":
+        """Look at the fields of fixed size: a position and a speed make a radar return."""
+        dtype, pins = fixed_part(definition, payload)
+        names = dtype.names or ()
+        strings = [field.name for field in definition.fields if field.type == "string"]
+        plan = plan_for("point", names, strings)
+        if plan is None or plan.doppler is None or any("." in name for name in plan.position):
+            return None
+        decoder = find_decoder("point", (*names, *strings))
+        numbers = (decoder.point_number,) if decoder and decoder.point_number else _POINT_NUMBERS
+        return cls(
+            definition,
+            plan,
+            dtype,
+            next((name for name in _FRAME_NUMBERS if name in names), None),
+            next((name for name in numbers if name in names), None),
+            pins,
+        )
+
+    @property
+    def description(self) -> str:
+        """Say what is read."""
+        how = self.frame_number or self.point_number or "pauses"
+        return f"one return per message, scans told apart by {how}: {self.plan.describe()}"
+
+    def returns_of_rows(self, rows: np.ndarray) -> Returns:
+        """Read many returns from the first bytes (n, dtype.itemsize) of their messages."""
+        points = self.view(rows)
+        return _known_snr(returns_from(self.plan, lambda name: points[name]))
+
+    def returns(self, payload: bytes) -> Returns:
+        """Read the return of one whole message, whatever its strings.
+
+        Raises:
+            MessageError: the bytes do not fit the definition.
+        """
+        message = self.message(payload)
+        return _known_snr(returns_from(self.plan, lambda name: np.array([message.number(name)])))
+
+    def message(self, payload: bytes) -> Message:
+        """Decode one whole message.
+
+        Raises:
+            MessageError: the bytes do not fit the definition.
+        """
+        return decode(self.definition, payload)
+
+    def misfits(self, rows: np.ndarray) -> np.ndarray:
+        """Tell which rows have strings of another length than the first, so that their fields lie elsewhere."""
+        moved = np.zeros(len(rows), dtype=bool)
+        for pin in (pin for pin in self.pins if pin.offset + 4 <= rows.shape[1]):
+            moved |= (rows[:, pin.offset : pin.offset + 4] != np.frombuffer(pin.length, dtype=np.uint8)).any(axis=1)
+        return moved
+
+    def with_plan(self, plan: ColumnPlan) -> "PointLayout":
+        """Read by another plan."""
+        return replace(self, plan=plan)
+
+    def view(self, rows: np.ndarray) -> np.ndarray:
+        """View raw rows (n, dtype.itemsize) as records."""
+        return np.ascontiguousarray(rows).view(self.dtype)[:, 0]
+
+    @property
+    def group_bytes(self) -> int:
+        """How many bytes of a message hold the stamp and the numbers that tell scans apart."""
+        places = [self._place(name) for name in (self.frame_number, self.point_number) if name]
+        return max([12, *(offset + code.itemsize for code, offset in places)])
+
+    def numbers(self, rows: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Read frame and point numbers from rows of at least group_bytes: (n,) each, None for one there is not."""
+        frame = self._column(rows, self.frame_number).copy() if self.frame_number else None
+        return frame, self._column(rows, self.point_number).copy() if self.point_number else None
+
+    def _column(self, rows: np.ndarray, name: str) -> np.ndarray:
+        code, offset = self._place(name)
+        return np.ascontiguousarray(rows[:, offset : offset + code.itemsize]).view(code)[:, 0]
+
+    def _place(self, name: str) -> tuple[np.dtype[Any], int]:
+        assert self.dtype.fields is not None
+        place = self.dtype.fields[name]
+        return place[0], place[1]
+
+
+def _known_snr(found: Returns) -> Returns:
+    """Leave out intensities of zero: the stock driver never fills them in."""
+    if found.snr_db.flags.writeable:
+        found.snr_db[found.snr_db == 0.0] = np.nan
+    return found
+
+
+def first_of_scans(
+    times_ns: TimesNs, frame_numbers: np.ndarray | None = None, point_numbers: np.ndarray | None = None
+) -> np.ndarray:
+    """Find the message that begins each scan, in drivers that send one message per return.
+
+    A scan ends where the frame number changes; without one, where the point number does not rise; and in any case at a
+    pause longer than half the usual time between scans (a scan of one return has no number to tell it from the next).
+
+    Args:
+        times_ns: (n,) stamps in the order of the recording.
+        frame_numbers: (n,) or None.
+        point_numbers: (n,) or None.
+
+    Returns:
+        (m,) indices, ascending, the first is 0; empty where n is 0.
+    """
+    n = len(times_ns)
+    if n < 2:
+        return np.zeros(n, dtype=np.int64)
+    pauses_ns = np.diff(times_ns)
+    if frame_numbers is not None:
+        begins = np.diff(frame_numbers.astype(np.int64)) != 0
+        return np.concatenate([[0], np.flatnonzero(begins) + 1])
+    if point_numbers is not None:
+        begins = np.diff(point_numbers.astype(np.int64)) <= 0
+        usual_ns = float(np.median(np.diff(times_ns[np.flatnonzero(begins) + 1]))) if begins.sum() > 2 else np.inf
+    else:
+        begins = np.zeros(n - 1, dtype=bool)
+        usual_ns = 2.0 * _between_scans_ns(pauses_ns)
+    if usual_ns > 0:
+        begins = begins | (pauses_ns > 0.5 * usual_ns)
+    return np.concatenate([[0], np.flatnonzero(begins) + 1])
+
+
+def _between_scans_ns(pauses_ns: np.ndarray) -> float:
+    """Return a pause that lies between those within a scan and those between scans.
+
+    It is the middle of the widest gap between their logarithms; where they are all alike, no radar cycle is shorter
+    than 5 ms, and no driver takes that long from one return to the next.
+    """
+    positive = np.sort(pauses_ns[pauses_ns > 0]).astype(np.float64)
+    if not len(positive):
+        return np.inf
+    logs = np.log(positive)
+    if np.any(pauses_ns <= 0):
+        logs = np.concatenate([[logs[0] - 1.0], logs])
+    steps = np.diff(logs)
+    if not len(steps) or steps.max() < np.log(2.0):
+        return max(float(positive[0]) / 2, _SHORTEST_CYCLE_NS)
+    cut = int(np.argmax(steps))
+    return float(np.exp((logs[cut] + logs[cut + 1]) / 2))

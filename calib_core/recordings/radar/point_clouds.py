@@ -1,0 +1,270 @@
+"""Radar returns in sensor_msgs/PointCloud2 (and the older PointCloud), whatever their layout in memory."""
+
+import struct
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+
+from calib_core.errors import MessageError
+from calib_core.recordings.messages.decoding import Message, decode, payload_byte_order
+from calib_core.recordings.messages.definitions import Definition
+from calib_core.recordings.radar.column_plans import plan_for, plan_like
+from calib_core.recordings.radar.columns import ColumnPlan, Returns, no_returns, returns_from
+
+__all__ = ["ChannelCloudLayout", "CloudLayout", "is_channel_cloud", "is_cloud"]
+
+_CLOUD_NAMES = frozenset({"height", "width", "fields", "is_bigendian", "point_step", "row_step", "data"})
+_FORMATS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+_MAX_POINT_STEP = 1 << 16
+_LIDAR_POINTS = 5000
+
+
+def is_cloud(definition: Definition) -> bool:
+    """Tell whether a message is laid out as sensor_msgs/PointCloud2."""
+    return definition.names >= _CLOUD_NAMES
+
+
+def is_channel_cloud(definition: Definition) -> bool:
+    """Tell whether a message is laid out as sensor_msgs/PointCloud."""
+    return definition.names >= {"points", "channels"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shape:
+    """How one point lies in memory, and what of it is used."""
+
+    dtype: np.dtype[Any]
+    plan: ColumnPlan
+
+
+def _no_known() -> dict[bytes, _Shape]:
+    return {}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CloudLayout:
+    """Reads PointCloud2. The description of the fields is parsed once, then recognised by its bytes."""
+
+    definition: Definition
+    plan: ColumnPlan
+    lidar_like: bool
+    _known: dict[bytes, _Shape] = field(default_factory=_no_known)
+
+    one_per_message = False
+
+    @classmethod
+    def recognise(cls, definition: Definition, payload: bytes) -> "CloudLayout | None":
+        """Look at a first message; None where it holds no positions."""
+        message = decode(definition, payload)
+        plan = plan_for("cloud", _point_dtype(message, payload_byte_order(payload, definition)).names or ())
+        if plan is None:
+            return None
+        points = message.whole("height") * message.whole("width")
+        return cls(definition, plan, points > _LIDAR_POINTS or not plan.looks_like_radar)
+
+    @property
+    def description(self) -> str:
+        """Say what is read."""
+        return self.plan.describe()
+
+    def returns(self, payload: bytes) -> Returns:
+        """Read one cloud.
+
+        Raises:
+            MessageError: the message contradicts itself.
+        """
+        fast = self._by_known_bytes(payload)
+        if fast is not None:
+            return fast
+        message = decode(self.definition, payload)
+        order = payload_byte_order(payload, self.definition)
+        data = message.octets("data")
+        height, width, step = message.whole("height"), message.whole("width"), message.whole("row_step")
+        dtype = _point_dtype(message, order)
+        plan = plan_like(self.plan, "cloud", dtype.names or ())
+        if plan is None:
+            raise MessageError(f"a cloud has only the fields {', '.join(dtype.names or ('(none)',))}: no position")
+        points = _points(data, dtype, height, width, step)
+        if height == 1 and order == "<":
+            start = _after_header(payload, self.definition) + 8
+            self._remember(payload[start : len(payload) - len(data) - 9], _Shape(dtype, plan))
+        return _returns(points, plan)
+
+    def returns_of_rows(self, rows: np.ndarray, lengths: np.ndarray) -> tuple[Returns, np.ndarray] | None:
+        """Read many one-row clouds at once; None unless all have the frame and the field description of a cloud seen before.
+
+        Args:
+            rows: (n, size) uint8, whole messages.
+            lengths: (n,) how long each is.
+
+        Returns:
+            the returns of all, and how many each cloud has.
+        """
+        try:
+            start = _after_header(rows[0].tobytes(), self.definition)
+        except struct.error:
+            return None
+        for block, shape in self._known.items():
+            end = start + 8 + len(block)
+            if end + 8 > min(rows.shape[1], int(lengths.min())):
+                continue
+            numbers = np.ascontiguousarray(rows[:, start : start + 8]).view("<u4").astype(np.int64)
+            sizes = np.ascontiguousarray(rows[:, end + 4 : end + 8]).view("<u4")[:, 0].astype(np.int64)
+            width, step = numbers[:, 1], shape.dtype.itemsize
+            alike = rows[:, start + 8 : end].tobytes() == block * len(rows) and (numbers[:, 0] == 1).all()
+            same_frame = rows[:, 12:16].tobytes() == rows[0, 12:16].tobytes() * len(rows)
+            if alike and same_frame and (width * step <= sizes).all() and (end + 8 + sizes <= lengths).all():
+                return _returns(_points_of_rows(rows, end + 8, width, shape.dtype), shape.plan), width
+        return None
+
+    def with_plan(self, plan: ColumnPlan) -> "CloudLayout":
+        """Read by another plan."""
+        return replace(self, plan=plan, _known={})
+
+    def _remember(self, block: bytes, shape: _Shape) -> None:
+        if len(self._known) < 16:
+            self._known[block] = shape
+
+    def _by_known_bytes(self, payload: bytes) -> Returns | None:
+        """Read a one-row cloud whose field description was seen before; None for any other."""
+        if not self._known:
+            return None
+        try:
+            start = _after_header(payload, self.definition)
+            height, width = struct.unpack_from("<II", payload, start)
+            for block, shape in self._known.items():
+                end = start + 8 + len(block)
+                if height != 1 or payload[start + 8 : end] != block:
+                    continue
+                _, size = struct.unpack_from("<II", payload, end)
+                if size < width * shape.dtype.itemsize or end + 8 + size > len(payload):
+                    return None
+                return _returns(np.frombuffer(payload, shape.dtype, width, end + 8), shape.plan)
+        except struct.error:
+            return None
+        return None
+
+
+def _after_header(payload: bytes, definition: Definition) -> int:
+    """Return where the fields after the header begin; both serialisations have the frame's length at byte 12."""
+    end = 16 + int(struct.unpack_from("<I", payload, 12)[0])
+    return end + (-end % 4 if definition.encoding == "cdr" else 0)
+
+
+def _point_dtype(message: Message, order: str) -> np.dtype[Any]:
+    """Build the dtype of one point from the PointField list, holes and all."""
+    step = message.whole("point_step")
+    big = bool(message.whole("is_bigendian"))
+    names, formats, offsets = [], [], []
+    if not 0 < step <= _MAX_POINT_STEP:
+        raise MessageError(f"a cloud has points of {step} bytes; 1 to {_MAX_POINT_STEP} can be read")
+    for point_field in message.messages("fields"):
+        name, code = point_field.text("name"), _FORMATS.get(point_field.whole("datatype"))
+        if code is None:
+            raise MessageError(
+                f"cloud field '{name}' has the unknown datatype {point_field.whole('datatype')}; 1 to 8 are known"
+            )
+        offset = point_field.whole("offset")
+        if offset + int(code[1]) > step:
+            raise MessageError(f"cloud field '{name}' at byte {offset} does not fit into points of {step} bytes")
+        if name and name not in names:
+            names.append(name)
+            formats.append((">" if big else "<") + code)
+            offsets.append(offset)
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": step})
+
+
+def _points_of_rows(rows: np.ndarray, start: int, width: np.ndarray, dtype: np.dtype[Any]) -> np.ndarray:
+    """Return the points of many clouds: (n, width) in place where all clouds are of one size, else behind one another.
+
+    Args:
+        rows: (n, size) whole messages.
+        start: where in a row the points begin.
+        width: (n,) how many points each has.
+        dtype: of a point.
+    """
+    if (width == width[0]).all():
+        shape, strides = (len(rows), int(width[0]), dtype.itemsize), (rows.strides[0], dtype.itemsize, 1)
+        return as_strided(rows[:, start:], shape, strides, writeable=False).view(dtype)[..., 0]
+    ends = np.cumsum(width)
+    points = np.empty(int(ends[-1]), dtype=dtype)
+    raw = points.view(np.uint8)
+    for row, size, end in zip(rows, (width * dtype.itemsize).tolist(), (ends * dtype.itemsize).tolist(), strict=True):
+        raw[end - size : end] = row[start : start + size]
+    return points
+
+
+def _points(data: np.ndarray, dtype: np.dtype[Any], height: int, width: int, row_step: int) -> np.ndarray:
+    """View the bytes as points, rows that are padded included."""
+    count, used = height * width, width * dtype.itemsize
+    if not count:
+        return np.zeros(0, dtype=dtype)
+    row_step = row_step if height > 1 else max(row_step, used)
+    if row_step < used or len(data) < row_step * (height - 1) + used:
+        raise MessageError(
+            f"a cloud of {height} x {width} points of {dtype.itemsize} bytes (rows of {row_step}) "
+            f"has only {len(data)} bytes of data"
+        )
+    rows = np.ndarray((height, used), np.uint8, np.ascontiguousarray(data), 0, (row_step, 1))
+    return np.ascontiguousarray(rows).reshape(-1).view(dtype)
+
+
+def _returns(points: np.ndarray, plan: ColumnPlan) -> Returns:
+    if not points.size:
+        return no_returns()
+    return returns_from(plan, lambda name: points[name])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChannelCloudLayout:
+    """Reads sensor_msgs/PointCloud: points as float32 x, y, z, everything else in named channels (Oculii)."""
+
+    definition: Definition
+    plan: ColumnPlan
+    lidar_like: bool
+
+    one_per_message = False
+
+    @classmethod
+    def recognise(cls, definition: Definition, payload: bytes) -> "ChannelCloudLayout | None":
+        """Look at a first message."""
+        columns = _channel_columns(decode(definition, payload))
+        plan = plan_for("channels", columns)
+        if plan is None:
+            return None
+        return cls(definition, plan, len(columns["x"]) > _LIDAR_POINTS or not plan.looks_like_radar)
+
+    @property
+    def description(self) -> str:
+        """Say what is read."""
+        return self.plan.describe()
+
+    def returns(self, payload: bytes) -> Returns:
+        """Read one cloud.
+
+        Raises:
+            MessageError: a column the first message had is missing.
+        """
+        columns = _channel_columns(decode(self.definition, payload))
+        if not len(columns["x"]):
+            return no_returns()
+        try:
+            return returns_from(self.plan, lambda name: columns[name])
+        except KeyError as error:
+            raise MessageError(f"a cloud lacks the channel {error}, which the first one has") from error
+
+    def with_plan(self, plan: ColumnPlan) -> "ChannelCloudLayout":
+        """Read by another plan."""
+        return replace(self, plan=plan)
+
+
+def _channel_columns(message: Message) -> dict[str, np.ndarray]:
+    columns = {axis: message.column("points", axis) for axis in "xyz"} if message.count("points") else {}
+    columns = columns or {axis: np.zeros(0) for axis in "xyz"}
+    for number, channel in enumerate(message.messages("channels")):
+        values = channel.numbers("values", channel.count("values"))
+        if len(values) == len(columns["x"]):
+            columns.setdefault(channel.text("name") or f"channel{number}", values)
+    return columns

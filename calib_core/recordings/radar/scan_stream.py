@@ -1,0 +1,267 @@
+"""The stream of radar scans of a recording: decoded in blocks, by window."""
+
+import contextlib
+import threading
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from calib_core.arrays import Points3, TimesNs, frozen_array
+from calib_core.errors import MessageError, RecordingError
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
+from calib_core.recordings.radar.columns import Returns, no_returns
+from calib_core.recordings.radar.layouts import RadarLayout
+from calib_core.recordings.radar.list_messages import PointLayout, first_of_scans
+from calib_core.recordings.radar.point_clouds import CloudLayout
+from calib_core.recordings.topics import Topic
+
+__all__ = ["RadarStream", "join_scans"]
+
+_BLOCK_SCANS = 128
+_USUAL_CLOUD_BYTES = 4096
+_SMALLEST_CLOUD_BYTES = 256
+_LONGEST_TOGETHER = 1 << 17
+_CLAIMS_OF_A_SCAN = 16
+_CACHED_RETURNS = 1_000_000
+_WINDOW_RETURNS = 50_000
+_FIRST_WINDOW_SCANS = 16
+_MOST_WINDOW_SCANS = 2048
+_MOST_WINDOW_BYTES = 1 << 23
+
+
+class RadarStream:
+    """The scans of one radar topic, decoded in blocks when asked for.
+
+    Args:
+        topic: the radar topic.
+        layouts: one per part of the topic.
+        stamps_ns: (n,) one time per message, by the chosen clock.
+        heads: (n, size) the first bytes of the messages, at least as many as PointLayout.group_bytes.
+    """
+
+    def __init__(self, topic: Topic, layouts: Sequence[RadarLayout], stamps_ns: TimesNs, heads: np.ndarray) -> None:
+        self.topic = topic
+        self.layout: RadarLayout = layouts[0]
+        """Of the first part; all parts of a driver that sends one return per message share it."""
+        self._layouts = layouts
+        self._blocks: OrderedDict[int, RadarScans] = OrderedDict()
+        self._lock = threading.Lock()
+        self.unreadable: Mapping[int, str] = {}
+        self._cloud_bytes = _USUAL_CLOUD_BYTES
+        first = np.arange(len(topic))
+        if isinstance(self.layout, PointLayout):
+            first = first_of_scans(stamps_ns, *self._numbers(self.layout, heads))
+        order = np.argsort(stamps_ns[first], kind="stable")
+        last = np.append(first[1:], len(topic))
+        self._first, self._last = first[order], last[order]
+        self.times_ns: TimesNs = frozen_array(stamps_ns[first][order], (None,), dtype=np.int64)
+
+    def _numbers(self, layout: PointLayout, heads: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Read the numbers that tell scans apart; of messages with longer strings than the first, from the whole message."""
+        frame, point = layout.numbers(heads)
+        for row in np.flatnonzero(layout.misfits(heads)).tolist():
+            with contextlib.suppress(RecordingError):  # told when the scan itself is read
+                message = layout.message(self.topic.payload(row))
+                for numbers, name in ((frame, layout.frame_number), (point, layout.point_number)):
+                    if numbers is not None and name:
+                        numbers[row] = message.number(name)
+        return frame, point
+
+    def scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
+        """Decode the scans with start <= stamp <= end."""
+        first = 0 if start is None else int(np.searchsorted(self.times_ns, start, side="left"))
+        last = len(self.times_ns) if end is None else int(np.searchsorted(self.times_ns, end, side="right"))
+        return self._between(first, max(first, last))
+
+    def around(self, times: Sequence[TimeNs], half_window_s: float) -> RadarScans:
+        """Decode the scans within half_window_s of any of the times, each once."""
+        half = round(half_window_s * NS_PER_S)
+        wanted = np.zeros(len(self.times_ns) + 1, dtype=np.int64)
+        for time in times:
+            wanted[np.searchsorted(self.times_ns, int(time) - half, side="left")] += 1
+            wanted[np.searchsorted(self.times_ns, int(time) + half, side="right")] -= 1
+        inside = np.concatenate([[False], np.cumsum(wanted)[:-1] > 0, [False]])
+        edges = np.flatnonzero(np.diff(inside.astype(np.int8)))
+        return join_scans([self._between(int(a), int(b)) for a, b in edges.reshape(-1, 2)])
+
+    def _between(self, first: int, last: int) -> RadarScans:
+        """Return the scans first to last - 1."""
+        pieces = []
+        for number in range(first // _BLOCK_SCANS, -(-last // _BLOCK_SCANS)):
+            block, base = self._block(number), number * _BLOCK_SCANS
+            pieces.append(_cut(block, max(first - base, 0), min(last - base, len(block))))
+        return join_scans(pieces)
+
+    def _block(self, number: int) -> RadarScans:
+        with self._lock:
+            if number in self._blocks:
+                self._blocks.move_to_end(number)
+                return self._blocks[number]
+        block = self._decoded(np.arange(number * _BLOCK_SCANS, min((number + 1) * _BLOCK_SCANS, len(self.times_ns))))
+        with self._lock:
+            self._blocks[number] = block
+            while len(self._blocks) > 2 and sum(len(b.points_radar_m) for b in self._blocks.values()) > _CACHED_RETURNS:
+                self._blocks.popitem(last=False)
+        return block
+
+    def windows(self) -> Iterator[RadarScans]:
+        """Decode all scans in order, about as many returns at a time; nothing of it is kept."""
+        first, count = 0, _FIRST_WINDOW_SCANS
+        while first < len(self.times_ns):
+            scans = self._decoded(np.arange(first, min(first + count, len(self.times_ns))))
+            yield scans
+            first += len(scans)
+            per_scan = max(1.0, len(scans.points_radar_m) / len(scans))
+            most = min(_MOST_WINDOW_SCANS, _MOST_WINDOW_BYTES // self._cloud_bytes)
+            count = max(1, min(int(_WINDOW_RETURNS / per_scan), most))
+
+    def sample(self, count: int) -> RadarScans:
+        """Decode at most count scans spread evenly over the recording."""
+        places = np.linspace(0, len(self.times_ns) - 1, min(count, len(self.times_ns)))
+        return self._decoded(np.unique(places.astype(np.int64)))
+
+    def claims(self, count: int) -> Returns:
+        """Decode of at most count scans the messages' own ranges and angles beside the positions, in the message's own axes."""
+        layout = self.layout.with_plan(replace(self.layout.plan, claiming=True, axes=None))
+        places = np.unique(np.linspace(0, len(self.times_ns) - 1, min(count, len(self.times_ns))).astype(np.int64))
+        first, last = self._first[places], np.minimum(self._last[places], self._first[places] + _CLAIMS_OF_A_SCAN)
+        rows = np.concatenate([np.zeros(0, np.int64), *(np.arange(a, b) for a, b in zip(first, last, strict=True))])
+        rows = rows[self.topic.part[rows] == self.topic.part[0]] if len(rows) else rows
+        if isinstance(layout, PointLayout):
+            heads = self.topic.heads(rows, layout.dtype.itemsize)
+            whole = (heads.lengths >= layout.dtype.itemsize) & ~layout.misfits(heads.rows)
+            return layout.returns_of_rows(heads.rows[whole])
+        found = []
+        for row in rows.tolist():
+            with contextlib.suppress(RecordingError):  # told when the scan itself is read
+                found.append(layout.returns(self.topic.payload(row)))
+        return _joined(found)
+
+    def _decoded(self, scans: np.ndarray) -> RadarScans:
+        """Decode the given scans, ascending."""
+        if isinstance(self.layout, PointLayout):
+            return self._decoded_points(self.layout, scans)
+        if isinstance(self.layout, CloudLayout) and len(self._layouts) == 1 and len(scans) > 1:
+            together = self._decoded_clouds(self.layout, scans)
+            if together is not None:
+                return together
+        returns = [self._returns(int(message)) for message in self._first[scans]]
+        return _stacked(self.times_ns[scans], [len(scan) for scan in returns], _joined(returns))
+
+    def _decoded_clouds(self, layout: CloudLayout, scans: np.ndarray) -> RadarScans | None:
+        """Decode clouds that are all alike in one go; None where they have to be read one by one."""
+        messages = self._first[scans]
+        heads = self.topic.heads(messages, self._cloud_bytes)
+        longest = int(heads.lengths.max())
+        if heads.rows.shape[1] < longest <= _LONGEST_TOGETHER:
+            heads = self.topic.heads(messages, longest)
+        self._cloud_bytes = max(_SMALLEST_CLOUD_BYTES, min(longest + longest // 8, _LONGEST_TOGETHER))
+        if longest > heads.rows.shape[1] or int(heads.lengths.min()) < 0:
+            return None
+        found = layout.returns_of_rows(heads.rows, heads.lengths)
+        return None if found is None else _stacked(self.times_ns[scans], found[1].tolist(), found[0])
+
+    def _returns(self, message: int) -> Returns:
+        """Decode one message; one that cannot be read is an empty scan, and is told."""
+        layout = self._layouts[int(self.topic.part[message])]
+        assert not isinstance(layout, PointLayout)
+        try:
+            return layout.returns(self.topic.payload(message))
+        except MessageError as error:
+            self._note_unreadable({message: str(error)})
+            return no_returns()
+
+    def _note_unreadable(self, found: Mapping[int, str]) -> None:
+        with self._lock:
+            self.unreadable = {**self.unreadable, **found}
+
+    def _decoded_points(self, layout: PointLayout, scans: np.ndarray) -> RadarScans:
+        counts = self._last[scans] - self._first[scans]
+        if not len(counts):
+            return RadarScans()
+        messages = np.concatenate([np.arange(a, b) for a, b in zip(self._first[scans], self._last[scans], strict=True)])
+        heads = self.topic.heads(messages, layout.dtype.itemsize)
+        short = heads.lengths < layout.dtype.itemsize
+        returns = layout.returns_of_rows(heads.rows)
+        if short.any():
+            returns.points_radar_m[short] = np.nan
+            self._note_unreadable(dict.fromkeys(messages[short].tolist(), "the message is cut short"))
+        misfits = np.flatnonzero(layout.misfits(heads.rows) & ~short).tolist()
+        returns = _joined([returns, no_returns()]) if misfits else returns  # a copy that can be written to
+        for row in misfits:
+            self._reread(layout, int(messages[row]), row, returns)
+        return _stacked(self.times_ns[scans], counts.tolist(), returns)
+
+    def _reread(self, layout: PointLayout, message: int, row: int, returns: Returns) -> None:
+        """Read a return whose fields lie elsewhere than in the first message, and put it into its row."""
+        try:
+            single = layout.returns(self.topic.payload(message))
+        except MessageError as error:
+            returns.points_radar_m[row] = np.nan
+            self._note_unreadable({message: str(error)})
+            return
+        for name in ("points_radar_m", "doppler_mps", "snr_db", "sigma_polar"):
+            getattr(returns, name)[row] = getattr(single, name)[0]
+
+
+def _joined(scans: Sequence[Returns]) -> Returns:
+    if len(scans) < 2:
+        return scans[0] if scans else no_returns()
+    return Returns(
+        np.concatenate([scan.points_radar_m for scan in scans]),
+        np.concatenate([scan.doppler_mps for scan in scans]),
+        np.concatenate([scan.snr_db for scan in scans]),
+        np.concatenate([scan.sigma_polar for scan in scans]),
+        _joined_claims(scans),
+    )
+
+
+def _joined_claims(scans: Sequence[Returns]) -> Points3 | None:
+    claims = [scan.claimed_polar for scan in scans if scan.claimed_polar is not None]
+    return np.concatenate(claims) if claims else None
+
+
+def _stacked(times_ns: TimesNs, counts: Sequence[int], returns: Returns) -> RadarScans:
+    """Make scans of returns that nobody else has."""
+    for column in (returns.points_radar_m, returns.doppler_mps, returns.snr_db, returns.sigma_polar):
+        column.setflags(write=False)
+    return RadarScans(
+        times_ns=times_ns,
+        first_return=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+        points_radar_m=returns.points_radar_m,
+        doppler_mps=returns.doppler_mps,
+        snr_db=returns.snr_db,
+        sigma_polar=returns.sigma_polar,
+    )
+
+
+def _cut(scans: RadarScans, first: int, last: int) -> RadarScans:
+    """Keep the scans first to last - 1."""
+    if first == 0 and last == len(scans):
+        return scans
+    low, high = int(scans.first_return[first]), int(scans.first_return[last])
+    return RadarScans(
+        times_ns=scans.times_ns[first:last],
+        first_return=scans.first_return[first : last + 1] - low,
+        points_radar_m=scans.points_radar_m[low:high],
+        doppler_mps=scans.doppler_mps[low:high],
+        snr_db=scans.snr_db[low:high],
+        sigma_polar=scans.sigma_polar[low:high],
+    )
+
+
+def join_scans(pieces: Sequence[RadarScans]) -> RadarScans:
+    """Put scans behind one another; the pieces must be in order of time."""
+    if len(pieces) < 2:
+        return pieces[0] if pieces else RadarScans()
+    counts = np.concatenate([np.diff(piece.first_return) for piece in pieces])
+    return RadarScans(
+        times_ns=np.concatenate([piece.times_ns for piece in pieces]),
+        first_return=np.concatenate([[0], np.cumsum(counts)]),
+        points_radar_m=np.concatenate([piece.points_radar_m for piece in pieces]),
+        doppler_mps=np.concatenate([piece.doppler_mps for piece in pieces]),
+        snr_db=np.concatenate([piece.snr_db for piece in pieces]),
+        sigma_polar=np.concatenate([piece.sigma_polar for piece in pieces]),
+    )

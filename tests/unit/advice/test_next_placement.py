@@ -1,0 +1,76 @@
+"""Advice that pays: following it beats walking about."""
+
+import numpy as np
+
+from calib_core.advice.next_placement import PlacementLimits, next_placement
+from calib_core.calibration import calibrate_pairs
+from calib_core.measurements import Pair
+from calib_core.options import CalibrationOptions, NoiseOptions
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
+from calib_core.results import Calibration
+from calib_core.synthetic import NOISE_PROFILES, SimulatedPairs, simulate_pairs
+
+OPTIONS = CalibrationOptions(noise=NoiseOptions(2.0, 0.015, 0.55, 1.0))
+
+
+def solved(pairs: list[Pair], simulated: SimulatedPairs) -> Calibration:
+    outcome = calibrate_pairs(pairs, simulated.camera, OPTIONS)
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+def rotation_sigma(calibration: Calibration) -> float:
+    return float(np.sqrt(np.trace(calibration.covariance[3:, 3:])))
+
+
+def measured_at(position: np.ndarray, name: str, simulated: SimulatedPairs, rng: np.random.Generator) -> Pair:
+    """Put the reflector where the advice says and measure it as the simulation does."""
+    sigma = NOISE_PROFILES["ti"].sigma_polar
+    point = cartesian_from_polar(polar_from_cartesian(position) + sigma * rng.standard_normal(3))
+    pixel = simulated.camera.project(simulated.camera_from_radar @ position[None])[0] + 2.0 * rng.standard_normal(2)
+    example = simulated.pairs[0].candidates[0]
+    covariance = covariance_from_sigma_polar(point, sigma)
+    return Pair(name, pixel, (type(example)(point, sigma, covariance),), sigma_px=2.0)
+
+
+def test_following_the_advice_beats_random_placements() -> None:
+    ratios = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        simulated = simulate_pairs(14, rng=rng)
+        advised = list(simulated.pairs[:6])
+        while len(advised) < 14:
+            advice = next_placement(solved(advised, simulated))
+            assert advice is not None
+            advised.append(measured_at(advice.position_radar_m, f"a{len(advised)}", simulated, rng))
+        random = solved(list(simulated.pairs), simulated)
+        ratios.append(rotation_sigma(random) / rotation_sigma(solved(advised, simulated)))
+    assert np.median(ratios) > 1.2
+
+
+def test_the_advised_place_is_in_view_and_new() -> None:
+    simulated = simulate_pairs(10, rng=np.random.default_rng(3))
+    calibration = solved(list(simulated.pairs), simulated)
+    advice = next_placement(calibration, limits=PlacementLimits(separation_m=1.0))
+    assert advice is not None
+    assert calibration.camera.in_image(advice.pixel_px[None]).all()
+    used = np.array([pair.point_radar_m for pair in calibration.pairs])
+    assert np.linalg.norm(used - advice.position_radar_m, axis=1).min() >= 1.0
+    assert advice.gain > 1.0
+
+
+def test_after_many_placements_one_may_stop_and_after_few_not() -> None:
+    simulated = simulate_pairs(60, rng=np.random.default_rng(4))
+    few, many = (next_placement(solved(list(simulated.pairs[:n]), simulated)) for n in (6, 60))
+    assert few is not None
+    assert many is not None
+    assert not few.may_stop
+    assert many.may_stop
+    assert few.gain > many.gain
+
+
+def test_there_is_no_advice_without_a_covariance() -> None:
+    simulated = simulate_pairs(12, rng=np.random.default_rng(5), noise="imaging")
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions(method="paper"))
+    assert isinstance(outcome, Calibration)
+    assert next_placement(outcome) is None

@@ -1,0 +1,442 @@
+"""A session on disk: what is kept, what is given back, and what is refused without touching it."""
+
+import errno
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from app.session import (
+    Cleared,
+    ClickExcluded,
+    ClickMoved,
+    ClickPlaced,
+    ClickRemoved,
+    ClicksImported,
+    History,
+    OptionsChanged,
+    OptionsEdited,
+    RecordingFacts,
+    Redo,
+    Solved,
+    Undo,
+    advance,
+)
+from app.session.file import (
+    SessionFile,
+    SessionFileError,
+    open_session_file,
+    recording_session_folder,
+    set_aside,
+    user_session_folder,
+)
+from app.session.file.step_json import StepForm, form_of_step, step_from_form
+from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+
+START_NS = 1_700_000_000_123_456_789
+FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)
+TIMES = [TimeNs(int(time)) for time in FACTS.image_times]
+STEPS = (
+    ClickPlaced(TIMES[3], 100.1, 200.2),
+    ClickPlaced(TIMES[1], 0.1 + 0.2, 1e-17),
+    ClickMoved("c1", 101.0, 201.0),
+    OptionsChanged(CalibrationOptions(method="paper", solving=SolvingOptions(CameraPositionPrior((0.1, 0.2, 0.3))))),
+    ClickExcluded("c2", True),
+    Undo(),
+    Redo(),
+    ClicksImported((ReflectorClick(TIMES[9], "p1", 5.0, 6.0, 0.5, True),)),
+    ClickRemoved("c1"),
+    Cleared(),
+    Undo(),
+)
+
+
+def keep(session_file: SessionFile, *steps) -> History:
+    history = session_file.restored.history
+    for step in steps:
+        history = advance(history, step, FACTS)
+        session_file.append(step, history)
+    return history
+
+
+def kept(folder: Path, *steps) -> History:
+    """Live through steps in a session of its own and close it."""
+    session_file = open_session_file(folder, FACTS)
+    history = keep(session_file, *steps)
+    session_file.close()
+    return history
+
+
+@pytest.mark.parametrize("step", STEPS, ids=lambda step: type(step).__name__)
+def test_a_step_comes_back_from_its_json_form_bit_for_bit(step) -> None:
+    text = msgspec.json.encode(form_of_step(step))
+    assert step_from_form(msgspec.json.decode(text, type=StepForm)) == step
+
+
+@pytest.mark.parametrize("step", [Solved(1, Unsolvable("a", "b", "c")), OptionsEdited(())])
+def test_answers_and_half_finished_edits_are_not_journalled(step) -> None:
+    with pytest.raises(TypeError, match="is not journalled"):
+        form_of_step(step)
+
+
+def test_a_session_comes_back_with_everything_that_can_be_undone_and_redone(tmp_path: Path) -> None:
+    history = kept(tmp_path / "s", *STEPS)
+    session_file = open_session_file(tmp_path / "s", FACTS)
+    assert session_file.restored.history == history
+    assert session_file.restored.steps == len(STEPS)
+    assert session_file.restored.note == ""
+    session_file.close()
+
+
+def test_a_session_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    kept(tmp_path, ClickPlaced(TIMES[1], 1.0, 1.0))
+    kept(tmp_path, ClickPlaced(TIMES[2], 2.0, 2.0))
+    history = kept(tmp_path, Undo())
+    assert [click.id for click in history.present.clicks] == ["c1"]
+    assert (tmp_path / "journal.jsonl").read_text().count("\n") == 4
+
+
+def test_the_journal_is_only_ever_appended_to(tmp_path: Path) -> None:
+    kept(tmp_path, *STEPS[:4])
+    before = (tmp_path / "journal.jsonl").read_bytes()
+    kept(tmp_path, *STEPS[4:])
+    assert (tmp_path / "journal.jsonl").read_bytes().startswith(before)
+
+
+def test_a_step_is_in_the_journal_before_append_returns(tmp_path: Path) -> None:
+    session_file = open_session_file(tmp_path, FACTS)
+    keep(session_file, STEPS[0])
+    assert b'"click_placed"' in (tmp_path / "journal.jsonl").read_bytes()
+    session_file.close()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+def test_a_process_killed_outright_loses_nothing_that_was_confirmed(tmp_path: Path) -> None:
+    script = textwrap.dedent(
+        f"""
+        import os, signal
+        import numpy as np
+        from pathlib import Path
+        from app.session import ClickPlaced, History, RecordingFacts, advance
+        from app.session.file import open_session_file
+        facts = RecordingFacts("drive", {START_NS} + 100_000_000 * np.arange(50), 640, 480)
+        session_file, history = open_session_file(Path({str(tmp_path)!r}), facts), History()
+        for frame in range(13):
+            step = ClickPlaced(int(facts.image_times[frame]), float(frame), 1.0)
+            history = advance(history, step, facts)
+            session_file.append(step, history)
+        os.kill(os.getpid(), signal.SIGKILL)
+        """
+    )
+    done = subprocess.run([sys.executable, "-c", script], check=False, timeout=60)
+    assert done.returncode == -signal.SIGKILL
+    session_file = open_session_file(tmp_path, FACTS)
+    assert [click.u_px for click in session_file.restored.history.present.clicks] == [
+        float(frame) for frame in range(13)
+    ]
+    session_file.close()
+
+
+def test_a_half_written_last_line_is_dropped_and_told(tmp_path: Path) -> None:
+    history = kept(tmp_path, *STEPS[:3])
+    journal = tmp_path / "journal.jsonl"
+    whole = journal.read_bytes()
+    journal.write_bytes(whole + b'{"n":4,"step":{"type":"cle')
+    session_file = open_session_file(tmp_path, FACTS)
+    assert session_file.restored.history == history
+    assert session_file.restored.torn_bytes == 26
+    assert "not in the session" in session_file.restored.note
+    keep(session_file, STEPS[3])
+    session_file.close()
+    assert journal.read_bytes().startswith(whole + b'{"n":4,"step":{"type":"options_changed"')
+
+
+def damaged(line: int, text: bytes, whole: bytes) -> bytes:
+    lines = whole.split(b"\n")
+    lines[line] = text
+    return b"\n".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("line", "text", "words"),
+    [
+        (2, b'{"n":2,"step":{"type":"click_placed","image', "line 3 is damaged"),
+        (2, b"\x00\x00\xff\xfe", "line 3 is damaged"),
+        (2, b"", "line 3 is damaged"),
+        (2, b'{"n":7,"step":{"type":"cleared"}}', "step 7 stands where step 2 belongs"),
+        (2, b'{"n":2,"step":{"type":"click_removed","id":"c9"}}', "there is no click 'c9'"),
+        (2, b'{"n":2,"step":{"type":"options_changed","options":{"nois":{}}}}', "there is no option 'nois'"),
+        (2, b'{"n":2,"step":{"type":"juggled"}}', "Invalid value 'juggled'"),
+        (0, b"{}", "line 1 is damaged"),
+        (0, b'{"schema":"cocalib/session-1"', "line 1 is damaged"),
+    ],
+)
+def test_a_damaged_journal_is_refused_in_words_and_left_alone(
+    tmp_path: Path, line: int, text: bytes, words: str
+) -> None:
+    kept(tmp_path, *STEPS[:4])
+    journal = tmp_path / "journal.jsonl"
+    journal.write_bytes(damaged(line, text, journal.read_bytes()))
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.name != "lock"}
+    with pytest.raises(SessionFileError) as refused:
+        open_session_file(tmp_path, FACTS)
+    assert words in str(refused.value)
+    assert "rename journal.jsonl" in str(refused.value)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.name != "lock"} == before
+
+
+def test_a_journal_of_another_version_is_refused_with_that_version_named(tmp_path: Path) -> None:
+    kept(tmp_path)
+    journal = tmp_path / "journal.jsonl"
+    journal.write_bytes(journal.read_bytes().replace(b"cocalib/session-1", b"cocalib/session-9"))
+    with pytest.raises(SessionFileError, match=r"cocalib/session-9.*with that version"):
+        open_session_file(tmp_path, FACTS)
+
+
+def test_after_damage_the_snapshot_brings_the_clicks_back(tmp_path: Path) -> None:
+    history = kept(tmp_path, *STEPS[:5])
+    (tmp_path / "journal.jsonl").rename(tmp_path / "journal.damaged")
+    session_file = open_session_file(tmp_path, FACTS)
+    assert session_file.restored.history.present.clicks == history.present.clicks
+    assert session_file.restored.history.present.options == history.present.options
+    assert "last snapshot" in session_file.restored.note
+    session_file.close()
+    again = open_session_file(tmp_path, FACTS)
+    assert again.restored.history.present.clicks == history.present.clicks
+    assert again.restored.note == ""
+    again.close()
+
+
+def test_a_damaged_snapshot_is_refused_only_when_it_is_needed(tmp_path: Path) -> None:
+    kept(tmp_path, *STEPS[:2])
+    (tmp_path / "session.json").write_text("{")
+    open_session_file(tmp_path, FACTS).close()
+    (tmp_path / "session.json").write_text("{")
+    (tmp_path / "journal.jsonl").unlink()
+    with pytest.raises(SessionFileError, match="the snapshot is damaged"):
+        open_session_file(tmp_path, FACTS)
+    assert not (tmp_path / "journal.jsonl").exists()
+
+
+def test_the_snapshot_is_at_most_ten_steps_behind(tmp_path: Path) -> None:
+    session_file = open_session_file(tmp_path, FACTS)
+    keep(session_file, *(ClickPlaced(time, 1.0, 1.0) for time in TIMES[:14]))
+    assert msgspec.json.decode((tmp_path / "session.json").read_bytes())["steps"] == 10
+    session_file.close()
+    assert msgspec.json.decode((tmp_path / "session.json").read_bytes())["steps"] == 14
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        RecordingFacts("other", FACTS.image_times[:-1], 640, 480),
+        RecordingFacts("other", FACTS.image_times + 1, 640, 480),
+        RecordingFacts("other", FACTS.image_times, 320, 240),
+        RecordingFacts("other", np.zeros(0, dtype=np.int64), 640, 480),
+    ],
+)
+def test_a_session_of_another_recording_is_refused_in_words(tmp_path: Path, other: RecordingFacts) -> None:
+    kept(tmp_path, STEPS[0])
+    with pytest.raises(
+        SessionFileError, match=r"the session is of 'drive' \(50 frames of 640 x 480 px from 1700000000\.123456789 s\)"
+    ):
+        open_session_file(tmp_path, other)
+
+
+def test_a_recording_that_was_renamed_is_still_the_same(tmp_path: Path) -> None:
+    history = kept(tmp_path, STEPS[0])
+    session_file = open_session_file(tmp_path, RecordingFacts("renamed", FACTS.image_times, 640, 480))
+    assert session_file.restored.history == history
+    session_file.close()
+
+
+def test_other_radar_axes_than_the_last_time_are_told_and_harm_no_click(tmp_path: Path) -> None:
+    kept(tmp_path, STEPS[0])
+    turned = replace(FACTS, radar_axes="forward,right,up")
+    killed = open_session_file(tmp_path, turned)
+    (told,) = killed.restored.warnings
+    assert told.code == "other-axes"
+    assert "last open without --radar-axes, and is now open with --radar-axes forward,right,up" in told.message
+    assert len(killed.restored.history.present.clicks) == 1
+    killed._journal.close()  # as a kill leaves it: nothing is written on the way out
+    killed._lock.close()
+    again = open_session_file(tmp_path, turned)
+    assert again.restored.warnings == ()
+    again.close()
+    forgotten = open_session_file(tmp_path, FACTS)
+    assert "start again with --radar-axes forward,right,up" in forgotten.restored.warnings[0].hint
+    forgotten.close()
+
+
+def test_a_session_without_clicks_has_no_axes_to_tell_of(tmp_path: Path) -> None:
+    kept(tmp_path)
+    opened = open_session_file(tmp_path, replace(FACTS, radar_axes="degrees"))
+    assert opened.restored.warnings == ()
+    opened.close()
+
+
+def test_a_session_that_is_open_elsewhere_is_refused_with_the_process_named(tmp_path: Path) -> None:
+    session_file = open_session_file(tmp_path, FACTS)
+    with pytest.raises(SessionFileError, match=rf"is open already, in process {os.getpid()} on "):
+        open_session_file(tmp_path, FACTS)
+    session_file.close()
+    open_session_file(tmp_path, FACTS).close()
+
+
+def test_a_refused_session_is_not_left_locked(tmp_path: Path) -> None:
+    kept(tmp_path, STEPS[0])
+    journal = tmp_path / "journal.jsonl"
+    good = journal.read_bytes()
+    journal.write_bytes(b"no\n")
+    with pytest.raises(SessionFileError):
+        open_session_file(tmp_path, FACTS)
+    journal.write_bytes(good)
+    open_session_file(tmp_path, FACTS).close()
+
+
+def test_a_full_disk_refuses_the_step_and_leaves_the_journal_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session_file = open_session_file(tmp_path, FACTS)
+    history = keep(session_file, STEPS[0])
+    before = (tmp_path / "journal.jsonl").read_bytes()
+    real_write = os.write
+
+    def full(descriptor: int, data: bytes) -> int:
+        if len(data) <= 20:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return real_write(descriptor, data[:20])
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", full)
+        with pytest.raises(SessionFileError, match="could not be kept, so it was not made: No space left on device"):
+            session_file.append(STEPS[1], history)
+    assert (tmp_path / "journal.jsonl").read_bytes() == before
+    history = advance(history, STEPS[1], FACTS)
+    session_file.append(STEPS[1], history)
+    session_file.close()
+    again = open_session_file(tmp_path, FACTS)
+    assert again.restored.history == history
+    again.close()
+
+
+def test_a_disk_that_cannot_even_take_back_stops_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    session_file = open_session_file(tmp_path, FACTS)
+    history = keep(session_file, STEPS[0])
+
+    def broken(*_: object) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", broken)
+        patch.setattr(os, "ftruncate", broken)
+        with pytest.raises(SessionFileError, match="Input/output error"):
+            session_file.append(STEPS[1], history)
+    with pytest.raises(SessionFileError, match="the session is closed"):
+        session_file.append(STEPS[1], history)
+    session_file.close()
+
+
+def test_a_closed_session_writes_into_no_other_file(tmp_path: Path) -> None:
+    session_file = open_session_file(tmp_path / "s", FACTS)
+    session_file.close()
+    with (tmp_path / "other").open("w+b") as other:
+        with pytest.raises(SessionFileError, match="the session is closed"):
+            keep(session_file, STEPS[0])
+        assert other.read() == b""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows does not delete open files")
+def test_a_folder_deleted_under_an_open_session_is_noticed(tmp_path: Path) -> None:
+    session_file = open_session_file(tmp_path, FACTS)
+    (tmp_path / "journal.jsonl").unlink()
+    with pytest.raises(SessionFileError, match="deleted while the session was open"):
+        keep(session_file, STEPS[0])
+    session_file.close()
+
+
+def test_a_place_that_is_no_folder_is_refused_in_words(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SessionFileError, match=r"cannot be made: .*; give another --session folder"):
+        open_session_file(tmp_path / "file" / "s", FACTS)
+
+
+def test_a_session_set_aside_is_kept_beside_under_the_next_free_number(tmp_path: Path) -> None:
+    folder = tmp_path / "s"
+    assert set_aside(folder) is None
+    for number in (1, 2):
+        kept(folder, STEPS[0])
+        assert set_aside(folder) == tmp_path / f"s.{number}"
+    assert (tmp_path / "s.1" / "journal.jsonl").exists()
+    assert not folder.exists()
+
+
+def test_a_session_that_is_open_is_not_set_aside(tmp_path: Path) -> None:
+    session_file = open_session_file(tmp_path / "s", FACTS)
+    with pytest.raises(SessionFileError, match="is open already"):
+        set_aside(tmp_path / "s")
+    session_file.close()
+    assert (tmp_path / "s" / "journal.jsonl").exists()
+
+
+def test_the_session_lies_beside_its_recording(tmp_path: Path) -> None:
+    assert (
+        recording_session_folder([tmp_path / "drive.bag", tmp_path / "b.bag"]) == tmp_path / "drive.bag.cocalib-session"
+    )
+
+
+def test_beside_a_folder_that_cannot_be_written_the_session_lies_in_the_state_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    folder = recording_session_folder([tmp_path / "missing" / "drive.bag"])
+    assert folder.parent == tmp_path / "state" / "cocalib" / "sessions"
+    assert folder.name.startswith("drive.bag-")
+    assert folder.name.endswith(".cocalib-session")
+    assert folder != recording_session_folder([tmp_path / "absent" / "drive.bag"])
+
+
+def test_a_session_that_exists_in_the_state_folder_is_found_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    recording = tmp_path / "drive.bag"
+    at_home = user_session_folder("drive.bag", key=str(recording.resolve()))
+    at_home.mkdir(parents=True)
+    assert recording_session_folder([recording]) == at_home
+
+
+@pytest.mark.parametrize(
+    ("platform", "variable", "value", "start"),
+    [
+        ("linux", "XDG_STATE_HOME", "", "home/.local/state/cocalib"),
+        ("linux", "XDG_STATE_HOME", "relative", "home/.local/state/cocalib"),
+        ("darwin", "XDG_STATE_HOME", "", "home/Library/Application Support/cocalib"),
+        ("win32", "LOCALAPPDATA", "", "home/AppData/Local/cocalib"),
+    ],
+)
+def test_the_state_folder_is_the_one_of_the_system(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, platform: str, variable: str, value: str, start: str
+) -> None:
+    monkeypatch.setattr(sys, "platform", platform)
+    monkeypatch.setattr(Path, "home", lambda: tmp_path / "home")
+    monkeypatch.setenv(variable, value)
+    assert user_session_folder("demo") == tmp_path / start / "sessions" / "demo.cocalib-session"
+
+
+def test_a_restored_session_asks_for_an_answer(tmp_path: Path) -> None:
+    history = kept(tmp_path, STEPS[0])
+    session_file = open_session_file(tmp_path, FACTS)
+    session_file.close()
+    assert session_file.restored.history.present.needs_solving
+    assert replace(history.present, outcome=None) == session_file.restored.history.present

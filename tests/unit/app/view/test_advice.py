@@ -1,0 +1,49 @@
+"""Where to put the reflector next, as the page says it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from app.view.advice import advice_for
+from calib_core.calibration import calibrate_pairs
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
+from calib_core.synthetic import simulate_pairs
+
+
+def solved(count: int) -> Calibration:
+    simulated = simulate_pairs(count, rng=np.random.default_rng(3), noise="ti")
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions())
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+def test_the_advised_place_lies_in_the_picture_and_in_the_words() -> None:
+    calibration = solved(6)
+    advice = advice_for(calibration)
+    assert advice is not None
+    assert not advice.may_stop
+    assert calibration.camera.in_image(np.array([[advice.u_px, advice.v_px]]))[0]
+    assert advice.range_m == pytest.approx(np.linalg.norm(advice.position_radar_m))
+    assert f"{advice.position_radar_m[0]:.1f} m ahead" in advice.words
+    assert "surer" in advice.words
+
+
+def test_the_side_is_named_as_the_radar_sees_it() -> None:
+    advice = advice_for(solved(6))
+    assert advice is not None
+    y = advice.position_radar_m[1]
+    expected = "straight ahead" if abs(y) < 0.1 * advice.position_radar_m[0] else ("left" if y > 0 else "right")
+    assert expected in advice.words
+
+
+def test_many_placements_are_enough() -> None:
+    advice = advice_for(solved(400))
+    assert advice is not None
+    assert advice.may_stop
+    assert "You may stop" in advice.words
+
+
+def test_the_papers_method_gives_no_advice_for_it_has_no_covariance() -> None:
+    assert advice_for(dataclasses.replace(solved(6), covariance=np.full((6, 6), np.nan))) is None

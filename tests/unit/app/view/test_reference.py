@@ -1,0 +1,165 @@
+"""A calibration that is given for review: shown until the clicks give their own, then compared with it."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli.import_file import camera_in, reference_from
+from app.session import History, RecordingFacts, Session
+from app.solving import check_clicks
+from app.view import Reference, shown_calibration, view
+from app.web.radar_sight import overlay_of
+from calib_core.errors import InputError
+from calib_core.interchange import (
+    FORMATS,
+    CalibrationFile,
+    FrameNames,
+    adopt,
+    export,
+    format_named,
+    read_any,
+    read_calibration,
+    write_calibration,
+)
+from calib_core.measurements import (
+    RadarScan,
+    RadarScans,
+    ReflectorClick,
+    TimeNs,
+    Unsolvable,
+)
+
+FEW = Unsolvable("too-few-pairs", "1 of 4 pairs", "click more placements")
+
+
+@pytest.fixture
+def file(project_root: Path) -> CalibrationFile:
+    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def facts(file) -> RecordingFacts:
+    camera = file.calibration.camera
+    return RecordingFacts("drive", np.arange(5, dtype=np.int64) * 10**8, camera.width_px, camera.height_px)
+
+
+@pytest.fixture
+def reference(file) -> Reference:
+    return Reference("other.yaml", file.calibration)
+
+
+def clicked(count: int) -> tuple[ReflectorClick, ...]:
+    return tuple(ReflectorClick(TimeNs(index * 10**8), f"c{index + 1}", 100.0, 120.0) for index in range(count))
+
+
+def test_without_clicks_the_screen_shows_the_file_and_says_so(facts, reference):
+    seen = view(History(), facts, reference)
+    assert seen.status == "Showing the calibration from other.yaml; click reflectors to check or replace it"
+    assert [figure.key for figure in seen.pose][:3] == ["camera_x", "camera_y", "camera_z"]
+    assert not seen.has_calibration
+    assert seen.comparison == ()
+    overlay = overlay_of(0, Session(), None, (), reference)
+    assert overlay.returns == ()
+    assert overlay_of(0, Session(), None, ()).returns is None
+
+
+def test_the_first_click_already_has_a_residual_against_it(facts, reference):
+    point = np.array([6.0, 0.5, -0.4])
+    pixel = reference.calibration.reproject(point[None])[0] + [3.0, 4.0]
+    click = ReflectorClick(TimeNs(10**8), "c1", float(pixel[0]), float(pixel[1]))
+
+    class Radar:
+        def radar_scans_around(self, times, half_window_s):
+            stamps = [TimeNs(10**8 + step * 5 * 10**7) for step in range(-4, 5)]
+            return RadarScans.from_scans(
+                [
+                    RadarScan(time, point[None], np.zeros(1), np.full(1, 20.0), np.full((1, 3), np.nan))
+                    for time in stamps
+                ]
+            )
+
+    session = Session((click,))
+    (checked,) = check_clicks(Radar(), session.clicks, reference.calibration, session.options)
+    assert checked.excluded
+    assert checked.distance_px == pytest.approx(5.0, abs=1e-6)
+    seen = view(
+        History(Session((click,), revision=1, outcome=FEW, outcome_revision=1, checked=(checked,))), facts, reference
+    )
+    assert seen.status == "Showing the calibration from other.yaml; 1 click lies 5.00 px from it"
+    assert seen.hint == "3 more placements for a new calibration."
+    (row,) = seen.clicks
+    assert row.state == "pending"
+    assert row.residual_px == pytest.approx(5.0, abs=1e-6)
+    assert row.range_m == pytest.approx(np.linalg.norm(point))
+
+
+def test_once_solved_the_own_calibration_is_drawn_and_compared(facts, file):
+    moved = file.calibration.camera_from_radar.perturbed(np.array([0, 0, 0.05, 0, np.deg2rad(0.5), 0]))
+    other = Reference("other.yaml", dataclasses.replace(file.calibration, camera_from_radar=moved))
+    session = Session(clicked(4), revision=1, outcome=file.calibration, outcome_revision=1)
+    assert shown_calibration(session, other) is file.calibration
+    figures = {figure.key: figure for figure in view(History(session), facts, other).comparison}
+    assert figures["rotation_apart"].value.startswith("0.5")
+    assert {"apart_5_m", "apart_20_m", "apart_60_m"} <= set(figures)
+    assert float(figures["apart_60_m"].value) > 1.0
+    assert "other.yaml" in figures["rotation_apart"].hint
+
+
+@pytest.mark.parametrize("name", [form.name for form in FORMATS])
+def test_every_format_becomes_calibration_1_and_stays_the_same_calibration(file, name):
+    found = read_any(export(file, name, rectified=format_named(name).is_for_rectified).data, name)
+    camera = None if found.camera else file.calibration.camera
+    text = write_calibration(adopt(found, name, camera=camera))
+    again = read_calibration(text)
+    np.testing.assert_allclose(
+        again.calibration.camera_from_radar.as_matrix(),
+        file.calibration.camera_from_radar.as_matrix(),
+        rtol=0,
+        atol=1e-9,
+    )
+    assert "NaN" not in text
+    assert again.check_point is not None
+    if name != "json":
+        assert "imported" in {warning.code for warning in again.calibration.warnings}
+
+
+def test_what_cannot_be_taken_over_is_refused_in_words(file, tmp_path):
+    text = export(file, "tf2").data.decode()
+    with pytest.raises(InputError, match="tf2 carries no camera"):
+        adopt(read_any(text), "x.sh")
+    with pytest.raises(InputError, match="leave the other camera out"):
+        adopt(read_any(write_calibration(file)), "x.json", camera=file.calibration.camera)
+    swapped = dataclasses.replace(
+        file,
+        calibration=dataclasses.replace(
+            file.calibration, camera_from_radar=file.calibration.camera_from_radar.inverse()
+        ),
+    )
+    wrong = text.splitlines()[:-3] + export(swapped, "tf2").data.decode().splitlines()[-3:]
+    path = tmp_path / "wrong.sh"
+    path.write_text("\n".join(wrong))
+    with pytest.raises(InputError, match="swapped"):
+        reference_from(path, file.calibration.camera)
+    path.write_text(text)
+    assert reference_from(path, file.calibration.camera).name == "wrong.sh"
+    with pytest.raises(InputError, match="--camera FILE"):
+        reference_from(path, None)
+
+
+def test_a_calibration_brings_its_camera_where_it_fits_the_frames(file, tmp_path):
+    path = tmp_path / "c.json"
+    path.write_text(write_calibration(file))
+    camera = file.calibration.camera
+    assert camera_in(path, camera.width_px, camera.height_px) is not None
+    assert camera_in(path, camera.width_px + 1, camera.height_px) is None
+
+
+def test_bad_frames_and_mirrored_rotations_are_refused_in_words():
+    with pytest.raises(InputError, match="no name"):
+        FrameNames("", "camera")
+    with pytest.raises(InputError, match="both frames"):
+        FrameNames("a", "a")
+    with pytest.raises(InputError, match="proper rotation"):
+        read_any("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n", "mirrored.txt")

@@ -1,0 +1,366 @@
+"""What the screen shows for a session: words, figures, rows, ellipses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Stamp, Undo, advance
+from app.view import View, WarningRow, summary_lines, view
+from app.view.click_rows import ellipse_of
+from app.view.figures import pose_figures
+from app.view.mounting import OPTICAL_FROM_BODY, mounting_of
+from app.view.number_format import plain, with_sigma
+from app.view.wording import sentence
+from calib_core.calibration import calibrate_pairs
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.measurements import TimeNs, Unpaired, Unsolvable
+from calib_core.options import CalibrationOptions
+from calib_core.radar import cartesian_from_polar, polar_from_cartesian
+from calib_core.results import Calibration, DataWarning, Metrics, PairResult
+from calib_core.synthetic import NoiseProfile, simulate_pairs
+
+FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), width_px=640, height_px=480)
+TIMES = [TimeNs(int(time)) for time in FACTS.image_times]
+CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
+LEVEL = RigidTransform(OPTICAL_FROM_BODY, -OPTICAL_FROM_BODY @ np.array([0.05, -0.10, 0.30]))
+NAN = float("nan")
+
+
+def pair(name: str, *, inlier: bool = True, **more) -> PairResult:
+    number = int(name[1:])
+    at = {
+        "pixel_px": [10.0 * number, 20.0],
+        "projected_px": [10.0 * number + 3.0, 24.0],
+        "point_radar_m": [3.0, 4.0, 0.0],
+        "expected_covariance_px2": np.diag([4.0, 9.0]),
+        "outlier_probability": 0.01 if inlier else 0.97,
+    }
+    return PairResult(name, inlier=inlier, **(at | more))
+
+
+def calibration(*pairs: PairResult, unpaired: tuple[Unpaired, ...] = (), warnings=(), **more) -> Calibration:
+    values = {
+        "camera_from_radar": LEVEL,
+        "covariance": np.diag([1e-4, 4e-4, 9e-4, 1e-6, 4e-6, 9e-6]),
+        "metrics": Metrics(12.4321, 3.0, 13.0, n=sum(row.inlier for row in pairs), held_out_aed_px=14.0),
+        "options": CalibrationOptions(),
+    }
+    return Calibration(camera=CAMERA, pairs=pairs, unpaired=unpaired, warnings=warnings, **(values | more))
+
+
+def clicked(count: int, *steps) -> History:
+    history = History()
+    for number in range(1, count + 1):
+        history = advance(history, ClickPlaced(TIMES[number], 10.0 * number, 20.0), FACTS)
+    for step in steps:
+        history = advance(history, step, FACTS)
+    return history
+
+
+def shown(count: int, outcome: Calibration | Unsolvable, *steps) -> View:
+    history = clicked(count)
+    history = advance(history, Solved(history.present.revision, outcome), FACTS)
+    for step in steps:
+        history = advance(history, step, FACTS)
+    return view(history, FACTS)
+
+
+FIVE = tuple(pair(f"c{number}") for number in range(1, 6))
+
+
+@pytest.mark.parametrize(
+    ("count", "status"),
+    [(0, "4 more placements needed"), (1, "3 more placements needed"), (3, "1 more placement needed"), (4, "Solving…")],
+)
+def test_the_status_counts_down_to_the_first_solve(count: int, status: str) -> None:
+    assert view(clicked(count), FACTS).status == status
+
+
+def test_excluded_clicks_do_not_count_towards_the_first_solve() -> None:
+    assert view(clicked(4, ClickExcluded("c2", True)), FACTS).status == "1 more placement needed"
+
+
+def test_before_the_first_click_the_hint_says_what_to_do() -> None:
+    seen = view(History(), FACTS)
+    assert (seen.stage, seen.solving, seen.has_calibration, seen.solved_revision) == ("collecting", False, False, -1)
+    assert "click its centre" in seen.hint
+
+
+def test_a_solved_session_says_how_many_pairs_agree() -> None:
+    four_agree = (*FIVE[:4], pair("c5", inlier=False))
+    assert shown(5, calibration(*FIVE)).status == "Solved: all 5 pairs agree"
+    assert shown(5, calibration(*four_agree)).status == "Solved: 4 of 5 pairs agree"
+
+
+def test_an_excluded_pair_is_not_among_those_that_could_agree() -> None:
+    assert shown(5, calibration(*FIVE[:4], pair("c5", excluded=True))).status == "Solved: all 4 pairs agree"
+
+
+def test_an_unsolvable_session_shows_reason_and_hint() -> None:
+    seen = shown(5, Unsolvable("no-pose", "only 3 of 5 pairs agree on any pose", "spread the placements"))
+    assert (seen.stage, seen.status, seen.hint) == (
+        "unsolvable",
+        "Only 3 of 5 pairs agree on any pose.",
+        "Spread the placements.",
+    )
+    assert not seen.has_calibration
+
+
+def test_what_more_clicks_cannot_mend_is_told_from_the_first_click_on() -> None:
+    seen = shown(1, Unsolvable("no-camera", "the intrinsics are missing", "give --camera"))
+    assert (seen.stage, seen.status) == ("unsolvable", "The intrinsics are missing.")
+
+
+def test_too_few_pairs_is_no_failure_while_clicks_are_collected() -> None:
+    seen = shown(2, Unsolvable("too-few-pairs", "2 of at least 4 pairs", "click more"))
+    assert (seen.stage, seen.status) == ("collecting", "2 more placements needed")
+
+
+def test_clicks_that_the_radar_did_not_see_do_not_count_and_say_why() -> None:
+    unseen = tuple(
+        Unpaired(name, "no-scan", "the nearest radar scan is 9.00 s away", "check that both clocks agree")
+        for name in ("c1", "c3")
+    )
+    seen = shown(5, Unsolvable("too-few-pairs", "3 of at least 4 pairs", "click more", unseen))
+    assert (seen.stage, seen.status) == ("collecting", "1 more placement needed")
+    assert seen.hint == (
+        "2 of 5 clicks found no radar position: the nearest radar scan is 9.00 s away. Check that both clocks agree."
+    )
+    assert [row.state for row in seen.clicks] == ["unpaired", "pending", "unpaired", "pending", "pending"]
+    assert "9.00 s away" in seen.clicks[0].note
+
+
+def test_figures_stay_while_a_newer_answer_is_worked_out() -> None:
+    seen = shown(5, calibration(*FIVE), ClickMoved("c1", 11.0, 20.0))
+    assert (seen.stage, seen.status, seen.solving) == ("solving", "Solving…", True)
+    assert seen.has_calibration
+    assert seen.solved_revision == seen.revision - 1
+    assert seen.metrics
+
+
+def test_what_can_be_undone_and_redone_is_told() -> None:
+    seen = view(clicked(2, Undo()), FACTS)
+    assert (seen.can_undo, seen.can_redo) == (True, True)
+    assert not view(clicked(1), FACTS).can_redo
+
+
+def test_a_row_says_where_the_click_is_before_any_answer() -> None:
+    (row,) = view(clicked(1), FACTS).clicks
+    assert (row.id, row.frame, row.image_time, row.u_px, row.v_px) == ("c1", 1, Stamp.of(TIMES[1]), 10.0, 20.0)
+    assert (row.state, row.projected_px, row.residual_px, row.note) == ("pending", None, None, "")
+
+
+def test_a_row_of_a_solved_pair_carries_residual_position_and_ellipse() -> None:
+    row = shown(5, calibration(*FIVE)).clicks[0]
+    assert (row.state, row.projected_px, row.residual_px) == ("inlier", (13.0, 24.0), 5.0)
+    assert row.range_m == pytest.approx(5.0)
+    assert row.azimuth_deg == pytest.approx(53.130102)
+    assert row.elevation_deg == pytest.approx(0.0)
+    assert row.ellipse is not None
+    assert row.ellipse.semi_major_px == pytest.approx(3.0 * 2.447747)
+    assert row.outlier_probability == pytest.approx(0.01)
+
+
+def test_the_residual_follows_a_moved_click_at_once() -> None:
+    row = shown(5, calibration(*FIVE), ClickMoved("c1", 13.0, 22.0)).clicks[0]
+    assert row.residual_px == pytest.approx(2.0)
+
+
+def test_each_state_of_a_click_is_told_in_words() -> None:
+    outcome = calibration(
+        pair("c1"),
+        pair("c2", inlier=False),
+        pair("c3", inlier=False, excluded=True),
+        unpaired=(Unpaired("c4", "no-scan", "the radar has no scan here", "click where both recordings overlap"),),
+    )
+    history = clicked(5, ClickExcluded("c3", True))
+    history = advance(history, Solved(history.present.revision, outcome), FACTS)
+    rows = {row.id: row for row in view(history, FACTS).clicks}
+    assert [row.state for row in rows.values()] == ["inlier", "outlier", "excluded", "unpaired", "pending"]
+    assert rows["c2"].note.startswith(
+        "Does not agree with the others (97 % sure): its radar position comes out 5.00 px"
+    )
+    assert rows["c3"].note == "Left out of the solve; its radar position comes out 5.00 px from the click."
+    assert rows["c4"].note == "The radar has no scan here. Click where both recordings overlap."
+    taken_in = view(advance(history, ClickExcluded("c3", False), FACTS), FACTS)
+    assert taken_in.clicks[2].state == "pending"
+
+
+def test_a_radar_position_behind_the_camera_has_no_reprojection() -> None:
+    row = shown(1, calibration(pair("c1", inlier=False, projected_px=[NAN, NAN], outlier_probability=NAN))).clicks[0]
+    assert (row.projected_px, row.residual_px, row.outlier_probability) == (None, None, None)
+    assert "behind the camera" in row.note
+
+
+def test_every_figure_has_a_value_and_a_sentence_that_explains_it() -> None:
+    seen = shown(5, calibration(*FIVE))
+    figures = {figure.key: figure for figure in (*seen.metrics, *seen.pose)}
+    assert figures["aed"].value == "12.4"
+    assert figures["inliers"].value == "5 of 5"
+    assert figures["camera_x"].value == "5.0 ± 3.0"
+    assert list(figures) == [
+        *("aed", "held_out_aed", "cdsd", "rms", "inliers"),
+        *("camera_x", "camera_y", "camera_z", "roll", "pitch", "yaw"),
+    ]
+    assert all(figure.hint.endswith(".") and len(figure.hint) > 20 for figure in figures.values())
+
+
+def test_smooth_angle_errors_of_the_radar_are_a_figure_where_correcting_them_pays() -> None:
+    simulated = simulate_pairs(30, rng=np.random.default_rng(7), noise=NoiseProfile(0.008, 0.1, 0.25))
+    solved = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions())
+    assert isinstance(solved, Calibration)
+    assert "radar_angles" not in {figure.key for figure in pose_figures(solved)}
+    bent = []
+    for row in solved.pairs:
+        polar = polar_from_cartesian(row.point_radar_m)
+        polar[2] += np.deg2rad(1.5) * np.cos(9.0 * polar[1])
+        bent.append(replace(row, point_radar_m=cartesian_from_polar(polar)))
+    figure = pose_figures(replace(solved, pairs=tuple(bent)))[-1]
+    assert figure.key == "radar_angles"
+    assert 0.5 < float(figure.value.removeprefix("up to ")) < 3.0
+    assert "radar_angle_map" in figure.hint
+
+
+def test_a_figure_that_was_not_computed_is_a_dash() -> None:
+    metrics = Metrics(12.0, NAN, 13.0, n=1)
+    figures = {figure.key: figure for figure in shown(5, calibration(*FIVE, metrics=metrics)).metrics}
+    assert figures["cdsd"].value == figures["held_out_aed"].value == "–"
+    assert figures["held_out_aed"].level == "plain"
+
+
+def test_a_pose_that_leans_on_single_pairs_stands_out() -> None:
+    metrics = Metrics(2.0, 1.0, 2.1, n=5, held_out_aed_px=6.0)
+    figures = {figure.key: figure for figure in shown(5, calibration(*FIVE, metrics=metrics)).metrics}
+    assert figures["held_out_aed"].level == "warning"
+    assert "leans on single pairs" in figures["held_out_aed"].hint
+
+
+def test_a_pose_without_covariance_is_shown_without_one() -> None:
+    seen = shown(5, calibration(*FIVE, covariance=np.full((6, 6), NAN)))
+    assert [figure.value for figure in seen.pose] == ["5.00", "-10.0", "30.0", "0", "0", "0"]
+
+
+def test_warnings_are_shown_as_sentences_and_the_first_is_the_next_thing_to_do() -> None:
+    seen = shown(5, calibration(*FIVE, warnings=(DataWarning("few-pairs", "only 5 pairs", "add placements"),)))
+    assert seen.warnings == (WarningRow("few-pairs", "Only 5 pairs.", "Add placements."),)
+    assert seen.hint == "Add placements."
+
+
+def test_the_residual_limit_is_the_usual_ellipse_or_ransacs_threshold() -> None:
+    assert shown(5, calibration(*FIVE)).residual_limit_px == pytest.approx(3.0 * 2.447747)
+    blind = tuple(replace(row, expected_covariance_px2=np.full((2, 2), NAN)) for row in FIVE)
+    assert shown(5, calibration(*blind)).residual_limit_px is None
+    assert shown(5, calibration(*blind, options=CalibrationOptions(method="paper"))).residual_limit_px == 8.0
+
+
+def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings() -> None:
+    outcome = calibration(
+        *FIVE,
+        warnings=(DataWarning("a", "b", "c"),),
+        unpaired=(Unpaired("c9", "no-scan", "no scan", "click elsewhere"),),
+    )
+    lines = summary_lines(outcome)
+    assert lines[0] == "AED               12.4 px"
+    assert lines[-2:] == ("warning: B. C.", "unpaired: c9: No scan. Click elsewhere.")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (12.4321, "12.4"),
+        (0.0314159, "0.0314"),
+        (1234.6, "1235"),
+        (99.96, "100"),
+        (0.0, "0"),
+        (-5.5, "-5.50"),
+        (NAN, "–"),
+    ],
+)
+def test_a_plain_number_has_three_digits_that_count(value: float, text: str) -> None:
+    assert plain(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "text"),
+    [
+        (0.3142, 0.0834, "0.31 ± 0.08"),
+        (0.3142, 0.0234, "0.314 ± 0.023"),
+        (12.3456, 0.0999, "12.35 ± 0.10"),
+        (1234.5, 57.0, "1230 ± 60"),
+        (5.0, 3.5551, "5 ± 4"),
+        (5.0, 3.5, "5.0 ± 3.5"),
+        (-0.001, 0.2, "0.00 ± 0.20"),
+        (1.0, float("inf"), "1.00"),
+        (1.0, NAN, "1.00"),
+        (1.0, 0.0, "1.00"),
+        (NAN, 1.0, "–"),
+    ],
+)
+def test_a_number_with_a_standard_deviation_has_the_digits_it_has_earned(value: float, sigma: float, text: str) -> None:
+    assert with_sigma(value, sigma) == text
+
+
+def test_an_ellipse_turns_with_its_covariance() -> None:
+    angle_rad = np.deg2rad(30.0)
+    turn = np.array([[np.cos(angle_rad), -np.sin(angle_rad)], [np.sin(angle_rad), np.cos(angle_rad)]])
+    ellipse = ellipse_of(turn @ np.diag([16.0, 1.0]) @ turn.T)
+    assert ellipse is not None
+    assert ellipse.angle_rad == pytest.approx(angle_rad)
+    assert (ellipse.semi_major_px, ellipse.semi_minor_px) == pytest.approx((4 * 2.447747, 2.447747))
+    assert ellipse_of(np.full((2, 2), NAN)) is None
+
+
+def test_ninety_five_percent_of_draws_lie_in_the_ellipse() -> None:
+    rng = np.random.default_rng(5)
+    covariance = np.array([[9.0, 4.0], [4.0, 5.0]])
+    ellipse = ellipse_of(covariance)
+    assert ellipse is not None
+    draws = rng.multivariate_normal([0, 0], covariance, size=20_000)
+    along = draws @ [np.cos(ellipse.angle_rad), np.sin(ellipse.angle_rad)]
+    across = draws @ [-np.sin(ellipse.angle_rad), np.cos(ellipse.angle_rad)]
+    inside = (along / ellipse.semi_major_px) ** 2 + (across / ellipse.semi_minor_px) ** 2 <= 1
+    assert inside.mean() == pytest.approx(0.95, abs=0.006)
+
+
+@pytest.mark.parametrize(
+    ("turn", "axis", "meaning"),
+    [(0, [1.0, 0, 0], "tips to its right"), (1, [0, 1.0, 0], "looks down"), (2, [0, 0, 1.0], "looks left")],
+)
+def test_roll_pitch_and_yaw_are_turns_about_the_radar_axes(turn: int, axis: list[float], meaning: str) -> None:
+    radar_from_body = rotation_exp(0.1 * np.array(axis))
+    camera_from_radar = RigidTransform(OPTICAL_FROM_BODY @ radar_from_body.T, np.zeros(3))
+    expected = np.zeros(3)
+    expected[turn] = 0.1
+    assert mounting_of(calibration(camera_from_radar=camera_from_radar)).roll_pitch_yaw_rad == pytest.approx(expected)
+    ahead, left = radar_from_body[:, 0], radar_from_body[:, 1]
+    assert {"tips to its right": left[2] > 0, "looks down": ahead[2] < 0, "looks left": ahead[1] > 0}[meaning]
+
+
+def test_the_sigmas_of_the_mounting_are_those_of_many_perturbed_poses() -> None:
+    rng = np.random.default_rng(11)
+    root = 1e-3 * rng.normal(size=(6, 6))
+    covariance = root @ root.T
+    pose = RigidTransform(OPTICAL_FROM_BODY @ rotation_exp(np.array([0.2, -0.3, 0.5])), np.array([0.3, -0.1, 0.2]))
+    mounting = mounting_of(calibration(camera_from_radar=pose, covariance=covariance))
+    errors = rng.multivariate_normal(np.zeros(6), covariance, size=4000)
+    drawn = [mounting_of(calibration(camera_from_radar=pose.perturbed(error))) for error in errors]
+    assert np.std([one.position_m for one in drawn], axis=0) == pytest.approx(mounting.position_sigma_m, rel=0.05)
+    spread = np.std([one.roll_pitch_yaw_rad for one in drawn], axis=0)
+    assert spread == pytest.approx(mounting.roll_pitch_yaw_sigma_rad, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("phrase", "text"),
+    [
+        ("the end", "The end."),
+        ("Really?", "Really?"),
+        ("", ""),
+        ("/radar is odd", "/radar is odd."),
+        ("c14 suits", "c14 suits."),
+        ("solving…", "Solving…"),
+    ],
+)
+def test_a_phrase_becomes_a_sentence(phrase: str, text: str) -> None:
+    assert sentence(phrase) == text

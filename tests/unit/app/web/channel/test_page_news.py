@@ -1,0 +1,189 @@
+"""What goes to a page: the newest of each kind, in order, and never more than it can read."""
+
+import asyncio
+import logging
+
+import numpy as np
+import pytest
+
+from app.session import Session
+from app.web.channel.newest import NewestWins
+from app.web.channel.outbox import Outbox
+from app.web.channel.radar_survey import placements_at, survey_of
+from app.web.radar_sight import RadarSight, overlay_of
+from calib_core.measurements import RadarScan, RadarScans, TimeNs
+from calib_core.options import GatingOptions
+
+
+def delivered(outbox: Outbox, count: int) -> list[str | bytes]:
+    got: list[str | bytes] = []
+
+    async def take(message: str | bytes) -> None:
+        got.append(message)
+        if len(got) == count:
+            raise EOFError
+
+    async def run() -> None:
+        with pytest.raises(EOFError):
+            await outbox.deliver(take)
+
+    asyncio.run(run())
+    return got
+
+
+def test_of_one_kind_only_the_newest_is_sent_and_answers_are_all_sent() -> None:
+    outbox = Outbox()
+    for message, kind in (
+        ("v1", "view"),
+        ("done 1", None),
+        ("v2", "view"),
+        ("f1", "frame"),
+        ("done 2", None),
+        ("f2", "frame"),
+    ):
+        outbox.put(message, kind=kind)
+    assert delivered(outbox, 4) == ["done 1", "v2", "done 2", "f2"]
+
+
+def test_a_page_that_reads_nothing_is_given_up() -> None:
+    outbox = Outbox()
+    for number in range(2001):
+        outbox.put(f"done {number}")
+
+    async def never(message: str | bytes) -> None:
+        await asyncio.Event().wait()
+
+    with pytest.raises(BufferError, match="2001"):
+        asyncio.run(outbox.deliver(never))
+
+
+def test_of_the_work_that_waits_only_the_newest_is_done() -> None:
+    worked: list[int] = []
+
+    async def run() -> None:
+        going, ended = asyncio.Event(), asyncio.Event()
+
+        async def work(item: int) -> None:
+            worked.append(item)
+            await going.wait()
+            if item == 4:
+                ended.set()
+
+        worker = NewestWins(work)
+        worker.give(1)
+        await asyncio.sleep(0)
+        for item in (2, 3, 4):
+            worker.give(item)
+        going.set()
+        await ended.wait()
+
+    asyncio.run(run())
+    assert worked == [1, 4]
+
+
+def test_work_that_fails_is_logged_and_the_next_is_done(caplog: pytest.LogCaptureFixture) -> None:
+    worked: list[str] = []
+
+    async def run() -> None:
+        async def work(item: str) -> None:
+            if item == "bad":
+                raise ZeroDivisionError("bad work")
+            worked.append(item)
+
+        worker = NewestWins(work)
+        worker.give("bad")
+        for _ in range(5):
+            await asyncio.sleep(0)
+        worker.give("good")
+        for _ in range(5):
+            await asyncio.sleep(0)
+
+    with caplog.at_level(logging.ERROR):
+        asyncio.run(run())
+    assert worked == ["good"]
+    assert "bad work" in caplog.text
+
+
+def scan(time_s: float, points: list[list[float]]) -> RadarScan:
+    rows = np.array(points, dtype=float).reshape(-1, 3)
+    return RadarScan(
+        TimeNs(int(time_s * 1e9)), rows, np.zeros(len(rows)), np.full(len(rows), 20.0), np.full((len(rows), 3), np.nan)
+    )
+
+
+def recorded() -> RadarScans:
+    """Return ten seconds at 10 Hz: a pole that is always there, and a reflector from 3 s to 7 s."""
+    generator = np.random.default_rng(1)
+    scans = []
+    for time_s in np.arange(0, 10, 0.1):
+        points = [generator.normal([12.0, 3.0, 0.0], 0.01)]
+        if 3 <= time_s <= 7:
+            points.append(generator.normal([6.0, -1.0, -0.3], 0.01))
+        scans.append(scan(time_s, [list(point) for point in points]))
+    return RadarScans.from_scans(scans)
+
+
+def test_the_survey_finds_the_reflector_and_a_frame_to_click_in() -> None:
+    image_times = (np.arange(0, 10, 0.7) * 1e9).astype(np.int64)
+    survey = survey_of([recorded()], image_times, GatingOptions())
+    [row] = survey.rows
+    assert row.range_m == pytest.approx(np.sqrt(36 + 1 + 0.09), abs=0.05)
+    assert row.start_s == pytest.approx(3, abs=0.3)
+    assert row.end_s == pytest.approx(7, abs=0.3)
+    assert row.frame == 7, "4.9 s is nearest to the middle"
+    assert placements_at(survey, int(5e9)) == [survey.placements[0]]
+    assert placements_at(survey, int(1e9)) == []
+    assert placements_at(None, int(5e9)) == ()
+
+
+def test_the_activity_counts_returns_per_scan() -> None:
+    image_times = np.array([0, int(10e9)], dtype=np.int64)
+    activity = survey_of([recorded()], image_times, GatingOptions()).activity
+    in_the_middle = activity.returns[int(5 / activity.step_s)]
+    assert activity.returns[0] == 1
+    assert in_the_middle == 2
+    assert len(activity.returns) * activity.step_s == pytest.approx(10)
+
+
+def test_a_placement_that_no_frame_shows_is_not_offered() -> None:
+    image_times = np.array([0, int(9.9e9)], dtype=np.int64)
+    assert survey_of([recorded()], image_times, GatingOptions()).rows == ()
+
+
+def test_a_survey_in_windows_and_in_stretches_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    image_times = (np.arange(0, 10, 0.7) * 1e9).astype(np.int64)
+    whole, scans = survey_of([recorded()], image_times, GatingOptions()), recorded()
+    windows = [scans.between(TimeNs(int(s * 1e9)), TimeNs(int((s + 1) * 1e9) - 1)) for s in range(10)]
+    assert survey_of(windows, image_times, GatingOptions()).rows == whole.rows
+    assert survey_of(windows, image_times, GatingOptions()).activity == whole.activity
+    monkeypatch.setattr("app.web.channel.radar_survey._MOST_STATIC_RETURNS", 128)  # 9 s of 10
+    in_stretches = survey_of(windows, image_times, GatingOptions())
+    assert [row.frame for row in in_stretches.rows] == [row.frame for row in whole.rows]
+    assert in_stretches.activity == whole.activity
+
+
+def test_a_survey_of_no_radar_is_empty() -> None:
+    survey = survey_of([], np.array([0, int(1e9)], dtype=np.int64), GatingOptions())
+    assert survey.rows == ()
+    assert set(survey.activity.returns) == {0.0}
+
+
+class Radar:
+    def radar_scans_around(self, times: list[TimeNs], half_window_s: float) -> RadarScans:
+        low, high = times[0] - int(half_window_s * 1e9), times[0] + int(half_window_s * 1e9)
+        return recorded().between(TimeNs(low), TimeNs(high))
+
+
+def test_the_scan_of_a_frame_is_the_nearest_one_and_none_when_none_is_near() -> None:
+    sight = RadarSight(Radar())  # type: ignore[arg-type]
+    found = sight.scan_at(TimeNs(int(4.96e9)))
+    assert found is not None
+    assert found.time == pytest.approx(5.0e9, abs=1e3)
+    assert len(found) == 2
+    assert sight.scan_at(TimeNs(int(60e9))) is None
+
+
+def test_without_a_calibration_nothing_is_carried_into_the_picture() -> None:
+    overlay = overlay_of(3, Session(), scan(0, [[5, 0, 0]]), ())
+    assert overlay.returns is None
+    assert overlay.guesses == ()

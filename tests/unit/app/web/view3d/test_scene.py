@@ -1,0 +1,201 @@
+"""Shapes of the 3D view are where they should be; a view drawn again assigns properties and adds no node."""
+
+import contextlib
+import io
+from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.session import History, RecordingFacts, Session
+from app.view import Advice, view
+from app.web.frames import Frame
+from app.web.view3d.scene import Sight, TabScene
+from app.web.view3d.shapes import (
+    ellipsoids,
+    next_place,
+    nominal_camera_from_radar,
+    range_numbers,
+    range_rings,
+    rays_to,
+    residual_colours,
+    vertical_field_of_view_rad,
+)
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import RadarScan, ReflectorClick, TimeNs
+from calib_core.options import CalibrationOptions, NoiseOptions
+from calib_core.radar import polar_from_cartesian
+from calib_core.results import Calibration, Metrics, PairResult
+
+CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
+FACTS = RecordingFacts("made", np.arange(4, dtype=np.int64) * 1000, 640, 480)
+
+
+def calibration(*, off_px: float = 0.0) -> Calibration:
+    """Return a calibration whose clicks lie `off_px` right of their reprojections."""
+    camera_from_radar = RigidTransform(nominal_camera_from_radar().rotation, np.array([0.1, 0.2, 0.0]))
+    points = np.array([[5.0, 1.0, -0.5], [8.0, -2.0, 0.3], [12.0, 0.5, -0.8], [6.0, 0.0, 0.0]])
+    pixels = CAMERA.project(camera_from_radar @ points)
+    pairs = tuple(
+        PairResult(f"c{place + 1}", np.add(pixel, (off_px, 0.0)), pixel, point, inlier=True)
+        for place, (pixel, point) in enumerate(zip(pixels, points, strict=True))
+    )
+    metrics = Metrics(off_px, 0.0, off_px, len(pairs))
+    return Calibration(camera_from_radar, np.full((6, 6), np.nan), CAMERA, metrics, pairs, (), (), CalibrationOptions())
+
+
+def test_a_ray_of_an_exact_click_ends_at_its_return() -> None:
+    solved = calibration()
+    rays = rays_to(solved, solved.pairs)
+    assert rays[:, 1] == pytest.approx(np.array([pair.point_radar_m for pair in solved.pairs]), abs=1e-9)
+    centre = solved.camera_from_radar.inverse().translation_m
+    assert rays[:, 0] == pytest.approx(np.broadcast_to(centre, (4, 3)), abs=1e-12)
+
+
+def test_rings_lie_at_their_ranges_and_numbers_on_the_ground_beside_them() -> None:
+    ranges = polar_from_cartesian(range_rings(every_m=5, up_to_m=30).reshape(-1, 3))[:, 0]
+    assert set(np.round(ranges, 9)) == {5, 10, 15, 20, 25, 30}
+    numbers = range_numbers(every_m=10, up_to_m=20)
+    assert np.all(numbers[..., 2] == 0)
+    assert len(numbers) == (2 + 6) + (5 + 6), "strokes of 1 and 0, of 2 and 0"
+
+
+def test_an_ellipsoid_holds_its_point_and_reaches_as_far_as_the_noise_says() -> None:
+    point = np.array([[10.0, 0.0, 0.0]])
+    shell = ellipsoids(
+        point, NoiseOptions(sigma_range_m=0.1, sigma_azimuth_deg=1.0, sigma_elevation_deg=2.0), (1, 1, 2, 1)
+    )
+    reach = np.abs(shell.reshape(-1, 3) - point).max(axis=0)
+    sigma_m = [0.1, 10 * np.deg2rad(1.0) * 2, 10 * np.deg2rad(2.0)]
+    assert reach == pytest.approx(np.sqrt(7.8147) * np.array(sigma_m), rel=0.02)
+
+
+def test_small_residuals_are_blue_large_ones_red_and_unknown_ones_grey() -> None:
+    small, large, beyond, unknown = residual_colours(np.array([0.0, 10.0, 99.0, np.nan]), 10.0).astype(int)
+    assert small[2] > small[0]
+    assert large[0] > large[2]
+    assert np.array_equal(large, beyond)
+    assert np.ptp(unknown) < 30
+
+
+def test_the_nominal_camera_looks_along_the_radars_x_axis() -> None:
+    ahead, left, up = nominal_camera_from_radar() @ np.eye(3)
+    assert ahead == pytest.approx([0, 0, 1])
+    assert left == pytest.approx([-1, 0, 0])
+    assert up == pytest.approx([0, -1, 0])
+    assert vertical_field_of_view_rad(CAMERA) == pytest.approx(2 * np.arctan(240 / 500))
+
+
+class Drawn:
+    """A 3D view over a real viser server, with the client's camera recorded."""
+
+    def __init__(self, server: Any) -> None:
+        self.camera = SimpleNamespace()
+        client = SimpleNamespace(scene=server.scene, camera=self.camera, atomic=server.atomic, flush=server.flush)
+        self.scene = TabScene(client)  # type: ignore[arg-type]
+        self.node = server.scene.get_handle_by_name
+
+    def names(self) -> list[str]:
+        return sorted(
+            name
+            for name in ("/scan", "/window", "/chosen", "/rays", "/ray", "/gap", "/selected", "/next", "/next_name")
+            if self.node(name).visible
+        )
+
+
+@pytest.fixture
+def drawn() -> Iterator[Drawn]:
+    import viser
+
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        yield Drawn(server)
+        server.stop()
+
+
+def sight(outcome: Calibration | None = None, *, selected: str | None = None, index: int = 0) -> Sight:
+    clicks = tuple(ReflectorClick(TimeNs(place * 1000), f"c{place + 1}", 100.0, 100.0) for place in range(4))
+    session = Session(clicks=clicks, outcome=outcome, outcome_revision=0 if outcome else -1)
+    points, none = np.array([[4.0, 0.0, 0.0], [9.0, 1.0, 0.2]]), np.full(2, np.nan)
+    scan = RadarScan(TimeNs(0), points, np.array([0.0, 1.5]), none, np.full((2, 3), np.nan))
+    picture = Frame(index, b"jpeg", "jpeg", 640, 480, 1.0)
+    shown = view(History(session), FACTS)
+    return Sight(session, shown, selected, scan, points[:1], picture, CAMERA)
+
+
+def test_before_a_calibration_the_camera_stands_dimmed_at_the_radar_and_carries_the_picture(drawn: Drawn) -> None:
+    drawn.scene.show(sight())
+    frustum = drawn.node("/camera")
+    assert frustum.position == pytest.approx([0, 0, 0])
+    assert frustum._image_data == b"jpeg"
+    assert drawn.names() == ["/scan", "/window"]
+    assert drawn.node("/scan").colors.tolist()[0] != drawn.node("/scan").colors.tolist()[1], "moving and still differ"
+
+
+def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear(drawn: Drawn) -> None:
+    drawn.scene.show(sight())
+    dimmed = drawn.node("/camera").color
+    solved = calibration(off_px=12.0)
+    drawn.scene.show(sight(solved, selected="c2"))
+    frustum = drawn.node("/camera")
+    assert frustum.position == pytest.approx(solved.camera_from_radar.inverse().translation_m)
+    assert frustum.color != dimmed
+    assert drawn.names() == ["/chosen", "/gap", "/ray", "/rays", "/scan", "/selected", "/window"]
+    assert len(drawn.node("/chosen").points) == 4
+    assert drawn.node("/selected").text.startswith("c2: ")
+    drawn.scene.show(sight(solved))
+    assert "/selected" not in drawn.names()
+
+
+def test_the_advised_place_is_ringed_until_one_may_stop(drawn: Drawn) -> None:
+    seen = sight(calibration())
+    advice = Advice(10.0, 20.0, 5.0, 1.4, False, (4.0, 3.0, 0.0), "There.")
+    drawn.scene.show(replace(seen, view=replace(seen.view, advice=advice)))
+    assert {"/next", "/next_name"} <= set(drawn.names())
+    assert drawn.node("/next").points.reshape(-1, 3).mean(axis=0) == pytest.approx([4.0, 3.0, 0.0], abs=0.05)
+    assert drawn.node("/next_name").text == "next 5.0 m"
+    drawn.scene.show(replace(seen, view=replace(seen.view, advice=replace(advice, may_stop=True))))
+    assert not {"/next", "/next_name"} & set(drawn.names())
+
+
+def test_in_the_light_theme_nothing_is_white_on_white(drawn: Drawn) -> None:
+    solved = calibration()
+    drawn.scene.show(sight(solved, selected="c2"))
+    dark = drawn.node("/camera").color
+    drawn.scene.show(replace(sight(solved, selected="c2"), light=True))
+    assert drawn.node("/camera").color != dark
+    for name in ("/ray", "/scan", "/window", "/ground/rings"):
+        assert np.asarray(drawn.node(name).colors).reshape(-1, 3).mean(axis=1).max() < 170
+    drawn.scene.show(sight(solved, selected="c2"))
+    assert drawn.node("/camera").color == dark
+    assert np.asarray(drawn.node("/ray").colors).min() == 255
+
+
+def test_the_ring_of_the_next_place_is_level_and_half_gaps() -> None:
+    segments = next_place(np.array([[6.0, -2.0, 0.4]]), radius_m=0.5)
+    ring, plumb = segments[:-1], segments[-1]
+    assert np.linalg.norm(ring - [6.0, -2.0, 0.4], axis=2) == pytest.approx(0.5)
+    assert ring[..., 2] == pytest.approx(0.4)
+    assert np.linalg.norm(ring[:, 1] - ring[:, 0], axis=1).sum() == pytest.approx(np.pi * 0.5, rel=0.01)
+    assert plumb == pytest.approx(np.array([[6.0, -2.0, 0.15], [6.0, -2.0, 0.65]]))
+
+
+def test_after_an_undo_to_nothing_the_pairs_are_gone(drawn: Drawn) -> None:
+    drawn.scene.show(sight(calibration(), selected="c1"))
+    drawn.scene.show(sight())
+    assert drawn.names() == ["/scan", "/window"]
+    assert drawn.node("/camera").position == pytest.approx([0, 0, 0])
+
+
+@pytest.mark.parametrize("viewpoint", ["behind", "above", "side", "camera"])
+def test_every_viewpoint_looks_at_what_lies_before_the_radar(drawn: Drawn, viewpoint: str) -> None:
+    drawn.scene.show(sight(calibration()))
+    drawn.scene.look_from(viewpoint)
+    direction = np.subtract(drawn.camera.look_at, drawn.camera.position)
+    to_reflector = np.subtract((6.0, 0.0, 0.0), drawn.camera.position)
+    cosine = direction @ to_reflector / np.linalg.norm(direction) / np.linalg.norm(to_reflector)
+    assert cosine > 0.95

@@ -1,0 +1,109 @@
+"""Clusters of a window, and what makes one of them the reflector."""
+
+import numpy as np
+import pytest
+
+from calib_core.association.clustering import (
+    candidate_at,
+    candidates_of,
+    clusters_of,
+    floor_sigma_polar,
+    scores_of,
+    window_around,
+)
+from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
+from calib_core.options import LocatingOptions, NoiseOptions
+
+REFLECTOR = (8.0, 1.0, -1.0)
+POST = (5.0, -2.0, 0.3)
+
+
+def window(
+    objects: dict[tuple[float, float, float], float], *, start_s: float = 0.0, scans: int = 30, seed: int = 0
+) -> RadarScans:
+    """Thirty scans of objects with their SNR [dB], 1 cm and 0.1 deg of noise."""
+    rng = np.random.default_rng(seed)
+    made = []
+    for k in range(scans):
+        points = np.array(list(objects)) + 0.01 * rng.standard_normal((len(objects), 3))
+        snr = np.array(list(objects.values())) + rng.standard_normal(len(objects))
+        time = TimeNs(round((start_s + 0.1 * k) * NS_PER_S))
+        n = len(points)
+        made.append(RadarScan(time, points, np.zeros(n), snr, np.full((n, 3), np.nan)))
+    return RadarScans.from_scans(made)
+
+
+def test_two_objects_are_two_clusters_and_never_one_mean() -> None:
+    clusters = clusters_of(window({REFLECTOR: 30.0, POST: 25.0}), most=6)
+    assert len(clusters) == 2
+    ranges = sorted(cluster.centre[0] for cluster in clusters)
+    assert ranges == pytest.approx(sorted(np.linalg.norm([POST, REFLECTOR], axis=1)), abs=0.01)
+
+
+def test_a_cluster_knows_in_how_many_scans_it_was_seen() -> None:
+    (cluster,) = clusters_of(window({REFLECTOR: 30.0}, scans=20), most=6)
+    assert (cluster.scans, cluster.returns, cluster.persistence) == (20, 20, 1.0)
+    assert cluster.snr_db == pytest.approx(30.0, abs=1.0)
+
+
+def test_an_empty_window_has_no_cluster() -> None:
+    assert clusters_of(RadarScans(), most=6) == ()
+
+
+def test_what_is_always_there_loses_to_what_is_new_even_when_it_is_stronger() -> None:
+    places = [(8.0, 1.0, -1.0), (6.0, 0.5, -1.0), (10.0, -1.5, -1.0), (4.0, 0.0, -1.0)]
+    windows = [window({place: 20.0, POST: 35.0}, start_s=100.0 * i, seed=i) for i, place in enumerate(places)]
+    clusters = [clusters_of(one, most=6) for one in windows]
+    for place, found, scores in zip(places, clusters, scores_of(windows, clusters), strict=True):
+        best = candidates_of(found, scores, LocatingOptions(), NoiseOptions())[0]
+        assert best.position_radar_m == pytest.approx(place, abs=0.02)
+        assert scores.sum() == pytest.approx(1.0)
+
+
+def test_windows_of_the_same_placement_are_no_witnesses_against_it() -> None:
+    windows = [window({REFLECTOR: 20.0, POST: 21.0}, start_s=0.5 * i) for i in range(5)]
+    clusters = [clusters_of(one, most=6) for one in windows]
+    for scores in scores_of(windows, clusters):
+        assert scores.min() > 0.3
+
+
+def test_sigma_keeps_its_floor_however_many_returns_are_averaged() -> None:
+    found = clusters_of(window({REFLECTOR: 30.0}, scans=300), most=6)
+    (candidate,) = candidates_of(found, np.ones(1), LocatingOptions(), NoiseOptions())
+    floor = floor_sigma_polar(candidate.position_radar_m, NoiseOptions())
+    assert (candidate.sigma_polar >= floor).all()
+    assert candidate.sigma_polar == pytest.approx(floor, rel=0.05)
+
+
+def test_sigmas_in_the_message_replace_the_assumed_ones() -> None:
+    plain = window({REFLECTOR: 30.0})
+    told = RadarScans(
+        plain.times_ns,
+        plain.first_return,
+        plain.points_radar_m,
+        plain.doppler_mps,
+        plain.snr_db,
+        np.tile([0.1, 0.02, 0.04], (len(plain.points_radar_m), 1)),
+    )
+    (candidate,) = candidates_of(clusters_of(told, most=6), np.ones(1), LocatingOptions(), NoiseOptions())
+    assert candidate.sigma_polar == pytest.approx([0.1, 0.02, 0.04], rel=0.02)
+
+
+def test_the_assumed_angle_noise_grows_to_the_side() -> None:
+    ahead = candidate_at(np.array([10.0, 0.0, 0.0]), NoiseOptions())
+    assert ahead.sigma_polar == pytest.approx(floor_sigma_polar(np.array([10.0, 0.0, 0.0]), NoiseOptions()))
+    aside = floor_sigma_polar(np.array([5.0, 5.0, 0.0]), NoiseOptions())
+    assert aside[1] == pytest.approx(np.sqrt(2.0) * ahead.sigma_polar[1])
+
+
+def test_the_window_is_centred_on_the_nearest_scan() -> None:
+    scans = window({REFLECTOR: 30.0}, scans=100)
+    cut = window_around(scans, TimeNs(round(5.04 * NS_PER_S)), window_s=3.0)
+    assert (cut.times_ns[0], cut.times_ns[-1]) == (round(3.5 * NS_PER_S), round(6.5 * NS_PER_S))
+
+
+def test_at_most_the_wanted_number_of_candidates_is_kept() -> None:
+    objects = {(3.0 + i, 0.5 * i - 2.0, 0.0): 25.0 for i in range(10)}
+    found = clusters_of(window(objects), most=24)
+    assert len(found) == 10
+    assert len(candidates_of(found, np.full(10, 0.1), LocatingOptions(max_candidates=4), NoiseOptions())) == 4

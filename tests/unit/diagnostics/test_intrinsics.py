@@ -1,0 +1,65 @@
+"""Wrong intrinsics are suspected by name, with the right amount; right ones are left in peace."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib_core.calibration import calibrate_pairs
+from calib_core.camera import Camera
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from calib_core.results import Calibration, DataWarning
+from calib_core.synthetic import RigOptions, simulate_pairs
+
+FREE = CalibrationOptions()
+MEASURED = CalibrationOptions(
+    solving=SolvingOptions(camera_position=CameraPositionPrior(RigOptions().camera_offset_m, 0.01))
+)
+
+
+def suspected(seed: int, noise: str, options: CalibrationOptions, *, focal: float = 1.0, count: int = 20) -> str | None:
+    simulated = simulate_pairs(count, rng=np.random.default_rng([7, seed]), noise=noise)  # type: ignore[arg-type]
+    matrix_px = simulated.camera.matrix_px * np.array([[focal, 1, 1], [1, focal, 1], [1, 1, 1]])
+    return suspicion_under(replace(simulated.camera, matrix_px=matrix_px), simulated.pairs, options)
+
+
+def suspicion_under(camera: Camera, pairs: object, options: CalibrationOptions) -> str | None:
+    outcome = calibrate_pairs(pairs, camera, options)  # type: ignore[arg-type]
+    assert isinstance(outcome, Calibration)
+    return text_of(outcome.warnings)
+
+
+def text_of(warnings: tuple[DataWarning, ...]) -> str | None:
+    found = [one.message for one in warnings if one.code == "intrinsics-suspected"]
+    return found[0] if found else None
+
+
+@pytest.mark.parametrize(("focal", "word"), [(1.03, "too long"), (0.97, "too short")])
+def test_a_focal_length_that_is_three_percent_off_is_suspected_by_amount_and_sign(focal: float, word: str) -> None:
+    for seed in range(3):
+        text = suspected(seed, "imaging", MEASURED, focal=focal)
+        assert text is not None
+        assert word in text
+        amount, sigma = map(float, re.findall(r"([\d.]+) ± ([\d.]+) %", text)[0])
+        assert abs(amount - 3.0) < 3.5 * sigma
+        assert sigma < 0.7
+
+
+def test_a_distortion_that_was_forgotten_is_suspected() -> None:
+    for seed in range(3):
+        simulated = simulate_pairs(30, rng=np.random.default_rng([8, seed]), noise="imaging")
+        straight = replace(simulated.camera, distortion=np.zeros(4))
+        text = suspicion_under(straight, simulated.pairs, MEASURED)
+        assert text is not None
+        assert "grow with" in text
+
+
+@pytest.mark.parametrize("options", [FREE, MEASURED])
+@pytest.mark.parametrize("noise", ["ti", "imaging"])
+def test_right_intrinsics_are_not_suspected(noise: str, options: CalibrationOptions) -> None:
+    assert [suspected(seed, noise, options) for seed in range(6)] == [None] * 6
+
+
+def test_a_few_pairs_do_not_speak_of_the_lens() -> None:
+    assert suspected(0, "imaging", MEASURED, focal=1.03, count=8) is None

@@ -1,0 +1,66 @@
+"""Radar positions that a radar cannot tell apart by itself: the pose and all pairs together tell which is meant."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib_core.calibration import calibrate_pairs
+from calib_core.measurements import Pair
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from calib_core.radar import cartesian_from_polar, polar_from_cartesian
+from calib_core.results import Calibration
+from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
+
+FREE = CalibrationOptions()
+MEASURED = CalibrationOptions(
+    solving=SolvingOptions(camera_position=CameraPositionPrior(RigOptions().camera_offset_m, 0.01))
+)
+OTHER_LOBE_RAD = np.deg2rad(25.0)
+
+
+def with_alternatives(simulated: SimulatedPairs, kind: str, rng: np.random.Generator) -> list[Pair]:
+    """Give every pair the position it has and one that it may have as well, in random order, neither more plausible."""
+    pairs = []
+    for pair in simulated.pairs:
+        (candidate,) = pair.candidates
+        polar = polar_from_cartesian(candidate.position_radar_m)
+        if kind == "mirrored elevation":
+            polar[2] *= -1.0
+        else:
+            polar[1] += rng.choice([-OTHER_LOBE_RAD, OTHER_LOBE_RAD])
+        either = [
+            replace(candidate, score=0.5),
+            replace(candidate, score=0.5, position_radar_m=cartesian_from_polar(polar)),
+        ]
+        pairs.append(replace(pair, candidates=tuple(either if rng.random() < 0.5 else either[::-1])))
+    return pairs
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [("another azimuth", FREE), ("another azimuth", MEASURED), ("mirrored elevation", MEASURED)],
+)
+def test_the_right_one_of_two_positions_is_chosen_for_every_pair(kind: str, options: CalibrationOptions) -> None:
+    for seed in range(3):
+        rng = np.random.default_rng([61, seed])
+        simulated = simulate_pairs(20, rng=rng, noise="imaging")
+        outcome = calibrate_pairs(with_alternatives(simulated, kind, rng), simulated.camera, options)
+        assert isinstance(outcome, Calibration)
+        meant = [pair.candidates[0].position_radar_m for pair in simulated.pairs]
+        wrong = [
+            pair.id for pair, place in zip(outcome.pairs, meant, strict=True) if (pair.point_radar_m != place).any()
+        ]
+        named = [one.message for one in outcome.warnings if one.code == "uncertain-association"]
+        assert len(wrong) <= 1
+        assert all(name in text for name in wrong for text in named)
+        assert len(named) >= bool(wrong)
+
+
+def test_where_all_elevations_may_be_mirrored_and_the_camera_is_not_measured_the_question_is_said_to_be_open() -> None:
+    for seed in range(3):
+        rng = np.random.default_rng([62, seed])
+        simulated = simulate_pairs(20, rng=rng, noise="imaging")
+        outcome = calibrate_pairs(with_alternatives(simulated, "mirrored elevation", rng), simulated.camera, FREE)
+        assert isinstance(outcome, Calibration)
+        assert {one.code for one in outcome.warnings} & {"handedness-open", "two-poses", "mirrored-axes"}

@@ -1,0 +1,110 @@
+"""A wrong pair is counted out or named, even one the pose leans on; good pairs are left in peace."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib_core.calibration import calibrate, calibrate_pairs
+from calib_core.geometry import RigidTransform
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from calib_core.results import Calibration
+from calib_core.synthetic import simulate_pairs
+from tests.rooftop import ClickedSample, read_rooftop
+
+FREE = CalibrationOptions()
+MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
+
+
+@pytest.fixture(scope="module")
+def rooftop(project_root: Path) -> ClickedSample:
+    return read_rooftop(project_root, 1.6)
+
+
+@pytest.fixture(scope="module")
+def truth(project_root: Path) -> RigidTransform:
+    document = json.loads((project_root / "sample_data" / "rooftop" / "truth.json").read_text(encoding="utf-8"))
+    found = document["camera_from_radar"]
+    return RigidTransform(np.array(found["rotation"]), np.array(found["translation_m"]))
+
+
+def solved_with(
+    rooftop: ClickedSample, click: str, *, du_px: float = 0.0, dv_px: float = 0.0, method: str = "default"
+) -> Calibration:
+    clicks, scans, camera = rooftop
+    slipped = [replace(one, u_px=one.u_px + du_px, v_px=one.v_px + dv_px) if one.id == click else one for one in clicks]
+    outcome = calibrate(slipped, scans, camera, CalibrationOptions(method=method))  # type: ignore[arg-type]
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+def inside_what_is_stated(calibration: Calibration, truth: RigidTransform) -> bool:
+    error = truth.error_from(calibration.camera_from_radar)
+    return bool(error @ np.linalg.solve(calibration.covariance, error) < calibration.covariance_quantile)
+
+
+def named(calibration: Calibration) -> set[str]:
+    """Return the ids of the pairs that are counted out or doubted by name."""
+    out = {pair.id for pair in calibration.pairs if not pair.inlier}
+    texts = [one.message for one in calibration.warnings if one.code == "doubtful-pair"]
+    return out | {pair.id for pair in calibration.pairs if any(f"without {pair.id} " in text for text in texts)}
+
+
+def test_the_sample_raises_no_doubt_but_that_flat_ground_has_two_hands(
+    rooftop: ClickedSample, truth: RigidTransform
+) -> None:
+    calibration = solved_with(rooftop, "c1")
+    assert named(calibration) == set()
+    assert [one.code for one in calibration.warnings] == ["handedness-assumed"]
+    assert inside_what_is_stated(calibration, truth)
+
+
+@pytest.mark.parametrize(
+    ("click", "du_px", "dv_px"), [("c1", -40.0, 0.0), ("c11", 0.0, -40.0), ("c6", 35.0, 0.0), ("c2", -40.0, 0.0)]
+)
+def test_a_click_that_slipped_is_named_and_the_truth_stays_inside_what_is_stated(
+    rooftop: ClickedSample, truth: RigidTransform, click: str, du_px: float, dv_px: float
+) -> None:
+    calibration = solved_with(rooftop, click, du_px=du_px, dv_px=dv_px)
+    assert named(calibration) == {click}
+    assert inside_what_is_stated(calibration, truth)
+
+
+def test_a_slip_far_away_leaves_the_noise_level_alone(rooftop: ClickedSample) -> None:
+    clicks, scans, camera = rooftop
+    without = calibrate([replace(one, excluded=one.id == "c11") for one in clicks], scans, camera, FREE)
+    assert isinstance(without, Calibration)
+    assert solved_with(rooftop, "c11", dv_px=-60.0).noise_scale == pytest.approx(without.noise_scale, rel=0.1)
+
+
+def test_a_doubtful_pair_that_is_let_go_moves_the_camera_as_announced(rooftop: ClickedSample) -> None:
+    clicks, scans, camera = rooftop
+    doubted = solved_with(rooftop, "c1", du_px=-40.0)
+    rest = [replace(click, excluded=click.id == "c1") for click in clicks]
+    alone = calibrate(rest, scans, camera, FREE)
+    assert isinstance(alone, Calibration)
+    centres = [one.camera_from_radar.inverse().translation_m for one in (doubted, alone)]
+    moved_cm = 100 * np.linalg.norm(centres[0] - centres[1])
+    (warning,) = (one for one in doubted.warnings if one.code == "doubtful-pair")
+    assert f"the camera moves {moved_cm:.0f} cm" in warning.message
+
+
+@pytest.mark.parametrize("options", [FREE, MEASURED], ids=["free", "measured"])
+def test_a_hundred_good_sets_raise_hardly_a_doubt(options: CalibrationOptions) -> None:
+    doubted = wrongly_out = 0
+    for seed in range(100):
+        simulated = simulate_pairs(20, rng=np.random.default_rng(7000 + seed), noise="ti_fine")
+        outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
+        assert isinstance(outcome, Calibration)
+        doubted += any(warning.code == "doubtful-pair" for warning in outcome.warnings)
+        wrongly_out += sum(not pair.inlier for pair in outcome.pairs)
+    assert doubted < 3
+    assert wrongly_out <= 4  # of 2000
+
+
+def test_algorithm_1_says_that_most_pairs_disagree_and_residuals_are_too_large(rooftop: ClickedSample) -> None:
+    calibration = solved_with(rooftop, "c1", method="paper")
+    codes = {warning.code for warning in calibration.warnings}
+    assert {"many-outliers", "residuals-too-large"} <= codes

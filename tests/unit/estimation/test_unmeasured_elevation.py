@@ -1,0 +1,63 @@
+"""A radar without elevation: the stated uncertainty allows for what it cannot know, and the warning says what fixes what."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib_core.calibration import calibrate_pairs
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import Pair
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from calib_core.results import Calibration
+from calib_core.synthetic import FIELD, RigOptions, simulate_pairs
+
+LEVEL = RigOptions(radar_tilt_deg=0.0)
+FREE = CalibrationOptions()
+MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior(LEVEL.camera_offset_m, 0.01)))
+
+
+def flattened(pair: Pair) -> Pair:
+    """Report range and azimuth of the pair as a radar without elevation does."""
+    (candidate,) = pair.candidates
+    x, y, _ = candidate.position_radar_m
+    range_m, azimuth_rad = np.linalg.norm(candidate.position_radar_m), np.arctan2(y, x)
+    flat = range_m * np.array([np.cos(azimuth_rad), np.sin(azimuth_rad), 0.0])
+    return replace(pair, candidates=(replace(candidate, position_radar_m=flat),))
+
+
+def solved(seed: int, height_m: float, options: CalibrationOptions) -> tuple[Calibration, RigidTransform]:
+    layout = replace(FIELD, height_m=height_m)
+    simulated = simulate_pairs(20, rng=np.random.default_rng([9, seed]), layout=layout, rig_options=LEVEL)
+    outcome = calibrate_pairs([flattened(pair) for pair in simulated.pairs], simulated.camera, options)
+    assert isinstance(outcome, Calibration)
+    return outcome, simulated.camera_from_radar
+
+
+@pytest.mark.parametrize("options", [FREE, MEASURED])
+@pytest.mark.parametrize("height_m", [0.025, 1.2])
+def test_the_truth_lies_inside_whether_the_reflector_stood_on_the_ground_or_at_the_radars_height(
+    height_m: float, options: CalibrationOptions
+) -> None:
+    inside = 0
+    for seed in range(10):
+        calibration, truth = solved(seed, height_m, options)
+        error = truth.error_from(calibration.camera_from_radar)
+        inside += bool(error @ np.linalg.solve(calibration.covariance, error) < calibration.covariance_quantile)
+    assert inside >= 8
+
+
+def test_the_warning_says_what_the_pairs_fix_and_what_rests_on_a_guess() -> None:
+    calibration, _ = solved(1, 1.2, FREE)
+    (warning,) = (one for one in calibration.warnings if one.code == "flat-radar")
+    fixed, guessed = warning.message.split("; up ")
+    assert "up axis ± 0." in fixed
+    assert "about left" in guessed
+    assert "radar's height" in warning.hint
+
+
+def test_a_radar_that_measures_elevation_is_not_widened() -> None:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(2))
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED)
+    assert isinstance(outcome, Calibration)
+    assert np.sqrt(outcome.covariance[3:, 3:].trace()) < np.deg2rad(1.5)

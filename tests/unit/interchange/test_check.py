@@ -1,0 +1,514 @@
+"""A check finds the slip that made a right calibration into a wrong file, and names it."""
+
+import dataclasses
+import io
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
+from calib_core.interchange import (
+    FORMATS,
+    CalibrationFile,
+    FrameNames,
+    check,
+    compare,
+    contents_text,
+    export,
+    format_named,
+    imported,
+    read_any,
+    read_any_file,
+    read_calibration,
+    read_camera,
+    write_calibration,
+)
+from calib_core.interchange.syntax.mat_file import load_mat
+from calib_core.interchange.syntax.zip_archives import pack, unpack
+
+
+@pytest.fixture(scope="module")
+def file(project_root: Path) -> CalibrationFile:
+    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+
+
+def text_of(file: CalibrationFile, name: str) -> str:
+    return export(file, name, rectified=format_named(name).is_for_rectified).data.decode()
+
+
+def without_comments(text: str) -> str:
+    return "".join(line for line in text.splitlines(keepends=True) if not line.startswith("#"))
+
+
+def codes(text: str | bytes, against: CalibrationFile | None = None) -> list[str]:
+    report = check(read_any(text), against=imported(against) if against else None)
+    assert report.ok == (not any(result.level == "error" for result in report.results))
+    return [result.code for result in report.results if result.level == "error"]
+
+
+@pytest.mark.parametrize("name", [known.name for known in FORMATS])
+def test_what_we_write_passes(file, name):
+    report = check(
+        read_any(export(file, name, rectified=format_named(name).is_for_rectified).data), against=imported(file)
+    )
+
+    assert report.ok
+    assert [f for f in report.results if f.level != "good"] == []
+    assert any("0 deg apart" in line for line in report.lines())
+
+
+def test_exchanged_frames_are_a_swapped_direction(file):
+    text = text_of(file, "tf2")
+    swapped = text.replace(
+        "--frame-id radar --child-frame-id camera_optical", "--frame-id camera_optical --child-frame-id radar"
+    )
+
+    assert codes(swapped) == ["swapped-direction"]
+    assert codes(without_comments(swapped), against=file) == ["swapped-direction"]
+
+
+def test_an_inverse_matrix_is_a_swapped_direction(file):
+    rows = np.linalg.inv(file.calibration.camera_from_radar.as_matrix())
+    comments = "".join(line for line in text_of(file, "matrix").splitlines(keepends=True) if line.startswith("#"))
+
+    assert codes(comments + "\n".join(" ".join(map(repr, row)) for row in rows.tolist())) == ["swapped-direction"]
+
+
+def test_a_transposed_rotation_is_found(file):
+    content = json.loads(write_calibration(file))
+    content["camera_from_radar"]["rotation"] = np.transpose(content["camera_from_radar"]["rotation"]).tolist()
+
+    found = codes(json.dumps(content))
+
+    assert found[:2] == ["contradiction", "contradiction"]
+    assert "transposed-rotation" in found
+
+
+def test_a_quaternion_in_the_other_order_is_found(file):
+    text = text_of(file, "tf2")
+    x, y, z, w = (re.search(rf"--q{axis} (\S+)", text)[1] for axis in "xyzw")  # type: ignore[index]
+    for axis, number in zip("xyzw", (w, x, y, z), strict=True):
+        text = re.sub(rf"--q{axis} \S+", f"--q{axis} {number}", text)
+    assert codes(text) == ["quaternion-order"]
+
+    radar, camera = json.loads(text_of(file, "nuscenes"))
+    camera["rotation"] = [*camera["rotation"][1:], camera["rotation"][0]]
+    assert codes(json.dumps([radar, camera]), against=file) == ["quaternion-order"]
+
+
+def test_degrees_and_reversed_angles_are_found(file):
+    text = text_of(file, "urdf")
+    found = re.search(r'rpy="([^"]+)"', text)
+    assert found is not None
+    angles = [float(word) for word in found[1].split()]
+
+    in_degrees = text.replace(found[1], " ".join(repr(float(np.degrees(a))) for a in angles))
+    reversed_angles = text.replace(found[1], " ".join(map(repr, angles[::-1])))
+
+    assert codes(in_degrees) == ["degrees-for-radians"]
+    assert codes(reversed_angles) == ["angle-order"]
+
+
+def test_the_optical_pose_on_the_body_frame_is_found(file):
+    radar_from_camera = file.calibration.camera_from_radar.inverse()
+    kit = text_of(file, "autoware")
+    from scipy.spatial.transform import Rotation
+
+    angles = Rotation.from_matrix(radar_from_camera.rotation).as_euler("xyz")
+    head, _, entry = kit.partition('"camera_link"')
+    for key, angle in zip(("roll", "pitch", "yaw"), angles, strict=True):
+        entry = re.sub(rf"{key}: \S+", f"{key}: {float(angle)!r}", entry)
+
+    assert codes(head + '"camera_link"' + entry) == ["optical-for-link"]
+
+
+def test_millimetres_are_found(file):
+    text = text_of(file, "apollo")
+    for axis, value in zip("xyz", file.calibration.camera_from_radar.inverse().translation_m, strict=True):
+        text = text.replace(f"    {axis}: {float(value)!r}", f"    {axis}: {float(value) * 1000!r}")
+
+    assert codes(text) == ["millimetres"]
+
+
+def test_a_camera_position_written_for_the_translation_is_found(file):
+    text = text_of(file, "kalibr")
+    position = file.calibration.camera_from_radar.inverse().translation_m.tolist()
+    for old, new in zip(file.calibration.camera_from_radar.translation_m.tolist(), position, strict=True):
+        text = text.replace(f", {old!r}]", f", {new!r}]")
+
+    assert codes(text) == ["position-for-translation"]
+
+
+def test_two_slips_at_once_are_found(file):
+    rows = np.linalg.inv(file.calibration.camera_from_radar.as_matrix())
+    rows[:3, 3] *= 1000
+    comments = "".join(line for line in text_of(file, "matrix").splitlines(keepends=True) if line.startswith("#"))
+
+    found = codes(comments + "\n".join(" ".join(map(repr, row)) for row in rows.tolist()))
+
+    assert found == ["swapped-direction+millimetres"]
+
+
+def test_a_mirrored_axis_is_refused_in_words(file):
+    text = text_of(file, "matrix")
+    first_row = next(line for line in text.splitlines() if not line.startswith("#"))
+    mirrored = " ".join(repr(-float(number)) for number in first_row.split())
+
+    with pytest.raises(InputError, match=r"left-handed.*axis is mirrored"):
+        read_any(text.replace(first_row, mirrored))
+
+
+@pytest.mark.parametrize("name", ["json", "kalibr", "opencv", "kitti", "matrix", "numpy", "matlab"])
+def test_a_left_handed_rotation_is_refused_in_every_format_of_matrices(file, name):
+    first_row = file.calibration.camera_from_radar.rotation[0]
+    if name in ("numpy", "matlab"):
+        data = export(file, name).data
+        for number in first_row.tolist():
+            data = data.replace(np.float64(number).tobytes(), np.float64(-number).tobytes())
+        if name == "numpy":
+            arrays = dict(np.load(io.BytesIO(export(file, name).data)))
+            arrays["camera_from_radar"][0] *= -1
+            buffer = io.BytesIO()
+            np.savez(buffer, **arrays)
+            data = buffer.getvalue()
+    else:
+        head, start, body = text_of(file, name).partition(repr(float(first_row[0])))
+        for number in first_row.tolist():
+            body = (start + body).replace(repr(number), repr(-number), 1)
+            start = ""
+        data = (head + body).encode()
+
+    with pytest.raises(InputError, match=r"file: .*left-handed.*an axis is mirrored"):
+        read_any(data, "file")
+
+
+def test_numbers_changed_without_a_known_slip_are_called_so(file):
+    text = text_of(file, "matrix").replace("-0.0608874", "0.4391126")
+
+    report = check(read_any(text))
+
+    assert [result.code for result in report.results if result.level == "error"] == ["check-point-missed"]
+    assert not report.ok
+    assert any(line.startswith("WRONG: the check point (5, 1, -0.5) m comes out at") for line in report.lines())
+
+
+def test_pairs_that_were_changed_after_solving_are_found(file):
+    content = json.loads(write_calibration(file))
+    content["pairs"][2]["radar_m"][1] += 0.1
+    assert codes(json.dumps(content)) == ["pairs-disagree"]
+
+    content = json.loads(write_calibration(file))
+    content["metrics"]["aed_px"] = 0.1
+    assert codes(json.dumps(content)) == ["metrics-disagree"]
+
+
+def test_a_bare_matrix_that_looks_sideways_is_a_warning_with_a_guess(file):
+    rows = np.linalg.inv(file.calibration.camera_from_radar.as_matrix())
+    report = check(read_any("\n".join(" ".join(map(repr, row)) for row in rows.tolist())))
+
+    assert report.ok
+    (result,) = report.results
+    assert (result.level, result.code) == ("warning", "looks-elsewhere")
+    assert "the direction is swapped" in result.hint
+
+
+def test_a_check_point_in_pixels_needs_a_camera_or_says_so(file):
+    text = text_of(file, "opencv").replace("image_width: 640\n", "")
+    text = without_comments(text)
+
+    without = check(read_any(text))
+    with_camera = check(read_any(text), camera=file.calibration.camera)
+
+    assert [result.code for result in without.results] == ["check-point-unused"]
+    assert [result.code for result in with_camera.results] == ["check-point"]
+
+
+def test_two_calibrations_are_compared_in_degrees_centimetres_and_pixels(file):
+    moved = file.calibration.camera_from_radar.perturbed(np.array([0, 0, 0, 0, np.radians(1.0), 0]))
+    shifted = RigidTransform(
+        file.calibration.camera_from_radar.rotation,
+        file.calibration.camera_from_radar.translation_m + np.array([0.1, 0, 0]),
+    )
+
+    def with_pose(pose: RigidTransform) -> CalibrationFile:
+        return dataclasses.replace(file, calibration=dataclasses.replace(file.calibration, camera_from_radar=pose))
+
+    turned = compare(imported(file), imported(with_pose(moved)))
+    aside = compare(imported(file), imported(with_pose(shifted)))
+
+    assert turned.rotation_deg == pytest.approx(1.0)
+    # sqrt(2) for two covariances of a standard deviation of sqrt(2e-6) rad about y
+    assert turned.rotation_sigma_deg == pytest.approx(np.degrees(np.sqrt(2 * 2e-6)))
+    assert turned.pixels[2].rms_px == pytest.approx(turned.pixels[0].rms_px, rel=0.01)
+    assert aside.rotation_deg == pytest.approx(0.0, abs=1e-9)
+    assert aside.position_cm == pytest.approx(10.0)
+    assert aside.position_sigma_cm == pytest.approx(100 * np.sqrt(2e-4), rel=0.01)
+    at_5, at_20, at_60 = aside.pixels
+    assert at_5.rms_px == pytest.approx(12 * at_60.rms_px, rel=0.05)
+    assert (at_5.distance_m, at_20.distance_m, at_60.distance_m) == (5.0, 20.0, 60.0)
+    assert aside.chi2 == pytest.approx(0.1**2 * np.linalg.inv(2 * file.calibration.covariance)[0, 0])
+
+
+def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
+    rng = np.random.default_rng(4)
+    calibration = file.calibration
+    expected = compare(imported(file), read_any(text_of(file, "tf2"))).pixels
+    squares = []
+    for _ in range(120):
+        error = rng.multivariate_normal(np.zeros(6), calibration.covariance)
+        pose = dataclasses.replace(calibration, camera_from_radar=calibration.camera_from_radar.perturbed(error))
+        other = compare(imported(file), imported(dataclasses.replace(file, calibration=pose)))
+        squares.append([at.rms_px**2 for at in other.pixels])
+
+    np.testing.assert_allclose(np.sqrt(np.mean(squares, axis=0)), [at.sigma_px for at in expected], rtol=0.15)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("", "no pose of a camera and a radar in it"),
+        ("hello: world", "no pose of a camera and a radar in it .found hello"),
+        ("{}", "no pose of a camera and a radar in it"),
+        ("[]", "0 records with camera_intrinsic"),
+        (b"\xff\xfe\x00", "neither text nor an archive"),
+        (b"PK\x03\x04broken", "not a whole zip archive"),
+        (b"MATLAB 5.0 MAT-file", "not a mat file of level 5; save it with -v7 or -v6"),
+        ("1 0 0 0\n0 1 0 0\n", "expected 12 or 16 finite numbers, found 8"),
+        ("1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 2\n", "the last row must be 0 0 0 1"),
+        ("1 0 0 0\n0 2 0 0\n0 0 1 0\n", "not orthonormal"),
+        ("ros2 run tf2_ros static_transform_publisher --x 1\n", "a frame's name is missing"),
+        ("ros2 run tf2_ros static_transform_publisher 1 2 3\n", "no static_transform_publisher with a pose"),
+        ("static_transform_publisher --qx 1 --qy 1 --frame-id radar --child-frame-id cam", "has length 1.732, not 1"),
+        ("static_transform_publisher --x inf --frame-id radar --child-frame-id cam", "'inf' is not a number"),
+        ("<launch/>", "no <node> that runs static_transform_publisher"),
+        ("<robot/>", "no joint between a radar and a camera"),
+        ("<html/>", "expected OpenCV's <opencv_storage>"),
+        ("def generate_launch_description(): return [", "not Python"),
+        ("def generate_launch_description(): return []", "no arguments"),
+        ("Tr_velo_to_cam: 1 2 3\n", "Tr_velo_to_cam: expected 12 numbers, found 3"),
+        ('{"parent_frame_id": "radar"}', "parent_frame_id or child_frame_id is missing"),
+        ("child_frame_id: camera\n", "a stamped transform needs header.frame_id"),
+        ("R: [1, 0, 0]\nT: [0, 0, 0]\n", "R: expected 9 numbers, found 3"),
+    ],
+)
+def test_what_is_no_calibration_is_refused_in_one_line(content, words):
+    with pytest.raises(InputError, match=words) as refusal:
+        read_any(content, "file")
+
+    assert str(refusal.value).startswith("file: ")
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_launch_file_is_read_without_running_it(tmp_path):
+    marker = tmp_path / "was_run"
+    text = (
+        f"open({str(marker)!r}, 'w')\n"
+        "def generate_launch_description():\n    Node(arguments=['--x', '1', '--frame-id', 'radar', '--child-frame-id', 'cam'])\n"
+    )
+
+    assert read_any(text).pose.translation_m[0] == 1.0
+    assert not marker.exists()
+
+
+def test_a_known_pose_in_the_vehicle_moves_the_exports_and_comes_out_again(file):
+    parent_from_radar = RigidTransform.identity().perturbed(np.array([3.5, 0.1, 0.6, 0.0, 0.02, 0.3]))
+    for name in ("autoware", "nuscenes"):
+        rectified = format_named(name).is_for_rectified
+        moved = export(file, name, parent_from_radar=parent_from_radar, rectified=rectified)
+
+        assert moved.data != export(file, name, rectified=rectified).data
+        pose = read_any(moved.data).camera_from_radar
+        np.testing.assert_allclose(pose.as_matrix(), file.calibration.camera_from_radar.as_matrix(), atol=1e-12)
+
+    with pytest.raises(InputError, match=r"the format tf2 has no third frame .*; those that have: autoware, nuscenes"):
+        export(file, "tf2", parent_from_radar=parent_from_radar)
+
+
+def test_a_format_that_does_not_exist_is_refused_with_the_nearest(file):
+    with pytest.raises(InputError, match=r"no format 'autowear'; did you mean autoware\?"):
+        export(file, "autowear")
+
+
+def test_formats_that_cannot_hold_the_lens_say_so(file):
+    rational = read_camera(
+        json.dumps(
+            {
+                "model": "rational_polynomial",
+                "width_px": 64,
+                "height_px": 48,
+                "matrix_px": [[50, 0, 32], [0, 50, 24], [0, 0, 1]],
+                "distortion": [0.1] * 8,
+            }
+        )
+    )
+    with_k3 = dataclasses.replace(file.calibration.camera, distortion=np.array([-0.3, 0.1, 0, 0, 0.05]))
+    skewed = dataclasses.replace(rational, matrix_px=np.array([[50, 0.5, 32], [0, 50, 24], [0, 0, 1.0]]))
+    cases = [
+        (rational, "kalibr", "Kalibr's radtan model has no k3 to k6, which this camera uses; export with --to opencv"),
+        (with_k3, "kalibr", "Kalibr's radtan model has no k3, which this camera uses"),
+        (skewed, "kalibr", "Kalibr's pinhole model has no skew"),
+        (skewed, "colmap", "COLMAP's models have no skew"),
+        (
+            skewed,
+            "opencv",
+            "OpenCV's camera models have no skew, this camera has; export with --to json, matlab or numpy",
+        ),
+        (skewed, "foxglove", "Foxglove's CameraCalibration has no skew"),
+    ]
+    for camera, name, words in cases:
+        other = dataclasses.replace(file, calibration=dataclasses.replace(file.calibration, camera=camera))
+        with pytest.raises(InputError, match=words):
+            export(other, name)
+
+
+def test_a_file_is_read_by_its_path(file, tmp_path):
+    for known in FORMATS:
+        written = export(file, known.name, rectified=known.is_for_rectified)
+        (tmp_path / written.file_name).write_bytes(written.data)
+        assert read_any_file(tmp_path / written.file_name).format == known.name
+    with pytest.raises(InputError, match="cannot be read"):
+        read_any_file(tmp_path / "absent")
+
+
+def test_an_unknown_covariance_is_left_out_of_binary_files_not_written_as_nan(file):
+    unknown = dataclasses.replace(file.calibration, covariance=np.full((6, 6), np.nan))
+
+    for name in ("numpy", "matlab"):
+        known, left_out = (
+            contents_text(export(dataclasses.replace(file, calibration=calibration), name))
+            for calibration in (file.calibration, unknown)
+        )
+        assert "covariance" in known
+        assert "covariance" not in left_out
+        assert "nan" not in left_out
+
+
+def test_an_npz_with_python_objects_is_refused(tmp_path):
+    np.savez(tmp_path / "objects.npz", camera_from_radar=np.array([{"a": 1}], dtype=object), allow_pickle=True)
+
+    with pytest.raises(InputError, match="save plain arrays"):
+        read_any_file(tmp_path / "objects.npz")
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_what_scipy_writes_for_matlab_is_read(tmp_path, compressed):
+    from scipy.io import savemat
+
+    matrix = np.eye(4)[[1, 2, 0, 3]]
+    content = {
+        "camera_from_radar": matrix,
+        "frames": {"radar": "rädar", "camera": "cam"},
+        "whole": np.arange(6, dtype=np.int16).reshape(2, 3),
+        "cells": np.array([1, "a"], dtype=object),
+    }
+    savemat(tmp_path / "a.mat", content, do_compression=compressed)
+
+    read = load_mat((tmp_path / "a.mat").read_bytes(), source="a.mat")
+
+    assert read["camera_from_radar"].tolist() == matrix.tolist()
+    assert read["whole"].tolist() == [[0, 1, 2], [3, 4, 5]]
+    assert read["frames"] == {"radar": "rädar", "camera": "cam"}
+    assert read_any_file(tmp_path / "a.mat").camera_from_radar.rotation.tolist() == matrix[:3, :3].tolist()
+
+
+def test_the_shell_gets_a_strange_frame_name_as_one_word(file, tmp_path):
+    strange = FrameNames("radar; touch was_run #", "camera *|=(x) optical")
+    (tmp_path / "static_transform.sh").write_bytes(export(dataclasses.replace(file, frames=strange), "tf2").data)
+    (tmp_path / "ros2").write_text("#!/bin/sh\nprintf '%s\\n' \"$@\" > words\n", encoding="utf-8")
+    (tmp_path / "ros2").chmod(0o755)
+
+    path = f"{tmp_path}:{os.environ['PATH']}"
+    subprocess.run(["sh", "static_transform.sh"], cwd=tmp_path, env={**os.environ, "PATH": path}, check=True)
+
+    words = (tmp_path / "words").read_text(encoding="utf-8").splitlines()
+    assert words[words.index("--frame-id") + 1] == strange.radar
+    assert words[words.index("--child-frame-id") + 1] == strange.camera
+    assert not (tmp_path / "was_run").exists()
+
+
+def test_a_comparison_says_whose_uncertainty_it_counts(file):
+    both = compare(imported(file), imported(file))
+    one = compare(imported(file), read_any(text_of(file, "tf2")))
+    none = compare(read_any(text_of(file, "tf2")), read_any(text_of(file, "tf2")))
+
+    assert (both.covariances, one.covariances, none.covariances) == (2, 1, 0)
+    assert both.rotation_sigma_deg == pytest.approx(np.sqrt(2) * one.rotation_sigma_deg)
+    assert "the other's alone" in one.lines()[-1]
+    assert not any("alone" in line or "standard deviation" in line for line in (*both.lines()[3:], *none.lines()))
+
+
+@pytest.mark.parametrize(
+    ("radar", "camera"), [("ti_mmwave_0", "camera_optical_frame"), ("front_ars540", "rgb_optical")]
+)
+@pytest.mark.parametrize("name", ["autoware", "urdf", "tf2", "apollo"])
+def test_sensors_are_told_by_the_names_people_give_them_where_no_words_do(file, name, radar, camera):
+    text = text_of(dataclasses.replace(file, frames=FrameNames(radar, camera)), name)
+    bare = re.sub(r"<!--.*?-->", "", without_comments(text), flags=re.DOTALL)
+
+    assert "check point" not in bare
+    assert check(read_any(bare.lstrip()), against=imported(file)).verdict == "right"
+
+
+@pytest.mark.parametrize("name", [known.name for known in FORMATS if known.name not in ("colmap", "matlab", "numpy")])
+def test_a_text_that_went_through_windows_is_read_the_same(file, name):
+    data = export(file, name, rectified=format_named(name).is_for_rectified).data
+    right = read_any(data).camera_from_radar.as_matrix()
+
+    for changed in (data.replace(b"\n", b"\r\n"), b"\xef\xbb\xbf" + data, data.decode().encode("utf-16")):
+        again = read_any(changed)
+        assert again.format == name
+        assert check(again, against=imported(file)).verdict == "right"
+        np.testing.assert_array_equal(again.camera_from_radar.as_matrix(), right)
+
+
+TWO_MORE = {
+    "tf2": "ros2 run tf2_ros static_transform_publisher --x 1 --frame-id base_link --child-frame-id lidar\n"
+    "ros2 run tf2_ros static_transform_publisher 1 0 0 0 0 0 base_link imu\n",
+    "tf2-launch-xml": '<node pkg="tf2_ros" exec="static_transform_publisher" args="--frame-id base_link --child-frame-id lidar"/>'
+    '<node pkg="tf2_ros" exec="static_transform_publisher" args="1 0 0 0 0 0 1 base_link imu"/>',
+    "tf1-launch": '<node pkg="tf" type="static_transform_publisher" args="1 0 0 0 0 0 base_link lidar 100"/>',
+    "tf2-launch-py": "Node(arguments=['--frame-id', 'base_link', '--child-frame-id', 'lidar'])\n",
+    "urdf": '<joint name="a" type="fixed"><parent link="base_link"/><child link="radar"/></joint>',
+}
+
+
+@pytest.mark.parametrize("with_words", [True, False])
+@pytest.mark.parametrize("name", TWO_MORE)
+def test_among_other_transforms_the_one_between_radar_and_camera_is_read(file, name, with_words):
+    text = text_of(file, name)
+    if not with_words:
+        text = re.sub(r"<!--.*?-->", "", without_comments(text), flags=re.DOTALL)
+    for start in ("ros2 run", "<launch>", '<robot name="radar_camera">', "def generate"):
+        if start in text:
+            opening = start if start.startswith("<") else ""
+            text = text.replace(start, opening + TWO_MORE[name] + start.removeprefix(opening), 1)
+
+    assert check(read_any(text.lstrip()), against=imported(file)).verdict == "right"
+
+
+def test_several_transforms_that_may_be_meant_are_refused_with_their_names(file):
+    text = without_comments(text_of(file, "tf2"))
+    left, right = text.replace("camera_optical", "cam_left"), text.replace("camera_optical", "cam_right")
+
+    with pytest.raises(
+        InputError, match=r"file: holds 2 transforms \(radar to cam_left, radar to cam_right\), 2 of them"
+    ):
+        read_any(left + right, "file")
+    joint = '<joint name="j" type="fixed"><parent link="radar"/><child link="cam_{}"/></joint>'
+    with pytest.raises(InputError, match="holds 2 transforms"):
+        read_any(f"<robot>{joint.format(1)}{joint.format(2)}</robot>", "file")
+    chain = text_of(file, "kalibr")
+    with pytest.raises(InputError, match="T_cam_radar stands in cam0, cam1; keep the camera that is meant"):
+        read_any(chain + chain[chain.index("cam0:") :].replace("cam0", "cam1"))
+    members = unpack(export(file, "colmap").data, source="")
+    members["images.txt"] += b"2 1 0 0 0 0 0 0 1 other\n\n"
+    with pytest.raises(InputError, match="holds 2 images"):
+        read_any(pack(members))
+    with pytest.raises(InputError, match="0 of them between a radar and a camera"):
+        read_any("transforms:\n- {child_frame_id: a}\n- {child_frame_id: b}\n", "file")

@@ -1,0 +1,252 @@
+"""Images: files passed through, pixels converted, the rest refused in words."""
+
+import cv2
+import numpy as np
+import pytest
+
+from calib_core.errors import MessageError, RecordingError
+from calib_core.measurements import NS_PER_S
+from calib_core.recordings import RecordingOptions, inspect_recording, open_recording
+from calib_core.recordings.camera.jpeg import mended_jpeg
+
+START_NS = 1_700_000_000 * NS_PER_S
+EXIF_TURNED = b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
+
+
+def opened(write, ros, *messages, **options):
+    rows = [("/camera/image", START_NS + i * 10**8, message) for i, message in enumerate(messages)]
+    return open_recording(write(ros, rows), RecordingOptions(**options), require=("image",))
+
+
+def picture(height: int = 24, width: int = 32) -> np.ndarray:
+    """Return a picture of smooth colours, blue first."""
+    v, u = np.mgrid[:height, :width]
+    return np.stack([u * 255 // width, v * 255 // height, 255 - u * 127 // width], axis=2).astype(np.uint8)
+
+
+def test_a_jpeg_is_passed_through_byte_for_byte_whatever_the_format_says(ros, write, jpeg):
+    with opened(write, ros, ros.compressed(START_NS, jpeg, "png; nonsense")) as recording:
+        frame = recording.image_bytes(0)
+        assert (frame.data, frame.format) == (jpeg, "jpeg")
+        expected = cv2.imdecode(np.frombuffer(jpeg, dtype=np.uint8), cv2.IMREAD_COLOR)
+        np.testing.assert_array_equal(recording.image(0), expected)
+
+
+def test_a_png_is_passed_through_byte_for_byte(ros, write):
+    data = cv2.imencode(".png", picture())[1].tobytes()
+    with opened(write, ros, ros.compressed(START_NS, data, "jpeg")) as recording:
+        frame = recording.image_bytes(0)
+        assert (frame.data, frame.format, frame.width_px, frame.height_px) == (data, "png", 32, 24)
+        np.testing.assert_array_equal(recording.image(0), picture())
+
+
+def test_an_orientation_in_the_exif_block_does_not_turn_the_picture(ros, write, jpeg):
+    turned = jpeg[:2] + EXIF_TURNED + jpeg[2:]
+    assert cv2.imdecode(np.frombuffer(turned, dtype=np.uint8), cv2.IMREAD_COLOR).shape == (64, 48, 3)
+    with opened(write, ros, ros.compressed(START_NS, turned)) as recording:
+        assert recording.image_bytes(0).data == jpeg
+        assert recording.image(0).shape == (48, 64, 3)
+
+
+def test_a_missing_end_marker_is_added(ros, write, jpeg):
+    assert jpeg.endswith(b"\xff\xd9")
+    with opened(write, ros, ros.compressed(START_NS, jpeg[:-2])) as recording:
+        assert recording.image_bytes(0).data == jpeg
+    assert mended_jpeg(jpeg + bytes(8))[0] == jpeg + bytes(8)
+
+
+@pytest.mark.parametrize("cut", [0, 2, 3, 30])
+def test_a_jpeg_cut_before_its_picture_is_refused(jpeg, cut):
+    with pytest.raises(MessageError):
+        mended_jpeg(jpeg[:cut])
+
+
+@pytest.mark.parametrize(
+    ("encoding", "pixels"),
+    [
+        ("bgr8", picture()),
+        ("rgb8", cv2.cvtColor(picture(), cv2.COLOR_BGR2RGB)),
+        ("bgra8", cv2.cvtColor(picture(), cv2.COLOR_BGR2BGRA)),
+        ("rgba8", cv2.cvtColor(picture(), cv2.COLOR_BGR2RGBA)),
+        ("8UC3", picture()),
+    ],
+)
+def test_raw_colour_images_keep_their_pixels_and_padded_rows_are_cut(ros, write, encoding, pixels):
+    height, width, channels = pixels.shape
+    rows = np.pad(pixels.reshape(height, width * channels), ((0, 0), (0, 5)), constant_values=77)
+    message = ros.image(START_NS, rows, encoding, width=width)
+    with opened(write, ros, message) as recording:
+        np.testing.assert_array_equal(recording.image(0), picture())
+        frame = recording.image_bytes(0)
+        assert (frame.format, frame.width_px, frame.height_px) == ("jpeg", width, height)
+        back = cv2.imdecode(np.frombuffer(frame.data, dtype=np.uint8), cv2.IMREAD_COLOR)
+        assert np.abs(back.astype(int) - picture()).mean() < 2.0
+
+
+def test_grey_images_become_grey_pictures(ros, write):
+    grey = picture()[:, :, 0]
+    with opened(write, ros, ros.image(START_NS, grey, "mono8")) as recording:
+        np.testing.assert_array_equal(recording.image(0), np.repeat(grey[:, :, None], 3, axis=2))
+
+
+@pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
+def test_bayer_patterns_give_the_right_colours(ros1, write, pattern):
+    colour = {"r": 200, "g": 120, "b": 40}
+    tile = np.array(
+        [[colour[pattern[0]], colour[pattern[1]]], [colour[pattern[2]], colour[pattern[3]]]], dtype=np.uint8
+    )
+    message = ros1.image(START_NS, np.tile(tile, (12, 16)), f"bayer_{pattern}8")
+    with opened(write, ros1, message) as recording:
+        np.testing.assert_array_equal(recording.image(0)[4:-4, 4:-4].reshape(-1, 3), [[40, 120, 200]] * (16 * 24))
+
+
+@pytest.mark.parametrize(("encoding", "order"), [("yuv422", "uyvy"), ("yuv422_yuy2", "yuyv")])
+def test_yuv_images_give_the_right_colours(ros1, write, encoding, order):
+    value = {"u": 90, "v": 160, "y": 130}
+    row = np.array([value[letter] for letter in order] * 8, dtype=np.uint8)
+    message = ros1.image(START_NS, np.tile(row, (8, 1)), encoding, width=16)
+    with opened(write, ros1, message) as recording:
+        blue, green, red = recording.image(0)[4, 4].astype(int)
+    y, u, v = 1.164 * (130 - 16), 90 - 128, 160 - 128
+    expected = np.array([y + 2.018 * u, y - 0.391 * u - 0.813 * v, y + 1.596 * v])
+    np.testing.assert_allclose([blue, green, red], expected, atol=2)
+
+
+@pytest.mark.parametrize("big", [False, True])
+@pytest.mark.parametrize("bits", [10, 12, 16])
+def test_grey_of_16_bits_is_stretched_whatever_the_camera_fills(ros1, write, big, bits) -> None:
+    ramp = np.linspace(0, 2**bits - 1, 64 * 64).astype(np.uint16).reshape(64, 64)
+    rows = ramp.astype(">u2" if big else "<u2").view(np.uint8)
+    padded = np.pad(rows, ((0, 0), (0, 6)))
+    message = ros1.image(START_NS, padded, "mono16", width=64, is_bigendian=int(big))
+    with opened(write, ros1, message) as recording:
+        found = recording.image(0)
+    assert found.shape == (64, 64, 3)
+    np.testing.assert_allclose(found[:, :, 0], np.linspace(0, 255, 64 * 64).reshape(64, 64), atol=1.6)
+    np.testing.assert_array_equal(found[:, :, 0], found[:, :, 2])
+
+
+@pytest.mark.parametrize(
+    ("encoding", "values"),
+    [
+        ("rgb16", (200, 120, 40)),
+        ("bgr16", (40, 120, 200)),
+        ("rgba16", (200, 120, 40, 7)),
+        ("bgra16", (40, 120, 200, 7)),
+    ],
+)
+def test_colour_of_16_bits_keeps_its_order_of_channels(ros1, write, encoding, values) -> None:
+    pixels16 = np.zeros((16, 16, len(values)), dtype="<u2")
+    pixels16[:8] = np.array(values) * 256
+    message = ros1.image(START_NS, pixels16.reshape(16, -1).view(np.uint8), encoding, width=16)
+    with opened(write, ros1, message) as recording:
+        blue, green, red = recording.image(0)[2, 2].astype(int)
+    assert blue < green < red == 255
+
+
+@pytest.mark.parametrize("pattern", ["rggb", "bggr", "gbrg", "grbg"])
+def test_bayer_patterns_of_16_bits_give_the_right_colours(ros1, write, pattern) -> None:
+    colour = {"r": 4095, "g": 2048, "b": 0}
+    tile = np.array([[colour[pattern[0]], colour[pattern[1]]], [colour[pattern[2]], colour[pattern[3]]]], dtype="<u2")
+    rows = np.tile(tile, (12, 16)).view(np.uint8)
+    with opened(write, ros1, ros1.image(START_NS, rows, f"bayer_{pattern}16", width=32)) as recording:
+        np.testing.assert_array_equal(recording.image(0)[4:-4, 4:-4].reshape(-1, 3), [[0, 128, 255]] * (16 * 24))
+
+
+def test_a_png_of_16_bit_grey_that_says_mono16_is_stretched(ros, write) -> None:
+    ramp = np.linspace(0, 4095, 32 * 32).astype(np.uint16).reshape(32, 32)
+    data = cv2.imencode(".png", ramp)[1].tobytes()
+    with opened(write, ros, ros.compressed(START_NS, data, "mono16; png compressed ")) as recording:
+        assert recording.image_bytes(0).format == "png"
+        np.testing.assert_allclose(recording.image(0)[:, :, 1], ramp / 4095 * 255, atol=1.6)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "words"),
+    [
+        (
+            "16UC1",
+            "the encoding '16UC1' cannot be read; a depth image has no agreed brightness; convert it to mono8",
+        ),
+        ("32FC1", "a depth image has no agreed brightness"),
+        ("bayer_rggb12", "'bayer_rggb12' cannot be read; jpeg, png, mono8"),
+        ("nonsense", "'nonsense' cannot be read; jpeg, png, mono8"),
+    ],
+)
+def test_raw_encodings_that_cannot_be_read_are_refused_in_words(ros, write, encoding, words):
+    message = ros.image(START_NS, np.zeros((4, 8), dtype=np.uint8), encoding, width=4)
+    with pytest.raises(RecordingError, match="no camera image topic that can be read") as caught:
+        opened(write, ros, message)
+    assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("data", "form", "words"),
+    [
+        (b"qoif" + bytes(40), "rgb8; qoi", "the encoding 'qoi' cannot be read; record or convert it to jpeg or png"),
+        (bytes(12) + b"\x89PNG" + bytes(40), "16UC1; compressedDepth", "is a depth image, not a picture"),
+        (b"RIFF1234WEBP" + bytes(40), "webp", "the encoding 'webp' cannot be read"),
+        (b"", "jpeg", "the encoding 'jpeg' cannot be read"),
+        (b"\xff\xd8\xff\xe0", "jpeg", "the JPEG ends before its picture begins"),
+        (cv2.imencode(".png", np.zeros((4, 4), np.uint16))[1].tobytes(), "16UC1; png compressed ", "16-bit grey"),
+    ],
+)
+def test_compressed_images_that_cannot_be_read_are_refused_in_words(ros, write, data, form, words):
+    path = write(ros, [("/camera/image", START_NS, ros.compressed(START_NS, data, form))])
+    with pytest.raises(MessageError, match="topic /camera/image") as caught:
+        open_recording(path, RecordingOptions(image_topic="/camera/image"), require=())
+    assert words in str(caught.value)
+    with inspect_recording(path) as recording:
+        assert recording.image_topic is None
+        assert words in str(recording.topics[0].problem)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"height": 100_000, "width": 100_000, "step": 100_000}, "100000 x 100000 pixels is refused"),
+        ({"height": 0}, "is refused"),
+        ({"step": 3}, "rows of 3 bytes"),
+        ({"height": 25}, "has 768 bytes of data; 800 are needed"),
+        ({"step": 2**31}, "the message is damaged"),
+    ],
+)
+def test_images_whose_sizes_contradict_themselves_are_refused(ros, write, changes, words):
+    message = ros.image(START_NS, picture()[:, :, 0], "mono8", **changes)
+    with pytest.raises(RecordingError) as caught:
+        opened(write, ros, message)
+    assert words in str(caught.value)
+
+
+def test_one_damaged_frame_does_not_take_the_others_down(ros, write, jpeg):
+    broken = jpeg[:60]
+    with opened(
+        write, ros, *(ros.compressed(START_NS + i * 10**8, d) for i, d in enumerate([jpeg, broken, jpeg]))
+    ) as recording:
+        assert len(recording.image_times) == 3
+        assert recording.image_bytes(2).data == jpeg
+        with pytest.raises(MessageError, match="topic /camera/image: the JPEG"):
+            recording.image_bytes(1)
+
+
+def test_frames_with_the_same_stamp_are_shown_once_and_said(ros, write, jpeg):
+    messages = [ros.compressed(START_NS + (i // 2) * 10**8, jpeg) for i in range(6)]
+    with opened(write, ros, *messages) as recording:
+        assert recording.image_times.tolist() == [START_NS, START_NS + 10**8, START_NS + 2 * 10**8]
+        assert [warning.code for warning in recording.warnings] == ["repeated-stamps"]
+        assert "3 images of /camera/image" in recording.warnings[0].message
+
+
+def test_the_camera_with_intrinsics_and_colour_is_chosen(ros, write, jpeg):
+    grey = np.zeros((8, 8), dtype=np.uint8)
+    rows = []
+    for i in range(4):
+        at = START_NS + i * 10**8
+        rows += [
+            ("/a/depth/image", at, ros.image(at, grey, "mono8")),
+            ("/a/depth/image", at + 1, ros.image(at + 1, grey, "mono8")),
+        ]
+        rows += [("/b/image_raw", at, ros.image(at, grey, "mono8")), ("/b/camera_info", at, ros.camera_info(at))]
+        rows += [("/c/image_raw", at, ros.image(at, grey, "mono8"))]
+    with open_recording(write(ros, rows), require=("image",)) as recording:
+        assert (recording.image_topic, recording.camera_info_topic) == ("/b/image_raw", "/b/camera_info")

@@ -1,0 +1,83 @@
+"""MCAP files carry checksums: of each chunk, and of the summary. What does not have them any more is told."""
+
+import struct
+
+import pytest
+
+from calib_core.recordings import inspect_recording, open_recording
+from tests.unit.recordings.containers.mcap_writing import mcap
+
+CHUNK_ROWS = 15  # 5 clouds, 5 frames and 5 camera infos in each chunk
+SHAPES = [{}, {"compression": "lz4"}, {"compression": "lz4", "summary": False}]
+
+
+def write(tmp_path, ros, rows, change=None, **shape):
+    data = bytearray(mcap(ros, rows, checksums=True, chunk_rows=CHUNK_ROWS, **shape))
+    if change is not None:
+        change(data)
+    path = tmp_path / "made.mcap"
+    path.write_bytes(data)
+    return path
+
+
+def spoil_checksum(number):
+    """Change the checksum of a chunk: as good as changing what it is of, and no unpacker notices it before."""
+
+    def change(data):
+        place = 0
+        for _ in range(number + 1):
+            place = data.index(b"\x06", place + 1)
+            while not 100 < struct.unpack_from("<Q", data, place + 1)[0] < len(data):
+                place = data.index(b"\x06", place + 1)
+            found, place = place, place + 9 + struct.unpack_from("<Q", data, place + 1)[0]
+        data[found + 9 + 24] ^= 0x40
+
+    return change
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_checksums_that_are_right_are_not_spoken_of(shape, ros2, plain, jpeg, tmp_path):
+    with open_recording(write(tmp_path, ros2, plain(ros2, jpeg, n=20), **shape)) as recording:
+        assert recording.image_bytes(19).data == jpeg
+        assert len(recording.radar_scans()) == 20
+        assert [c.code for c in recording.warnings if c.code != "not-closed"] == []
+
+
+@pytest.mark.parametrize("compression", ["", "lz4"])
+def test_a_chunk_without_its_checksum_is_told_and_its_messages_are_counted(compression, ros2, plain, jpeg, tmp_path):
+    path = write(tmp_path, ros2, plain(ros2, jpeg, n=20), spoil_checksum(1), compression=compression)
+    with open_recording(path) as recording:
+        assert recording.image_bytes(7).data == jpeg
+        assert len(recording.radar_scans()) == 20
+        (warning,) = recording.warnings
+    assert warning.code == "checksum"
+    assert "1 of its chunks read so far, with 15 messages," in warning.message
+
+
+def test_a_flipped_byte_in_a_picture_is_told(ros2, plain, jpeg, tmp_path):
+    def flip(data):
+        data[data.index(jpeg, data.index(jpeg, len(data) // 2) + 1) + len(jpeg) // 2] ^= 1
+
+    path = write(tmp_path, ros2, plain(ros2, jpeg, n=20), flip)
+    with open_recording(path) as recording:
+        whole = [recording.image_bytes(number).data == jpeg for number in range(20)]
+        assert whole.count(False) == 1
+        assert [warning.code for warning in recording.warnings] == ["checksum"]
+
+
+def test_a_packed_chunk_without_its_checksum_counts_as_damaged_in_a_file_without_index(ros2, plain, jpeg, tmp_path):
+    path = write(tmp_path, ros2, plain(ros2, jpeg, n=20), spoil_checksum(2), compression="lz4", summary=False)
+    with open_recording(path) as recording:
+        assert len(recording.radar_scans()) == 20
+        assert [warning.code for warning in recording.warnings] == ["not-closed"]
+        assert "do not have the checksum" in recording.warnings[0].message
+
+
+def test_a_summary_without_its_checksum_is_not_trusted(ros2, plain, jpeg, tmp_path):
+    def change(data):
+        data[data.rindex(b"/radar/points") + 1] ^= 0x20  # in the repeated channel, which comes in the summary
+
+    with inspect_recording(write(tmp_path, ros2, plain(ros2, jpeg, n=20), change)) as recording:
+        assert recording.radar_topic == "/radar/points"
+        assert len(recording.radar_scans()) == 20
+        assert [warning.code for warning in recording.warnings] == ["not-closed"]

@@ -1,0 +1,443 @@
+"""Folders of pictures and radar files, radar CSV and videos as recordings."""
+
+import struct
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from calib_core.errors import RecordingError
+from calib_core.measurements import NS_PER_S
+from calib_core.radar import cartesian_from_polar
+from calib_core.recordings import RecordingOptions, describe, inspect_recording, open_recording
+from calib_core.recordings.time.written_times import read_time, time_from_name
+
+START_NS = 1_700_000_000 * NS_PER_S
+
+
+def pixels(number: int = 0) -> np.ndarray:
+    v, u = np.mgrid[:48, :64]
+    return np.stack([u * 3, v * 4, np.full_like(u, 40 + 20 * number)], axis=2).astype(np.uint8)
+
+
+def pictures(folder: Path, names: list[str]) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    for number, name in enumerate(names):
+        assert cv2.imwrite(str(folder / name), pixels(number))
+    return folder
+
+
+def radar_csv(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refusal(*paths: Path, **options: str) -> str:
+    with pytest.raises(RecordingError) as caught:
+        inspect_recording(paths, RecordingOptions(**options))
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+# -- times
+
+
+@pytest.mark.parametrize(
+    ("stem", "expected"),
+    [
+        ("1700000000123456789", 1_700_000_000_123_456_789),
+        ("1700000000123456", 1_700_000_000_123_456_000),
+        ("1700000000123", 1_700_000_000_123_000_000),
+        ("1700000000", 1_700_000_000_000_000_000),
+        ("1700000000.25", 1_700_000_000_250_000_000),
+        ("frame_1700000000_000000042", 1_700_000_000_000_000_042),
+        ("n015-2018-07-24-11-22-45+0800__RADAR_FRONT__1532402927664178", 1_532_402_927_664_178_000),
+        ("00544", None),
+        ("9999999999", None),
+        ("image-12345678901234", None),
+    ],
+)
+def test_times_are_found_in_names(stem, expected) -> None:
+    assert time_from_name(stem) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("1700000000.000000001", None, START_NS + 1),
+        ("2023-11-14T22:13:20Z", None, START_NS),
+        ("2023-11-14T23:13:20.5+01:00", None, START_NS + NS_PER_S // 2),
+        ("2023-11-14 22:13:20.000000007", None, START_NS + 7),
+        ("12.5", "ms", 12_500_000),
+        ("-1.5", "s", -1_500_000_000),
+    ],
+)
+def test_written_times_are_read_exactly(text, unit, expected) -> None:
+    assert read_time(text, unit) == expected
+
+
+@pytest.mark.parametrize(("text", "words"), [("yesterday", "'yesterday' is no time"), ("12345", "has 5 digits")])
+def test_what_is_no_time_is_refused(text, words) -> None:
+    with pytest.raises(RecordingError, match=words):
+        read_time(text)
+
+
+# -- pictures
+
+
+def test_a_folder_of_pictures_is_a_camera(tmp_path) -> None:
+    names = [f"{START_NS + i * 10**8}.{suffix}" for i, suffix in enumerate(["jpg", "png", "bmp", "jpg"])]
+    folder = pictures(tmp_path / "front", names)
+    with open_recording(folder, require=("image",)) as recording:
+        assert recording.image_topic == "/front/image"
+        assert recording.camera_frame == "camera"
+        np.testing.assert_array_equal(recording.image_times, START_NS + 10**8 * np.arange(4))
+        assert recording.image_bytes(0).data == (folder / names[0]).read_bytes()
+        assert recording.image_bytes(1).data == (folder / names[1]).read_bytes()
+        assert [recording.image_bytes(i).format for i in range(4)] == ["jpeg", "png", "png", "jpeg"]
+        np.testing.assert_array_equal(recording.image(2), pixels(2))
+        assert recording.warnings == ()
+        assert "folder of images, 4 files" in describe(recording)
+        (file,) = recording.fingerprint()
+        assert file.size_bytes == sum(path.stat().st_size for path in folder.iterdir())
+
+
+def test_the_fingerprint_of_a_folder_follows_its_contents(tmp_path) -> None:
+    import hashlib
+
+    folder = pictures(tmp_path / "front", [f"{START_NS + i}.png" for i in range(3)])
+    whole = b"".join(path.read_bytes() for path in sorted(folder.iterdir()))
+    with open_recording(folder, require=("image",)) as recording:
+        assert recording.fingerprint()[0].sha256 == hashlib.sha256(whole).hexdigest()
+
+
+@pytest.mark.parametrize(
+    ("table", "text"),
+    [
+        ("front/times.csv", "file,time_ns\na.png,1700000000000000000\nb.png,1700000001000000000\n"),
+        ("front/data.csv", "#timestamp [ns],filename\n1700000000000000000,a.png\n1700000001000000000,b.png\n"),
+        ("front.csv", "name,time_s\nimages/a,1700000000.0\nimages/b,1700000001.000000000\n"),
+        ("timestamps.txt", "2023-11-14 22:13:20\n2023-11-14 22:13:21.000000000\n"),
+        ("front/times.txt", "1700000000.0\n1700000001.0\n"),
+    ],
+)  # fmt: skip
+def test_a_table_beside_gives_the_times(tmp_path, table, text) -> None:
+    folder = pictures(tmp_path / "front", ["b.png", "a.png"])
+    radar_csv(tmp_path / table, text)
+    with open_recording(folder, require=("image",)) as recording:
+        assert recording.image_times.tolist() == [START_NS, START_NS + NS_PER_S]
+        np.testing.assert_array_equal(recording.image(1), pixels(0))
+
+
+def test_pictures_without_a_time_are_left_out_and_said(tmp_path) -> None:
+    folder = pictures(tmp_path / "front", [f"{START_NS}.png", "notes.png", "zebra.png"])
+    with open_recording(folder, require=("image",)) as recording:
+        assert len(recording.image_times) == 1
+        (warning,) = recording.warnings
+    assert warning.code == "unstamped-files"
+    assert "2 of 3 files have no time and are left out; the first is notes.png" in warning.message
+
+
+def test_pictures_without_any_times_are_refused_in_words(tmp_path) -> None:
+    text = refusal(pictures(tmp_path / "front", ["a.png", "b.png"]))
+    assert "the names carry no times (a.png)" in text
+    assert "put a CSV with the columns file,time_ns beside them" in text
+
+
+def test_one_damaged_picture_does_not_take_the_others_down(tmp_path) -> None:
+    folder = pictures(tmp_path / "front", [f"{START_NS + i}.png" for i in range(3)])
+    (folder / f"{START_NS + 1}.png").write_bytes(b"GIF89a nothing")
+    with open_recording(folder, require=("image",)) as recording:
+        assert len(recording.image_times) == 3
+        np.testing.assert_array_equal(recording.image(2), pixels(2))
+        with pytest.raises(RecordingError, match="is no picture that can be read"):
+            recording.image(1)
+
+
+# -- radar files
+
+NUSCENES_HEAD = """\
+# .PCD v0.7 - Point Cloud Data file format
+VERSION 0.7
+FIELDS x y z dyn_prop id rcs vx vy vx_comp vy_comp is_quality_valid ambig_state x_rms y_rms invalid_state pdh0 vx_rms vy_rms
+SIZE 4 4 4 1 2 4 4 4 4 4 1 1 1 1 1 1 1 1
+TYPE F F F I I F F F F F I I I I I I I I
+COUNT 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1 1
+WIDTH {n}
+HEIGHT 1
+VIEWPOINT 0 0 0 1 0 0 0
+POINTS {n}
+DATA binary
+"""
+
+
+def nuscenes(path: Path, rows: np.ndarray) -> None:
+    """Write x, y, rcs, vx, vy rows."""
+    body = b"".join(
+        struct.pack("<fffbhfffffbbbbbbbb", x, y, 0, 1, 7, rcs, vx, vy, 0, 0, *[1] * 8) for x, y, rcs, vx, vy in rows
+    )
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(NUSCENES_HEAD.format(n=len(rows)).encode() + body)
+
+
+def test_a_nuscenes_radar_folder_is_a_radar(tmp_path) -> None:
+    rng = np.random.default_rng(2)
+    scans = [rng.uniform(1, 9, (n, 5)).astype(np.float32) for n in (4, 7)]
+    for number, rows in enumerate(scans):
+        nuscenes(tmp_path / "RADAR_FRONT" / f"n015__RADAR_FRONT__{1_700_000_000_000_000 + 77_000 * number}.pcd", rows)
+    with open_recording(tmp_path / "RADAR_FRONT", require=("radar",)) as recording:
+        assert recording.radar_topic == "/RADAR_FRONT/radar"
+        assert recording.radar_times.tolist() == [START_NS, START_NS + 77_000_000]
+        assert [warning.code for warning in recording.warnings] == ["flat-radar"]
+        found = recording.radar_scans()
+        text = describe(recording)
+        assert (
+            "nuScenes radar: position from x, y, z (forward, left, up); speed from vx, vy; amplitude from rcs" in text
+        )
+    rows = np.concatenate(scans).astype(np.float64)
+    np.testing.assert_array_equal(found.points_radar_m, np.stack([rows[:, 0], rows[:, 1], 0 * rows[:, 0]], axis=1))
+    np.testing.assert_allclose(found.doppler_mps, (rows[:, :2] * rows[:, 3:]).sum(1) / np.hypot(rows[:, 0], rows[:, 1]))
+    np.testing.assert_array_equal(found.snr_db, rows[:, 2])
+
+
+def test_an_ascii_pcd_is_read_and_a_packed_one_is_explained(tmp_path) -> None:
+    folder = tmp_path / "radar"
+    folder.mkdir()
+    head = "VERSION .7\nFIELDS x y z velocity snr\nSIZE 4 4 4 4 4\nTYPE F F F F F\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA "
+    (folder / f"{START_NS}.pcd").write_text(head + "ascii\n1 2 3 0.5 9\n4 5 6 0.25 8\n")
+    (folder / f"{START_NS + 10**8}.pcd").write_text(head + "binary_compressed\n")
+    (folder / f"{START_NS + 2 * 10**8}.pcd").write_text(head + "binary\nshort")
+    (folder / f"{START_NS + 3 * 10**8}.pcd").write_text("FIELDS x y z velocity\nSIZE 4\nDATA binary\n")
+    with open_recording(folder, require=("radar",)) as recording:
+        scans = recording.radar_scans()
+        (warning,) = recording.warnings
+    np.testing.assert_array_equal(scans.points_radar_m, [[1, 2, 3], [4, 5, 6]])
+    assert np.diff(scans.first_return).tolist() == [2, 0, 0, 0]
+    assert "3 radar messages could not be read" in warning.message
+    assert "'binary_compressed' data; binary and ascii can be read" in warning.message
+
+
+def delft(folder: Path, count: int = 3) -> np.ndarray:
+    folder.mkdir()
+    rows = np.random.default_rng(4).uniform(1, 9, (count, 5, 7)).astype(np.float32)
+    for number in range(count):
+        (folder / f"{number:05}.bin").write_bytes(rows[number].tobytes())
+    return rows.astype(np.float64)
+
+
+def test_a_view_of_delft_folder_goes_with_its_pictures_by_number(tmp_path) -> None:
+    rows = delft(tmp_path / "velodyne")
+    camera = pictures(tmp_path / "image_2", [f"{number:05}.jpg" for number in range(3)])
+    with open_recording([tmp_path / "velodyne", camera]) as recording:
+        assert (recording.radar_topic, recording.image_topic) == ("/velodyne/radar", "/image_2/image")
+        np.testing.assert_array_equal(recording.radar_times, recording.image_times)
+        assert np.diff(recording.radar_times).tolist() == [10**8] * 2
+        assert [warning.code for warning in recording.warnings] == ["numbered-files", "numbered-files"]
+        scans = recording.radar_scans()
+    np.testing.assert_array_equal(scans.points_radar_m, rows[:, :, :3].reshape(-1, 3))
+    np.testing.assert_array_equal(scans.doppler_mps, rows[:, :, 4].reshape(-1))
+    np.testing.assert_array_equal(scans.snr_db, rows[:, :, 3].reshape(-1))
+
+
+def test_a_bin_file_of_another_kind_is_explained(tmp_path) -> None:
+    delft(tmp_path / "radar", 1)
+    (tmp_path / "radar" / "00000.bin").write_bytes(bytes(30))
+    with inspect_recording(tmp_path / "radar") as recording:
+        assert recording.radar_topic is None
+        assert "no multiple of 28: not a View-of-Delft radar file" in str(recording.topics[0].problem)
+
+
+# -- radar CSV
+
+
+def test_a_radar_csv_is_a_radar(tmp_path) -> None:
+    path = radar_csv(
+        tmp_path / "scan.csv",
+        "time_ns,x_m,y_m,z_m,doppler_mps,snr_db,track_id\n"
+        "1700000000100000000,3,1,0.5,-0.25,12,1\n1700000000000000001,5,-2,0.25,,9,2\n1700000000100000000,4,1,0.5,0.5,11,3\n\n",
+    )
+    with open_recording(path, require=("radar",)) as recording:
+        scans = recording.radar_scans()
+        assert "radar CSV, without track_id" in describe(recording)
+    assert scans.times_ns.tolist() == [START_NS + 1, START_NS + 10**8]
+    np.testing.assert_array_equal(scans.points_radar_m, [[5, -2, 0.25], [3, 1, 0.5], [4, 1, 0.5]])
+    np.testing.assert_array_equal(scans.doppler_mps, [np.nan, -0.25, 0.5])
+    np.testing.assert_array_equal(scans.snr_db, [9, 12, 11])
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_columns_may_be_parted_by_semicolons_or_tabs(tmp_path, delimiter) -> None:
+    text = "time_ns,x_m,y_m,doppler_mps\n1700000000000000001,3,1,-0.25\n".replace(",", delimiter)
+    with open_recording(radar_csv(tmp_path / "scan.csv", text), require=("radar",)) as recording:
+        np.testing.assert_array_equal(recording.radar_scans().points_radar_m, [[3, 1, 0]])
+
+
+@pytest.mark.parametrize(
+    ("header", "row"),
+    [
+        ("time_s,range_m,azimuth_deg,elevation_deg,sigma_range_m,sigma_azimuth_deg", "1700000000,5,30,10,0.1,2"),
+        ("Timestamp [us],Range [cm],Azimuth [rad],Elevation (rad),sigma_range_mm,sigma_azimuth_rad",
+         f"1700000000000000,500,{np.radians(30)},{np.radians(10)},100,{np.radians(2)}"),
+    ],
+)  # fmt: skip
+def test_units_in_the_header_are_followed(tmp_path, header, row) -> None:
+    with open_recording(radar_csv(tmp_path / "a.csv", f"{header}\n{row}\n"), require=("radar",)) as recording:
+        scans = recording.radar_scans()
+    assert scans.times_ns.tolist() == [START_NS]
+    np.testing.assert_allclose(
+        scans.points_radar_m, cartesian_from_polar(np.array([[5, np.radians(30), np.radians(10)]]))
+    )
+    np.testing.assert_allclose(scans.sigma_polar, [[0.1, np.radians(2), np.nan]])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time_ns,x_ft,y_m\n1,2,3\n", "column 'x_ft' has the unknown unit 'ft'; known units: m, cm, mm, km"),
+        ("time_ns,x,y_m\n1,2,3\n", "column 'x' names no unit; write x_m"),
+        ("time_fortnights,x_m,y_m\n1,2,3\n", "column 'time_fortnights' has the unknown unit 'fortnights'"),
+        ("x_m,y_m\n1,2\n", "no column of time; the first line must name columns and units, such as time_ns,x_m"),
+        ("time_ns,x_m,snr_db\n1,2,3\n", "no position; x_m and y_m, or range_m and azimuth_deg, are needed"),
+        ("time_ns,range_m,r_m,azimuth_deg\n1,2,3,4\n", "two columns say the same"),
+        ("time_ns,x_m,y_m\n", "the file has a header and no rows"),
+        ("time_ns,x_m,y_m\n1,2,3\n2,two,3\n", "line 3: could not convert string to float: 'two'"),
+        ("time_ns,x_m,y_m\n1,2\n", "line 2: too few columns"),
+        ("", "no column of time"),
+    ],
+)
+def test_a_csv_that_leaves_something_open_is_refused_in_words(tmp_path, text, words) -> None:
+    assert words in refusal(radar_csv(tmp_path / "a.csv", text))
+
+
+# -- videos
+
+
+def striped(number: int) -> np.ndarray:
+    """Write a number into a picture: eight stripes, one per bit."""
+    bits = [255 if number >> bit & 1 else 0 for bit in range(8)]
+    return np.repeat(np.repeat(np.array(bits, dtype=np.uint8), 8)[None, :, None], 48, axis=0).repeat(3, axis=2)
+
+
+def number_in(picture: np.ndarray) -> int:
+    bits = picture.mean(axis=(0, 2)).reshape(8, 8).mean(axis=1) > 127
+    return int(sum(1 << bit for bit in range(8) if bits[bit]))
+
+
+def video(path: Path, count: int = 90, rate: float = 20.0) -> Path:
+    codec = "MJPG" if path.suffix == ".avi" else "mp4v"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), rate, (64, 48))
+    for number in range(count):
+        writer.write(striped(number))
+    writer.release()
+    return path
+
+
+@pytest.mark.parametrize("start", ["1700000000.25", "2023-11-14T22:13:20.25Z"])
+@pytest.mark.parametrize("suffix", [".avi", ".mp4"])
+def test_a_video_with_its_start_is_a_camera(tmp_path, suffix, start) -> None:
+    path = video(tmp_path / f"cam{suffix}")
+    with open_recording(path, RecordingOptions(video_start=start), require=("image",)) as recording:
+        assert recording.image_topic == "/cam/image"
+        assert recording.video_start == start
+        times = recording.image_times - START_NS
+        np.testing.assert_allclose(times, 250_000_000 + 50_000_000 * np.arange(90), atol=1000)
+        for index in (11, 0, 5, 6, 3, 89, 70, 1, 88, 44, 45):
+            assert number_in(recording.image(index)) == index
+        frame = recording.image_bytes(2)
+        assert (frame.format, frame.width_px, frame.height_px) == ("jpeg", 64, 48)
+
+
+def test_a_video_without_its_start_or_without_frames_is_refused_in_words(tmp_path) -> None:
+    assert "give the time of its first frame with --video-start" in refusal(video(tmp_path / "cam.avi"))
+    assert "--video-start: 'noon' is no time" in refusal(tmp_path / "cam.avi", video_start="noon")
+    (tmp_path / "b.mp4").write_bytes(b"nothing of the kind")
+    assert "no video that can be read" in refusal(tmp_path / "b.mp4", video_start="1700000000")
+
+
+def test_a_start_without_a_video_is_refused_rather_than_ignored(project_root: Path) -> None:
+    words = refusal(project_root / "sample_data" / "rooftop" / "camera.bag", video_start="1700000000")
+    assert "there is no video among camera.bag" in words
+
+
+# -- together
+
+
+def test_plain_files_join_a_bag_as_one_recording(ros1, write, plain, jpeg, tmp_path) -> None:
+    bag = write(ros1, [row for row in plain(ros1, jpeg) if "radar" not in row[0]])
+    text = "time_ns,x_m,y_m,z_m,doppler_mps\n" + "".join(f"{START_NS + i * 10**8},{i},1,{i % 3},0\n" for i in range(20))
+    with open_recording([bag, radar_csv(tmp_path / "radar.csv", text)]) as recording:
+        assert (recording.radar_topic, recording.image_topic) == ("/radar/radar", "/camera/image/compressed")
+        assert (recording.radar_clock, recording.image_clock) == ("header", "header")
+        assert recording.camera() is not None
+        assert len(recording.fingerprint()) == 2
+
+
+def test_folders_of_one_name_stay_two_topics(tmp_path) -> None:
+    folders = [pictures(tmp_path / side / "images", [f"{START_NS}.png"]) for side in ("left", "right")]
+    with open_recording(folders, require=("image",)) as recording:
+        assert [topic.name for topic in recording.topics] == ["/images/image", "/right/images/image"]
+
+
+def test_mixed_folders_and_single_files_are_explained(tmp_path) -> None:
+    mixed = pictures(tmp_path / "mixed", [f"{START_NS}.png"])
+    (mixed / "a.pcd").write_bytes(b"")
+    assert "put pictures and radar files into folders of their own" in refusal(mixed)
+    assert "give the folder that holds them all" in refusal(mixed / f"{START_NS}.png")
+
+
+def test_damaged_radar_files_and_csv_are_answered_with_values_or_one_clear_error(tmp_path) -> None:
+    import random
+
+    rng = random.Random(7)
+    rows = np.random.default_rng(1).uniform(1, 9, (6, 5)).astype(np.float32)
+    nuscenes(tmp_path / "whole" / f"{START_NS}.pcd", rows)
+    whole = (tmp_path / "whole" / f"{START_NS}.pcd").read_bytes()
+    text = b"time_ns,x_m,y_m,z_m,doppler_mps,snr_db\n" + b"1700000000100000000,3,1,0.5,-0.25,12\n" * 4
+    folder = tmp_path / "damaged"
+    folder.mkdir()
+    kept = 0
+    for number in range(300):
+        original, path = (whole, folder / f"{START_NS}.pcd") if number % 2 else (text, tmp_path / "damaged.csv")
+        data = bytearray(original)
+        for _ in range(rng.randrange(1, 4)):
+            place = rng.randrange(min(len(data), 420))
+            if rng.random() < 0.6:
+                data[place] = rng.choice(b"0123456789 -.,e\n\xff\0FIUxyz")
+            else:
+                del data[place : place + rng.randrange(1, 60)]
+        path.write_bytes(data)
+        try:
+            with inspect_recording(path.parent if number % 2 else path) as recording:
+                kept += len(recording.radar_scans().points_radar_m)
+        except RecordingError as error:
+            assert str(path.parent) in str(error)  # noqa: PT017
+    assert kept > 300
+
+
+@pytest.mark.parametrize(
+    ("time", "words"),
+    [
+        ("-5", "outside the years 1970 to 2106"),
+        ("99999999999999999999999", "too many for a time"),
+        ("9200000000000000000", "outside the years 1970 to 2106"),
+    ],
+)
+def test_times_that_no_message_can_carry_are_refused_in_words(tmp_path, time, words) -> None:
+    assert words in refusal(radar_csv(tmp_path / "a.csv", f"time_ns,x_m,y_m\n{time},1,2\n"))
+
+
+def test_the_folder_of_a_data_set_stands_for_what_it_holds(tmp_path, ros1, write, plain, jpeg) -> None:
+    root = tmp_path / "drive"
+    root.mkdir()
+    pictures(root / "camera", ["a.png", "b.png"])
+    radar_csv(root / "camera.csv", f"file,time_ns\na.png,{START_NS}\nb.png,{START_NS + 10**8}\n")
+    radar_csv(root / "radar.csv", f"time_ns,x_m,y_m,z_m,doppler_mps\n{START_NS},1,2,3,0\n{START_NS},2,2,2,0\n")
+    (root / "empty").mkdir()
+    with open_recording(root) as recording:
+        assert (recording.radar_topic, recording.image_topic) == ("/radar/radar", "/camera/image")
+        assert recording.image_times.tolist() == [START_NS, START_NS + 10**8]
+    write(ros1, plain(ros1, jpeg), name="drive/all")
+    with open_recording(root) as recording:
+        assert recording.radar_topic == "/radar/points"  # a recording of ROS goes first

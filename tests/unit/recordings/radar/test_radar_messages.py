@@ -1,0 +1,451 @@
+"""Radar messages of many drivers become scans."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from calib_core.measurements import NS_PER_S
+from calib_core.radar import cartesian_from_polar
+from calib_core.recordings import RecordingOptions, open_recording
+from calib_core.recordings.radar.columns import plan_columns
+from calib_core.recordings.radar.list_messages import first_of_scans
+
+START_NS = 1_700_000_000 * NS_PER_S
+
+TI_SCAN = """\
+Header header
+uint16 point_id
+float32 x
+float32 y
+float32 z
+float32 range
+float32 velocity
+uint16 doppler_bin
+float32 bearing
+float32 intensity
+"""
+TI_FORK = """\
+Header header
+uint16 radar_frame_idx
+uint16 point_id
+float32 x
+float32 y
+float32 z
+float32 range
+float32 velocity
+uint16 doppler_bin
+float32 bearing
+float32 intensity
+float32 intensity_snr_noise
+float32 noise
+string time_human
+"""
+
+
+def opened(write, ros, messages, *, topic="/radar", step_ns=100_000_000, **options):
+    rows = [(topic, START_NS + i * step_ns, message) for i, message in enumerate(messages)]
+    return open_recording(write(ros, rows), RecordingOptions(**options), require=("radar",))
+
+
+# -- clouds
+
+
+def test_a_cloud_is_read_through_holes_mixed_types_and_padded_rows(ros, write):
+    dtype = np.dtype(
+        {
+            "names": ["id", "x", "y", "z", "v", "rcs"],
+            "formats": ["<u2", "<f4", "<f8", "<i2", "<f4", "i1"],
+            "offsets": [0, 4, 12, 21, 24, 29],
+            "itemsize": 33,
+        }
+    )
+    points = np.zeros(6, dtype=dtype)
+    points["x"], points["y"], points["z"] = np.arange(6) + 2.5, -np.arange(6) * 0.125, np.arange(6) - 3
+    points["v"], points["rcs"] = 0.5 * np.arange(6), np.arange(6) - 20
+    with opened(write, ros, [ros.cloud(START_NS, points, padding=7, height=2)]) as recording:
+        scan = recording.radar_scans().scan(0)
+    np.testing.assert_array_equal(scan.points_radar_m, np.stack([points["x"], points["y"], points["z"]], axis=1))
+    np.testing.assert_array_equal(scan.doppler_mps, points["v"])
+    np.testing.assert_array_equal(scan.snr_db, points["rcs"])
+
+
+def test_a_big_endian_cloud_is_read(ros, write, cloud_points):
+    points = cloud_points(4)
+    swapped = points.astype(np.dtype([(name, ">f4") for name in points.dtype.names]))
+    with opened(write, ros, [ros.cloud(START_NS, swapped), ros.cloud(START_NS + 10**8, swapped)]) as recording:
+        scans = recording.radar_scans()
+    for number in range(2):
+        np.testing.assert_array_equal(scans.scan(number).points_radar_m[:, 0], points["x"])
+        np.testing.assert_array_equal(scans.scan(number).snr_db, points["snr"])
+
+
+def test_clouds_whose_layout_changes_on_the_way_are_each_read_by_their_own(ros, write, cloud_points):
+    wide = cloud_points(5)
+    narrow = wide[["x", "y", "z"]].astype([("x", "<f8"), ("y", "<f8"), ("z", "<f8")])
+    empty = cloud_points(0)
+    messages = [ros.cloud(START_NS + i * 10**8, [wide, narrow, empty][i % 3]) for i in range(9)]
+    with opened(write, ros, messages) as recording:
+        scans = recording.radar_scans()
+    np.testing.assert_array_equal(np.diff(scans.first_return), [5, 5, 0] * 3)
+    for number in (0, 1, 3, 4, 6, 7):
+        np.testing.assert_array_equal(scans.scan(number).points_radar_m[:, 0], wide["x"])
+    assert np.isnan(scans.scan(4).doppler_mps).all()
+    np.testing.assert_array_equal(scans.scan(6).doppler_mps, wide["velocity"])
+
+
+def test_returns_that_are_not_numbers_keep_their_row(ros, write, cloud_points):
+    points = cloud_points(3)
+    points["x"][1] = np.nan
+    with opened(write, ros, [ros.cloud(START_NS, points)]) as recording:
+        scan = recording.radar_scans().scan(0)
+    assert np.isnan(scan.points_radar_m[1]).tolist() == [True, False, False]
+    np.testing.assert_array_equal(scan.snr_db, points["snr"])
+
+
+def test_a_polar_cloud_with_its_own_noise_is_carried_over(ros, write):
+    names = ("azimuth", "azimuth_std", "elevation", "elevation_std", "range", "range_std", "range_rate", "rcs")
+    points = np.zeros(5, dtype=[(name, "<f4") for name in names])
+    rng = np.random.default_rng(5)
+    for name in names:
+        points[name] = rng.uniform(0.1, 0.9, 5)
+    with opened(write, ros, [ros.cloud(START_NS, points)]) as recording:
+        scan = recording.radar_scans().scan(0)
+    polar = np.stack([points["range"], points["azimuth"], points["elevation"]], axis=1).astype(np.float64)
+    np.testing.assert_allclose(scan.points_radar_m, cartesian_from_polar(polar))
+    np.testing.assert_array_equal(
+        scan.sigma_polar, np.stack([points["range_std"], points["azimuth_std"], points["elevation_std"]], axis=1)
+    )
+    np.testing.assert_array_equal(scan.doppler_mps, points["range_rate"])
+
+
+def test_angles_beside_positions_are_not_used():
+    """CARLA's azimuth has the sign of another frame than its y."""
+    plan = plan_columns(["x", "y", "z", "Range", "Velocity", "AzimuthAngle", "ElevationAngle"])
+    assert plan is not None
+    assert (plan.position, plan.polar, plan.doppler) == (("x", "y", "z"), False, "Velocity")
+
+
+@pytest.mark.parametrize(
+    ("names", "doppler", "amplitude"),
+    [
+        ("x y z intensity velocity range bearing doppler_bin", "velocity", "intensity"),
+        ("x y z snr_db v_doppler_mps noise_db range", "v_doppler_mps", "snr_db"),
+        ("x y z v r RCS azimuth elevation", "v", "RCS"),
+        ("x y z radial_speed power rcs noise snr azimuth_angle elevation_angle range", "radial_speed", "snr"),
+        ("x y z doppler", "doppler", None),
+        ("x y z Doppler Power", "Doppler", "Power"),
+        ("x y z range_rate rcs", "range_rate", "rcs"),
+    ],
+)
+def test_the_columns_of_known_drivers_are_recognised(names, doppler, amplitude):
+    plan = plan_columns(names.split())
+    assert plan is not None
+    assert (plan.position, plan.doppler, plan.amplitude) == (("x", "y", "z"), doppler, amplitude)
+    assert plan.looks_like_radar
+
+
+def test_speed_along_the_line_of_sight_comes_from_velocity_components(ros, write):
+    points = np.zeros(2, dtype=[(name, "<f4") for name in ("x", "y", "z", "vx", "vy")])
+    points["x"], points["y"], points["vx"], points["vy"] = [3, 0], [4, 2], [1, 5], [2, -1]
+    with opened(write, ros, [ros.cloud(START_NS, points)]) as recording:
+        np.testing.assert_allclose(recording.radar_scans().doppler_mps, [(3 + 8) / 5, -1.0])
+
+
+def test_a_cloud_that_contradicts_itself_counts_as_empty_and_is_said(ros, write, cloud_points):
+    good, bad = ros.cloud(START_NS, cloud_points()), ros.cloud(START_NS + 10**8, cloud_points())
+    bad.width = 1000
+    with opened(write, ros, [good, bad, good]) as recording:
+        scans = recording.radar_scans()
+        assert np.diff(scans.first_return).tolist() == [3, 3, 0]
+        (warning,) = recording.warnings
+        assert warning.code == "unreadable-messages"
+        assert "1 radar messages could not be read and count as empty; the first is number 1" in warning.message
+
+
+def test_a_lidar_beside_the_radar_is_not_chosen_and_alone_it_is_said(ros, write, cloud_points):
+    lidar = np.zeros(6000, dtype=[("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
+    lidar["z"] = np.arange(6000)
+    rows = [
+        (topic, START_NS + i * 10**8, ros.cloud(START_NS + i * 10**8, points))
+        for i in range(4)
+        for topic, points in (("/lidar/points", lidar), ("/front", cloud_points()))
+    ]
+    path = write(ros, rows, name="both")
+    with open_recording(path, require=("radar",)) as recording:
+        assert recording.radar_topic == "/front"
+        assert recording.warnings == ()
+    with open_recording(path, RecordingOptions(radar_topic="/lidar/points"), require=("radar",)) as recording:
+        assert [warning.code for warning in recording.warnings] == ["looks-like-lidar"]
+
+
+def test_a_radar_without_elevation_is_said_to_be_flat(ros, write, cloud_points):
+    points = cloud_points(3)
+    points["z"] = 0.0
+    with opened(write, ros, [ros.cloud(START_NS, points)]) as recording:
+        assert [warning.code for warning in recording.warnings] == ["flat-radar"]
+
+
+def test_the_older_cloud_with_named_channels_is_read(ros, write):
+    channel = ros.store.types["sensor_msgs/msg/ChannelFloat32"]
+    point = ros.store.types["geometry_msgs/msg/Point32"]
+    message = ros.new(
+        "sensor_msgs/msg/PointCloud",
+        header=ros.header(START_NS),
+        points=[point(x=1.0, y=2.0, z=3.0), point(x=4.0, y=5.0, z=6.0)],
+        channels=[
+            channel(name="Doppler", values=np.array([0.5, -0.5], dtype=np.float32)),
+            channel(name="Power", values=np.array([20.0, 30.0], dtype=np.float32)),
+        ],
+    )
+    with opened(write, ros, [message]) as recording:
+        scan = recording.radar_scans().scan(0)
+    np.testing.assert_array_equal(scan.points_radar_m, [[1, 2, 3], [4, 5, 6]])
+    np.testing.assert_array_equal(scan.doppler_mps, [0.5, -0.5])
+    np.testing.assert_array_equal(scan.snr_db, [20, 30])
+
+
+# -- lists
+
+
+def test_radar_msgs_scans_become_cartesian(ros, write):
+    fields = "float32 range\nfloat32 azimuth\nfloat32 elevation\nfloat32 doppler_velocity\nfloat32 amplitude\n"
+    ros.define("radar_msgs/msg/RadarReturn", fields)
+    ros.define("radar_msgs/msg/RadarScan", "Header header\nradar_msgs/RadarReturn[] returns\n")
+    rows = [(5.0, 0.25, 0.125, -1.5, 12.0), (7.5, -0.5, 0.0, 0.0, 3.0)]
+    names = ("range", "azimuth", "elevation", "doppler_velocity", "amplitude")
+    returns = [ros.new("radar_msgs/msg/RadarReturn", **dict(zip(names, row, strict=True))) for row in rows]
+    scan_type = "radar_msgs/msg/RadarScan"
+    messages = [
+        ros.new(scan_type, header=ros.header(START_NS), returns=returns),
+        ros.new(scan_type, header=ros.header(START_NS + 10**8), returns=[]),
+    ]
+    with opened(write, ros, messages) as recording:
+        scans = recording.radar_scans()
+    np.testing.assert_allclose(scans.points_radar_m, cartesian_from_polar(np.array(rows)[:, :3]))
+    np.testing.assert_array_equal(scans.doppler_mps, [-1.5, 0.0])
+    np.testing.assert_array_equal(scans.snr_db, [12.0, 3.0])
+    assert np.diff(scans.first_return).tolist() == [2, 0]
+
+
+def test_radar_tracks_become_scans_of_their_positions(ros, write):
+    track = (
+        "unique_identifier_msgs/UUID uuid\ngeometry_msgs/Point position\ngeometry_msgs/Vector3 velocity\n"
+        "uint16 classification\nfloat32[6] position_covariance\n"
+    )
+    ros.define("unique_identifier_msgs/msg/UUID", "uint8[16] uuid\n")
+    ros.define("radar_msgs/msg/RadarTrack", track)
+    ros.define("radar_msgs/msg/RadarTracks", "Header header\nradar_msgs/RadarTrack[] tracks\n")
+    uuid = ros.new("unique_identifier_msgs/msg/UUID", uuid=np.arange(16, dtype=np.uint8))
+    tracks = [
+        ros.new(
+            "radar_msgs/msg/RadarTrack",
+            uuid=uuid,
+            position=ros.new("geometry_msgs/msg/Point", x=3.0 * k, y=4.0 * k, z=0.5),
+            velocity=ros.new("geometry_msgs/msg/Vector3", x=1.0, y=0.0, z=0.0),
+            classification=k,
+            position_covariance=np.zeros(6, dtype=np.float32),
+        )
+        for k in (1, 2, 3)
+    ]
+    message = ros.new("radar_msgs/msg/RadarTracks", header=ros.header(START_NS), tracks=tracks)
+    with opened(write, ros, [message]) as recording:
+        scan = recording.radar_scans().scan(0)
+    np.testing.assert_array_equal(scan.points_radar_m, [[3, 4, 0.5], [6, 8, 0.5], [9, 12, 0.5]])
+    np.testing.assert_allclose(scan.doppler_mps[0], 3 / np.sqrt(25.25))
+
+
+def test_ainstein_angles_are_degrees(ros, write):
+    ros.define(
+        "ainstein_radar_msgs/msg/RadarTarget",
+        "uint16 target_id\nfloat64 snr\nfloat64 range\nfloat64 speed\nfloat64 azimuth\nfloat64 elevation\n",
+    )
+    ros.define("ainstein_radar_msgs/msg/RadarTargetArray", "Header header\nainstein_radar_msgs/RadarTarget[] targets\n")
+    target = ros.new(
+        "ainstein_radar_msgs/msg/RadarTarget", target_id=1, snr=9.0, range=2.0, speed=0.5, azimuth=90.0, elevation=0.0
+    )
+    array = "ainstein_radar_msgs/msg/RadarTargetArray"
+    with opened(write, ros, [ros.new(array, header=ros.header(START_NS), targets=[target])]) as recording:
+        scan = recording.radar_scans().scan(0)
+    np.testing.assert_allclose(scan.points_radar_m, [[0.0, 2.0, 0.0]], atol=1e-12)
+    assert (scan.doppler_mps[0], scan.snr_db[0]) == (0.5, 9.0)
+
+
+def test_a_list_of_poses_is_no_radar(ros, write, plain, jpeg):
+    pose = ros.new(
+        "geometry_msgs/msg/Pose",
+        position=ros.new("geometry_msgs/msg/Point", x=1.0, y=2.0, z=3.0),
+        orientation=ros.new("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0),
+    )
+    path_message = ros.new("geometry_msgs/msg/PoseArray", header=ros.header(START_NS), poses=[pose])
+    with open_recording(write(ros, [*plain(ros, jpeg), ("/radar/poses", START_NS, path_message)])) as recording:
+        kinds = {topic.name: topic.kind for topic in recording.topics}
+        assert kinds["/radar/poses"] == "other"
+        assert recording.radar_topic == "/radar/points"
+
+
+# -- one return per message
+
+
+def ti_messages(ros, text: str, counts: list[int], **extra: Any) -> tuple[list[tuple[str, int, Any]], np.ndarray]:
+    kind = ros.define("ti_mmwave_rospkg/msg/RadarScan", text)
+    rng = np.random.default_rng(8)
+    rows, positions = [], []
+    for scan, count in enumerate(counts):
+        at = START_NS + scan * 100_000_000
+        for point in range(count):
+            position = rng.uniform(0.5, 9.0, 3).astype(np.float32)
+            fields: dict[str, Any] = {
+                "point_id": point, "x": position[0], "y": position[1], "z": position[2], "range": 0.0,
+                "velocity": 0.25 * scan, "doppler_bin": 3, "bearing": 0.0, "intensity": 0.0,
+            }  # fmt: skip
+            for name, value in extra.items():
+                fields[name] = value(scan) if callable(value) else value
+            stamp = at + 200_000 * point
+            message = ros.new(kind, header=ros.header(stamp, "/ti_mmwave"), **fields)
+            rows.append(("/ti_mmwave/radar_scan", stamp + 4_000_000, message))
+            positions.append(position)
+    return rows, np.array(positions, dtype=np.float64)
+
+
+def test_one_message_per_return_becomes_scans_by_the_point_number(container, container_ros, write):
+    counts = [3, 1, 5, 2, 1, 1, 7, 4]
+    rows, positions = ti_messages(container_ros, TI_SCAN, counts)
+    with open_recording(write(container_ros, rows, container), require=("radar",)) as recording:
+        scans = recording.radar_scans()
+        assert np.diff(scans.first_return).tolist() == counts
+        np.testing.assert_array_equal(scans.times_ns, START_NS + 10**8 * np.arange(len(counts)))
+        np.testing.assert_array_equal(scans.points_radar_m, positions)
+        np.testing.assert_array_equal(scans.doppler_mps, np.repeat(0.25 * np.arange(8), counts))
+        assert np.isnan(scans.snr_db).all()  # the stock driver leaves 0
+        assert recording.radar_frame == "ti_mmwave"
+
+
+def test_the_fork_with_frame_numbers_is_grouped_by_them_and_its_snr_is_tenths_of_a_db(ros, write):
+    counts = [2, 3, 1, 4]
+    extra: dict[str, Any] = {"radar_frame_idx": lambda scan: 65534 + scan & 0xFFFF, "intensity": 153.0}
+    extra |= {"intensity_snr_noise": 1.0, "noise": 2.0, "time_human": "2024-01-01"}
+    rows, positions = ti_messages(ros, TI_FORK, counts, **extra)
+    with open_recording(write(ros, rows), require=("radar",)) as recording:
+        scans = recording.radar_scans()
+    assert np.diff(scans.first_return).tolist() == counts
+    np.testing.assert_array_equal(scans.points_radar_m, positions)
+    np.testing.assert_allclose(scans.snr_db, 15.3)
+
+
+def test_the_scan_messages_are_preferred_to_the_drivers_cloud(ros, write):
+    rows, _ = ti_messages(ros, TI_SCAN, [2, 2, 2])
+    points = np.zeros(2, dtype=[(name, "<f4") for name in ("x", "y", "z", "intensity")])
+    rows += [("/ti_mmwave/radar_scan_pcl", START_NS + i * 10**8, ros.cloud(0, points)) for i in range(3)]
+    with open_recording(write(ros, sorted(rows, key=lambda row: row[1])), require=("radar",)) as recording:
+        assert recording.radar_topic == "/ti_mmwave/radar_scan"
+
+
+@given(st.lists(st.integers(1, 12), min_size=1, max_size=40), st.integers(20, 200), st.integers(0, 3), st.data())
+def test_grouping_finds_every_scan_whatever_the_driver_filtered_out(counts, period_ms, phase, data):
+    """Point numbers rise within a scan; some points are missing; messages lie close together in time."""
+    times, numbers, owners = [], [], []
+    for scan, count in enumerate(counts):
+        kept = sorted(data.draw(st.sets(st.integers(0, 60), min_size=count, max_size=count)))
+        times += [scan * period_ms * 10**6 + 50_000 * k for k in range(count)]
+        numbers += kept
+        owners += [scan] * count
+    first = first_of_scans(np.array(times) + phase, None, np.array(numbers))
+    scans = np.searchsorted(first, np.arange(len(times)), side="right") - 1
+    together = np.diff(owners) == 0
+    assert np.all(np.diff(scans)[together] == 0)  # no scan is ever torn apart
+    resets = np.diff(numbers) <= 0
+    assert np.all(np.diff(scans)[resets] == 1)  # and where the numbers fall, one ends
+    if np.count_nonzero(resets) > 2 and np.all(np.diff(np.flatnonzero(resets)) > 0):
+        usual = np.median(np.diff(np.array(times)[np.flatnonzero(resets) + 1]))
+        if usual <= 1.5 * period_ms * 10**6:
+            assert np.array_equal(scans, owners)
+
+
+@given(st.lists(st.integers(1, 9), min_size=1, max_size=30), st.booleans())
+def test_without_numbers_scans_are_told_apart_by_pauses(counts, same_stamp):
+    times = [scan * 50_000_000 + (0 if same_stamp else 100_000 * k) for scan, n in enumerate(counts) for k in range(n)]
+    first = first_of_scans(np.array(times, dtype=np.int64))
+    assert first.tolist() == np.concatenate([[0], np.cumsum(counts)[:-1]]).tolist()
+
+
+def test_grouping_nothing_gives_nothing():
+    assert first_of_scans(np.zeros(0, dtype=np.int64)).tolist() == []
+    assert first_of_scans(np.array([5])).tolist() == [0]
+
+
+def test_returns_flagged_as_invalid_keep_their_row_without_a_value(ros, write):
+    kind = ros.define(
+        "continental_msgs/msg/Detection",
+        "float32 azimuth_angle\nbool invalid_azimuth\nfloat32 range\nfloat32 range_rate\nbool invalid_range_rate\n",
+    )
+    ros.define("continental_msgs/msg/DetectionList", "Header header\ncontinental_msgs/Detection[] detections\n")
+    flags = [(False, False), (True, False), (False, True)]
+    detections = [
+        ros.new(kind, azimuth_angle=0.0, invalid_azimuth=a, range=2.0, range_rate=0.5, invalid_range_rate=r)
+        for a, r in flags
+    ]
+    message = ros.new("continental_msgs/msg/DetectionList", header=ros.header(START_NS), detections=detections)
+    with opened(write, ros, [message]) as recording:
+        scan = recording.radar_scans().scan(0)
+    np.testing.assert_array_equal(scan.points_radar_m, [[2, 0, 0], [np.nan] * 3, [2, 0, 0]])
+    np.testing.assert_array_equal(scan.doppler_mps, [0.5, 0.5, np.nan])
+
+
+def test_big_endian_messages_are_read(ros2, write, cloud_points, monkeypatch, plain, jpeg):
+    """A machine of the other byte order wrote them; CDR says so in its first bytes."""
+    little = ros2.serialise
+    monkeypatch.setattr(
+        ros2, "serialise", lambda m: bytes(ros2.store.serialize_cdr(m, m.__msgtype__, little_endian=False))
+    )
+    messages = [ros2.cloud(START_NS + i * 10**8, cloud_points(3)) for i in range(3)]
+    ti, positions = ti_messages(ros2, TI_SCAN, [2, 3, 1])
+    rows = [("/radar/cloud", START_NS + i * 10**8, message) for i, message in enumerate(messages)] + ti
+    assert little(messages[0]) != ros2.serialise(messages[0])
+    path = write(ros2, rows)
+    with open_recording(path, RecordingOptions(radar_topic="/radar/cloud"), require=("radar",)) as recording:
+        np.testing.assert_array_equal(recording.radar_times, START_NS + 10**8 * np.arange(3))
+        np.testing.assert_array_equal(recording.radar_scans().scan(2).points_radar_m[:, 0], cloud_points(3)["x"])
+    with open_recording(path, RecordingOptions(radar_topic="/ti_mmwave/radar_scan"), require=("radar",)) as recording:
+        np.testing.assert_array_equal(recording.radar_scans().points_radar_m, positions)
+        assert np.diff(recording.radar_scans().first_return).tolist() == [2, 3, 1]
+
+
+def test_windows_hold_every_scan_once_and_few_returns_each(ros, write, plain, jpeg, cloud_points):
+    at = [START_NS + i * 10**8 for i in range(80)]
+    rows = [("/radar/points", t, ros.cloud(t, cloud_points(1 + 2000 * (i % 40 == 7), i))) for i, t in enumerate(at)]
+    with open_recording(write(ros, rows), require=("radar",)) as recording:
+        whole, windows = recording.radar_scans(), list(recording.radar_windows())
+    assert len(windows) > 1
+    assert max(len(window) for window in windows) < 80
+    for name in ("times_ns", "points_radar_m", "doppler_mps", "snr_db", "sigma_polar"):
+        np.testing.assert_array_equal(np.concatenate([getattr(w, name) for w in windows]), getattr(whole, name))
+
+
+def test_scans_of_a_window_cannot_be_written_to(ros, write, plain, jpeg):
+    with open_recording(write(ros, plain(ros, jpeg))) as recording:
+        scans = recording.radar_scans(START_NS, START_NS + 10**9)
+    for name in ("times_ns", "points_radar_m", "doppler_mps", "snr_db", "sigma_polar"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(scans, name)[0] = 1
+        with pytest.raises(ValueError, match="cannot set WRITEABLE"):
+            getattr(scans, name)[:1].setflags(write=True)
+
+
+@pytest.mark.parametrize("sizes", [[3], [3, 5, 0]])
+def test_clouds_far_apart_in_a_file_are_read_like_any(sizes, ros, write, plain, jpeg, cloud_points):
+    at = [START_NS + i * 10**8 for i in range(200)]
+    clouds = [cloud_points(sizes[i % len(sizes)], i) for i in range(200)]
+    rows = []
+    for t, points in zip(at, clouds, strict=True):
+        rows.append(("/radar/points", t, ros.cloud(t, points)))
+        rows.append(("/camera/image/compressed", t, ros.compressed(t, jpeg + bytes(20_000))))
+    with open_recording(write(ros, rows)) as recording:
+        scans = recording.radar_scans()
+        windows = list(recording.radar_windows())
+    expected = np.concatenate([np.stack([p["x"], p["y"], p["z"]], axis=1) for p in clouds])
+    np.testing.assert_array_equal(scans.points_radar_m, expected)
+    np.testing.assert_array_equal(np.concatenate([w.points_radar_m for w in windows]), expected)
+    np.testing.assert_array_equal(scans.doppler_mps, np.concatenate([p["velocity"] for p in clouds]))

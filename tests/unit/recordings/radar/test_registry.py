@@ -1,0 +1,262 @@
+"""Every layout of the registry, read from bytes built from its real definition; contradictions; axes that a person tells."""
+
+import contextlib
+import random
+import sqlite3
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calib_core.errors import MessageError, OptionError
+from calib_core.recordings import RecordingOptions, describe, open_recording
+from calib_core.recordings.containers.opening import open_sources
+from calib_core.recordings.radar.axes import parse_radar_axes
+from calib_core.recordings.radar.layouts import recognise
+from calib_core.recordings.radar.registry import DECODERS
+from calib_core.recordings.radar.registry_table import radar_formats
+from calib_core.recordings.topics import join_topics
+from tests.unit.recordings.radar.radar_samples import CLOUDS, OTHERS, START_NS, sample
+
+NAMES = [decoder.name for decoder in DECODERS]
+
+
+def opened(write: Callable[..., Any], ros: Any, messages: list[Any], **options: Any) -> Any:
+    rows = [("/radar", START_NS + 10**6 * i, message) for i, message in enumerate(messages)]
+    return open_recording(write(ros, rows), RecordingOptions(**options), require=("radar",))
+
+
+def test_every_layout_of_the_registry_has_a_sample() -> None:
+    assert sorted(NAMES) == sorted([*CLOUDS, *OTHERS])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_layout_is_recognised_and_read(name: str, ros: Any, write: Callable[..., Any]) -> None:
+    expected = sample(ros, name)
+    with opened(write, ros, expected.messages) as recording:
+        scans = recording.radar_scans()
+        (topic,) = recording.topics
+        codes = [warning.code for warning in recording.warnings]
+    assert topic.layout.startswith(f"{name}: ") or f": {name}: " in topic.layout
+    assert len(scans) == 1
+    np.testing.assert_allclose(scans.points_radar_m, expected.points, rtol=1e-6, atol=1e-6)
+    nothing = np.full(len(expected.points), np.nan)
+    for found, wanted in ((scans.doppler_mps, expected.doppler), (scans.snr_db, expected.amplitude)):
+        np.testing.assert_allclose(found, nothing if wanted is None else wanted, rtol=1e-6)
+    sigma = np.full((len(expected.points), 3), np.nan) if expected.sigma is None else expected.sigma
+    np.testing.assert_allclose(scans.sigma_polar, sigma, rtol=1e-6)
+    assert sorted(codes) == sorted(expected.warnings)
+
+
+def damaged(payload: bytes, rng: random.Random) -> bytes:
+    """Overwrite, remove or cut off a few bytes; counts of billions are among them."""
+    raw = bytearray(payload)
+    for _ in range(rng.choice([1, 1, 2, 4])):
+        place = rng.randrange(max(1, len(raw)))
+        kind = rng.random()
+        if kind < 0.7:
+            raw[place : place + 4] = rng.choice(
+                [b"\xff\xff\xff\xff", b"\xff\xff\xff\x7f", b"\0\0\0\0", rng.randbytes(4)]
+            )
+        elif kind < 0.9:
+            del raw[place : place + rng.randrange(1, 9)]
+        else:
+            del raw[place:]
+    return bytes(raw)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_damaged_messages_of_any_layout_give_values_or_one_clear_error(name: str, ros: Any, write: Any) -> None:
+    path = write(ros, [("/radar", START_NS, sample(ros, name).messages[0])])
+    (source,) = open_sources([path])
+    (topic,), _ = join_topics([source])
+    definition, payload = topic.definition(), topic.payload(0)
+    source.close()
+    layout = recognise(definition, payload)
+    rng = random.Random(name)
+    for _ in range(60):
+        worse = damaged(payload, rng)
+        with contextlib.suppress(MessageError):
+            recognise(definition, worse)
+        with contextlib.suppress(MessageError):
+            assert layout is not None
+            layout.returns(worse)
+
+
+@pytest.mark.parametrize(
+    "name", ["Oculii cloud", "ARS548 detections, 18 fields", "radar_msgs scan", "radar_msgs tracks"]
+)
+def test_what_ros_itself_defines_is_read_from_bags_without_definitions(name: str, ros2: Any, write: Any) -> None:
+    expected = sample(ros2, name)
+    path = write(ros2, [("/radar", START_NS, message) for message in expected.messages], "db3")
+    database = sqlite3.connect(path)
+    with database:
+        database.execute("DROP TABLE message_definitions")
+    database.close()
+    with open_recording(path, require=("radar",)) as recording:
+        np.testing.assert_allclose(recording.radar_scans().points_radar_m, expected.points, rtol=1e-6, atol=1e-6)
+
+
+# -- contradictions
+
+
+def changed(
+    ros: Any, cloud_points: Callable[..., np.ndarray], **columns: Callable[[np.ndarray], np.ndarray]
+) -> list[Any]:
+    """Return clouds with further columns computed from x, y, z."""
+    points = cloud_points(12)
+    xyz = np.stack([points[axis] for axis in "xyz"], axis=1).astype(np.float64)
+    wide = np.zeros(12, dtype=[*points.dtype.descr, *((name, "<f4") for name in columns)])
+    for name in points.dtype.names or ():
+        wide[name] = points[name]
+    for name, make in columns.items():
+        wide[name] = make(xyz)
+    return [ros.cloud(START_NS + i * 10**8, wide) for i in range(3)]
+
+
+def length(xyz: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(xyz, axis=1)
+
+
+def azimuth(xyz: np.ndarray) -> np.ndarray:
+    return np.arctan2(xyz[:, 1], xyz[:, 0])
+
+
+@pytest.mark.parametrize(
+    ("columns", "code", "words"),
+    [
+        ({"range": length, "azimuth": azimuth}, None, ""),
+        ({"range": lambda p: 0 * length(p), "azimuth": lambda p: 0 * azimuth(p)}, None, ""),
+        ({"azimuth": lambda p: np.degrees(azimuth(p))}, None, ""),
+        ({"range": lambda p: 2 * length(p)}, "radar-range-contradicts", "range and the length of x, y, z differ by"),
+        ({"azimuth": lambda p: -azimuth(p)}, "radar-azimuth-mirrored", "have opposite signs"),
+        ({"azimuth": lambda p: -np.degrees(azimuth(p))}, "radar-azimuth-mirrored", "have opposite signs"),
+        ({"azimuth": lambda p: 0.4 + 0.3 * length(p)}, "radar-azimuth-contradicts", "disagree in every unit and sign"),
+        ({"elevation": lambda p: 0 * length(p)}, "radar-elevation-zero", "is always 0, yet the positions have heights"),
+    ],
+)
+def test_columns_that_contradict_the_positions_are_said(columns, code, words, ros1, write, cloud_points) -> None:
+    with opened(write, ros1, changed(ros1, cloud_points, **columns)) as recording:
+        assert [warning.code for warning in recording.warnings] == ([code] if code else [])
+        assert all(words in warning.message for warning in recording.warnings)
+
+
+def polar_cloud(ros: Any, azimuths: np.ndarray) -> Any:
+    points = np.zeros(len(azimuths), dtype=[(name, "<f4") for name in ("range", "azimuth", "elevation", "doppler")])
+    points["range"], points["azimuth"] = 5.0 + np.arange(len(azimuths)), azimuths
+    points["elevation"] = azimuths / 8
+    return ros.cloud(START_NS, points)
+
+
+def test_angles_of_the_wrong_unit_are_said_and_one_option_sets_them_right(ros1, write) -> None:
+    angles = np.linspace(-60.0, 60.0, 24)
+    message = polar_cloud(ros1, angles)
+    with opened(write, ros1, [message]) as recording:
+        (warning,) = recording.warnings
+        assert warning.code == "radar-angle-unit"
+        assert "has angles up to 60.0, which cannot be radians" in warning.message
+        assert warning.hint == "if they are degrees: --radar-axes degrees"
+    write_again = lambda *a, **k: write(*a, name="again", **k)  # noqa: E731
+    with opened(write_again, ros1, [message], radar_axes="degrees") as recording:
+        assert recording.warnings == ()
+        points = recording.radar_scans().points_radar_m
+    np.testing.assert_allclose(np.degrees(np.arctan2(points[:, 1], points[:, 0])), angles, atol=1e-4)
+
+
+def test_radians_read_as_degrees_are_said(ros2, write) -> None:
+    kind = ros2.define(
+        "ainstein_radar_msgs/msg/RadarTarget",
+        "uint16 target_id\nfloat64 snr\nfloat64 range\nfloat64 speed\nfloat64 azimuth\nfloat64 elevation\n",
+    )
+    array = ros2.define(
+        "ainstein_radar_msgs/msg/RadarTargetArray", "Header header\nainstein_radar_msgs/RadarTarget[] targets\n"
+    )
+    targets = [
+        ros2.new(kind, target_id=i, snr=1.0, range=5.0 + i, speed=0.0, azimuth=0.1 * i - 1, elevation=0.01 * i)
+        for i in range(20)
+    ]
+    message = ros2.new(array, header=ros2.header(START_NS), targets=targets)
+    with opened(write, ros2, [message]) as recording:
+        (warning,) = recording.warnings
+    assert warning.code == "radar-angle-unit"
+    assert "little for degrees" in warning.message
+
+
+# -- axes that a person tells
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("forward,left,up", [[1, 0, 0], [0, 1, 0], [0, 0, 1]]),
+        ("right, forward, up", [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
+        ("RIGHT DOWN FORWARD", [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]),
+        ("backward,left,down,radians", [[-1, 0, 0], [0, 1, 0], [0, 0, -1]]),
+        ("degrees", np.eye(3)),
+    ],
+)
+def test_the_words_for_axes_become_a_signed_permutation(words, expected) -> None:
+    axes = parse_radar_axes(words)
+    np.testing.assert_array_equal(axes.matrix, expected)
+    assert axes.degrees == {"radians": False, "degrees": True}.get(words.rpartition(",")[2])
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ("forward,north,up", "'north' is no direction; forward, backward"),
+        ("forward,left", "say where the message's x, y and z point"),
+        ("forward,left,up,degrees,radians", "at most one unit"),
+        ("", "say where the message's x, y and z point"),
+        ("forward,backward,up", "two of the directions lie on one line"),
+    ],
+)
+def test_axes_that_make_no_sense_are_refused_in_words(words, complaint) -> None:
+    with pytest.raises(OptionError, match="--radar-axes") as caught:
+        parse_radar_axes(words)
+    assert complaint in str(caught.value)
+
+
+def test_axes_that_a_person_tells_hold_for_positions_and_noise_and_are_shown(ros, write, cloud_points) -> None:
+    points = cloud_points(5)
+    messages = [ros.cloud(START_NS + i * 10**8, points[: 5 - i]) for i in range(2)]
+    with opened(write, ros, messages, radar_axes="right,forward,up") as recording:
+        found = recording.radar_scans().points_radar_m[:5]
+        assert "axes as told: x right, y forward, z up" in describe(recording)
+        assert recording.radar_axes == "right,forward,up"
+    np.testing.assert_array_equal(found, np.stack([points["y"], -points["x"], points["z"]], axis=1))
+
+
+def test_a_mirrored_radar_is_set_right_and_its_assumption_is_no_longer_told(ros, write) -> None:
+    expected = sample(ros, "UniBw detections")
+    with opened(write, ros, expected.messages, radar_axes="forward,right,up") as recording:
+        found = recording.radar_scans()
+        assert recording.warnings == ()
+    np.testing.assert_allclose(found.points_radar_m, expected.points * [1, -1, 1], rtol=1e-6)
+
+
+def test_the_noise_of_a_track_turns_with_its_axes(ros1, write) -> None:
+    expected = sample(ros1, "radar_msgs tracks")
+    assert expected.sigma is not None
+    with opened(write, ros1, expected.messages, radar_axes="forward,right,up") as recording:
+        sigma = recording.radar_scans().sigma_polar
+    np.testing.assert_allclose(sigma, expected.sigma, rtol=1e-6)
+    write_again = lambda *a, **k: write(*a, name="again", **k)  # noqa: E731
+    with opened(write_again, ros1, expected.messages, radar_axes="forward,up,left") as recording:
+        turned = recording.radar_scans().sigma_polar
+    np.testing.assert_allclose(turned[0], expected.sigma[0][[0, 2, 1]], rtol=1e-6)  # straight ahead: they change places
+
+
+def test_an_option_of_nonsense_is_refused_before_anything_is_read(ros1, write, plain, jpeg) -> None:
+    with pytest.raises(OptionError, match="'sideways' is no direction"):
+        open_recording(write(ros1, plain(ros1, jpeg)), RecordingOptions(radar_axes="sideways"))
+
+
+def test_the_page_of_radar_formats_is_the_one_the_registry_writes() -> None:
+    page = Path(__file__).parents[4] / "docs" / "radar-formats.md"
+    assert page.read_text(encoding="utf-8") == radar_formats(), (
+        "python -m calib_core.recordings.radar.registry_table docs/radar-formats.md"
+    )
+    assert all(f"| {name} |" in radar_formats() for name in NAMES)

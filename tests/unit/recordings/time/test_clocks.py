@@ -1,0 +1,224 @@
+"""Which clock is used, when, and that it is said."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from calib_core.errors import RecordingError
+from calib_core.measurements import NS_PER_S
+from calib_core.recordings import RecordingOptions, open_recording
+from calib_core.recordings.time.clocks import Stamps, choose_clock, choose_clocks, header_fault
+
+START_NS = 1_700_000_000 * NS_PER_S
+YEAR_NS = 365 * 86_400 * NS_PER_S
+RECEIVE_NS = START_NS + 100_000_000 * np.arange(50)
+
+
+def stamps(header_ns, receive_ns=RECEIVE_NS, topic="/radar") -> Stamps:
+    header = None if header_ns is None else np.asarray(header_ns, dtype=np.int64)
+    return Stamps(topic, np.asarray(receive_ns, dtype=np.int64), header)
+
+
+SOUND = stamps(RECEIVE_NS - 20_000_000, topic="/camera")
+
+
+@pytest.mark.parametrize(
+    ("header_ns", "words"),
+    [
+        (np.zeros(50), "has stamps that are all zero (50 messages)"),
+        (np.full(50, START_NS), "has the same stamp in all of its 50 messages"),
+        (np.where(np.arange(50) % 10 == 3, 0, RECEIVE_NS), "has 5 of 50 stamps that are zero"),
+        (RECEIVE_NS - START_NS + 7 * NS_PER_S, "has stamps from the year 1970 (9.450 s)"),
+        (RECEIVE_NS[::-1], "has 49 stamps of 50 that go backwards, by up to 0.100 s"),
+        (np.where(np.arange(50) < 25, RECEIVE_NS, RECEIVE_NS - 60 * NS_PER_S), "by up to 59.900 s"),
+        (None, "carries no stamps"),
+    ],
+)
+def test_stamps_that_cannot_be_right_fall_back_to_receive_time_with_a_warning(header_ns, words):
+    radar = stamps(header_ns)
+    fault = header_fault(radar)
+    assert fault is not None
+    assert words in fault
+    choice = choose_clocks(radar, SOUND)
+    assert choice.clocks == ("receive", "header")
+    assert [warning.code for warning in choice.warnings] == ["stamps-unusable"]
+    assert choice.warnings[0].message.startswith(f"/radar {fault}")
+    assert choose_clocks(SOUND, radar).clocks == ("header", "receive")
+
+
+def test_a_rare_zero_or_a_small_step_back_is_no_reason_to_leave_the_stamps():
+    header = RECEIVE_NS.copy()
+    header[30] -= 150_000_000
+    assert header_fault(stamps(header)) is None
+    many = START_NS + 100_000_000 * np.arange(500)
+    header = many.copy()
+    header[3] = 0
+    assert header_fault(stamps(header, many)) is None
+
+
+def test_stamps_years_from_receive_time_are_right_when_both_sensors_agree():
+    radar = stamps(RECEIVE_NS - YEAR_NS)
+    camera = stamps(RECEIVE_NS - YEAR_NS - 15_000_000, topic="/camera")
+    choice = choose_clocks(radar, camera)
+    assert (choice.clocks, choice.warnings) == (("header", "header"), ())
+
+
+@pytest.mark.parametrize("radar_first", [True, False])
+def test_a_fallback_beside_a_clock_of_another_year_takes_both_to_receive_time(radar_first):
+    zero, old = stamps(np.zeros(50)), stamps(RECEIVE_NS - YEAR_NS, topic="/camera")
+    choice = choose_clocks(zero, old) if radar_first else choose_clocks(old, zero)
+    assert choice.clocks == ("receive", "receive")
+    assert [warning.code for warning in choice.warnings] == ["stamps-unusable", "mixed-clocks"]
+    assert "365.0 days away from receive time" in choice.warnings[1].message
+
+
+def test_two_clocks_more_than_a_second_apart_are_not_compared():
+    hour = stamps(RECEIVE_NS - 3600 * NS_PER_S)
+    choice = choose_clocks(hour, SOUND)
+    assert choice.clocks == ("receive", "receive")
+    assert "on clocks 60.0 minutes apart" in choice.warnings[0].message
+    assert choose_clocks(stamps(RECEIVE_NS - 900_000_000), SOUND).clocks == ("header", "header")
+
+
+LONG_NS = START_NS + 100_000_000 * np.arange(1000)
+
+
+def late(by_s, of=LONG_NS):
+    """Stamps behind receive time by so much in the last two fifths."""
+    return of - np.where(np.arange(1000) < 600, 0, int(by_s * NS_PER_S))
+
+
+@pytest.mark.parametrize(
+    ("radar_ns", "camera_ns", "clock"),
+    [
+        (late(-3.0), LONG_NS, "receive"),
+        (LONG_NS, late(-1.5), "receive"),
+        (late(-0.5), LONG_NS, "header"),
+        (late(-3.0), late(-3.0), "header"),
+        (LONG_NS + 1_900_000 * np.arange(1000), LONG_NS, "receive"),
+        (LONG_NS + 900_000 * np.arange(1000), LONG_NS, "header"),
+    ],
+    ids=["radar set", "camera set", "set by little", "recorder set", "much drift", "some drift"],
+)
+def test_stamps_that_part_during_the_recording_are_not_compared(radar_ns, camera_ns, clock):
+    choice = choose_clocks(stamps(radar_ns, LONG_NS), stamps(camera_ns, LONG_NS, "/camera"))
+    assert choice.clocks == (clock, clock)
+    told = [warning.message for warning in choice.warnings]
+    assert ("stamps of /radar and /camera part during the recording" in "".join(told)) == (clock == "receive")
+
+
+def test_recordings_rewritten_at_different_times_are_matched_by_their_stamps():
+    radar = stamps(RECEIVE_NS, RECEIVE_NS + YEAR_NS)
+    assert choose_clocks(radar, SOUND).clocks == ("header", "header")
+
+
+def test_simulated_time_of_both_sensors_is_kept():
+    boot = RECEIVE_NS - START_NS + 60 * NS_PER_S
+    choice = choose_clocks(stamps(boot), stamps(boot + 5_000_000, topic="/camera"))
+    assert (choice.clocks, choice.warnings) == (("header", "header"), ())
+    assert choose_clock(stamps(boot)).clocks == ("header",)
+
+
+@given(
+    st.lists(st.integers(-(10**6), 10**6), min_size=2, max_size=60),
+    st.integers(-(10**15), 10**15),
+    st.sampled_from(["header", "receive"]),
+)
+def test_the_clock_a_person_asks_for_is_the_clock(jitter, shift, wish):
+    receive = START_NS + 10**8 * np.arange(len(jitter))
+    radar = stamps(receive + np.array(jitter) + shift, receive)
+    choice = choose_clocks(radar, stamps(receive, receive, "/camera"), wish)
+    assert (choice.clocks, choice.warnings) == ((wish, wish), ())
+
+
+@given(
+    st.integers(2, 60),
+    st.sampled_from(["sound", "zero", "constant", "boot", "backwards"]),
+    st.sampled_from(["sound", "zero", "constant", "boot", "backwards"]),
+    st.integers(-(10**17), 10**17),
+)
+def test_times_in_use_never_differ_from_one_another_by_more_than_the_receive_times_do(
+    n, radar_kind, camera_kind, shift
+):
+    """Whatever the stamps: simultaneous messages end up within a second, or both by receive time."""
+    receive = START_NS + 10**8 * np.arange(n)
+
+    def header(kind, extra):
+        return {
+            "sound": receive + extra,
+            "zero": np.zeros(n),
+            "constant": np.full(n, START_NS),
+            "boot": receive - START_NS + 10**9,
+            "backwards": receive[::-1] - 10**8 * n,
+        }[kind]
+
+    radar, camera = stamps(header(radar_kind, shift), receive), stamps(header(camera_kind, 0), receive, "/camera")
+    choice = choose_clocks(radar, camera)
+    times = [
+        both.header_ns if clock == "header" else both.receive_ns
+        for both, clock in zip((radar, camera), choice.clocks, strict=True)
+    ]
+    assert np.abs(np.median(times[0] - times[1])) <= NS_PER_S
+    assert bool(choice.warnings) == (choice.clocks != ("header", "header"))
+
+
+# -- through files
+
+
+def test_zero_stamps_of_the_radar_are_replaced_and_said(ros, write, plain, jpeg, cloud_points):
+    rows = [
+        (topic, at, ros.cloud(0, cloud_points()) if topic == "/radar/points" else message)
+        for topic, at, message in plain(ros, jpeg)
+    ]
+    with open_recording(write(ros, rows)) as recording:
+        np.testing.assert_array_equal(recording.radar_times, START_NS + 10**8 * np.arange(20) + 30_000_000)
+        np.testing.assert_array_equal(recording.image_times, START_NS + 10**8 * np.arange(20) + 50_000_000)
+        assert [warning.code for warning in recording.warnings] == ["stamps-unusable"]
+        clocks = {topic.name: topic.clock for topic in recording.topics}
+        assert (clocks["/radar/points"], clocks["/camera/image/compressed"]) == ("receive", "header")
+
+
+def test_stamps_of_another_year_are_kept_when_both_sensors_have_them(ros, write, plain, jpeg):
+    rows = plain(ros, jpeg, radar_shift_ns=-YEAR_NS, camera_shift_ns=-YEAR_NS)
+    with open_recording(write(ros, rows)) as recording:
+        assert recording.radar_times[0] == START_NS - YEAR_NS
+        assert recording.warnings == ()
+
+
+def test_a_person_can_choose_the_clock(ros, write, plain, jpeg):
+    rows = plain(ros, jpeg, radar_shift_ns=-3600 * NS_PER_S, camera_shift_ns=-3600 * NS_PER_S)
+    path = write(ros, rows)
+    with open_recording(path, RecordingOptions(clock="receive")) as recording:
+        assert recording.radar_times[0] == START_NS + 30_000_000
+    with open_recording(path, RecordingOptions(clock="header")) as recording:
+        assert recording.radar_times[0] == START_NS - 3600 * NS_PER_S
+
+
+def test_a_few_zero_stamps_are_filled_in_from_the_delay_of_the_others(ros1, write, plain, jpeg, cloud_points):
+    rows = plain(ros1, jpeg, n=200)
+    place = next(i for i, row in enumerate(rows) if row[0] == "/radar/points" and i > 100)
+    at = rows[place][1]
+    rows[place] = ("/radar/points", at, ros1.cloud(0, cloud_points()))
+    with open_recording(write(ros1, rows)) as recording:
+        assert at - 30_000_000 in recording.radar_times
+        assert len(recording.radar_times) == 200
+
+
+def test_types_without_stamps_cannot_go_by_them(ros1, write, plain, jpeg):
+    ros1.define("bare_msgs/msg/Picture", "string format\nuint8[] data\n")
+    rows = plain(ros1, jpeg)
+    rows = [
+        (
+            topic,
+            at,
+            ros1.new("bare_msgs/msg/Picture", format="jpeg", data=message.data) if "image" in topic else message,
+        )
+        for topic, at, message in rows
+    ]
+    path = write(ros1, rows)
+    with open_recording(path) as recording:
+        assert recording.image_times[0] == START_NS + 80_000_000
+        assert "carries no stamps" in recording.warnings[0].message
+    with pytest.raises(RecordingError, match=r"carries no stamps; use the receive times: --clock receive"):
+        open_recording(path, RecordingOptions(clock="header"))

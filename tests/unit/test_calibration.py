@@ -1,0 +1,159 @@
+"""The pipeline from pairs to a pose, on pairs whose truth is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib_core.calibration import calibrate, calibrate_pairs
+from calib_core.measurements import MIN_PAIRS, Unsolvable
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from calib_core.results import Calibration
+from calib_core.synthetic import SimulatedPairs, simulate_pairs
+from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.scans import simulate_scans
+
+MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
+
+
+def solved(simulated: SimulatedPairs, options: CalibrationOptions = MEASURED) -> Calibration:
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
+    assert isinstance(outcome, Calibration), outcome
+    return outcome
+
+
+def error_in_sigmas(simulated: SimulatedPairs, calibration: Calibration) -> float:
+    error = simulated.camera_from_radar.error_from(calibration.camera_from_radar)
+    return float(np.sqrt(error @ np.linalg.solve(calibration.covariance, error)))
+
+
+def test_exact_pairs_give_the_exact_pose() -> None:
+    simulated = simulate_pairs(12, rng=np.random.default_rng(1), noise="none")
+    free = solved(simulated, CalibrationOptions())
+    error = simulated.camera_from_radar.error_from(free.camera_from_radar)
+    # the wide prior about the camera position still pulls by a whisker
+    assert np.linalg.norm(error[3:]) < 1e-4
+    assert np.linalg.norm(error[:3]) < 2e-3
+    assert free.metrics.aed_px < 0.05
+
+
+@pytest.mark.parametrize("noise", ["ti", "ti_fine", "imaging"])
+def test_a_third_of_wrong_pairs_is_named_and_does_not_move_the_pose(noise: str) -> None:
+    simulated = simulate_pairs(24, rng=np.random.default_rng(5), noise=noise, outlier_share=0.33)  # type: ignore[arg-type]
+    calibration = solved(simulated)
+    named = np.array([pair.outlier_probability > 0.5 for pair in calibration.pairs])
+    assert (named == simulated.outlier).mean() > 0.9
+    assert error_in_sigmas(simulated, calibration) < np.sqrt(calibration.covariance_quantile) * 1.3
+
+
+def test_decoy_candidates_do_not_take_the_place_of_the_reflector() -> None:
+    simulated = simulate_pairs(16, rng=np.random.default_rng(3), noise="ti_fine", decoys=4)
+    calibration = solved(simulated)
+    chosen = tuple(pair.candidate for pair in calibration.pairs)
+    assert chosen == simulated.true_candidate
+
+
+def test_the_order_of_pairs_does_not_change_a_bit() -> None:
+    simulated = simulate_pairs(14, rng=np.random.default_rng(7), outlier_share=0.2, decoys=2)
+    forward = solved(simulated)
+    backward = calibrate_pairs(simulated.pairs[::-1], simulated.camera, MEASURED)
+    assert isinstance(backward, Calibration)
+    assert forward.camera_from_radar.as_matrix().tobytes() == backward.camera_from_radar.as_matrix().tobytes()
+    assert forward.covariance.tobytes() == backward.covariance.tobytes()
+    assert forward.metrics == backward.metrics
+    assert [pair.id for pair in backward.pairs] == [pair.id for pair in simulated.pairs[::-1]]
+
+
+def test_fewer_than_four_pairs_are_unsolvable_with_the_count() -> None:
+    simulated = simulate_pairs(5, rng=np.random.default_rng(2))
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED, frozenset({"p1", "p2"}))
+    assert isinstance(outcome, Unsolvable)
+    assert outcome.code == "too-few-pairs"
+    assert f"3 of at least {MIN_PAIRS}" in outcome.reason
+    assert "2 excluded" in outcome.reason
+
+
+def test_an_excluded_pair_is_shown_but_changes_nothing() -> None:
+    simulated = simulate_pairs(12, rng=np.random.default_rng(4))
+    without = calibrate_pairs(simulated.pairs[:-1], simulated.camera, MEASURED)
+    aside = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED, frozenset({"p12"}))
+    assert isinstance(without, Calibration)
+    assert isinstance(aside, Calibration)
+    assert aside.camera_from_radar.as_matrix().tobytes() == without.camera_from_radar.as_matrix().tobytes()
+    assert aside.pairs[-1].excluded
+    assert not aside.pairs[-1].inlier
+    assert np.isfinite(aside.pairs[-1].distance_px)
+    assert aside.metrics == without.metrics
+
+
+def test_the_paper_method_is_dispatched() -> None:
+    simulated = simulate_pairs(12, rng=np.random.default_rng(6), noise="imaging")
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, replace(CalibrationOptions(), method="paper"))
+    assert isinstance(outcome, Calibration)
+    assert np.isnan(outcome.covariance).all()
+
+
+def test_figures_are_over_the_inliers_and_held_out_is_larger() -> None:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(8), outlier_share=0.2)
+    calibration = solved(simulated)
+    inliers = [pair for pair in calibration.pairs if pair.inlier]
+    assert calibration.metrics.n == len(inliers)
+    assert calibration.metrics.aed_px == pytest.approx(np.mean([pair.distance_px for pair in inliers]))
+    assert calibration.metrics.held_out_aed_px > calibration.metrics.aed_px
+
+
+def test_one_place_clicked_over_and_over_is_unsolvable() -> None:
+    simulated = simulate_pairs(4, rng=np.random.default_rng(9))
+    repeated = [replace(simulated.pairs[0], id=f"again-{k}") for k in range(6)]
+    outcome = calibrate_pairs(repeated, simulated.camera, CalibrationOptions())
+    assert isinstance(outcome, Unsolvable)
+    assert outcome.code == "degenerate-placements"
+
+
+def test_placements_along_one_line_are_unsolvable_without_a_camera_position() -> None:
+    simulated = simulate_pairs(4, rng=np.random.default_rng(9))
+    line = np.array([[4.0 + k, 1.0, -0.8] for k in range(6)])
+    pixels = simulated.camera.project(simulated.camera_from_radar @ line)
+    example = simulated.pairs[0].candidates[0]
+    pairs = [
+        replace(
+            simulated.pairs[0], id=f"l{k}", pixel_px=pixels[k], candidates=(replace(example, position_radar_m=line[k]),)
+        )
+        for k in range(6)
+    ]
+    outcome = calibrate_pairs(pairs, simulated.camera, CalibrationOptions())
+    assert isinstance(outcome, Unsolvable)
+    assert outcome.code == "degenerate-placements"
+
+
+def test_clicks_that_have_nothing_to_do_with_the_radar_are_unsolvable() -> None:
+    rng = np.random.default_rng(10)
+    simulated = simulate_pairs(8, rng=rng)
+    random = [replace(pair, pixel_px=rng.uniform(0.0, 1000.0, 2)) for pair in simulated.pairs]
+    outcome = calibrate_pairs(random, simulated.camera, MEASURED)
+    assert isinstance(outcome, Unsolvable)
+    assert outcome.hint
+
+
+def test_a_whole_simulated_session_comes_out_within_its_uncertainty() -> None:
+    session = simulate_scans(SimulationOptions(placements=12, seed=4))
+    options = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.015)))
+    outcome = calibrate(session.clicks, session.scans, session.camera, options)
+    assert isinstance(outcome, Calibration)
+    truth = session.stage.rig.camera_from_radar
+    error = truth.error_from(outcome.camera_from_radar)
+    assert error @ np.linalg.solve(outcome.covariance, error) < 1.5 * outcome.covariance_quantile
+    at = {click.id: place.position_radar_m for click, place in zip(session.clicks, session.placements, strict=True)}
+    for pair in outcome.pairs:
+        assert not pair.inlier or np.linalg.norm(pair.point_radar_m - at[pair.id]) < 1.0
+
+
+def test_clicks_in_any_order_give_the_same_bits() -> None:
+    session = simulate_scans(SimulationOptions(placements=6, seed=5, person=False))
+    clicks = [*session.clicks[:-1], replace(session.clicks[-1], excluded=True)]
+    forward, backward = (calibrate(order, session.scans, session.camera, MEASURED) for order in (clicks, clicks[::-1]))
+    assert isinstance(forward, Calibration)
+    assert isinstance(backward, Calibration)
+    assert forward.camera_from_radar.as_matrix().tobytes() == backward.camera_from_radar.as_matrix().tobytes()
+    assert [pair.id for pair in forward.pairs] == [pair.id for pair in backward.pairs]
+    assert [pair.excluded for pair in forward.pairs].count(True) == 1
