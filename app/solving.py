@@ -15,14 +15,12 @@ import numpy as np
 from app.option_changes import checked_options
 from app.resources import version
 from app.session import Outcome, Solved
-from calib_core.arrays import TimesNs
 from calib_core.association.pairing import pair_clicks
 from calib_core.calibration import calibrate, calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError, InputError
 from calib_core.interchange import (
     FrameNames,
-    InputFile,
     Provenance,
     read_camera_file,
     read_pairs,
@@ -30,11 +28,11 @@ from calib_core.interchange import (
 from calib_core.interchange import calibration_text as interchange_text
 from calib_core.measurements import Pair, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
-from calib_core.results import Calibration, PairResult
+from calib_core.recordings import Recording
+from calib_core.results import Calibration, InputFile, PairResult
 
 __all__ = [
     "RadarSource",
-    "RecordingSource",
     "SolverWorker",
     "calibration_text",
     "calibration_text_of_pairs",
@@ -48,60 +46,11 @@ __all__ = [
 _log = logging.getLogger(__name__)
 
 
-class Picture(Protocol):
-    """The size of a frame."""
-
-    @property
-    def width_px(self) -> int: ...
-    @property
-    def height_px(self) -> int: ...
-
-
-class HashedFile(Protocol):
-    """A file by its content."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def size_bytes(self) -> int: ...
-    @property
-    def sha256(self) -> str: ...
-
-
 class RadarSource(Protocol):
     """The part of a Recording that a solve needs."""
 
     def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans:
         """Return the scans within the half window of any of the times, each once, in order of time."""
-
-
-class RecordingSource(RadarSource, Protocol):
-    """The part of a Recording that the application needs besides."""
-
-    @property
-    def image_times(self) -> TimesNs: ...  # noqa: D102
-    @property
-    def radar_topic(self) -> str | None: ...  # noqa: D102
-    @property
-    def image_topic(self) -> str | None: ...  # noqa: D102
-    @property
-    def camera_info_topic(self) -> str | None: ...  # noqa: D102
-    @property
-    def radar_clock(self) -> str | None: ...  # noqa: D102
-    @property
-    def image_clock(self) -> str | None: ...  # noqa: D102
-    @property
-    def radar_axes(self) -> str | None: ...  # noqa: D102
-    @property
-    def video_start(self) -> str | None: ...  # noqa: D102
-    @property
-    def radar_frame(self) -> str: ...  # noqa: D102
-    @property
-    def camera_frame(self) -> str: ...  # noqa: D102
-
-    def camera(self) -> Camera | None: ...  # noqa: D102
-    def image_bytes(self, index: int, /) -> Picture: ...  # noqa: D102
-    def fingerprint(self) -> Sequence[HashedFile]: ...  # noqa: D102
 
 
 def solve_clicks(
@@ -181,7 +130,7 @@ def solve_pairs(text: str, source: str, options: CalibrationOptions) -> Outcome:
     return calibrate_pairs(pairs_file.pairs, pairs_file.camera, checked_options(pairs_file.options(options)))
 
 
-def camera_for(recording: RecordingSource, camera_file: Path | None) -> Camera | None:
+def camera_for(recording: Recording, camera_file: Path | None) -> Camera | None:
     """Return the intrinsics to solve with: the file's where one is given, else the recording's, else None.
 
     Raises:
@@ -199,10 +148,10 @@ def camera_for(recording: RecordingSource, camera_file: Path | None) -> Camera |
     return camera
 
 
-def calibration_text(calibration: Calibration, recording: RecordingSource) -> str:
+def calibration_text(calibration: Calibration, recording: Recording) -> str:
     """Write a calibration-1 file; the page and the command line give the same bytes for the same clicks."""
     provenance = Provenance(
-        inputs=tuple(InputFile(file.name, file.size_bytes, file.sha256) for file in recording.fingerprint()),
+        inputs=recording.fingerprint(),
         radar_topic=recording.radar_topic,
         image_topic=recording.image_topic,
         camera_info_topic=recording.camera_info_topic,
@@ -215,7 +164,7 @@ def calibration_text(calibration: Calibration, recording: RecordingSource) -> st
     return interchange_text(calibration, _frame_names(recording), provenance)
 
 
-def _frame_names(recording: RecordingSource) -> FrameNames:
+def _frame_names(recording: Recording) -> FrameNames:
     """Take the recording's names; a calibration must not be lost because a recorder named both frames alike."""
     usual = FrameNames()
     try:

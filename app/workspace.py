@@ -8,13 +8,14 @@ from typing import Protocol, TypeAlias
 
 from app.session import ClicksImported, History, RecordingFacts, Redo, Session, Solved, Step, Undo, advance, settled
 from app.session.file import Restored, open_session_file
-from app.solving import RecordingSource, SolverWorker
+from app.solving import SolverWorker
 from app.view import Reference, View, view
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import read_clicks, write_clicks
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
+from calib_core.recordings import Recording
 
 __all__ = ["Journal", "Solver", "Subscriber", "Workspace", "open_workspace", "recording_facts"]
 
@@ -183,7 +184,7 @@ class Workspace:
                     self._telling = False
 
 
-def recording_facts(recording: RecordingSource, name: str) -> RecordingFacts:
+def recording_facts(recording: Recording, name: str) -> RecordingFacts:
     """Return the little that clicks must fit.
 
     Args:
@@ -202,7 +203,7 @@ def recording_facts(recording: RecordingSource, name: str) -> RecordingFacts:
 
 
 def open_workspace(
-    recording: RecordingSource,
+    recording: Recording,
     *,
     camera: Camera | None,
     session_folder: Path,

@@ -15,6 +15,7 @@ __all__ = [
     "RadarScan",
     "RadarScans",
     "ReflectorClick",
+    "Stamp",
     "TimeNs",
     "Unpaired",
     "Unsolvable",
@@ -39,6 +40,24 @@ def time_from_parts(sec: int, nanosec: int) -> TimeNs:
 def time_parts(time: TimeNs) -> tuple[int, int]:
     """Split a stamp into whole seconds and the nanoseconds within the second."""
     return divmod(int(time), NS_PER_S)
+
+
+@dataclass(frozen=True, slots=True)
+class Stamp:
+    """A time as JSON carries it: two integers, because a JavaScript number cannot hold nanoseconds of today."""
+
+    sec: int
+    nanosec: int
+
+    @classmethod
+    def of(cls, time: TimeNs) -> "Stamp":
+        """Split a time in nanoseconds."""
+        return cls(*time_parts(time))
+
+    @property
+    def time(self) -> TimeNs:
+        """The same time in nanoseconds since the epoch."""
+        return time_from_parts(self.sec, self.nanosec)
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -8,7 +8,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 
-__all__ = ["Calibration", "CheckPoint", "DataWarning", "Metrics", "PairResult"]
+__all__ = ["Calibration", "CheckPoint", "DataWarning", "InputFile", "Metrics", "PairResult"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +24,21 @@ class DataWarning:
     code: str
     message: str
     hint: str
+
+
+@dataclass(frozen=True, slots=True)
+class InputFile:
+    """A file, or the files of a folder in order of their names, by its content: what a calibration was made from.
+
+    Attributes:
+        name: without its folder.
+        size_bytes: its length.
+        sha256: of its content, in hexadecimal.
+    """
+
+    name: str
+    size_bytes: int
+    sha256: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,8 +43,8 @@ export interface Figure {
   level: "plain" | "good" | "warning";
 }
 
-/** Something a person must decide on. */
-export interface WarningRow {
+/** Something about the data that a person must decide on. */
+export interface DataWarning {
   code: string;
   message: string;
   hint: string;
@@ -136,7 +136,7 @@ export interface View {
   clicks: ClickRow[];
   metrics: Figure[];
   pose: Figure[];
-  warnings: WarningRow[];
+  warnings: DataWarning[];
   options: CalibrationOptions;
   residual_limit_px: number | null;
   advice: Advice | null;
@@ -204,7 +204,7 @@ export interface RecordingNote {
   frame_times: StampColumns;
   start: Stamp;
   radar: StampColumns;
-  warnings: WarningRow[];
+  warnings: DataWarning[];
   sensors: SensorNote[];
   session: SessionNote;
   version: string;

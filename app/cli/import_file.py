@@ -32,8 +32,9 @@ class Import:
 
     def run(self) -> int:
         """Write the calibration; return the exit code."""
-        from calib_core.interchange import InputFile, Provenance, adopt, read_any_file, read_camera_file
+        from calib_core.interchange import Provenance, adopt, read_any_file, read_camera_file
         from calib_core.interchange import write_calibration as write
+        from calib_core.results import InputFile
 
         found = read_any_file(self.calibration)
         camera = read_camera_file(self.camera) if self.camera else None

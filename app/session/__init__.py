@@ -20,7 +20,7 @@ from app.session.events import (
     Undo,
 )
 from app.session.history import History, advance, settled
-from app.session.state import Outcome, RecordingFacts, Session, Stamp
+from app.session.state import Outcome, RecordingFacts, Session
 
 __all__ = [
     "Cleared",
@@ -39,7 +39,6 @@ __all__ = [
     "Redo",
     "Session",
     "Solved",
-    "Stamp",
     "Step",
     "Undo",
     "advance",

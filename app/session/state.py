@@ -6,31 +6,13 @@ from typing import TypeAlias
 import numpy as np
 
 from calib_core.arrays import TimesNs, frozen_array
-from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable, time_from_parts, time_parts
+from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, PairResult
 
-__all__ = ["Outcome", "RecordingFacts", "Session", "Stamp"]
+__all__ = ["Outcome", "RecordingFacts", "Session"]
 
 Outcome: TypeAlias = Calibration | Unsolvable
-
-
-@dataclass(frozen=True, slots=True)
-class Stamp:
-    """A time as JSON carries it: two integers, because a JavaScript number cannot hold nanoseconds of today."""
-
-    sec: int
-    nanosec: int
-
-    @classmethod
-    def of(cls, time: TimeNs) -> "Stamp":
-        """Split a time in nanoseconds."""
-        return cls(*time_parts(time))
-
-    @property
-    def time(self) -> TimeNs:
-        """The same time in nanoseconds since the epoch."""
-        return time_from_parts(self.sec, self.nanosec)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,11 +4,11 @@ from app.session import History, RecordingFacts, Session
 from app.view.advice import advice_for
 from app.view.click_rows import click_rows
 from app.view.figures import metric_figures, pose_figures, residual_limit_px
-from app.view.model import Stage, View, WarningRow
+from app.view.model import Stage, View
 from app.view.reference import Reference, comparison_figures, reference_words, shown_calibration
-from app.view.wording import sentence
+from app.view.wording import sentence, warning_in_sentences
 from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
-from calib_core.results import Calibration
+from calib_core.results import Calibration, DataWarning
 
 __all__ = ["view"]
 
@@ -131,7 +131,5 @@ def _agreement(calibration: Calibration) -> str:
     return f"Solved: {agreeing} of {len(used)} pairs agree"
 
 
-def _warnings(calibration: Calibration) -> tuple[WarningRow, ...]:
-    return tuple(
-        WarningRow(warning.code, sentence(warning.message), sentence(warning.hint)) for warning in calibration.warnings
-    )
+def _warnings(calibration: Calibration) -> tuple[DataWarning, ...]:
+    return tuple(map(warning_in_sentences, calibration.warnings))

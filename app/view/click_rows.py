@@ -4,12 +4,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from app.session import RecordingFacts, Session, Stamp
+from app.session import RecordingFacts, Session
 from app.view.model import ClickRow, ClickState, Ellipse
 from app.view.number_format import plain
 from app.view.wording import sentence
 from calib_core.arrays import Points2
-from calib_core.measurements import ReflectorClick, Unpaired
+from calib_core.measurements import ReflectorClick, Stamp, Unpaired
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 

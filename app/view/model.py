@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from app.session import Stamp
+from calib_core.measurements import Stamp
 from calib_core.options import CalibrationOptions, Method
+from calib_core.results import DataWarning
 
-__all__ = ["Advice", "ClickRow", "ClickState", "Ellipse", "Figure", "Level", "Stage", "View", "WarningRow"]
+__all__ = ["Advice", "ClickRow", "ClickState", "Ellipse", "Figure", "Level", "Stage", "View"]
 
 ClickState: TypeAlias = Literal["pending", "inlier", "outlier", "excluded", "unpaired"]
 Level: TypeAlias = Literal["plain", "good", "warning"]
@@ -89,21 +90,6 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
-class WarningRow:
-    """Something a person must decide on.
-
-    Attributes:
-        code: for programs; stable.
-        message: what is the matter, with figures.
-        hint: what to do about it.
-    """
-
-    code: str
-    message: str
-    hint: str
-
-
-@dataclass(frozen=True, slots=True)
 class Advice:
     """Where to put the reflector next.
 
@@ -165,7 +151,7 @@ class View:
     clicks: tuple[ClickRow, ...]
     metrics: tuple[Figure, ...]
     pose: tuple[Figure, ...]
-    warnings: tuple[WarningRow, ...]
+    warnings: tuple[DataWarning, ...]
     options: CalibrationOptions
     residual_limit_px: float | None
     advice: Advice | None = None

@@ -1,6 +1,10 @@
 """Phrases of the core as sentences on the screen."""
 
-__all__ = ["sentence"]
+from dataclasses import replace
+
+from calib_core.results import DataWarning
+
+__all__ = ["sentence", "warning_in_sentences"]
 
 
 def sentence(phrase: str) -> str:
@@ -10,3 +14,8 @@ def sentence(phrase: str) -> str:
         return ""
     start = phrase[0].upper() if phrase.split()[0].rstrip(",:;.…").isalpha() else phrase[0]
     return start + phrase[1:] + ("" if phrase[-1] in ".!?…" else ".")
+
+
+def warning_in_sentences(warning: DataWarning) -> DataWarning:
+    """Return the warning with message and hint as sentences."""
+    return replace(warning, message=sentence(warning.message), hint=sentence(warning.hint))

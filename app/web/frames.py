@@ -5,11 +5,13 @@ from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
-__all__ = ["EncodedPicture", "Frame", "FrameStore", "PictureSource", "Size"]
+from calib_core.recordings import Recording
+
+__all__ = ["Frame", "FrameStore", "Size"]
 
 Size = Literal["full", "half", "thumbnail"]
 
@@ -17,25 +19,6 @@ HALF_ABOVE_PX = 2_500_000
 """Pictures above this many pixels are halved while playing [px]."""
 THUMBNAIL_WIDTH_PX = 480
 _PROXY_QUALITY, _THUMBNAIL_QUALITY = 85, 80
-
-
-class EncodedPicture(Protocol):
-    """A compressed picture as the recording hands it out."""
-
-    @property
-    def data(self) -> bytes: ...  # noqa: D102
-    @property
-    def format(self) -> Literal["jpeg", "png"]: ...  # noqa: D102
-    @property
-    def width_px(self) -> int: ...  # noqa: D102
-    @property
-    def height_px(self) -> int: ...  # noqa: D102
-
-
-class PictureSource(Protocol):
-    """The part of a Recording that holds pictures."""
-
-    def image_bytes(self, index: int, /) -> EncodedPicture: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +45,7 @@ class Frame:
 class FrameStore:
     """Frames by index and size, the newest used kept in memory, each made once however many ask. Lives on one event loop."""
 
-    def __init__(self, source: PictureSource, count: int, executor: Executor, *, budget_bytes: int = 256 << 20) -> None:
+    def __init__(self, source: Recording, count: int, executor: Executor, *, budget_bytes: int = 256 << 20) -> None:
         self._source = source
         self._count = count
         self._executor = executor
@@ -140,12 +123,12 @@ def _retrieve(task: "asyncio.Task[Frame]") -> None:
         task.exception()
 
 
-def _full(source: PictureSource, index: int) -> Frame:
+def _full(source: Recording, index: int) -> Frame:
     picture = source.image_bytes(index)
     return Frame(index, picture.data, picture.format, picture.width_px, picture.height_px, 1.0)
 
 
-def _half(source: PictureSource, index: int) -> Frame:
+def _half(source: Recording, index: int) -> Frame:
     """Halve a large picture; a small one goes as it is."""
     full = _full(source, index)
     if full.width_px * full.height_px <= HALF_ABOVE_PX:
@@ -153,7 +136,7 @@ def _half(source: PictureSource, index: int) -> Frame:
     return _encoded(full, _decoded(full.data, 2), 0.5, _PROXY_QUALITY)
 
 
-def _thumbnail(source: PictureSource, index: int) -> Frame:
+def _thumbnail(source: Recording, index: int) -> Frame:
     """Shrink a picture for the frustum of the 3D view."""
     import cv2
 
@@ -191,4 +174,4 @@ def _encoded(full: Frame, pixels: np.ndarray, scale: float, quality: int) -> Fra
     return Frame(full.index, data.tobytes(), "jpeg", full.width_px, full.height_px, scale)
 
 
-_MAKERS: dict[Size, Callable[[PictureSource, int], Frame]] = {"full": _full, "half": _half, "thumbnail": _thumbnail}
+_MAKERS: dict[Size, Callable[[Recording, int], Frame]] = {"full": _full, "half": _half, "thumbnail": _thumbnail}

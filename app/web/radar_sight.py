@@ -2,36 +2,30 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from app.session import Session
+from app.solving import RadarSource
 from app.view import Reference, shown_calibration
 from app.web.messages import Overlay, OverlayReturn
 from calib_core.arrays import Flags, Points3
 from calib_core.association.gating import static_returns
 from calib_core.association.placements import Placement
-from calib_core.measurements import RadarScan, RadarScans, TimeNs
+from calib_core.measurements import RadarScan, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.results import Calibration
 
-__all__ = ["RadarSight", "Scans", "overlay_of", "still_returns"]
+__all__ = ["RadarSight", "overlay_of", "still_returns"]
 
 _NEAREST_WITHIN_S = 0.3
-
-
-class Scans(Protocol):
-    """The part of a Recording that holds radar scans."""
-
-    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
 class RadarSight:
     """Reads the radar around single moments."""
 
-    recording: Scans
+    recording: RadarSource
 
     def scan_at(self, time: TimeNs) -> RadarScan | None:
         """Return the scan nearest to a moment, rows without a position dropped; None when none is near."""

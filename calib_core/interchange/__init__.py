@@ -4,7 +4,6 @@ from calib_core.interchange.adopting import adopt, adopted_calibration
 from calib_core.interchange.calibration_file import (
     CalibrationFile,
     FrameNames,
-    InputFile,
     Provenance,
     choose_check_point,
 )
@@ -35,7 +34,6 @@ __all__ = [
     "Format",
     "FrameNames",
     "ImportedCalibration",
-    "InputFile",
     "PairsFile",
     "PixelDifference",
     "Provenance",

@@ -6,13 +6,12 @@ import numpy as np
 
 from calib_core.advice.angle_map import AngleMap
 from calib_core.errors import InputError
-from calib_core.results import Calibration, CheckPoint, PairResult
+from calib_core.results import Calibration, CheckPoint, InputFile, PairResult
 
 __all__ = [
     "EQUATION",
     "CalibrationFile",
     "FrameNames",
-    "InputFile",
     "Provenance",
     "UnknownResult",
     "choose_check_point",
@@ -64,21 +63,6 @@ def _checked_name(name: str, role: str) -> str:
     if len(shown) > 200:
         raise InputError(f"the {role} frame's name has {len(shown)} characters; take one of at most 200")
     return shown
-
-
-@dataclass(frozen=True, slots=True)
-class InputFile:
-    """A file that went in, by its content.
-
-    Attributes:
-        name: without its folder.
-        size_bytes: its length.
-        sha256: of its content, in hexadecimal.
-    """
-
-    name: str
-    size_bytes: int
-    sha256: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.description import clock_lines, describe
 from calib_core.recordings.first_picture import first_picture
-from calib_core.recordings.recording import InputFile, Recording, inspect_recording, open_recording, require_files
+from calib_core.recordings.recording import Recording, inspect_recording, open_recording, require_files
 from calib_core.recordings.selection import RecordingOptions
 from calib_core.recordings.summary import RecordingSummary, recording_summary
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
@@ -13,7 +13,6 @@ from calib_core.recordings.video_writing import WrittenVideo, write_video
 __all__ = [
     "ClockDiagnosis",
     "EncodedImage",
-    "InputFile",
     "Recording",
     "RecordingOptions",
     "RecordingSummary",

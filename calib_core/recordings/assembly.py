@@ -10,7 +10,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Stamp, TimeNs
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.camera.images import ImageLayout
 from calib_core.recordings.camera.recorded_intrinsics import recorded_camera
@@ -211,8 +211,8 @@ def _summary(
         type=topic.type,
         count=len(topic),
         kind=usage.kind,
-        start=TimeNs(int(times.min())) if len(times) else None,
-        end=TimeNs(int(times.max())) if len(times) else None,
+        start=Stamp.of(TimeNs(int(times.min()))) if len(times) else None,
+        end=Stamp.of(TimeNs(int(times.max()))) if len(times) else None,
         clock=diagnosis.chosen if diagnosis else "receive",
         problem=usage.problem,
         chosen=any(t and t.name == topic.name for t in (selection.radar, selection.image, selection.camera_info)),

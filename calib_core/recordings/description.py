@@ -2,17 +2,17 @@
 
 from collections.abc import Iterable, Sequence
 
+from calib_core.measurements import Stamp
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.summary import (
     CameraSummary,
     RadarSummary,
     RecordingSummary,
-    Stamp,
-    TopicReport,
     recording_summary,
 )
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.time.dates import span_text, utc
+from calib_core.recordings.topics import TopicSummary
 
 __all__ = ["clock_lines", "describe", "summary_text"]
 
@@ -71,7 +71,7 @@ def _seconds(stamp: Stamp) -> str:
     return f"{stamp.sec}.{stamp.nanosec // 1_000_000:03d}"
 
 
-def _topic_table(topics: Sequence[TopicReport]) -> list[str]:
+def _topic_table(topics: Sequence[TopicSummary]) -> list[str]:
     if not topics:
         return _labelled("topics", ["none"])
     rows = [("used as", "topic", "type", "messages", "rate", "longest gap", "jitter", "stamps")]
@@ -95,7 +95,7 @@ def _topic_table(topics: Sequence[TopicReport]) -> list[str]:
     return lines
 
 
-def _clocks(topics: Sequence[TopicReport]) -> list[str]:
+def _clocks(topics: Sequence[TopicSummary]) -> list[str]:
     """Say, topic by topic, which clock is used, why, and what is known about both."""
     lines = []
     for topic in topics:

@@ -3,7 +3,6 @@
 import hashlib
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -22,20 +21,11 @@ from calib_core.recordings.plain_files.opening import files_behind, open_plain_s
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.topics import TopicSummary
-from calib_core.results import DataWarning
+from calib_core.results import DataWarning, InputFile
 
-__all__ = ["InputFile", "Recording", "inspect_recording", "open_recording", "require_files"]
+__all__ = ["Recording", "inspect_recording", "open_recording", "require_files"]
 
 _HASH_BYTES = 1 << 22
-
-
-@dataclass(frozen=True, slots=True)
-class InputFile:
-    """A file, or the files of a folder in order of their names, by its contents: what a calibration was made from."""
-
-    name: str
-    size_bytes: int
-    sha256: str
 
 
 class Recording:

@@ -1,15 +1,14 @@
 """What a recording holds, as plain values: for `cocalib info --json` and the text beside it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.measurements import NS_PER_S, TimeNs, time_parts
+from calib_core.measurements import NS_PER_S, Stamp, TimeNs
 from calib_core.recordings.other_clocks import spare_clocks
 from calib_core.recordings.recording import Recording
-from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.topics import Rhythm, TopicSummary
 from calib_core.results import DataWarning
 
@@ -18,30 +17,10 @@ __all__ = [
     "FileSummary",
     "RadarSummary",
     "RecordingSummary",
-    "Stamp",
-    "TopicReport",
     "recording_summary",
 ]
 
 _SAMPLED_SCANS = 200
-
-
-@dataclass(frozen=True, slots=True)
-class Stamp:
-    """A time as files carry it."""
-
-    sec: int
-    nanosec: int
-
-    @classmethod
-    def of(cls, time: TimeNs | None) -> "Stamp | None":
-        """Split a stamp; None stays None."""
-        return None if time is None else cls(*time_parts(time))
-
-    @property
-    def time(self) -> TimeNs:
-        """The stamp in nanoseconds."""
-        return TimeNs(self.sec * NS_PER_S + self.nanosec)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,26 +30,6 @@ class FileSummary:
     name: str
     size_bytes: int
     container: str
-
-
-@dataclass(frozen=True, slots=True)
-class TopicReport:
-    """One topic; the attributes are those of TopicSummary. Clocks are known also of topics that could be used but are not."""
-
-    name: str
-    type: str
-    count: int
-    kind: str
-    chosen: bool
-    rate_hz: float | None
-    start: Stamp | None
-    end: Stamp | None
-    clock: str
-    longest_gap_s: float | None
-    jitter_s: float | None
-    layout: str
-    problem: str | None
-    clocks: ClockDiagnosis | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +110,7 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
     end: Stamp | None
     duration_s: float
     overlap_s: float | None
-    topics: tuple[TopicReport, ...]
+    topics: tuple[TopicSummary, ...]
     radar: RadarSummary | None
     camera: CameraSummary | None
     warnings: tuple[DataWarning, ...]
@@ -161,38 +120,19 @@ def recording_summary(recording: Recording) -> RecordingSummary:
     """Sum up an open recording; a few radar scans, one image, and the stamps of other topics that could be used are read."""
     spare = spare_clocks(recording)
     used = [topic for topic in recording.topics if topic.chosen and topic.kind in ("radar", "image")]
-    timed = [topic for topic in used or recording.topics if topic.start is not None and topic.end is not None]
-    start = min((topic.start for topic in timed if topic.start is not None), default=None)
-    end = max((topic.end for topic in timed if topic.end is not None), default=None)
+    timed = used or recording.topics
+    start = min((topic.start.time for topic in timed if topic.start is not None), default=None)
+    end = max((topic.end.time for topic in timed if topic.end is not None), default=None)
     return RecordingSummary(
         files=tuple(FileSummary(s.path.name, s.size_bytes, s.container) for s in recording.sources),
-        start=Stamp.of(start),
-        end=Stamp.of(end),
+        start=Stamp.of(start) if start is not None else None,
+        end=Stamp.of(end) if end is not None else None,
         duration_s=(end - start) / NS_PER_S if start is not None and end is not None else 0.0,
         overlap_s=_overlap_s(recording),
-        topics=tuple(_report(topic, spare.get(topic.name)) for topic in recording.topics),
+        topics=tuple(replace(topic, clocks=topic.clocks or spare.get(topic.name)) for topic in recording.topics),
         radar=_radar(recording),
         camera=_camera(recording),
         warnings=recording.warnings,
-    )
-
-
-def _report(topic: TopicSummary, spare: ClockDiagnosis | None) -> TopicReport:
-    return TopicReport(
-        name=topic.name,
-        type=topic.type,
-        count=topic.count,
-        kind=topic.kind,
-        chosen=topic.chosen,
-        rate_hz=topic.rate_hz,
-        start=Stamp.of(topic.start),
-        end=Stamp.of(topic.end),
-        clock=topic.clock,
-        longest_gap_s=topic.longest_gap_s,
-        jitter_s=topic.jitter_s,
-        layout=topic.layout,
-        problem=topic.problem,
-        clocks=topic.clocks or spare,
     )
 
 

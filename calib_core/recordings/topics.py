@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from calib_core.arrays import Indices, TimesNs
-from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.measurements import NS_PER_S, Stamp
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex, Source
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import Definition, definition_of
@@ -21,22 +21,22 @@ TopicKind = Literal["radar", "image", "camera-info", "other"]
 
 @dataclass(frozen=True, slots=True)
 class TopicSummary:
-    """A topic, for people and programs.
+    """A topic, for people and programs; these are the keys of `cocalib info --json`.
 
     Attributes:
         name: the topic.
         type: of its messages, as the recording spells it.
         count: messages.
         kind: what it can be used for.
+        chosen: it is the radar, image or camera-info topic in use.
+        rate_hz: messages per second, pauses between islands left out; None with fewer than two.
         start: stamp of the first message by the topic's clock; None without messages.
         end: of the last.
         clock: "header" or "receive": what start and end are by.
-        problem: why it cannot be used although its kind is right; None where all is well.
-        chosen: it is the radar, image or camera-info topic in use.
-        layout: what is read from it, in a few words; "" for kinds that need none.
-        rate_hz: messages per second, pauses between islands left out; None with fewer than two.
         longest_gap_s: longest time between neighbours [s]; None with fewer than two.
         jitter_s: median deviation of that time from its median [s]; None with fewer than two.
+        layout: what is read from it, in a few words; "" for kinds that need none.
+        problem: why it cannot be used although its kind is right; None where all is well.
         clocks: what is known about its two clocks; None where its messages were not looked into.
     """
 
@@ -44,15 +44,15 @@ class TopicSummary:
     type: str
     count: int
     kind: TopicKind
-    start: TimeNs | None
-    end: TimeNs | None
-    clock: Literal["header", "receive"]
-    problem: str | None
     chosen: bool
-    layout: str = ""
-    rate_hz: float | None = None
-    longest_gap_s: float | None = None
-    jitter_s: float | None = None
+    rate_hz: float | None
+    start: Stamp | None
+    end: Stamp | None
+    clock: Literal["header", "receive"]
+    longest_gap_s: float | None
+    jitter_s: float | None
+    layout: str
+    problem: str | None
     clocks: ClockDiagnosis | None = None
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import msgspec
 
-from app.session import RecordingFacts, Stamp
+from app.session import RecordingFacts
 from app.session.file.errors import SessionFileError
 from app.session.file.step_json import StampForm
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Stamp, TimeNs
 
 __all__ = ["SCHEMA", "RecordingForm", "recording_form", "require_same_recording"]
 

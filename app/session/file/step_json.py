@@ -16,11 +16,10 @@ from app.session import (
     ClicksImported,
     OptionsChanged,
     Redo,
-    Stamp,
     Step,
     Undo,
 )
-from calib_core.measurements import ReflectorClick
+from calib_core.measurements import ReflectorClick, Stamp
 
 __all__ = [
     "ClearedForm",

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 from urllib.parse import parse_qs
 
-from app.view import WarningRow, sentence
+from app.view import sentence, warning_in_sentences
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange import (
@@ -23,6 +23,7 @@ from calib_core.interchange import (
     parent_pose,
     read_any,
 )
+from calib_core.results import DataWarning
 
 __all__ = [
     "ExportPreview",
@@ -98,7 +99,7 @@ class ExportPreview:
     rotation: tuple[tuple[float, ...], ...]
     translation_m: tuple[float, ...]
     quaternion_xyzw: tuple[float, ...]
-    warnings: tuple[WarningRow, ...]
+    warnings: tuple[DataWarning, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +188,7 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         rotation=tuple(tuple(row) for row in pose.rotation.tolist()),
         translation_m=tuple(pose.translation_m.tolist()),
         quaternion_xyzw=(*wxyz[1:], wxyz[0]),
-        warnings=tuple(WarningRow(row.code, sentence(row.message), sentence(row.hint)) for row in warnings),
+        warnings=tuple(map(warning_in_sentences, warnings)),
     )
 
 

@@ -2,18 +2,16 @@
 
 import asyncio
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
-from pathlib import Path
 from typing import Protocol
 
 from app.resources import version
-from app.session import Stamp
-from app.view import View, WarningRow, sentence
+from app.view import View, warning_in_sentences
 from app.web.channel.outbox import Outbox
 from app.web.channel.radar_survey import Survey, survey_of
-from app.web.frames import EncodedPicture, FrameStore
+from app.web.frames import FrameStore
 from app.web.messages import (
     Outgoing,
     Placements,
@@ -26,41 +24,14 @@ from app.web.messages import (
 )
 from app.web.radar_sight import RadarSight
 from app.workspace import Workspace
-from calib_core.arrays import TimesNs
-from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
-from calib_core.measurements import RadarScans, TimeNs
-from calib_core.recordings import TopicSummary, clock_lines
-from calib_core.results import DataWarning
+from calib_core.measurements import Stamp, TimeNs
+from calib_core.recordings import Recording, TopicSummary, clock_lines
 
-__all__ = ["Hub", "PageRecording", "Tab"]
+__all__ = ["Hub", "Tab"]
 
 _SEARCHING = "Searching the radar for the reflector"
 _log = logging.getLogger(__name__)
-
-
-class PageRecording(Protocol):
-    """The part of a Recording that the page needs."""
-
-    @property
-    def paths(self) -> Sequence[Path]: ...  # noqa: D102
-    @property
-    def radar_topic(self) -> str | None: ...  # noqa: D102
-    @property
-    def image_topic(self) -> str | None: ...  # noqa: D102
-    @property
-    def topics(self) -> Sequence[TopicSummary]: ...  # noqa: D102
-    @property
-    def warnings(self) -> Sequence[DataWarning]: ...  # noqa: D102
-    @property
-    def image_times(self) -> TimesNs: ...  # noqa: D102
-    @property
-    def radar_times(self) -> TimesNs: ...  # noqa: D102
-
-    def camera(self) -> Camera | None: ...  # noqa: D102
-    def image_bytes(self, index: int, /) -> EncodedPicture: ...  # noqa: D102
-    def radar_windows(self) -> Iterator[RadarScans]: ...  # noqa: D102
-    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans: ...  # noqa: D102
 
 
 class Tab(Protocol):
@@ -75,7 +46,7 @@ class Tab(Protocol):
 class Hub:
     """Lives on viser's event loop, but for the workspace's callback."""
 
-    def __init__(self, workspace: Workspace, recording: PageRecording, executor: Executor) -> None:
+    def __init__(self, workspace: Workspace, recording: Recording, executor: Executor) -> None:
         self.workspace = workspace
         self.recording = recording
         self.executor = executor
@@ -156,10 +127,7 @@ class Hub:
             frame_times=StampColumns.of(facts.image_times),
             start=Stamp.of(TimeNs(int(facts.image_times[0]))),
             radar=StampColumns.of(recording.radar_times),
-            warnings=tuple(
-                WarningRow(row.code, sentence(row.message), sentence(row.hint))
-                for row in (*restored.warnings, *recording.warnings)
-            ),
+            warnings=tuple(map(warning_in_sentences, (*restored.warnings, *recording.warnings))),
             sensors=(
                 _sensor("radar", recording.radar_topic, recording.topics),
                 _sensor("camera", recording.image_topic, recording.topics),

@@ -8,10 +8,10 @@ from typing import Literal, TypeAlias
 import msgspec
 
 from app.option_changes import OptionGroup, option_groups
-from app.session import Stamp
-from app.view import View, WarningRow
+from app.view import View
 from calib_core.arrays import TimesNs
-from calib_core.measurements import NS_PER_S
+from calib_core.measurements import NS_PER_S, Stamp
+from calib_core.results import DataWarning
 
 __all__ = [
     "TYPES",
@@ -127,7 +127,7 @@ class RecordingNote:
     frame_times: StampColumns
     start: Stamp
     radar: StampColumns
-    warnings: tuple[WarningRow, ...]
+    warnings: tuple[DataWarning, ...]
     sensors: tuple[SensorNote, ...]
     session: SessionNote
     version: str

@@ -13,7 +13,7 @@ from typing import Protocol
 import msgspec
 
 from app.session import Session
-from app.solving import RecordingSource, calibration_text
+from app.solving import calibration_text
 from app.view import sentence
 from app.web.channel.export_preview import NoPreview, export_preview, exported, format_rows
 from app.web.channel.radar_survey import Survey
@@ -21,6 +21,7 @@ from app.workspace import Workspace
 from calib_core.errors import CalibrationError
 from calib_core.interchange import FORMATS, CalibrationFile, read_calibration
 from calib_core.measurements import MIN_PAIRS, Unsolvable
+from calib_core.recordings import Recording
 from calib_core.results import Calibration
 
 __all__ = ["Reply", "Routes", "refusal"]
@@ -107,7 +108,7 @@ class Routes:
         self._files["/"] = self._files["/index.html"]
         self._made: Mapping[str, Callable[[str], Reply]] | None = None
 
-    def admit(self, workspace: Workspace, recording: RecordingSource, hub: Surveyor) -> None:
+    def admit(self, workspace: Workspace, recording: Recording, hub: Surveyor) -> None:
         """Answer for this recording from now on."""
         self._made = _Downloads(workspace, recording, hub).by_path()
 
@@ -133,7 +134,7 @@ class Routes:
 class _Downloads:
     """What is made of a recording's session when it is asked for."""
 
-    def __init__(self, workspace: Workspace, recording: RecordingSource, hub: Surveyor) -> None:
+    def __init__(self, workspace: Workspace, recording: Recording, hub: Surveyor) -> None:
         self._workspace = workspace
         self._recording = recording
         self._hub = hub

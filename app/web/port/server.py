@@ -8,7 +8,7 @@ import secrets
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import websockets
@@ -17,25 +17,20 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from app.resources import state_folder, static_folder
-from app.solving import RecordingSource
 from app.web.channel.channel import Channel, Socket
-from app.web.channel.hub import Hub, PageRecording
-from app.web.frames import EncodedPicture
+from app.web.channel.hub import Hub
 from app.web.port import guard as doors
 from app.web.port.routes import Reply, Routes, refusal
 from app.web.port.viser_hook import ProcessRequest, SocketHandler, start_viser
 from app.web.port.waiting import WaitingRoom
 from app.web.view3d.scene import FIELD_OF_VIEW_RAD, LOOK_AT, STAND_AT, TabScene
 from app.workspace import Workspace
+from calib_core.recordings import EncodedImage, Recording
 
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["RunningServer", "ServedRecording", "ServerOptions", "start"]
-
-
-class ServedRecording(PageRecording, RecordingSource, Protocol):
-    """What a Recording must offer to be served."""
+__all__ = ["RunningServer", "ServerOptions", "start"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +77,7 @@ class RunningServer:
         self._viser.on_client_connect(self._space_came)
         self._viser.on_client_disconnect(self._space_went)
 
-    def admit(self, workspace: Workspace, recording: ServedRecording) -> None:
+    def admit(self, workspace: Workspace, recording: Recording) -> None:
         """Serve this recording from now on; pages that wait go on with it."""
         hub = Hub(workspace, recording, self._executor)
 
@@ -94,7 +89,7 @@ class RunningServer:
 
         asyncio.run_coroutine_threadsafe(open_up(), self._viser.get_event_loop()).result()
 
-    def show(self, picture: EncodedPicture) -> None:
+    def show(self, picture: EncodedImage) -> None:
         """Show pages that wait for the recording a picture of it.
 
         Raises:
@@ -200,7 +195,7 @@ class RunningServer:
                     self._channels[tab].scene = None
 
 
-def start(workspace: Workspace, recording: ServedRecording, options: ServerOptions) -> RunningServer:
+def start(workspace: Workspace, recording: Recording, options: ServerOptions) -> RunningServer:
     """Start to serve a recording; returns once the port answers."""
     server = RunningServer(options, WaitingRoom())
     server.admit(workspace, recording)

@@ -10,13 +10,13 @@ from types import TracebackType
 from typing import Self
 
 from app.view import sentence
-from app.web.frames import EncodedPicture
 from app.web.messages import Opening
 from app.web.port.guard import is_loopback
-from app.web.port.server import RunningServer, ServedRecording, ServerOptions
+from app.web.port.server import RunningServer, ServerOptions
 from app.web.port.waiting import WaitingRoom
 from app.workspace import Workspace
 from calib_core.errors import CalibrationError
+from calib_core.recordings import EncodedImage, Recording
 
 __all__ = ["Service"]
 
@@ -33,7 +33,7 @@ class Service:
         self,
         options: ServerOptions,
         opening: Opening,
-        first_picture: Callable[[], EncodedPicture | None],
+        first_picture: Callable[[], EncodedImage | None],
         *,
         let_in_after_s: float,
     ) -> None:
@@ -68,7 +68,7 @@ class Service:
     ) -> None:
         self._end(error)
 
-    def serve(self, workspace: Workspace, recording: ServedRecording) -> None:
+    def serve(self, workspace: Workspace, recording: Recording) -> None:
         """Serve what has been opened until Ctrl+C.
 
         Raises:
@@ -119,7 +119,7 @@ class Service:
         return server
 
 
-def _show(server: RunningServer, picture: "Future[EncodedPicture | None]") -> None:
+def _show(server: RunningServer, picture: "Future[EncodedImage | None]") -> None:
     """Show the first picture, if there is one; opening the recording tells what is wrong with it."""
     if picture.exception() is not None:
         _log.warning("the first picture could not be read: %s", picture.exception())

@@ -4,8 +4,8 @@ import asyncio
 from collections import deque
 
 from app.web.channel.channel import Socket
-from app.web.frames import EncodedPicture
 from app.web.messages import FrameHeader, Opening, encode, encode_frame
+from calib_core.recordings import EncodedImage
 
 __all__ = ["WaitingRoom"]
 
@@ -25,7 +25,7 @@ class WaitingRoom:
         self._over = False
         self._waiting: set[asyncio.Task[None]] = set()
 
-    def show(self, picture: EncodedPicture) -> None:
+    def show(self, picture: EncodedImage) -> None:
         """Show a picture. It is no frame yet: it has no place among them and no time."""
         header = FrameHeader(-1, 0, picture.width_px, picture.height_px, 1.0, picture.format)
         self._add(encode_frame(header, picture.data))

@@ -1,7 +1,8 @@
 """Where a calibration comes from, in a calibration-1 file."""
 
-from calib_core.interchange.calibration_file import InputFile, Provenance
+from calib_core.interchange.calibration_file import Provenance
 from calib_core.interchange.own import documents
+from calib_core.results import InputFile
 
 __all__ = ["provenance_document", "provenance_of"]
 

@@ -21,14 +21,13 @@ from app.session import (
     Redo,
     Session,
     Solved,
-    Stamp,
     Undo,
     advance,
     apply,
     settled,
 )
 from calib_core.errors import CalibrationError, OptionError
-from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
+from calib_core.measurements import ReflectorClick, Stamp, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, NoiseOptions
 
 START_NS = 1_700_000_000_123_456_789

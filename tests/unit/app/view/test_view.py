@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Stamp, Undo, advance
-from app.view import View, WarningRow, summary_lines, view
+from app.session import ClickExcluded, ClickMoved, ClickPlaced, History, RecordingFacts, Solved, Undo, advance
+from app.view import View, summary_lines, view
 from app.view.click_rows import ellipse_of
 from app.view.figures import pose_figures
 from app.view.mounting import OPTICAL_FROM_BODY, mounting_of
@@ -15,7 +15,7 @@ from app.view.wording import sentence
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.measurements import TimeNs, Unpaired, Unsolvable
+from calib_core.measurements import Stamp, TimeNs, Unpaired, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, Metrics, PairResult
@@ -244,7 +244,7 @@ def test_a_pose_without_covariance_is_shown_without_one() -> None:
 
 def test_warnings_are_shown_as_sentences_and_the_first_is_the_next_thing_to_do() -> None:
     seen = shown(5, calibration(*FIVE, warnings=(DataWarning("few-pairs", "only 5 pairs", "add placements"),)))
-    assert seen.warnings == (WarningRow("few-pairs", "Only 5 pairs.", "Add placements."),)
+    assert seen.warnings == (DataWarning("few-pairs", "Only 5 pairs.", "Add placements."),)
     assert seen.hint == "Add placements."
 
 

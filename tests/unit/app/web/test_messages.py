@@ -23,7 +23,6 @@ from app.session import (
     OptionsEdited,
     RecordingFacts,
     Redo,
-    Stamp,
     Undo,
     advance,
 )
@@ -52,7 +51,7 @@ from app.web.messages import (
 )
 from app.web.messages.typescript import declarations
 from calib_core.errors import CalibrationError, InputError, OptionError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import Stamp, TimeNs
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(3), width_px=640, height_px=480)
 
