@@ -1,6 +1,5 @@
 """Rigid motion: target_from_source, and the algebra of it."""
 
-import math
 from dataclasses import dataclass
 from typing import overload
 
@@ -30,24 +29,16 @@ def skew(vector: Vector3) -> Matrix33:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def rotation_exp(rotation_vector_rad: Vector3) -> Matrix33:
-    """Turn a rotation vector into a matrix by Rodrigues' formula, with its series near zero."""
-    angle = math.hypot(*rotation_vector_rad)
-    K = skew(np.asarray(rotation_vector_rad, dtype=np.float64))
-    if angle < _SMALL_ANGLE_RAD:
-        return np.eye(3) + K + 0.5 * K @ K
-    return np.eye(3) + math.sin(angle) / angle * K + (1.0 - math.cos(angle)) / angle**2 * K @ K
-
-
-def rotations_exp(rotation_vectors_rad: np.ndarray) -> np.ndarray:
-    """Turn rotation vectors (n, 3) into matrices (n, 3, 3), as `rotation_exp` does one."""
-    angles = np.linalg.norm(rotation_vectors_rad, axis=1)[:, None, None]
-    small = angles < _SMALL_ANGLE_RAD
-    safe = np.where(small, 1.0, angles)
-    x, y, z = rotation_vectors_rad.T
-    K = np.zeros((len(rotation_vectors_rad), 3, 3))
-    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -z, y, -x
-    K[:, 1, 0], K[:, 2, 0], K[:, 2, 1] = z, -y, x
+def rotation_exp(rotation_vector_rad: np.ndarray) -> np.ndarray:
+    """Turn rotation vectors (..., 3) into matrices (..., 3, 3) by Rodrigues' formula, with its series near zero."""
+    vector = np.asarray(rotation_vector_rad, dtype=np.float64)
+    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
+    angle = np.sqrt(x * x + y * y + z * z)[..., None, None]
+    small = angle < _SMALL_ANGLE_RAD
+    safe = np.where(small, 1.0, angle)
+    K = np.zeros((*vector.shape, 3))
+    K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -z, y, -x
+    K[..., 1, 0], K[..., 2, 0], K[..., 2, 1] = z, -y, x
     first = np.where(small, 1.0, np.sin(safe) / safe)
     second = np.where(small, 0.5, (1.0 - np.cos(safe)) / safe**2)
     return np.asarray(np.eye(3) + first * K + second * (K @ K))

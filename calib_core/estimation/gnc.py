@@ -13,7 +13,7 @@ import numpy as np
 from calib_core.arrays import Indices, Values
 from calib_core.estimation.linearization import Linearization, MeasurementPlanes
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.geometry import RigidTransform, rotations_exp
+from calib_core.geometry import RigidTransform, rotation_exp
 
 __all__ = ["GncSolution", "associate", "log_odds_of", "mixture_cost", "normal_equations", "solve_gnc"]
 
@@ -54,7 +54,7 @@ class _Poses:
         return cls(np.array([one.rotation for one in poses]), np.array([one.translation_m for one in poses]))
 
     def perturbed(self, steps: np.ndarray) -> "_Poses":
-        return _Poses(rotations_exp(steps[:, 3:]) @ self.rotations, self.translations_m + steps[:, :3])
+        return _Poses(rotation_exp(steps[:, 3:]) @ self.rotations, self.translations_m + steps[:, :3])
 
     def some(self, which: Sequence[int]) -> "_Poses":
         return _Poses(self.rotations[which], self.translations_m[which])
