@@ -1,5 +1,6 @@
 """From clicks to an answer: the one function that page and command line share, and the worker that runs it for the page."""
 
+import dataclasses
 import hashlib
 import logging
 import threading
@@ -8,7 +9,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -16,12 +17,15 @@ from app.option_changes import checked_options
 from app.resources import version
 from app.session import Outcome, Solved
 from calib_core.association.pairing import pair_clicks
-from calib_core.calibration import calibrate, calibrate_pairs
+from calib_core.calibration import calibrate, calibrate_pairs, solve_again
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError, InputError
 from calib_core.interchange import (
+    CALIBRATION_SCHEMA,
     FrameNames,
     Provenance,
+    names_schema,
+    read_calibration,
     read_camera_file,
     read_pairs,
 )
@@ -115,7 +119,10 @@ def half_window_s(options: CalibrationOptions) -> float:
 
 
 def solve_pairs(text: str, source: str, options: CalibrationOptions) -> Outcome:
-    """Solve for camera_from_radar from the text of a pairs-1 file; what the file says about noise wins over the options.
+    """Solve for camera_from_radar from the text of a pairs-1 file, or again from that of a calibration-1 file.
+
+    What a pairs-1 file says about noise wins over the options. A calibration-1 file brings its own options; of the given
+    ones those count that differ from the defaults.
 
     Args:
         text: the file's content.
@@ -123,11 +130,34 @@ def solve_pairs(text: str, source: str, options: CalibrationOptions) -> Outcome:
         options: what steers the solve.
 
     Raises:
-        InputError: the text is not a file of pairs.
+        InputError: the text is neither, or a calibration without the candidates of its pairs.
         OptionError: an option, or what the file says about noise, is out of range.
     """
-    pairs_file = read_pairs(text, source, noise=checked_options(options).noise)
+    checked_options(options)
+    if names_schema(text, CALIBRATION_SCHEMA):
+        calibration = read_calibration(text, source).calibration
+        again = checked_options(_over(calibration.options, options))
+        try:
+            return solve_again(calibration, again)
+        except InputError as error:
+            raise InputError(f"{source}: {error}") from None
+    pairs_file = read_pairs(text, source, noise=options.noise)
     return calibrate_pairs(pairs_file.pairs, pairs_file.camera, checked_options(pairs_file.options(options)))
+
+
+def _over(base: CalibrationOptions, given: CalibrationOptions) -> CalibrationOptions:
+    """Lay those options over the base that differ from the defaults."""
+    usual = CalibrationOptions()
+    changes: dict[str, Any] = {}
+    for group in dataclasses.fields(usual):
+        old, new, default = (getattr(options, group.name) for options in (base, given, usual))
+        if dataclasses.is_dataclass(default):
+            values = {one.name: getattr(new, one.name) for one in dataclasses.fields(default)}
+            chosen = {name: value for name, value in values.items() if value != getattr(default, name)}
+            changes[group.name] = dataclasses.replace(old, **chosen)
+        elif new != default:
+            changes[group.name] = new
+    return dataclasses.replace(base, **changes)
 
 
 def camera_for(recording: Recording, camera_file: Path | None) -> Camera | None:
@@ -175,7 +205,7 @@ def _frame_names(recording: Recording) -> FrameNames:
 
 
 def calibration_text_of_pairs(calibration: Calibration, text: str, name: str) -> str:
-    """Write a calibration-1 file of a calibration that came from a pairs-1 file.
+    """Write a calibration-1 file of a calibration that came from a pairs-1 file, or again from a calibration-1 file.
 
     Args:
         calibration: what was solved.
@@ -183,8 +213,12 @@ def calibration_text_of_pairs(calibration: Calibration, text: str, name: str) ->
         name: its name without the folder.
     """
     data = text.encode()
-    pairs_file = InputFile(name, len(data), hashlib.sha256(data).hexdigest())
-    return interchange_text(calibration, provenance=Provenance(inputs=(pairs_file,), version=version()))
+    origin = InputFile(name, len(data), hashlib.sha256(data).hexdigest())
+    if names_schema(text, CALIBRATION_SCHEMA):
+        file = read_calibration(text, name)
+        provenance = dataclasses.replace(file.provenance, inputs=(origin,), version=version())
+        return interchange_text(calibration, file.frames, provenance)
+    return interchange_text(calibration, provenance=Provenance(inputs=(origin,), version=version()))
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,29 +5,31 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Values
+from calib_core.advice.angle_map import learn_angle_map
+from calib_core.advice.next_placement import next_placement
+from calib_core.arrays import Values
+from calib_core.association.clustering import candidate_at
 from calib_core.association.pairing import pair_clicks
 from calib_core.camera import Camera
 from calib_core.diagnostics.checks import warnings_of
-from calib_core.diagnostics.clocks import clocks
+from calib_core.diagnostics.clocks import CLOCK_CODES, clocks
 from calib_core.diagnostics.solved_fit import SolvedFit
-from calib_core.estimation.covariance import LeftOut, leave_one_out, pose_covariance
+from calib_core.errors import InputError
+from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution, associate, solve_gnc
 from calib_core.estimation.influential_pairs import average_over_influential_pairs, find_influential_pairs
 from calib_core.estimation.initialization import initial_poses
-from calib_core.estimation.linearization import Linearization
+from calib_core.estimation.leave_one_out import leave_one_out
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.estimation.mirror_test import MIRRORED_GAIN, mirror_gain
+from calib_core.estimation.pair_results import excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
-from calib_core.metrics import distances, metrics_of
 from calib_core.options import CalibrationOptions
-from calib_core.radar import cartesian_from_polar
-from calib_core.results import Calibration, Metrics, PairResult
+from calib_core.results import Calibration
 
-__all__ = ["calibrate", "calibrate_pairs"]
+__all__ = ["calibrate", "calibrate_pairs", "solve_again"]
 
-_INLIER_PROBABILITY = 0.5
 _STARTS_MEASURED = 3
 _STARTS_FREE = 6
 _OPEN_ROTATION_RAD = 0.5  # a rotation less certain than that is not known
@@ -38,7 +40,7 @@ _PAIRS_TO_START = 150  # more do not make a start better
 
 
 def calibrate(
-    clicks: Sequence[ReflectorClick], scans: RadarScans, camera: Camera, options: CalibrationOptions
+    clicks: Sequence[ReflectorClick], scans: RadarScans, camera: Camera, options: CalibrationOptions | None = None
 ) -> Calibration | Unsolvable:
     """Calibrate from clicks and radar scans.
 
@@ -46,8 +48,9 @@ def calibrate(
         clicks: in any order; excluded ones are paired and shown, but not used.
         scans: at least those around the clicks.
         camera: the intrinsics.
-        options: method "paper" is Algorithm 1 as printed.
+        options: None takes the defaults; method "paper" is Algorithm 1 as printed.
     """
+    options = options or CalibrationOptions()
     if options.method == "paper":
         from calib_core.paper.algorithm_1 import calibrate_as_printed
 
@@ -61,22 +64,62 @@ def calibrate(
 
 
 def calibrate_pairs(
-    pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, excluded: frozenset[str] = frozenset()
+    pairs: Sequence[Pair],
+    camera: Camera,
+    options: CalibrationOptions | None = None,
+    excluded: frozenset[str] = frozenset(),
 ) -> Calibration | Unsolvable:
     """Calibrate from pairs that exist already, such as those of a pairs file.
 
     Args:
         pairs: in any order; results come in order of image time, pairs without a time in the order given.
         camera: the intrinsics.
-        options: method "paper" is Algorithm 1 as printed, from its RANSAC on.
+        options: None takes the defaults; method "paper" is Algorithm 1 as printed, from its RANSAC on.
         excluded: ids of pairs that are shown, but not used.
     """
+    options = options or CalibrationOptions()
     if options.method == "paper":
         from calib_core.paper.algorithm_1 import solve_pairs_as_printed
 
         return solve_pairs_as_printed(pairs, camera, options, excluded)
     shown = sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))
     return _solved(tuple(shown), (), excluded, camera, options)
+
+
+def solve_again(calibration: Calibration, options: CalibrationOptions | None = None) -> Calibration | Unsolvable:
+    """Calibrate from the pairs that a calibration kept: with the same options the answer is the same, to the last bit.
+
+    What only the recording can tell is taken over: clicks without a radar position, and the warnings about clocks.
+
+    Args:
+        calibration: solved here, or read from a calibration-1 file.
+        options: what to solve with; None takes the calibration's own.
+
+    Raises:
+        InputError: the calibration does not hold the candidates of its pairs.
+    """
+    kept = [pair.measured for pair in calibration.pairs if pair.measured is not None]
+    if not kept or len(kept) < len(calibration.pairs):
+        raise InputError(
+            f"{len(calibration.pairs) - len(kept)} of {len(calibration.pairs)} pairs come without their candidates, as in "
+            "files of version 0.1 and of other tools; solve from the recording and the clicks"
+        )
+    options = options or calibration.options
+    if options.method != "paper":
+        kept = [_with_noise(pair, options) for pair in kept]
+    excluded = frozenset(pair.id for pair in calibration.pairs if pair.excluded)
+    outcome = calibrate_pairs(kept, calibration.camera, options, excluded)
+    if isinstance(outcome, Unsolvable):
+        return replace(outcome, unpaired=calibration.unpaired)
+    clock_warnings = [warning for warning in calibration.warnings if warning.code in CLOCK_CODES]
+    return replace(outcome, unpaired=calibration.unpaired, warnings=(*outcome.warnings, *clock_warnings))
+
+
+def _with_noise(pair: Pair, options: CalibrationOptions) -> Pair:
+    """Give candidates of the paper's method, which assumes no noise, the assumed one."""
+    if all(np.isfinite(candidate.sigma_polar).all() for candidate in pair.candidates):
+        return pair
+    return replace(pair, candidates=tuple(candidate_at(one.position_radar_m, options.noise) for one in pair.candidates))
 
 
 def _solved(
@@ -101,7 +144,7 @@ def _solved(
     left_out = leave_one_out(refined, uncertainty.information)
     doubts = find_influential_pairs(measurements, refined, uncertainty.information)
     refined, uncertainty = average_over_influential_pairs(refined, uncertainty, doubts)
-    metrics = _metrics(measurements, refined, left_out)
+    metrics = fit_metrics(measurements, refined, left_out)
     findings = SolvedFit(
         ids=tuple(pair.id for pair in used),
         measurements=measurements,
@@ -109,13 +152,15 @@ def _solved(
         uncertainty=uncertainty,
         left_out=left_out,
         doubts=doubts,
-        inliers=_inliers(refined),
+        inliers=refined.inliers,
         alternatives=fit.found,
         mirror_gain=fit.mirror_gain,
         chi2_per_degree=metrics.chi2 / max(metrics.degrees_of_freedom, 1),
     )
-    results = _used_results(used, refined, left_out) | _excluded_results(shown, excluded, refined, camera, options)
-    return Calibration(
+    results = used_pair_results(used, refined, left_out) | excluded_pair_results(
+        shown, excluded, refined, camera, options
+    )
+    calibration = Calibration(
         camera_from_radar=refined.camera_from_radar,
         covariance=uncertainty.covariance,
         camera=camera,
@@ -126,6 +171,12 @@ def _solved(
         options=options,
         noise_scale=_four(refined.noise_scale),
         covariance_quantile=uncertainty.quantile,
+    )
+    angle_map = learn_angle_map(calibration)
+    return replace(
+        calibration,
+        angle_map=angle_map if angle_map is not None and angle_map.pays else None,
+        next_placement=next_placement(calibration),
     )
 
 
@@ -171,20 +222,16 @@ def _best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> _F
     if not _beyond_doubt(measurements, refined):
         fitted = refined if few is measurements else None
         gain = mirror_gain(few, found[0], plain=fitted, estimate_scale=estimate_scale, seed=seed)
-    inliers = int(_inliers(refined).sum())
+    inliers = int(refined.inliers.sum())
     if inliers < MIN_PAIRS:
         reason = f"only {inliers} of {len(measurements)} pairs agree on any pose"
         return _mirrored(reason) if gain > MIRRORED_GAIN else _no_pose(reason)
     return _Fit(refined, found, gain)
 
 
-def _inliers(refined: ErrorsInVariablesFit) -> Flags:
-    return np.asarray(refined.weights > _INLIER_PROBABILITY)
-
-
 def _beyond_doubt(measurements: PairMeasurements, refined: ErrorsInVariablesFit) -> bool:
     """Tell whether pairs and a measured camera position agree so well that mirrored axes are out of the question."""
-    agreeing = _inliers(refined).mean() >= _AGREEING_SHARE and float(refined.noise_scale.max()) < _PLAUSIBLE_SCALE
+    agreeing = refined.inliers.mean() >= _AGREEING_SHARE and float(refined.noise_scale.max()) < _PLAUSIBLE_SCALE
     assumed = associate(measurements, refined.camera_from_radar)[1].squared.mean() / 2.0
     agreeing = agreeing and float(assumed) < _PLAUSIBLE_SCALE**2
     prior_residual = measurements.prior.rows(refined.camera_from_radar)[0]
@@ -220,81 +267,3 @@ def _no_pose(reason: str) -> Unsolvable:
         "check that clicks and radar belong to the same moments, that the intrinsics are of this camera at this image "
         "size, and that the placements are spread over the picture",
     )
-
-
-def _metrics(measurements: PairMeasurements, refined: ErrorsInVariablesFit, left_out: LeftOut) -> Metrics:
-    """Measure the inlier pairs; chi2 is by the noise as assumed, so that a wrong assumption shows."""
-    inliers = _inliers(refined)
-    points = cartesian_from_polar(measurements.polar[refined.rows])
-    projected = measurements.camera.project(refined.camera_from_radar @ points)
-    errors = distances(projected, measurements.pixels_px)
-    assumed = associate(measurements, refined.camera_from_radar)[1]
-    return metrics_of(
-        errors[inliers],
-        held_out_distances_px=left_out.distance_px[inliers],
-        chi2=float(assumed.squared[inliers].sum()),
-        degrees_of_freedom=2 * int(inliers.sum()) - (3 if measurements.prior.measured else 6),
-    )
-
-
-def _used_results(used: Sequence[Pair], refined: ErrorsInVariablesFit, left_out: LeftOut) -> dict[str, PairResult]:
-    measurements = refined.measurements
-    points = cartesian_from_polar(measurements.polar[refined.rows])
-    projected = measurements.camera.project(refined.camera_from_radar @ points)
-    inliers, expected = _inliers(refined), _residual_covariances(refined.model)
-    return {
-        pair.id: PairResult(
-            id=pair.id,
-            pixel_px=pair.pixel_px,
-            projected_px=projected[i],
-            point_radar_m=pair.candidates[chosen].position_radar_m,
-            inlier=bool(inliers[i]),
-            outlier_probability=float(1.0 - refined.weights[i]),
-            influence=float(left_out.influence[i]),
-            candidate=chosen,
-            expected_covariance_px2=expected[i],
-            image_time=pair.image_time,
-        )
-        for i, pair in enumerate(used)
-        for chosen in (int(refined.rows[i] - measurements.first[i]),)
-    }
-
-
-def _residual_covariances(model: Linearization) -> np.ndarray:
-    """Recover S = W^-1 W^-T of each pair (n, 2, 2); NaN where the camera does not see the position."""
-    unseen = np.asarray(~model.whitening.any(axis=(1, 2)))
-    inverse = np.linalg.inv(np.where(unseen[:, None, None], np.eye(2), model.whitening))
-    inverse[unseen] = np.nan
-    return np.asarray(inverse @ np.swapaxes(inverse, 1, 2))
-
-
-def _excluded_results(
-    shown: Sequence[Pair],
-    excluded: frozenset[str],
-    refined: ErrorsInVariablesFit,
-    camera: Camera,
-    options: CalibrationOptions,
-) -> dict[str, PairResult]:
-    """Show the pairs left out by a person under the pose, each with the candidate that suits it best."""
-    aside = [pair for pair in shown if pair.id in excluded]
-    if not aside:
-        return {}
-    measurements = pair_measurements(aside, camera, options).scaled(refined.noise_scale)
-    rows, model = associate(measurements, refined.camera_from_radar)
-    expected = _residual_covariances(model)
-    results = {}
-    for i, pair in enumerate(aside):
-        chosen = int(rows[i] - measurements.first[i])
-        point = pair.candidates[chosen].position_radar_m
-        results[pair.id] = PairResult(
-            id=pair.id,
-            pixel_px=pair.pixel_px,
-            projected_px=camera.project(refined.camera_from_radar @ point[None])[0],
-            point_radar_m=point,
-            inlier=False,
-            excluded=True,
-            candidate=chosen,
-            expected_covariance_px2=expected[i],
-            image_time=pair.image_time,
-        )
-    return results

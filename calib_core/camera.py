@@ -9,6 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from calib_core.arrays import Flags, Matrix33, Points2, Points3, Values, frozen_array
+from calib_core.geometry import RigidTransform, rotation_jacobian
 
 __all__ = ["CAMERA_MODELS", "Camera", "CameraModel"]
 
@@ -102,6 +103,14 @@ class Camera:
         ideal = _undistorted(plane, _padded(self.distortion))
         rays = np.concatenate([ideal, np.ones((len(ideal), 1))], axis=1)
         return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+
+    def pose_jacobian(self, camera_from_radar: RigidTransform, points_radar_m: Points3) -> np.ndarray:
+        """Return d pixel / d (dt, dtheta) at radar points (n, 3), seen through the lens: (n, 2, 6) [px/m, px/rad]."""
+        turned_m = np.asarray(points_radar_m, dtype=np.float64) @ camera_from_radar.rotation.T
+        planes = np.empty((6, 2, len(turned_m)))
+        planes[:3] = self.project_with_jacobian(turned_m + camera_from_radar.translation_m)[1].T
+        rotation_jacobian(turned_m.T, planes[:3], out=planes[3:])
+        return np.asarray(planes.T)
 
     def in_image(self, pixels_px: Points2, *, margin_px: float = 0.0) -> Flags:
         """Tell which pixels lie on the image, whose edge is half a pixel outside the outermost pixel centres."""

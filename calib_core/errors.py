@@ -4,10 +4,11 @@ CalibrationError
  ├── RecordingError       a recording cannot be opened or read
  │    └── MessageError    one message, or one topic, cannot be decoded
  ├── InputError           a file of ours (clicks, pairs, camera, calibration) is malformed
- └── OptionError          an option is misspelt or out of range
+ ├── OptionError          an option is misspelt or out of range
+ └── UnsolvableError      an answer was asked for where the data give none
 """
 
-__all__ = ["CalibrationError", "InputError", "MessageError", "OptionError", "RecordingError"]
+__all__ = ["CalibrationError", "InputError", "MessageError", "OptionError", "RecordingError", "UnsolvableError"]
 
 
 class CalibrationError(Exception):
@@ -28,3 +29,7 @@ class InputError(CalibrationError):
 
 class OptionError(CalibrationError):
     """An option that is misspelt, of the wrong type or out of range."""
+
+
+class UnsolvableError(CalibrationError):
+    """A calibration was asked for where the data give none; raised by `Unsolvable.unwrap` only."""

@@ -15,6 +15,7 @@ __all__ = [
     "rotation_angle_rad",
     "rotation_exp",
     "rotation_from_euler",
+    "rotation_jacobian",
     "rotation_log",
     "skew",
 ]
@@ -204,3 +205,18 @@ class RigidTransform:
                 self.rotation @ other.rotation, self.rotation @ other.translation_m + self.translation_m
             )
         return np.asarray(other) @ self.rotation.T + self.translation_m
+
+
+def rotation_jacobian(turned_m: np.ndarray, d_point: np.ndarray, out: np.ndarray) -> None:
+    """Write d pixel / d theta (..., 3, 2, n): with R = Exp(dtheta) R_hat, a row j of d pixel / d point gives R p x j.
+
+    Args:
+        turned_m: (..., 3, n) R p, the points in camera axes before the translation.
+        d_point: (..., 3, 2, n) d pixel / d camera point [px/m].
+        out: where the result goes.
+    """
+    x, y, z = (turned_m[..., axis, None, :] for axis in range(3))
+    a, b, c = (d_point[..., axis, :, :] for axis in range(3))
+    out[..., 0, :, :] = y * c - z * b
+    out[..., 1, :, :] = z * a - x * c
+    out[..., 2, :, :] = x * b - y * a

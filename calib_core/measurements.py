@@ -1,11 +1,12 @@
 """What the sensors and the person measured: radar scans, clicks, and the pairs they make."""
 
 from dataclasses import dataclass, field
-from typing import NewType
+from typing import NewType, NoReturn
 
 import numpy as np
 
 from calib_core.arrays import Indices, Matrix33, Points3, TimesNs, Values, Vector2, Vector3, frozen_array
+from calib_core.errors import UnsolvableError
 
 __all__ = [
     "MIN_PAIRS",
@@ -300,3 +301,15 @@ class Unsolvable:
     reason: str
     hint: str
     unpaired: tuple[Unpaired, ...] = ()
+
+    def unwrap(self) -> NoReturn:
+        """Raise, because there is no calibration; `Calibration.unwrap` returns itself.
+
+        Raises:
+            UnsolvableError: reason and hint in one line.
+        """
+        raise UnsolvableError(f"no calibration: {self.reason}; {self.hint}")
+
+    def __str__(self) -> str:
+        rows = (f"\n  click {click.id}: {click.reason}; {click.hint}" for click in self.unpaired)
+        return f"No calibration ({self.code}): {self.reason}\n  {self.hint}" + "".join(rows)

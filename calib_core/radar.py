@@ -1,13 +1,16 @@
-"""Radar polar coordinates, and the noise of a return.
+"""Radar polar coordinates, the noise of a return, and the map of a radar's own angle errors.
 
 Radar frame: x forward, y left, z up (docs/conventions.md). Azimuth is positive to the left, elevation upwards.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from calib_core.arrays import Points3
+from calib_core.arrays import Points3, Values, frozen_array
 
 __all__ = [
+    "AngleMap",
     "cartesian_from_polar",
     "cartesian_jacobian",
     "covariance_from_sigma_polar",
@@ -15,6 +18,9 @@ __all__ = [
     "polar_from_cartesian",
     "position_planes",
 ]
+
+_WORTH_SAYING = 0.97
+"""AED with the map over AED without it, above which the gain may be chance."""
 
 
 def cartesian_from_polar(polar: Points3) -> Points3:
@@ -79,3 +85,62 @@ def covariance_from_sigma_polar(points_radar_m: Points3, sigma_polar: Points3) -
     jacobian = cartesian_jacobian(polar_from_cartesian(points_radar_m))
     scaled = jacobian * np.asarray(sigma_polar, dtype=np.float64)[..., None, :]
     return scaled @ np.swapaxes(scaled, -1, -2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AngleMap:
+    """What to add to the radar's angles, on a grid of directions; in between linear, beyond the edge as at the edge.
+
+    Attributes:
+        azimuth_rad: (a,) of the columns, ascending.
+        elevation_rad: (e,) of the rows, ascending.
+        correction_rad: (e, a, 2) to add to a measured (azimuth, elevation).
+        sigma_rad: (e, a, 2) standard deviation of the smooth error that is left.
+        raw_aed_px: AED of the pairs it was learnt from, under the pose as it is.
+        corrected_aed_px: the same with each pair corrected by what the others say of its direction.
+    """
+
+    azimuth_rad: Values
+    elevation_rad: Values
+    correction_rad: np.ndarray
+    sigma_rad: np.ndarray
+    raw_aed_px: float
+    corrected_aed_px: float
+
+    def __post_init__(self) -> None:
+        rows, columns = len(self.elevation_rad), len(self.azimuth_rad)
+        shapes: dict[str, tuple[int, ...]] = {"azimuth_rad": (columns,), "elevation_rad": (rows,)}
+        shapes |= {"correction_rad": (rows, columns, 2), "sigma_rad": (rows, columns, 2)}
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        for lines in (self.azimuth_rad, self.elevation_rad):
+            if len(lines) < 2 or not (np.diff(lines) > 0).all():
+                raise ValueError("the lines of an angle map must ascend, two or more of them")
+
+    @property
+    def largest_rad(self) -> float:
+        """The largest correction anywhere on the map."""
+        return float(np.abs(self.correction_rad).max())
+
+    @property
+    def pays(self) -> bool:
+        """Whether pairs that the map has not seen come out clearly closer to their clicks with it."""
+        return self.corrected_aed_px < _WORTH_SAYING * self.raw_aed_px
+
+    def corrected(self, points_radar_m: Points3) -> Points3:
+        """Return the positions (n, 3) with their angles corrected and their ranges kept."""
+        polar = polar_from_cartesian(points_radar_m)
+        row, row_share = _cell(self.elevation_rad, polar[:, 2])
+        column, column_share = _cell(self.azimuth_rad, polar[:, 1])
+        grid = self.correction_rad
+        lower = grid[row, column] * (1 - column_share) + grid[row, column + 1] * column_share
+        upper = grid[row + 1, column] * (1 - column_share) + grid[row + 1, column + 1] * column_share
+        polar[:, 1:] += lower * (1 - row_share) + upper * row_share
+        return cartesian_from_polar(polar)
+
+
+def _cell(lines: Values, values: Values) -> tuple[np.ndarray, np.ndarray]:
+    """Return the index (n,) of the line below each value, and how far (n, 1) it is to the next; NaN stays NaN."""
+    held = np.clip(values, lines[0], lines[-1])
+    below = np.clip(np.searchsorted(lines, held, side="right") - 1, 0, len(lines) - 2)
+    return below, ((held - lines[below]) / (lines[below + 1] - lines[below]))[:, None]

@@ -1,14 +1,18 @@
 """What a calibration is: the pose, how sure it is, and what each pair says about it."""
 
 from dataclasses import dataclass, field
+from typing import Self
+
+import numpy as np
 
 from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
-from calib_core.geometry import RigidTransform
-from calib_core.measurements import TimeNs, Unpaired
+from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
+from calib_core.measurements import Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
+from calib_core.radar import AngleMap
 
-__all__ = ["Calibration", "CheckPoint", "DataWarning", "InputFile", "Metrics", "PairResult"]
+__all__ = ["Calibration", "CheckPoint", "DataWarning", "InputFile", "Metrics", "NextPlacement", "PairResult"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +86,7 @@ class PairResult:
         candidate: which of the pair's candidates was chosen.
         expected_covariance_px2: (2, 2) covariance of the residual by the noise model; NaN where there is none.
         image_time: stamp of the clicked frame; None for pairs from a pairs file.
+        measured: the pair it came from, with all its candidates: what is needed to solve again; None where it was not kept.
     """
 
     id: str
@@ -95,6 +100,7 @@ class PairResult:
     candidate: int = 0
     expected_covariance_px2: Points2 = field(default_factory=lambda: frozen_array([[float("nan")] * 2] * 2, (2, 2)))
     image_time: TimeNs | None = None
+    measured: Pair | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
@@ -126,6 +132,27 @@ class CheckPoint:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class NextPlacement:
+    """A place to go to, and what it promises.
+
+    Attributes:
+        position_radar_m: (3,) in the radar frame.
+        pixel_px: (2,) where it appears in the picture.
+        gain: present uncertainty over the one expected afterwards (standard deviations), at least 1.
+        may_stop: no place promises a gain worth the walk.
+    """
+
+    position_radar_m: Vector3
+    pixel_px: Vector2
+    gain: float
+    may_stop: bool
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position_radar_m", frozen_array(self.position_radar_m, (3,)))
+        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
     """A solved extrinsic calibration: p_camera = R p_radar + t.
 
@@ -142,6 +169,8 @@ class Calibration:
         covariance_quantile: the factor on covariance whose ellipsoid holds 95 % for 6 degrees of freedom.
         iterative_px: the paper's Algorithm 1 only: mean reprojection error of RANSAC with the iterative solver.
         sqpnp_px: the same with SQPnP.
+        angle_map: the radar's own smooth angle errors; None where there is nothing to gain by correcting them.
+        next_placement: where the next placement would help most; None where no place is known.
     """
 
     camera_from_radar: RigidTransform
@@ -156,6 +185,8 @@ class Calibration:
     covariance_quantile: float = 12.591587243743977
     iterative_px: float = float("nan")
     sqpnp_px: float = float("nan")
+    angle_map: AngleMap | None = None
+    next_placement: NextPlacement | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
@@ -163,3 +194,54 @@ class Calibration:
     def reproject(self, points_radar_m: Points3) -> Points2:
         """Carry radar points (n, 3) [m] to pixels (n, 2); NaN where the lens does not see them."""
         return self.camera.project(self.camera_from_radar @ points_radar_m)
+
+    def pixel_covariance(self, points_radar_m: Points3) -> np.ndarray:
+        """Return the covariance (n, 2, 2) [px^2] of where true radar points project; NaN where the lens does not see them.
+
+        It holds the uncertainty of the pose alone: the noise of a measured radar position comes on top.
+
+        Args:
+            points_radar_m: (n, 3).
+        """
+        jacobian = self.camera.pose_jacobian(self.camera_from_radar, points_radar_m)
+        return np.asarray(jacobian @ self.covariance @ np.swapaxes(jacobian, 1, 2))
+
+    def pixel_sigma(self, points_radar_m: Points3) -> Points2:
+        """Return the standard deviations (n, 2) [px] of column and row where true radar points (n, 3) [m] project."""
+        return np.sqrt(np.diagonal(self.pixel_covariance(points_radar_m), axis1=1, axis2=2))
+
+    def unwrap(self) -> Self:
+        """Return itself; `Unsolvable.unwrap` raises."""
+        return self
+
+    def __str__(self) -> str:
+        """Sum up the calibration in eight lines."""
+        used = [pair for pair in self.pairs if not pair.excluded]
+        agreeing = sum(pair.inlier for pair in used)
+        sigma = np.sqrt(np.diag(self.covariance))
+        place, quaternion = (
+            self.camera_from_radar.translation_m,
+            quaternion_wxyz_from_matrix(self.camera_from_radar.rotation),
+        )
+        metrics, advised = self.metrics, self.next_placement
+        advice = "none" if advised is None else "no further placement is needed"
+        if advised is not None and not advised.may_stop:
+            x_m, y_m, z_m = advised.position_radar_m
+            percent = 100.0 * (1.0 - 1.0 / advised.gain)
+            advice = f"({x_m:.1f}, {y_m:.1f}, {z_m:.1f}) m would reduce the pose uncertainty by {percent:.0f} %"
+        return "\n".join(
+            (
+                f"camera_from_radar, method {self.options.method}: {agreeing} of {len(used)} pairs agree",
+                "  translation     " + " ".join(f"{value:.4f}" for value in place) + " m",
+                "  quaternion wxyz " + " ".join(f"{value:.6f}" for value in quaternion),
+                f"  one sigma       {_numbers(100 * sigma[:3], 2)} cm, {_numbers(np.rad2deg(sigma[3:]), 3)} deg",
+                f"  residuals       AED {metrics.aed_px:.2f} px, CDSD {metrics.cdsd_px:.2f} px, RMS {metrics.rms_px:.2f} px",
+                f"  held-out AED    {metrics.held_out_aed_px:.2f} px",
+                "  warnings        " + (", ".join(warning.code for warning in self.warnings) or "none"),
+                "  next placement  " + advice,
+            )
+        )
+
+
+def _numbers(values: Vector3, digits: int) -> str:
+    return " ".join(f"{value:.{digits}f}" for value in values)

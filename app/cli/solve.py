@@ -34,7 +34,7 @@ class Solve:
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON)."""
     pairs: File = None
-    """Pairs of radar positions and pixels (cocalib/pairs-1 JSON), instead of a recording."""
+    """Pairs of radar positions and pixels (cocalib/pairs-1 JSON), or a calibration to solve again, instead of a recording."""
     camera: File = None
     """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     out: File = None

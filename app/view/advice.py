@@ -1,11 +1,8 @@
 """Where to put the reflector next, in words and as a place in the frame."""
 
-from functools import lru_cache
-
 import numpy as np
 
 from app.view.model import Advice
-from calib_core.advice.next_placement import next_placement
 from calib_core.results import Calibration
 
 __all__ = ["advice_for"]
@@ -13,13 +10,9 @@ __all__ = ["advice_for"]
 _WORTH_SAYING = 0.05
 
 
-@lru_cache(maxsize=4)
 def advice_for(calibration: Calibration) -> Advice | None:
-    """Say where the next placement pays most; None where it knows no place, as in the paper's method.
-
-    Worked out once per calibration: a View is asked for more often than there is a new answer.
-    """
-    best = next_placement(calibration)
+    """Say where the next placement would help most; None where no place is known, as in the paper's method."""
+    best = calibration.next_placement
     if best is None:
         return None
     u_px, v_px = (round(float(value), 1) for value in best.pixel_px)

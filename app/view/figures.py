@@ -1,7 +1,6 @@
 """The figures beside the picture, each with one sentence that explains it."""
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -9,7 +8,6 @@ from app.view.click_rows import ellipse_of
 from app.view.model import Figure
 from app.view.mounting import mounting_of
 from app.view.number_format import plain, with_sigma
-from calib_core.advice.angle_map import AngleMap, learn_angle_map
 from calib_core.results import Calibration
 
 __all__ = ["metric_figures", "pose_figures", "residual_limit_px"]
@@ -76,8 +74,8 @@ def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:
 
 def _radar_figures(calibration: Calibration) -> tuple[Figure, ...]:
     """Return how far off the radar's own angles are, where correcting them would pay."""
-    angle_map = _angle_map_of(calibration)
-    if angle_map is None or not angle_map.pays:
+    angle_map = calibration.angle_map
+    if angle_map is None:
         return ()
     hint = (
         "The radar's angles are off smoothly with direction, which no pose can take out. Correcting them by the map in "
@@ -89,11 +87,6 @@ def _radar_figures(calibration: Calibration) -> tuple[Figure, ...]:
             "radar_angles", "radar's angles off by", f"up to {plain(np.rad2deg(angle_map.largest_rad))}", "deg", hint
         ),
     )
-
-
-@lru_cache(maxsize=4)
-def _angle_map_of(calibration: Calibration) -> AngleMap | None:
-    return learn_angle_map(calibration)
 
 
 def residual_limit_px(calibration: Calibration) -> float | None:

@@ -6,7 +6,6 @@ from typing import Literal
 import numpy as np
 
 from calib_core.association.clustering import candidate_at
-from calib_core.estimation.covariance import pose_jacobian
 from calib_core.estimation.measurement_model import CameraPrior
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
@@ -122,7 +121,7 @@ def bound_of(
     """
     profile, pose = NOISE_PROFILES[noise], simulated.camera_from_radar
     points = simulated.points_radar_m[~simulated.outlier] if points_radar_m is None else points_radar_m
-    jacobian = pose_jacobian(simulated.camera, pose, points)
+    jacobian = simulated.camera.pose_jacobian(pose, points)
     d_point = simulated.camera.project_with_jacobian(pose @ points)[1] @ pose.rotation
     radar = covariance_from_sigma_polar(points, np.tile(profile.sigma_polar, (len(points), 1)))
     spread = d_point @ radar @ np.swapaxes(d_point, 1, 2) + profile.sigma_px**2 * np.eye(2)

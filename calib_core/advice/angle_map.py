@@ -14,13 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points2, Points3, Values, frozen_array
+from calib_core.arrays import Points2, Points3, Values
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
-from calib_core.radar import cartesian_from_polar, polar_from_cartesian
+from calib_core.radar import AngleMap, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 
-__all__ = ["AngleMap", "learn_angle_map"]
+__all__ = ["learn_angle_map"]
 
 _LEAST_PAIRS = 8
 _MOST_PAIRS = 120
@@ -36,63 +36,8 @@ _ONE_PX = np.array([1.0, 0.0])
 _DECIMALS = 6
 """Of the map [rad]: far finer than any radar, and short in a file."""
 
-_WORTH_SAYING = 0.97
-"""AED with the map over AED without it, above which the gain may be chance."""
-
 _MOST_OFF_RAD = np.deg2rad(15.0)
 """A pair farther off is no smooth error of the radar."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class AngleMap:
-    """What to add to the radar's angles, on a grid of directions; in between linear, beyond the edge as at the edge.
-
-    Attributes:
-        azimuth_rad: (a,) of the columns, ascending.
-        elevation_rad: (e,) of the rows, ascending.
-        correction_rad: (e, a, 2) to add to a measured (azimuth, elevation).
-        sigma_rad: (e, a, 2) standard deviation of the smooth error that is left.
-        raw_aed_px: AED of the pairs it was learnt from, under the pose as it is.
-        corrected_aed_px: the same with each pair corrected by what the others say of its direction.
-    """
-
-    azimuth_rad: Values
-    elevation_rad: Values
-    correction_rad: np.ndarray
-    sigma_rad: np.ndarray
-    raw_aed_px: float
-    corrected_aed_px: float
-
-    def __post_init__(self) -> None:
-        rows, columns = len(self.elevation_rad), len(self.azimuth_rad)
-        shapes: dict[str, tuple[int, ...]] = {"azimuth_rad": (columns,), "elevation_rad": (rows,)}
-        shapes |= {"correction_rad": (rows, columns, 2), "sigma_rad": (rows, columns, 2)}
-        for name, shape in shapes.items():
-            object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
-        for lines in (self.azimuth_rad, self.elevation_rad):
-            if len(lines) < 2 or not (np.diff(lines) > 0).all():
-                raise ValueError("the lines of an angle map must ascend, two or more of them")
-
-    @property
-    def largest_rad(self) -> float:
-        """The largest correction anywhere on the map."""
-        return float(np.abs(self.correction_rad).max())
-
-    @property
-    def pays(self) -> bool:
-        """Whether pairs that the map has not seen come out clearly closer to their clicks with it."""
-        return self.corrected_aed_px < _WORTH_SAYING * self.raw_aed_px
-
-    def corrected(self, points_radar_m: Points3) -> Points3:
-        """Return the positions (n, 3) with their angles corrected and their ranges kept."""
-        polar = polar_from_cartesian(points_radar_m)
-        row, row_share = _cell(self.elevation_rad, polar[:, 2])
-        column, column_share = _cell(self.azimuth_rad, polar[:, 1])
-        grid = self.correction_rad
-        lower = grid[row, column] * (1 - column_share) + grid[row, column + 1] * column_share
-        upper = grid[row + 1, column] * (1 - column_share) + grid[row + 1, column + 1] * column_share
-        polar[:, 1:] += lower * (1 - row_share) + upper * row_share
-        return cartesian_from_polar(polar)
 
 
 def learn_angle_map(calibration: Calibration) -> AngleMap | None:
@@ -181,13 +126,6 @@ def _axis(angles_rad: Values) -> Values:
     first = np.floor((angles_rad.min() - _BEYOND_RAD) / _STEP_RAD)
     last = np.ceil((angles_rad.max() + _BEYOND_RAD) / _STEP_RAD)
     return np.asarray(np.arange(first, last + 1) * _STEP_RAD)
-
-
-def _cell(lines: Values, values: Values) -> tuple[np.ndarray, np.ndarray]:
-    """Return the index (n,) of the line below each value, and how far (n, 1) it is to the next; NaN stays NaN."""
-    held = np.clip(values, lines[0], lines[-1])
-    below = np.clip(np.searchsorted(lines, held, side="right") - 1, 0, len(lines) - 2)
-    return below, ((held - lines[below]) / (lines[below + 1] - lines[below]))[:, None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

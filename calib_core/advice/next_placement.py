@@ -4,13 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points3, Values, Vector2, Vector3, frozen_array
-from calib_core.estimation.covariance import pose_jacobian
+from calib_core.arrays import Points3, Values
 from calib_core.geometry import RigidTransform
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
-from calib_core.results import Calibration
+from calib_core.results import Calibration, NextPlacement
 
-__all__ = ["NextPlacement", "PlacementLimits", "next_placement"]
+__all__ = ["PlacementLimits", "next_placement"]
 
 _ENOUGH_GAIN = 1.04  # a placement that shrinks the uncertainty by less is hardly worth the walk
 _MARGIN_SHARE = 0.04  # of the image, kept free at its edges
@@ -28,27 +27,6 @@ class PlacementLimits:
     """Largest bearing to either side [deg]; beyond it a radar's angles get worse."""
     separation_m: float = 0.5
     """Smallest distance to a place that has been used [m]."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NextPlacement:
-    """A place to go to, and what it promises.
-
-    Attributes:
-        position_radar_m: (3,) in the radar frame.
-        pixel_px: (2,) where it appears in the picture.
-        gain: present uncertainty over the one expected afterwards (standard deviations), at least 1.
-        may_stop: no place promises a gain worth the walk.
-    """
-
-    position_radar_m: Vector3
-    pixel_px: Vector2
-    gain: float
-    may_stop: bool
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "position_radar_m", frozen_array(self.position_radar_m, (3,)))
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
 
 
 def next_placement(calibration: Calibration, *, limits: PlacementLimits | None = None) -> NextPlacement | None:
@@ -99,7 +77,7 @@ def _heights(places: np.ndarray, used: Points3) -> Values:
 
 def _covariances_after(calibration: Calibration, places: Points3) -> np.ndarray:
     """Return the covariance (n, 6, 6) after one more pair at each place: (P^-1 + J^T S^-1 J)^-1."""
-    jacobian = pose_jacobian(calibration.camera, calibration.camera_from_radar, places)
+    jacobian = calibration.camera.pose_jacobian(calibration.camera_from_radar, places)
     noise = _pixel_noise(calibration, places)
     added = np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(noise, jacobian)
     return np.linalg.inv(np.linalg.inv(calibration.covariance) + added)

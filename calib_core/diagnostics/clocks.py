@@ -20,7 +20,10 @@ from calib_core.options import GatingOptions
 from calib_core.radar import direction_cosines
 from calib_core.results import Calibration, DataWarning, PairResult
 
-__all__ = ["ClockOffset", "clock_offset", "clocks"]
+__all__ = ["CLOCK_CODES", "ClockOffset", "clock_offset", "clocks"]
+
+CLOCK_CODES = ("clock-bias-suspected",)
+"""Codes of the warnings that need the recording: pairs alone cannot show them."""
 
 _LEAST_OUTSIDE = 3
 _LEAST_SHARE = 0.25  # of the clicks with a dwell that lie outside of it
@@ -56,7 +59,7 @@ class ClockOffset:
 
 
 def clocks(calibration: Calibration, scans: RadarScans) -> list[DataWarning]:
-    """InfluentialPair that both sensors run on one clock: clicks lie before, or after, their dwells by the radar's stamps.
+    """Warn unless both sensors seem to run on one clock: clicks lie before, or after, their dwells by the radar's stamps.
 
     Args:
         calibration: whose inlier pairs tell which return was the reflector.

@@ -44,7 +44,7 @@ class LensError:
 
 
 def intrinsics(fit: SolvedFit) -> list[DataWarning]:
-    """InfluentialPair the focal length or the distortion, whichever explains more of the residuals."""
+    """Warn of the focal length or the distortion, whichever explains more of the residuals."""
     if fit.inliers.sum() < _LEAST_PAIRS or is_flat(fit.measurements):
         return []
     focal, radial = lens_errors(fit)

@@ -27,7 +27,7 @@ _ONE_IN_A_HUNDRED = 2.33
 
 
 def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
-    """InfluentialPair the radar's axes: mirrored ones are likelier, or as likely."""
+    """Warn where mirrored radar axes are likelier, or as likely."""
     if fit.mirror_gain > MIRRORED_GAIN:
         return [
             DataWarning(
@@ -85,7 +85,7 @@ def _heights_decide(fit: SolvedFit) -> bool:
 
 
 def two_poses(fit: SolvedFit) -> list[DataWarning]:
-    """InfluentialPair the choice between two poses that explain the pairs about alike (a plane seen from afar has two)."""
+    """Warn where two poses explain the pairs about alike (a plane seen from afar has two)."""
     best = fit.alternatives[0]
     for other in fit.alternatives[1:]:
         error = other.camera_from_radar.error_from(fit.refined.camera_from_radar)
@@ -103,7 +103,7 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
 
 
 def camera_position(fit: SolvedFit) -> list[DataWarning]:
-    """InfluentialPair a camera position that contradicts the tape measure, or is much farther away than expected."""
+    """Warn of a camera position that contradicts the tape measure, or is much farther away than expected."""
     if fit.measurements.prior.measured:
         return _contradicted_position(fit)
     prior = fit.measurements.prior

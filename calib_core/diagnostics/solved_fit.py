@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from calib_core.arrays import Flags
-from calib_core.estimation.covariance import LeftOut, PoseCovariance
+from calib_core.estimation.covariance import PoseCovariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.influential_pairs import InfluentialPair
+from calib_core.estimation.leave_one_out import LeaveOneOut
 from calib_core.estimation.measurement_model import PairMeasurements
 
 __all__ = ["SolvedFit"]
@@ -34,7 +35,7 @@ class SolvedFit:
     measurements: PairMeasurements
     refined: ErrorsInVariablesFit
     uncertainty: PoseCovariance
-    left_out: LeftOut
+    left_out: LeaveOneOut
     doubts: Sequence[InfluentialPair]
     inliers: Flags
     alternatives: Sequence[GncSolution]

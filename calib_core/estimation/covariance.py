@@ -1,21 +1,16 @@
-"""How sure the pose is: its covariance, what that means in pixels, and what each pair has to do with it."""
+"""The covariance of the pose: the observed information inverted, and widened by errors that the pairs share."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Points2, Points3, Values
-from calib_core.camera import Camera
+from calib_core.arrays import Matrix66
 from calib_core.estimation.correlated_angle_errors import pose_spread
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import normal_equations
-from calib_core.estimation.linearization import with_respect_to_pose
 from calib_core.estimation.unmeasured_elevation import shared_elevation_spread
-from calib_core.geometry import RigidTransform
-from calib_core.radar import cartesian_from_polar
-from calib_core.results import Calibration
 
-__all__ = ["LeftOut", "PoseCovariance", "leave_one_out", "pixel_covariance", "pose_covariance", "pose_jacobian"]
+__all__ = ["PoseCovariance", "pose_covariance"]
 
 _LEAST_SHARE = 0.25  # of the plain information that the correction for doubtful pairs must leave
 _CHI2_95_6 = 12.591587243743977
@@ -114,65 +109,3 @@ def _quantile(degrees_of_freedom: float, from_pairs: float) -> float:
     from scipy.special import fdtri
 
     return float(_CHI2_95_6 + from_pairs * (6.0 * fdtri(6.0, degrees_of_freedom, 0.95) - _CHI2_95_6))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LeftOut:
-    """What happens when each pair is left out in turn.
-
-    Attributes:
-        distance_px: (n,) from the click to where the others predict it.
-        influence: (n,) how far the pose moves, in standard deviations.
-    """
-
-    distance_px: Values
-    influence: Values
-
-
-def leave_one_out(refined: ErrorsInVariablesFit, information: Matrix66) -> LeftOut:
-    """Leave each pair out by one Newton step: delta_i = -(H - w J_i^T J_i)^-1 w J_i^T e_i.
-
-    Args:
-        refined: the fit.
-        information: (6, 6) of all pairs.
-    """
-    jacobian, residual, weights = refined.model.pose_jacobian, refined.model.residual, refined.weights
-    own = weights[:, None, None] * (np.swapaxes(jacobian, 1, 2) @ jacobian)
-    pull = weights[:, None] * (np.swapaxes(jacobian, 1, 2) @ residual[:, :, None])[:, :, 0]
-    scale = 1.0 / np.sqrt(np.diag(information))
-    rest = (information - 0.999 * own) * np.outer(scale, scale)
-    moves = -np.linalg.solve(rest, (pull * scale)[:, :, None])[:, :, 0] * scale
-    influence = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", moves, information, moves), 0.0))
-    points = cartesian_from_polar(refined.measurements.polar[refined.rows])
-    missed_px = _projected_after(refined, moves, points) - refined.measurements.pixels_px
-    return LeftOut(np.linalg.norm(missed_px, axis=1), influence)
-
-
-def _projected_after(refined: ErrorsInVariablesFit, moves: np.ndarray, points_radar_m: Points3) -> Points2:
-    """Project each point under the pose moved by its own (dt, dtheta): pixels (n, 2), by Rodrigues' formula on vectors."""
-    turned = points_radar_m @ refined.camera_from_radar.rotation.T
-    angle = np.linalg.norm(moves[:, 3:], axis=1, keepdims=True)
-    axis = moves[:, 3:] / np.maximum(angle, 1e-12)
-    along = axis * (axis * turned).sum(axis=1, keepdims=True)
-    swung = along + (turned - along) * np.cos(angle) + np.cross(axis, turned) * np.sin(angle)
-    return refined.measurements.camera.project(swung + refined.camera_from_radar.translation_m + moves[:, :3])
-
-
-def pixel_covariance(calibration: Calibration, points_radar_m: Points3) -> np.ndarray:
-    """Return the covariance (n, 2, 2) [px^2] of where true radar points project; NaN where the lens does not see them.
-
-    Only the pose's uncertainty counts: noise of a measured radar position comes on top.
-
-    Args:
-        calibration: with its covariance.
-        points_radar_m: (n, 3).
-    """
-    jacobian = pose_jacobian(calibration.camera, calibration.camera_from_radar, points_radar_m)
-    return np.asarray(jacobian @ calibration.covariance @ np.swapaxes(jacobian, 1, 2))
-
-
-def pose_jacobian(camera: Camera, camera_from_radar: RigidTransform, points_radar_m: Points3) -> np.ndarray:
-    """Return d pixel / d (dt, dtheta) at radar points (n, 3): (n, 2, 6) [px/m, px/rad]."""
-    turned_m = np.asarray(points_radar_m, dtype=np.float64) @ camera_from_radar.rotation.T
-    d_point = camera.project_with_jacobian(turned_m + camera_from_radar.translation_m)[1]
-    return with_respect_to_pose(d_point, turned_m)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from calib_core.arrays import Indices, Matrix66, Values
+from calib_core.arrays import Flags, Indices, Matrix66, Values
 from calib_core.estimation.gnc import GncSolution, associate, log_odds_of, normal_equations
 from calib_core.estimation.leave_one_out_prediction import (
     COMPONENTS,
@@ -68,6 +68,11 @@ class ErrorsInVariablesFit:
     noise_scale: Values
     degrees_of_freedom: float
     inlier_share: float
+
+    @property
+    def inliers(self) -> Flags:
+        """The pairs (n,) that are more likely inliers than not."""
+        return np.asarray(self.weights > 0.5)
 
 
 @dataclass(slots=True)

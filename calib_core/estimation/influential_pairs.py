@@ -54,7 +54,7 @@ def find_influential_pairs(
         refined: their fit.
         information: (6, 6) of all pairs.
     """
-    inliers = refined.weights > 0.5
+    inliers = refined.inliers
     if refined.weights.sum() < _LEAST_PAIRS:
         return ()
     scale = refined.noise_scale if refined.degrees_of_freedom > 0 else None

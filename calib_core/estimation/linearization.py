@@ -17,10 +17,10 @@ import numpy as np
 
 from calib_core.arrays import Indices, Points2, Points3, Values
 from calib_core.camera import Camera
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import RigidTransform, rotation_jacobian
 from calib_core.radar import position_planes
 
-__all__ = ["Linearization", "MeasurementPlanes", "linearize", "with_respect_to_pose"]
+__all__ = ["Linearization", "MeasurementPlanes", "linearize"]
 
 _FAR = 1e6  # whitened residual of a position the camera cannot see
 
@@ -60,7 +60,7 @@ class MeasurementPlanes:
         rows = np.empty((*rotations.shape[:-2], 10, *self.pixels_px.shape))
         np.subtract(self.pixels_px, projected_px, out=rows[..., 0, :, :])
         rows[..., 1:4, :, :] = d_point
-        _cross(turned_m, d_point, out=rows[..., 4:7, :, :])
+        rotation_jacobian(turned_m, d_point, out=rows[..., 4:7, :, :])
         to_polar = rows[..., 7:, :, :]
         np.einsum("...irn,...ikn->...krn", d_point, d_polar, out=to_polar)
         if at_polar is not None:
@@ -144,28 +144,6 @@ def linearize(
     measured = MeasurementPlanes(pixels_px.T, sigma_px, polar.T, sigma_polar.T)
     at = None if at_polar is None else at_polar.T
     return measured.linearize(camera, camera_from_radar.rotation, camera_from_radar.translation_m, at)
-
-
-def _cross(turned_m: np.ndarray, d_point: np.ndarray, out: np.ndarray) -> None:
-    """Write d pixel / d theta (..., 3, 2, n): with R = Exp(dtheta) R_hat, a row j of d pixel / d point gives R p x j."""
-    x, y, z = (turned_m[..., axis, None, :] for axis in range(3))
-    a, b, c = (d_point[..., axis, :, :] for axis in range(3))
-    out[..., 0, :, :] = y * c - z * b
-    out[..., 1, :, :] = z * a - x * c
-    out[..., 2, :, :] = x * b - y * a
-
-
-def with_respect_to_pose(d_point: np.ndarray, turned_m: Points3) -> np.ndarray:
-    """Turn d pixel / d camera point (n, 2, 3) into d pixel / d (dt, dtheta) (n, 2, 6).
-
-    Args:
-        d_point: (n, 2, 3) [px/m].
-        turned_m: (n, 3) R p, the points in camera axes before the translation.
-    """
-    planes = np.empty((6, 2, len(turned_m)))
-    planes[:3] = d_point.T
-    _cross(turned_m.T, planes[:3], out=planes[3:])
-    return np.asarray(planes.T)
 
 
 def _whitened(rows: np.ndarray, sigma_px: Values, sigma_polar: np.ndarray) -> Linearization:

@@ -19,10 +19,12 @@ from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoin
 from calib_core.interchange.importing import imported, read_any, read_any_file
 from calib_core.interchange.own.calibration_json import calibration_text, read_calibration, write_calibration
 from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
+from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
 from calib_core.interchange.own.pairs_json import PairsFile, read_pairs, write_pairs
 from calib_core.interchange.parent_pose import parent_pose
 
 __all__ = [
+    "CALIBRATION_SCHEMA",
     "FORMATS",
     "CalibrationFile",
     "CheckPairs",
@@ -51,6 +53,7 @@ __all__ = [
     "export",
     "format_named",
     "imported",
+    "names_schema",
     "parent_pose",
     "read_any",
     "read_any_file",

@@ -4,7 +4,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from calib_core.advice.angle_map import AngleMap
 from calib_core.errors import InputError
 from calib_core.results import Calibration, CheckPoint, InputFile, PairResult
 
@@ -115,7 +114,6 @@ class CalibrationFile:
         check_point: a radar point and the pixel it must come out at; None where a foreign file has none.
         provenance: where it comes from.
         unknown: results that a later version wrote and this one does not know; kept when written again.
-        angle_map: the radar's own smooth angle errors; None where there is nothing to gain by correcting them.
     """
 
     calibration: Calibration
@@ -123,7 +121,6 @@ class CalibrationFile:
     check_point: CheckPoint | None = None
     provenance: Provenance = field(default_factory=Provenance)
     unknown: tuple[UnknownResult, ...] = ()
-    angle_map: AngleMap | None = None
 
 
 def choose_check_point(calibration: Calibration) -> CheckPoint | None:

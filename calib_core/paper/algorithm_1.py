@@ -13,6 +13,7 @@ from calib_core.arrays import Flags, Points2, Points3, Values, Vector3, frozen_a
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import (
+    MIN_PAIRS,
     NS_PER_S,
     Candidate,
     Pair,
@@ -45,7 +46,6 @@ __all__ = [
     "z_score_inliers",
 ]
 
-MINIMUM_PAIRS = 4
 _ROUNDING = 1e-9  # two returns have z-scores of exactly 1, up to rounding
 
 
@@ -261,7 +261,7 @@ def _solved(
     used = sorted(
         (pair for pair in pairs if pair.id not in excluded), key=lambda pair: (pair.image_time or 0, pair.id)
     )  # whatever order they come in, RANSAC draws the same samples
-    if len(used) < MINIMUM_PAIRS:
+    if len(used) < MIN_PAIRS:
         return _too_few(len(used), len(ordered) - len(used), len(unpaired))
     points_radar_m = np.stack([pair.candidates[0].position_radar_m for pair in used])
     pixels_px = np.stack([pair.pixel_px for pair in used])
@@ -316,6 +316,7 @@ def _result(
         inlier=inlier,
         excluded=pair.id in excluded,
         image_time=pair.image_time,
+        measured=pair,
     )
 
 
@@ -361,8 +362,8 @@ def _too_few(used: int, excluded: int, unpaired: int) -> Unsolvable:
     rest = "".join(f", {count} more {text}" for count, text in zip(counts, aside, strict=True))
     return Unsolvable(
         "too-few-pairs",
-        f"{used} of {MINIMUM_PAIRS} pairs{rest}",
-        f"click the reflector at {MINIMUM_PAIRS - used} more placements at least; 10 to 20 spread over the picture are better",
+        f"{used} of {MIN_PAIRS} pairs{rest}",
+        f"click the reflector at {MIN_PAIRS - used} more placements at least; 10 to 20 spread over the picture are better",
     )
 
 

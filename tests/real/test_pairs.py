@@ -10,7 +10,6 @@ import pytest
 from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
-from calib_core.estimation.covariance import pose_jacobian
 from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, NoiseOptions
@@ -90,7 +89,7 @@ def test_the_published_fit_differs_from_ours_by_no_more_than_two_fits_to_the_sam
     points, pixels, _, _ = arrays(shared_data)
     calibration = solve(rows, camera, NoiseOptions())
     noise = np.array([pair.expected_covariance_px2 for pair in calibration.pairs])
-    jacobian = pose_jacobian(camera, calibration.camera_from_radar, points)
+    jacobian = camera.pose_jacobian(calibration.camera_from_radar, points)
     kept = np.linalg.norm(camera.project(published @ points) - pixels, axis=1) < 8.1
     plain = map_to_pose(jacobian, np.eye(2)[None] * kept[:, None, None])
     believed = np.array([1.0 - pair.outlier_probability for pair in calibration.pairs])

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from calib_core.advice.angle_map import AngleMap
 from calib_core.errors import InputError
 from calib_core.interchange.own.documents import AngleMapDocument
+from calib_core.radar import AngleMap
 
 __all__ = ["angle_map_document", "angle_map_of"]
 

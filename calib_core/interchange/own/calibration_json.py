@@ -2,12 +2,10 @@
 
 import dataclasses
 from collections.abc import Iterable
-from typing import Any
 
 import msgspec
 import numpy as np
 
-from calib_core.advice.angle_map import learn_angle_map
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz, quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import (
@@ -21,12 +19,14 @@ from calib_core.interchange.calibration_file import (
 from calib_core.interchange.own import documents
 from calib_core.interchange.own.angle_map_document import angle_map_document, angle_map_of
 from calib_core.interchange.own.camera_document import camera_document, camera_of
+from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
+from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
 from calib_core.interchange.own.provenance_document import provenance_document, provenance_of
 from calib_core.interchange.own.unknown_results import unknown_results, with_unknown
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import json_object, parse_document
-from calib_core.measurements import ReflectorClick, TimeNs, Unpaired, time_from_parts, time_parts
-from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics, PairResult
+from calib_core.measurements import ReflectorClick, Unpaired
+from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
 
 __all__ = [
     "COVARIANCE_CONVENTION",
@@ -42,7 +42,6 @@ COVARIANCE_CONVENTION = (
     "6x6, row-major, order (x, y, z, rotX, rotY, rotZ) [m, rad], of the error (dt, dtheta) of camera_from_radar "
     "in camera axes: t = t_hat + dt, R = Exp(dtheta) R_hat"
 )
-_NAN = float("nan")
 _AGREEMENT = 1e-5
 
 
@@ -67,13 +66,11 @@ def calibration_text(
         for pair in calibration.pairs
     )
     stamped = dataclasses.replace(calibration, pairs=pairs)
-    learnt = learn_angle_map(stamped)
     file = CalibrationFile(
         calibration=stamped,
         frames=frames or FrameNames(),
         check_point=choose_check_point(stamped),
         provenance=provenance or Provenance(),
-        angle_map=learnt if learnt is not None and learnt.pays else None,
     )
     return write_calibration(file)
 
@@ -89,24 +86,28 @@ def write_calibration(file: CalibrationFile) -> str:
         radar_from_camera=_transform_document(calibration.camera_from_radar.inverse()),
         frames=documents.FramesDocument(file.frames.radar, file.frames.camera),
         equation=EQUATION,
-        covariance=_nested(calibration.covariance),
+        covariance=nested(calibration.covariance),
         covariance_convention=COVARIANCE_CONVENTION,
-        covariance_quantile=_known(calibration.covariance_quantile),
-        sigma=documents.SigmaDocument(*map(_known, sigma)),
-        check_point=documents.CheckPointDocument(_nested(check.radar_m), _nested(check.pixel_px)) if check else None,
+        covariance_quantile=finite_or_none(calibration.covariance_quantile),
+        sigma=documents.SigmaDocument(*map(finite_or_none, sigma)),
+        check_point=documents.CheckPointDocument(nested(check.radar_m), nested(check.pixel_px)) if check else None,
         metrics=_metrics_document(calibration.metrics),
         noise_scale=documents.NoiseScaleDocument(*calibration.noise_scale),
-        radar_angle_map=angle_map_document(file.angle_map),
-        paper=documents.PaperDocument(_known(calibration.iterative_px), _known(calibration.sqpnp_px)),
+        radar_angle_map=angle_map_document(calibration.angle_map),
+        paper=documents.PaperDocument(finite_or_none(calibration.iterative_px), finite_or_none(calibration.sqpnp_px)),
         warnings=[documents.WarningDocument(c.code, c.message, c.hint) for c in calibration.warnings],
         unpaired=[documents.UnpairedDocument(u.id, u.code, u.reason, u.hint) for u in calibration.unpaired],
-        pairs=[_pair_document(pair) for pair in calibration.pairs],
+        pairs=[solved_pair_document(pair) for pair in calibration.pairs],
         camera=camera_document(calibration.camera),
         options=calibration.options,
         provenance=provenance_document(file.provenance),
     )
     content = msgspec.to_builtins(document)
-    known = {key: content[key] for key in _KEY_ORDER if key != "radar_angle_map" or file.angle_map is not None}
+    for pair in content["pairs"]:
+        if not pair["candidates"]:
+            for key in SOLVED_FROM_KEYS:
+                del pair[key]
+    known = {key: content[key] for key in _KEY_ORDER if key != "radar_angle_map" or calibration.angle_map is not None}
     return json_text(with_unknown(known, file.unknown))
 
 
@@ -156,14 +157,15 @@ def calibration_file_of(
         covariance=np.array(document.covariance or np.full((6, 6), np.nan)),
         camera=camera_of(document.camera, source=source),
         metrics=_metrics(document.metrics),
-        pairs=tuple(_pair(pair) for pair in document.pairs),
+        pairs=tuple(solved_pair_of(pair) for pair in document.pairs),
         unpaired=tuple(Unpaired(u.id, u.code, u.reason, u.hint) for u in document.unpaired),
         warnings=tuple(DataWarning(c.code, c.message, c.hint) for c in document.warnings),
         options=document.options,
         noise_scale=(scale.click, scale.range, scale.azimuth, scale.elevation),
-        covariance_quantile=_number(document.covariance_quantile),
-        iterative_px=_number(document.paper.iterative_px),
-        sqpnp_px=_number(document.paper.sqpnp_px),
+        covariance_quantile=nan_if_none(document.covariance_quantile),
+        iterative_px=nan_if_none(document.paper.iterative_px),
+        sqpnp_px=nan_if_none(document.paper.sqpnp_px),
+        angle_map=angle_map_of(document.radar_angle_map, source=source),
     )
     try:
         frames = FrameNames(document.frames.radar, document.frames.camera)
@@ -174,7 +176,6 @@ def calibration_file_of(
         frames=frames,
         check_point=CheckPoint(np.array(check.radar_m), np.array(check.pixel_px)) if check else None,
         provenance=provenance_of(document.provenance),
-        angle_map=angle_map_of(document.radar_angle_map, source=source),
     )
 
 
@@ -203,85 +204,35 @@ def _same_rotation(quaternion_wxyz: tuple[float, ...], transform: RigidTransform
     return bool(np.abs(matrix_from_quaternion_wxyz(quaternion) - transform.rotation).max() <= _AGREEMENT)
 
 
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def _number(value: float | None) -> float:
-    return _NAN if value is None else value
-
-
-def _nested(array: np.ndarray) -> Any:
-    """Return an array as nested tuples; None when any of it is unknown."""
-    if not np.isfinite(array).all():
-        return None
-    return tuple(map(tuple, array.tolist())) if array.ndim == 2 else tuple(array.tolist())
-
-
 def _transform_document(transform: RigidTransform) -> documents.TransformDocument:
     return documents.TransformDocument(
-        rotation=_nested(transform.rotation + 0.0),
-        translation_m=_nested(transform.translation_m + 0.0),
-        quaternion_wxyz=_nested(quaternion_wxyz_from_matrix(transform.rotation) + 0.0),
+        rotation=nested(transform.rotation + 0.0),
+        translation_m=nested(transform.translation_m + 0.0),
+        quaternion_wxyz=nested(quaternion_wxyz_from_matrix(transform.rotation) + 0.0),
     )
 
 
 def _metrics_document(metrics: Metrics) -> documents.MetricsDocument:
     return documents.MetricsDocument(
-        aed_px=_known(metrics.aed_px),
-        cdsd_px=_known(metrics.cdsd_px),
-        rms_px=_known(metrics.rms_px),
-        held_out_aed_px=_known(metrics.held_out_aed_px),
-        acc=None if metrics.acc is None else _known(metrics.acc),
+        aed_px=finite_or_none(metrics.aed_px),
+        cdsd_px=finite_or_none(metrics.cdsd_px),
+        rms_px=finite_or_none(metrics.rms_px),
+        held_out_aed_px=finite_or_none(metrics.held_out_aed_px),
+        acc=None if metrics.acc is None else finite_or_none(metrics.acc),
         n=metrics.n,
-        chi2=_known(metrics.chi2),
+        chi2=finite_or_none(metrics.chi2),
         degrees_of_freedom=metrics.degrees_of_freedom,
     )
 
 
 def _metrics(document: documents.MetricsDocument) -> Metrics:
     return Metrics(
-        aed_px=_number(document.aed_px),
-        cdsd_px=_number(document.cdsd_px),
-        rms_px=_number(document.rms_px),
+        aed_px=nan_if_none(document.aed_px),
+        cdsd_px=nan_if_none(document.cdsd_px),
+        rms_px=nan_if_none(document.rms_px),
         n=document.n,
-        held_out_aed_px=_number(document.held_out_aed_px),
+        held_out_aed_px=nan_if_none(document.held_out_aed_px),
         acc=document.acc,
-        chi2=_number(document.chi2),
+        chi2=nan_if_none(document.chi2),
         degrees_of_freedom=document.degrees_of_freedom,
-    )
-
-
-def _pair_document(pair: PairResult) -> documents.SolvedPairDocument:
-    return documents.SolvedPairDocument(
-        id=pair.id,
-        image_time=None if pair.image_time is None else documents.TimeDocument(*time_parts(pair.image_time)),
-        radar_m=_nested(pair.point_radar_m),
-        pixel_px=_nested(pair.pixel_px),
-        projected_px=_nested(pair.projected_px),
-        residual_px=_nested(pair.residual_px),
-        distance_px=_known(pair.distance_px),
-        inlier=bool(pair.inlier),
-        excluded=bool(pair.excluded),
-        outlier_probability=_known(pair.outlier_probability),
-        influence=_known(pair.influence),
-        candidate=int(pair.candidate),
-        expected_covariance_px2=_nested(pair.expected_covariance_px2),
-    )
-
-
-def _pair(document: documents.SolvedPairDocument) -> PairResult:
-    time = document.image_time
-    return PairResult(
-        id=document.id,
-        pixel_px=np.array(document.pixel_px),
-        projected_px=np.array(document.projected_px or (_NAN, _NAN)),
-        point_radar_m=np.array(document.radar_m),
-        inlier=document.inlier,
-        excluded=document.excluded,
-        outlier_probability=_number(document.outlier_probability),
-        influence=_number(document.influence),
-        candidate=document.candidate,
-        expected_covariance_px2=np.array(document.expected_covariance_px2 or [[_NAN] * 2] * 2),
-        image_time=None if time is None else TimeNs(time_from_parts(time.sec, time.nanosec)),
     )

@@ -5,6 +5,7 @@ Inputs and settings refuse keys they do not know; results may carry more.
 
 from typing import Annotated, Final, Literal
 
+import msgspec
 from msgspec import Meta, Struct, field
 
 from calib_core.options import CalibrationOptions
@@ -16,6 +17,7 @@ __all__ = [
     "AngleMapDocument",
     "CalibrationDocument",
     "CameraDocument",
+    "CandidateDocument",
     "CheckPointDocument",
     "ClickDocument",
     "ClicksDocument",
@@ -27,17 +29,29 @@ __all__ = [
     "SolvedPairDocument",
     "TimeDocument",
     "TransformDocument",
+    "names_schema",
 ]
 
 CLICKS_SCHEMA: Final = "cocalib/clicks-1"
 PAIRS_SCHEMA: Final = "cocalib/pairs-1"
 CALIBRATION_SCHEMA: Final = "cocalib/calibration-1"
 
+
+def names_schema(text: str, schema: str) -> bool:
+    """Tell whether JSON text says that it follows a schema, without checking anything else of it."""
+    try:
+        content = msgspec.json.decode(text)
+    except msgspec.DecodeError:
+        return False
+    return isinstance(content, dict) and content.get("schema") == schema
+
+
 Measured = Annotated[float, Meta(ge=-1e9, le=1e9)]
 """No position, pixel or coefficient comes near the bound; it keeps what is computed from them finite."""
 Pixel = tuple[Measured, Measured]
 Position = tuple[Measured, Measured, Measured]
 Vector2 = tuple[float, float]
+Vector3 = tuple[float, float, float]
 Vector4 = tuple[float, float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 Matrix22 = tuple[Vector2, Vector2]
@@ -163,8 +177,25 @@ class MetricsDocument(Struct, frozen=True):
     degrees_of_freedom: Count = 0
 
 
+class CandidateDocument(Struct, frozen=True):
+    """A radar position that may be the reflector.
+
+    sigma_polar holds the standard deviations of range [m], azimuth and elevation [rad]; null where no noise is assumed.
+    """
+
+    radar_m: Position
+    sigma_polar: Vector3 | None = None
+    score: float = 1.0
+    returns: Count = 1
+    scans: Count = 1
+    snr_db: float | None = None
+
+
 class SolvedPairDocument(Struct, frozen=True):
-    """One pair under the solved pose; residual_px is projected_px minus pixel_px, distance_px its length."""
+    """One pair under the solved pose; residual_px is projected_px minus pixel_px, distance_px its length.
+
+    sigma_px, radar_time and candidates are what the pair was solved from: with them it can be solved again.
+    """
 
     id: Name
     radar_m: Position
@@ -179,6 +210,9 @@ class SolvedPairDocument(Struct, frozen=True):
     influence: float | None = None
     candidate: Count = 0
     expected_covariance_px2: Matrix22 | None = None
+    sigma_px: Positive | None = None
+    radar_time: TimeDocument | None = None
+    candidates: list[CandidateDocument] = []
 
 
 class UnpairedDocument(Struct, frozen=True):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from calib_core.calibration import calibrate_pairs
-from calib_core.estimation.covariance import pixel_covariance
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
@@ -40,12 +39,12 @@ def test_pixel_covariance_is_that_of_projections_under_drawn_poses() -> None:
     drawn = rng.multivariate_normal(np.zeros(6), calibration.covariance, 1500)
     pixels = np.array([calibration.camera.project(calibration.camera_from_radar.perturbed(d) @ points) for d in drawn])
     for k in range(2):
-        assert np.cov(pixels[:, k].T) == pytest.approx(pixel_covariance(calibration, points)[k], rel=0.25, abs=0.3)
+        assert np.cov(pixels[:, k].T) == pytest.approx(calibration.pixel_covariance(points)[k], rel=0.25, abs=0.3)
 
 
 def test_pixel_covariance_of_what_the_lens_does_not_see_is_not_a_number() -> None:
     calibration = solved(simulate_pairs(12, rng=np.random.default_rng(3)))
-    assert np.isnan(pixel_covariance(calibration, np.array([[-5.0, 0.0, 0.0]]))).all()
+    assert np.isnan(calibration.pixel_covariance(np.array([[-5.0, 0.0, 0.0]]))).all()
 
 
 def test_a_measured_camera_position_shrinks_rotation_and_position_uncertainty() -> None:

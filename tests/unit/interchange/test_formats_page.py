@@ -75,7 +75,9 @@ def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(
     golden = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
     add = np.deg2rad(np.random.default_rng(2).uniform(-2, 2, (4, 6, 2)))
     angle_map = AngleMap(np.linspace(-0.5, 0.5, 6), np.linspace(-0.2, 0.1, 4), add, np.abs(add), 9.0, 5.0)
-    (tmp_path / "calibration.json").write_text(write_calibration(replace(golden, angle_map=angle_map)))
+    (tmp_path / "calibration.json").write_text(
+        write_calibration(replace(golden, calibration=replace(golden.calibration, angle_map=angle_map)))
+    )
     monkeypatch.chdir(tmp_path)
 
     names: dict[str, Any] = {}

@@ -134,8 +134,8 @@ def test_the_radars_angle_errors_travel_with_the_calibration_where_correcting_th
     content = json.loads(text)["radar_angle_map"]
     assert content["corrected_aed_px"] < content["aed_px"]
     back = read_calibration(text)
-    assert back.angle_map is not None
-    assert np.shape(content["add_elevation_rad"]) == back.angle_map.correction_rad.shape[:2]
+    assert back.calibration.angle_map is not None
+    assert np.shape(content["add_elevation_rad"]) == back.calibration.angle_map.correction_rad.shape[:2]
     assert write_calibration(back) == text
     content["add_azimuth_rad"].pop()
     with pytest.raises(InputError, match="radar_angle_map"):

@@ -12,11 +12,12 @@ from app.view.figures import pose_figures
 from app.view.mounting import OPTICAL_FROM_BODY, mounting_of
 from app.view.number_format import plain, with_sigma
 from app.view.wording import sentence
+from calib_core.association.clustering import candidate_at
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import Stamp, TimeNs, Unpaired, Unsolvable
-from calib_core.options import CalibrationOptions
+from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, Metrics, PairResult
 from calib_core.synthetic import NoiseProfile, simulate_pairs
@@ -213,11 +214,13 @@ def test_smooth_angle_errors_of_the_radar_are_a_figure_where_correcting_them_pay
     assert isinstance(solved, Calibration)
     assert "radar_angles" not in {figure.key for figure in pose_figures(solved)}
     bent = []
-    for row in solved.pairs:
-        polar = polar_from_cartesian(row.point_radar_m)
+    for pair in simulated.pairs:
+        polar = polar_from_cartesian(pair.candidates[0].position_radar_m)
         polar[2] += np.deg2rad(1.5) * np.cos(9.0 * polar[1])
-        bent.append(replace(row, point_radar_m=cartesian_from_polar(polar)))
-    figure = pose_figures(replace(solved, pairs=tuple(bent)))[-1]
+        bent.append(replace(pair, candidates=(candidate_at(cartesian_from_polar(polar), NoiseOptions()),)))
+    solved = calibrate_pairs(bent, simulated.camera, CalibrationOptions())
+    assert isinstance(solved, Calibration)
+    figure = pose_figures(solved)[-1]
     assert figure.key == "radar_angles"
     assert 0.5 < float(figure.value.removeprefix("up to ")) < 3.0
     assert "radar_angle_map" in figure.hint

@@ -1,0 +1,80 @@
+"""Pairs from arrays, where radar positions and pixels have been matched already."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calib_core.arrays import Points2, Points3
+from calib_core.errors import InputError
+from calib_core.measurements import Candidate, Pair
+from calib_core.options import NoiseOptions
+from calib_core.radar import covariance_from_sigma_polar
+
+__all__ = ["pairs_from_arrays"]
+
+
+def pairs_from_arrays(
+    points_radar_m: Points3,
+    pixels_px: Points2,
+    *,
+    sigma_px: float | None = None,
+    sigma_polar: np.ndarray | None = None,
+    noise: NoiseOptions | None = None,
+    ids: Sequence[str] | None = None,
+) -> tuple[Pair, ...]:
+    """Make pairs of radar positions and pixels that belong together already.
+
+    Args:
+        points_radar_m: (n, 3) reflector positions in the radar frame: x forward, y left, z up.
+        pixels_px: (n, 2) where the reflector's centre was seen; (0, 0) is the centre of the top-left pixel.
+        sigma_px: standard deviation of a pixel per axis; None takes the options' value.
+        sigma_polar: (3,) or (n, 3) standard deviations of range [m], azimuth and elevation [rad]; None takes `noise`.
+        noise: assumed noise of the radar; None takes the defaults.
+        ids: (n,) unique names; None numbers the pairs from 1.
+
+    Raises:
+        InputError: the arrays do not fit together, hold numbers that are not finite, or a position lies at the radar.
+    """
+    points, pixels = (np.asarray(values, dtype=np.float64) for values in (points_radar_m, pixels_px))
+    _require_columns(points, 3, "points_radar_m")
+    _require_columns(pixels, 2, "pixels_px")
+    names = [f"pair-{i + 1}" for i in range(len(points))] if ids is None else [str(name) for name in ids]
+    if not len(points) == len(pixels) == len(names):
+        raise InputError(
+            f"{len(points)} radar positions, {len(pixels)} pixels and {len(names)} ids: give one of each for every pair"
+        )
+    if len(set(names)) < len(names):
+        raise InputError("ids: some are given twice; name every pair differently")
+    at_radar = np.flatnonzero(~points.any(axis=1))
+    if len(at_radar):
+        raise InputError(
+            f"points_radar_m[{at_radar[0]}]: lies at the radar itself, which is no return; remove the pair"
+        )
+    sigmas = _sigma_polar_rows(sigma_polar, noise or NoiseOptions(), len(points))
+    covariances = covariance_from_sigma_polar(points, sigmas)
+    return tuple(
+        Pair(name, pixel, (Candidate(point, sigma, covariance),), sigma_px)
+        for name, pixel, point, sigma, covariance in zip(names, pixels, points, sigmas, covariances, strict=True)
+    )
+
+
+def _require_columns(values: np.ndarray, columns: int, name: str) -> None:
+    if values.ndim != 2 or values.shape[1] != columns:
+        raise InputError(f"{name}: expected an array of n x {columns}, got {' x '.join(map(str, values.shape))}")
+    wrong = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if len(wrong):
+        raise InputError(f"{name}[{wrong[0]}]: {values[wrong[0]].tolist()} is not finite; remove the pair")
+
+
+def _sigma_polar_rows(sigma_polar: np.ndarray | None, noise: NoiseOptions, count: int) -> Points3:
+    if sigma_polar is None:
+        angles_rad = np.deg2rad([noise.sigma_azimuth_deg, noise.sigma_elevation_deg])
+        sigma_polar = np.array([noise.sigma_range_m, *angles_rad])
+    sigmas = np.asarray(sigma_polar, dtype=np.float64)
+    if sigmas.shape not in ((3,), (count, 3)):
+        raise InputError(
+            f"sigma_polar: expected an array of 3 or of {count} x 3, got {' x '.join(map(str, sigmas.shape))}"
+        )
+    if not (np.isfinite(sigmas).all() and (sigmas > 0).all()):
+        raise InputError("sigma_polar: every standard deviation must be finite and above zero")
+    return np.broadcast_to(sigmas, (count, 3)).copy()

@@ -1,0 +1,102 @@
+"""What a fit says about each pair, and its figures over the inliers."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
+from calib_core.estimation.gnc import associate
+from calib_core.estimation.leave_one_out import LeaveOneOut
+from calib_core.estimation.linearization import Linearization
+from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
+from calib_core.measurements import Pair
+from calib_core.metrics import distances, metrics_of
+from calib_core.options import CalibrationOptions
+from calib_core.radar import cartesian_from_polar
+from calib_core.results import Metrics, PairResult
+
+__all__ = ["excluded_pair_results", "fit_metrics", "used_pair_results"]
+
+
+def fit_metrics(measurements: PairMeasurements, refined: ErrorsInVariablesFit, left_out: LeaveOneOut) -> Metrics:
+    """Measure the inlier pairs; chi2 is by the noise as assumed, so that a wrong assumption shows."""
+    inliers = refined.inliers
+    points = cartesian_from_polar(measurements.polar[refined.rows])
+    projected = measurements.camera.project(refined.camera_from_radar @ points)
+    errors = distances(projected, measurements.pixels_px)
+    assumed = associate(measurements, refined.camera_from_radar)[1]
+    return metrics_of(
+        errors[inliers],
+        held_out_distances_px=left_out.distance_px[inliers],
+        chi2=float(assumed.squared[inliers].sum()),
+        degrees_of_freedom=2 * int(inliers.sum()) - (3 if measurements.prior.measured else 6),
+    )
+
+
+def used_pair_results(
+    used: Sequence[Pair], refined: ErrorsInVariablesFit, left_out: LeaveOneOut
+) -> dict[str, PairResult]:
+    """Return the result of each used pair, by its id."""
+    measurements = refined.measurements
+    points = cartesian_from_polar(measurements.polar[refined.rows])
+    projected = measurements.camera.project(refined.camera_from_radar @ points)
+    inliers, expected = refined.inliers, _residual_covariances(refined.model)
+    return {
+        pair.id: PairResult(
+            id=pair.id,
+            pixel_px=pair.pixel_px,
+            projected_px=projected[i],
+            point_radar_m=pair.candidates[chosen].position_radar_m,
+            inlier=bool(inliers[i]),
+            outlier_probability=float(1.0 - refined.weights[i]),
+            influence=float(left_out.influence[i]),
+            candidate=chosen,
+            expected_covariance_px2=expected[i],
+            image_time=pair.image_time,
+            measured=pair,
+        )
+        for i, pair in enumerate(used)
+        for chosen in (int(refined.rows[i] - measurements.first[i]),)
+    }
+
+
+def _residual_covariances(model: Linearization) -> np.ndarray:
+    """Recover S = W^-1 W^-T of each pair (n, 2, 2); NaN where the camera does not see the position."""
+    unseen = np.asarray(~model.whitening.any(axis=(1, 2)))
+    inverse = np.linalg.inv(np.where(unseen[:, None, None], np.eye(2), model.whitening))
+    inverse[unseen] = np.nan
+    return np.asarray(inverse @ np.swapaxes(inverse, 1, 2))
+
+
+def excluded_pair_results(
+    shown: Sequence[Pair],
+    excluded: frozenset[str],
+    refined: ErrorsInVariablesFit,
+    camera: Camera,
+    options: CalibrationOptions,
+) -> dict[str, PairResult]:
+    """Show the pairs left out by a person under the pose, each with the candidate that suits it best."""
+    aside = [pair for pair in shown if pair.id in excluded]
+    if not aside:
+        return {}
+    measurements = pair_measurements(aside, camera, options).scaled(refined.noise_scale)
+    rows, model = associate(measurements, refined.camera_from_radar)
+    expected = _residual_covariances(model)
+    results = {}
+    for i, pair in enumerate(aside):
+        chosen = int(rows[i] - measurements.first[i])
+        point = pair.candidates[chosen].position_radar_m
+        results[pair.id] = PairResult(
+            id=pair.id,
+            pixel_px=pair.pixel_px,
+            projected_px=camera.project(refined.camera_from_radar @ point[None])[0],
+            point_radar_m=point,
+            inlier=False,
+            excluded=True,
+            candidate=chosen,
+            expected_covariance_px2=expected[i],
+            image_time=pair.image_time,
+            measured=pair,
+        )
+    return results

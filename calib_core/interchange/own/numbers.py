@@ -1,0 +1,24 @@
+"""Numbers of results as JSON carries them: what is not finite is null, and arrays are nested tuples."""
+
+from typing import Any
+
+import numpy as np
+
+__all__ = ["finite_or_none", "nan_if_none", "nested"]
+
+
+def finite_or_none(value: float) -> float | None:
+    """Return a finite number as it is, and None for any other."""
+    return float(value) if np.isfinite(value) else None
+
+
+def nan_if_none(value: float | None) -> float:
+    """Return the number a file holds, NaN for null."""
+    return float("nan") if value is None else value
+
+
+def nested(array: np.ndarray) -> Any:
+    """Return an array as nested tuples; None when any of it is unknown."""
+    if not np.isfinite(array).all():
+        return None
+    return tuple(map(tuple, array.tolist())) if array.ndim == 2 else tuple(array.tolist())

@@ -1,0 +1,98 @@
+"""A solved pair to and from the object that calibration-1 carries it in, with what it takes to solve it again."""
+
+import numpy as np
+
+from calib_core.interchange.own import documents
+from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
+from calib_core.measurements import Candidate, Pair, TimeNs, time_from_parts, time_parts
+from calib_core.radar import covariance_from_sigma_polar
+from calib_core.results import PairResult
+
+__all__ = ["SOLVED_FROM_KEYS", "solved_pair_document", "solved_pair_of"]
+
+SOLVED_FROM_KEYS = ("sigma_px", "radar_time", "candidates")
+"""What a pair was solved from; left out where it is not known, as in files of other tools."""
+
+
+def solved_pair_document(pair: PairResult) -> documents.SolvedPairDocument:
+    """Return the object that carries a solved pair."""
+    measured = pair.measured
+    return documents.SolvedPairDocument(
+        id=pair.id,
+        image_time=_time_document(pair.image_time),
+        radar_m=nested(pair.point_radar_m),
+        pixel_px=nested(pair.pixel_px),
+        projected_px=nested(pair.projected_px),
+        residual_px=nested(pair.residual_px),
+        distance_px=finite_or_none(pair.distance_px),
+        inlier=bool(pair.inlier),
+        excluded=bool(pair.excluded),
+        outlier_probability=finite_or_none(pair.outlier_probability),
+        influence=finite_or_none(pair.influence),
+        candidate=int(pair.candidate),
+        expected_covariance_px2=nested(pair.expected_covariance_px2),
+        sigma_px=measured.sigma_px if measured else None,
+        radar_time=_time_document(measured.radar_time) if measured else None,
+        candidates=[_candidate_document(candidate) for candidate in measured.candidates] if measured else [],
+    )
+
+
+def solved_pair_of(document: documents.SolvedPairDocument) -> PairResult:
+    """Return the solved pair that an object carries."""
+    return PairResult(
+        id=document.id,
+        pixel_px=np.array(document.pixel_px),
+        projected_px=np.array(document.projected_px or (np.nan, np.nan)),
+        point_radar_m=np.array(document.radar_m),
+        inlier=document.inlier,
+        excluded=document.excluded,
+        outlier_probability=nan_if_none(document.outlier_probability),
+        influence=nan_if_none(document.influence),
+        candidate=document.candidate,
+        expected_covariance_px2=np.array(document.expected_covariance_px2 or [[np.nan] * 2] * 2),
+        image_time=_time_of(document.image_time),
+        measured=_measured(document) if document.candidates else None,
+    )
+
+
+def _measured(document: documents.SolvedPairDocument) -> Pair:
+    return Pair(
+        id=document.id,
+        pixel_px=np.array(document.pixel_px),
+        candidates=tuple(_candidate(candidate) for candidate in document.candidates),
+        sigma_px=document.sigma_px,
+        image_time=_time_of(document.image_time),
+        radar_time=_time_of(document.radar_time),
+    )
+
+
+def _candidate_document(candidate: Candidate) -> documents.CandidateDocument:
+    return documents.CandidateDocument(
+        radar_m=nested(candidate.position_radar_m),
+        sigma_polar=nested(candidate.sigma_polar),
+        score=candidate.score,
+        returns=candidate.returns,
+        scans=candidate.scans,
+        snr_db=finite_or_none(candidate.snr_db),
+    )
+
+
+def _candidate(document: documents.CandidateDocument) -> Candidate:
+    position, sigma_polar = np.array(document.radar_m), np.array(document.sigma_polar or (np.nan,) * 3)
+    return Candidate(
+        position_radar_m=position,
+        sigma_polar=sigma_polar,
+        covariance_m2=covariance_from_sigma_polar(position, sigma_polar),
+        score=document.score,
+        returns=document.returns,
+        scans=document.scans,
+        snr_db=nan_if_none(document.snr_db),
+    )
+
+
+def _time_document(time: TimeNs | None) -> documents.TimeDocument | None:
+    return None if time is None else documents.TimeDocument(*time_parts(time))
+
+
+def _time_of(document: documents.TimeDocument | None) -> TimeNs | None:
+    return None if document is None else time_from_parts(document.sec, document.nanosec)

@@ -1,0 +1,109 @@
+"""What a result can be asked: itself or an error, a summary, and how sure it is in pixels."""
+
+import numpy as np
+import pytest
+
+from calib_core.association.array_pairs import pairs_from_arrays
+from calib_core.calibration import calibrate_pairs
+from calib_core.errors import InputError, UnsolvableError
+from calib_core.measurements import Unpaired, Unsolvable
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
+from calib_core.synthetic import SimulatedPairs, simulate_pairs
+
+POINT = np.array([[8.0, 0.5, 0.0]])
+
+
+@pytest.fixture(scope="module")
+def simulated() -> SimulatedPairs:
+    return simulate_pairs(20, rng=np.random.default_rng(5), noise="ti")
+
+
+def solved(simulated: SimulatedPairs, options: CalibrationOptions | None = None) -> Calibration:
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+def test_unwrap_gives_the_calibration_or_raises_with_reason_and_hint(simulated: SimulatedPairs) -> None:
+    calibration = solved(simulated)
+    assert calibration.unwrap() is calibration
+    unsolvable = calibrate_pairs(simulated.pairs[:3], simulated.camera)
+    assert isinstance(unsolvable, Unsolvable)
+    with pytest.raises(UnsolvableError) as refusal:
+        unsolvable.unwrap()
+    assert unsolvable.reason in str(refusal.value)
+    assert unsolvable.hint in str(refusal.value)
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_a_calibration_prints_as_eight_lines(simulated: SimulatedPairs, method: str) -> None:
+    lines = str(solved(simulated, CalibrationOptions(method=method))).splitlines()
+    assert len(lines) == 8
+    assert max(map(len, lines)) < 110
+    for word in ("pairs agree", "translation", "quaternion wxyz", "one sigma", "AED", "held-out", "warnings", "next"):
+        assert word in "\n".join(lines)
+
+
+def test_an_unsolvable_prints_its_reason_its_hint_and_the_clicks_without_radar() -> None:
+    text = str(Unsolvable("too-few-pairs", "2 of 4 pairs", "add two", (Unpaired("c3", "no-scan", "no scan", "wait"),)))
+    assert text.splitlines() == [
+        "No calibration (too-few-pairs): 2 of 4 pairs",
+        "  add two",
+        "  click c3: no scan; wait",
+    ]
+
+
+def test_pixel_sigma_is_the_root_of_the_covariances_diagonal(simulated: SimulatedPairs) -> None:
+    calibration = solved(simulated)
+    covariance = calibration.pixel_covariance(POINT)[0]
+    assert calibration.pixel_sigma(POINT)[0] == pytest.approx(np.sqrt(np.diag(covariance)))
+    assert calibration.pixel_sigma(np.array([[-5.0, 0.0, 0.0]])) == pytest.approx(np.full((1, 2), np.nan), nan_ok=True)
+
+
+def test_the_pose_jacobian_is_that_of_finite_differences(simulated: SimulatedPairs) -> None:
+    calibration, step = solved(simulated), 1e-6
+    jacobian = calibration.camera.pose_jacobian(calibration.camera_from_radar, POINT)[0]
+    for k, error in enumerate(np.eye(6) * step):
+        ahead, behind = (calibration.camera_from_radar.perturbed(sign * error) @ POINT for sign in (1.0, -1.0))
+        slope = (calibration.camera.project(ahead) - calibration.camera.project(behind))[0] / (2.0 * step)
+        assert jacobian[:, k] == pytest.approx(slope, rel=1e-5, abs=1e-4)
+
+
+def test_the_advice_of_a_calibration_is_worked_out_once_and_carried_along(simulated: SimulatedPairs) -> None:
+    calibration = solved(simulated)
+    assert calibration.next_placement is not None
+    assert solved(simulated, CalibrationOptions(method="paper")).next_placement is None
+
+
+def test_arrays_become_pairs_that_give_the_same_pose(simulated: SimulatedPairs) -> None:
+    points = np.array([pair.candidates[0].position_radar_m for pair in simulated.pairs])
+    pixels = np.array([pair.pixel_px for pair in simulated.pairs])
+    sigmas = np.array([pair.candidates[0].sigma_polar for pair in simulated.pairs])
+    pairs = pairs_from_arrays(points, pixels, sigma_polar=sigmas, ids=[pair.id for pair in simulated.pairs])
+    outcome = calibrate_pairs(pairs, simulated.camera)
+    assert isinstance(outcome, Calibration)
+    assert outcome.camera_from_radar.as_matrix().tobytes() == solved(simulated).camera_from_radar.as_matrix().tobytes()
+    assert [pair.id for pair in pairs_from_arrays(points[:2], pixels[:2])] == ["pair-1", "pair-2"]
+    assert pairs_from_arrays(points[:1], pixels[:1], sigma_px=2.5)[0].sigma_px == 2.5
+
+
+@pytest.mark.parametrize(
+    ("points", "pixels", "more", "words"),
+    [
+        (np.zeros((2, 2)), np.zeros((2, 2)), {}, "points_radar_m: expected an array of n x 3, got 2 x 2"),
+        (np.ones((2, 3)), np.zeros(2), {}, "pixels_px: expected an array of n x 2, got 2"),
+        (np.ones((2, 3)), np.zeros((3, 2)), {}, "2 radar positions, 3 pixels and 2 ids"),
+        (np.full((1, 3), np.nan), np.zeros((1, 2)), {}, r"points_radar_m\[0\]: .* is not finite"),
+        (np.ones((1, 3)), np.full((1, 2), np.inf), {}, r"pixels_px\[0\]: .* is not finite"),
+        (np.zeros((1, 3)), np.zeros((1, 2)), {}, "lies at the radar itself"),
+        (np.ones((2, 3)), np.zeros((2, 2)), {"ids": ["a", "a"]}, "ids: some are given twice"),
+        (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.1, 0.2]}, "sigma_polar: expected an array of 3"),
+        (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.1, 0.2, 0.0]}, "sigma_polar: every standard deviation"),
+    ],
+)
+def test_arrays_that_make_no_pairs_are_refused_in_words(
+    points: np.ndarray, pixels: np.ndarray, more: dict[str, object], words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        pairs_from_arrays(points, pixels, **more)  # type: ignore[arg-type]
