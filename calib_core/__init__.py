@@ -1,1 +1,142 @@
-"""Radar-camera calibration: clicks and radar returns go in, camera_from_radar comes out."""
+"""Radar-camera calibration: clicks and radar returns go in, camera_from_radar comes out.
+
+    import calib_core as cc
+
+    pairs = cc.pairs_from_arrays(points_radar_m, pixels_px)
+    calibration = cc.calibrate_pairs(pairs, cc.read_camera("camera_info.yaml")).unwrap()
+    print(calibration)
+
+Every name in `__all__` is public: see "What is public" in CONTRIBUTING.md. A name is imported when it is first used, so
+that `import calib_core` costs next to nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from calib_core.association.array_pairs import pairs_from_arrays
+    from calib_core.association.placements import Placement, find_placements
+    from calib_core.calibration import calibrate, calibrate_pairs, solve_again
+    from calib_core.camera import Camera
+    from calib_core.errors import CalibrationError, InputError, OptionError, RecordingError, UnsolvableError
+    from calib_core.geometry import RigidTransform
+    from calib_core.interchange import CalibrationFile, CheckReport, FrameNames, PairsFile, Provenance
+    from calib_core.interchange.files import (
+        check,
+        export,
+        read_calibration,
+        read_camera,
+        read_clicks,
+        read_pairs,
+        write_calibration,
+        write_clicks,
+        write_pairs,
+    )
+    from calib_core.measurements import Candidate, Pair, RadarScan, RadarScans, ReflectorClick, Unpaired, Unsolvable
+    from calib_core.metrics import acc, aed, cdsd
+    from calib_core.options import (
+        CalibrationOptions,
+        CameraPositionPrior,
+        GatingOptions,
+        LocatingOptions,
+        NoiseOptions,
+        PaperOptions,
+        SolvingOptions,
+    )
+    from calib_core.radar import AngleMap
+    from calib_core.recordings import Recording, RecordingOptions, open_recording
+    from calib_core.results import Calibration, DataWarning, Metrics, NextPlacement, PairResult
+
+__all__ = [
+    "AngleMap",
+    "Calibration",
+    "CalibrationError",
+    "CalibrationFile",
+    "CalibrationOptions",
+    "Camera",
+    "CameraPositionPrior",
+    "Candidate",
+    "CheckReport",
+    "DataWarning",
+    "FrameNames",
+    "GatingOptions",
+    "InputError",
+    "LocatingOptions",
+    "Metrics",
+    "NextPlacement",
+    "NoiseOptions",
+    "OptionError",
+    "Pair",
+    "PairResult",
+    "PairsFile",
+    "PaperOptions",
+    "Placement",
+    "Provenance",
+    "RadarScan",
+    "RadarScans",
+    "Recording",
+    "RecordingError",
+    "RecordingOptions",
+    "ReflectorClick",
+    "RigidTransform",
+    "SolvingOptions",
+    "Unpaired",
+    "Unsolvable",
+    "UnsolvableError",
+    "acc",
+    "aed",
+    "calibrate",
+    "calibrate_pairs",
+    "cdsd",
+    "check",
+    "export",
+    "find_placements",
+    "open_recording",
+    "pairs_from_arrays",
+    "read_calibration",
+    "read_camera",
+    "read_clicks",
+    "read_pairs",
+    "solve_again",
+    "write_calibration",
+    "write_clicks",
+    "write_pairs",
+]
+
+_MODULES = {
+    "association.array_pairs": ("pairs_from_arrays",),
+    "association.placements": ("Placement", "find_placements"),
+    "calibration": ("calibrate", "calibrate_pairs", "solve_again"),
+    "camera": ("Camera",),
+    "errors": ("CalibrationError", "InputError", "OptionError", "RecordingError", "UnsolvableError"),
+    "geometry": ("RigidTransform",),
+    "interchange": ("CalibrationFile", "CheckReport", "FrameNames", "PairsFile", "Provenance"),
+    "interchange.files": (
+        *("check", "export", "read_calibration", "read_camera", "read_clicks", "read_pairs"),
+        *("write_calibration", "write_clicks", "write_pairs"),
+    ),
+    "measurements": ("Candidate", "Pair", "RadarScan", "RadarScans", "ReflectorClick", "Unpaired", "Unsolvable"),
+    "metrics": ("acc", "aed", "cdsd"),
+    "options": (
+        *("CalibrationOptions", "CameraPositionPrior", "GatingOptions", "LocatingOptions", "NoiseOptions"),
+        *("PaperOptions", "SolvingOptions"),
+    ),
+    "radar": ("AngleMap",),
+    "recordings": ("Recording", "RecordingOptions", "open_recording"),
+    "results": ("Calibration", "DataWarning", "Metrics", "NextPlacement", "PairResult"),
+}
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(
+            f"module 'calib_core' has no attribute {name!r}; its public names are in calib_core.__all__"
+        )
+    value = getattr(import_module(f"calib_core.{_MODULE_OF[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

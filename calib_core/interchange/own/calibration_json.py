@@ -30,6 +30,7 @@ from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
 
 __all__ = [
     "COVARIANCE_CONVENTION",
+    "calibration_file",
     "calibration_file_of",
     "calibration_text",
     "kept_results",
@@ -60,19 +61,29 @@ def calibration_text(
         provenance: where it comes from.
         clicks: where the pairs carry no stamp of their frame, it is taken from the click of the same id.
     """
+    return write_calibration(calibration_file(calibration, frames, provenance, clicks=clicks))
+
+
+def calibration_file(
+    calibration: Calibration,
+    frames: FrameNames | None = None,
+    provenance: Provenance | None = None,
+    *,
+    clicks: Iterable[ReflectorClick] = (),
+) -> CalibrationFile:
+    """Return the content of a calibration-1 file: the calibration with its frames, a check point and its provenance."""
     times = {click.id: click.image_time for click in clicks}
     pairs = tuple(
         pair if pair.image_time is not None else dataclasses.replace(pair, image_time=times.get(pair.id))
         for pair in calibration.pairs
     )
     stamped = dataclasses.replace(calibration, pairs=pairs)
-    file = CalibrationFile(
+    return CalibrationFile(
         calibration=stamped,
         frames=frames or FrameNames(),
         check_point=choose_check_point(stamped),
         provenance=provenance or Provenance(),
     )
-    return write_calibration(file)
 
 
 def write_calibration(file: CalibrationFile) -> str:

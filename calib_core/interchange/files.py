@@ -1,0 +1,189 @@
+"""Files by their path, for scripts and notebooks: read, write, export and check in one call each."""
+
+from pathlib import Path
+from typing import TypeAlias
+
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance
+from calib_core.interchange.cameras.files import read_camera_file
+from calib_core.interchange.check import report as reports
+from calib_core.interchange.check.pair_residuals import read_check_pairs_file
+from calib_core.interchange.exporting import ExportBytes, ExportText
+from calib_core.interchange.exporting import export as export_file
+from calib_core.interchange.imported import ImportedCalibration
+from calib_core.interchange.importing import imported, read_any_file
+from calib_core.interchange.own import calibration_json, clicks_json, pairs_json
+from calib_core.measurements import ReflectorClick
+from calib_core.options import NoiseOptions
+from calib_core.results import Calibration
+
+__all__ = [
+    "check",
+    "export",
+    "read_calibration",
+    "read_camera",
+    "read_clicks",
+    "read_pairs",
+    "write_calibration",
+    "write_clicks",
+    "write_pairs",
+]
+
+PathLike: TypeAlias = str | Path
+
+_MAX_TEXT_BYTES = 64 << 20
+
+
+def read_camera(path: PathLike, *, image_size_px: tuple[int, int] | None = None) -> Camera:
+    """Read intrinsics: ROS camera_info YAML, OpenCV YAML or XML, Kalibr camchain, or JSON of ours.
+
+    Args:
+        path: of the file; "file.yml#cam1" says which camera where it holds several.
+        image_size_px: width and height, used where the file does not tell them.
+
+    Raises:
+        InputError: the file cannot be read, or holds no camera.
+    """
+    return read_camera_file(path, image_size_px=image_size_px)
+
+
+def read_pairs(path: PathLike, *, noise: NoiseOptions | None = None) -> pairs_json.PairsFile:
+    """Read a pairs-1 file: pairs, camera, and what it says about noise and the camera's position.
+
+    Args:
+        path: of the file.
+        noise: assumed where the file says nothing; None takes the defaults.
+
+    Raises:
+        InputError: the file, the place in it and what to do.
+    """
+    return pairs_json.read_pairs(_text(path), str(path), noise=noise)
+
+
+def write_pairs(path: PathLike, pairs_file: pairs_json.PairsFile) -> None:
+    """Write a pairs-1 file.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    Path(path).write_text(pairs_json.write_pairs(pairs_file), encoding="utf-8", newline="\n")
+
+
+def read_clicks(path: PathLike) -> tuple[ReflectorClick, ...]:
+    """Read a clicks-1 file.
+
+    Raises:
+        InputError: the file, the place in it and what to do.
+    """
+    return tuple(clicks_json.read_clicks(_text(path), str(path)))
+
+
+def write_clicks(path: PathLike, clicks: tuple[ReflectorClick, ...]) -> None:
+    """Write a clicks-1 file.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    Path(path).write_text(clicks_json.write_clicks(clicks), encoding="utf-8", newline="\n")
+
+
+def read_calibration(path: PathLike) -> CalibrationFile:
+    """Read a calibration-1 file.
+
+    Raises:
+        InputError: the file, the place in it and what to do; also when its two transforms or a quaternion disagree.
+    """
+    return calibration_json.read_calibration(_text(path), str(path))
+
+
+def write_calibration(
+    path: PathLike,
+    calibration: Calibration | CalibrationFile,
+    *,
+    frames: FrameNames | None = None,
+    provenance: Provenance | None = None,
+) -> None:
+    """Write a calibration-1 file: the same calibration gives the same bytes.
+
+    Args:
+        path: where to.
+        calibration: a result of the solver, or a file that was read, which is written as it is.
+        frames: names of the two frames, for a result; None takes "radar" and "camera_optical".
+        provenance: where a result comes from.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    text = (
+        calibration_json.calibration_text(calibration, frames, provenance)
+        if isinstance(calibration, Calibration)
+        else calibration_json.write_calibration(calibration)
+    )
+    Path(path).write_text(text, encoding="utf-8", newline="\n")
+
+
+def export(
+    calibration: Calibration | CalibrationFile, name: str, *, frames: FrameNames | None = None, rectified: bool = False
+) -> ExportText | ExportBytes:
+    """Write a calibration in the format of another tool.
+
+    Args:
+        calibration: a result of the solver, or a file that was read.
+        name: of the format, such as "tf2", "urdf", "kalibr", "opencv" or "kitti".
+        frames: names of the two frames, for a result; None takes "radar" and "camera_optical".
+        rectified: the pictures are undistorted with this same camera matrix; see the notes of "kitti" and "nuscenes".
+
+    Raises:
+        InputError: no such format, or it cannot carry this calibration: why, and what to take instead.
+    """
+    file = (
+        calibration_json.calibration_file(calibration, frames) if isinstance(calibration, Calibration) else calibration
+    )
+    return export_file(file, name, rectified=rectified)
+
+
+def check(
+    calibration: PathLike | Calibration | CalibrationFile,
+    *,
+    against: PathLike | Calibration | CalibrationFile | None = None,
+    camera: Camera | None = None,
+    pairs: PathLike | None = None,
+) -> reports.CheckReport:
+    """Check a calibration by its check point, by another calibration, by pairs, and by what is plausible.
+
+    Args:
+        calibration: a file of any format that can be read, or a result.
+        against: a calibration of the same sensors that is known to be right.
+        camera: the intrinsics, where the file has none.
+        pairs: a file of pairs or a calibration-1 file: radar positions and where they were seen.
+
+    Raises:
+        InputError: a file cannot be read, or holds no pose.
+    """
+    return reports.check(
+        _imported(calibration),
+        against=None if against is None else _imported(against),
+        camera=camera,
+        pairs=None if pairs is None else read_check_pairs_file(Path(pairs)),
+    )
+
+
+def _imported(calibration: PathLike | Calibration | CalibrationFile) -> ImportedCalibration:
+    if isinstance(calibration, str | Path):
+        return read_any_file(calibration)
+    if isinstance(calibration, Calibration):
+        calibration = calibration_json.calibration_file(calibration)
+    return imported(calibration)
+
+
+def _text(path: PathLike) -> str:
+    file = Path(path)
+    try:
+        if file.stat().st_size > _MAX_TEXT_BYTES:
+            raise InputError(f"{file}: larger than {_MAX_TEXT_BYTES >> 20} MB; is it the right file?")
+        return file.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{file}: not a text file (byte {error.start} is not UTF-8); check the path") from None
