@@ -118,7 +118,7 @@ CELLS: tuple[tuple[str, str], ...] = (
     (
         "code",
         'exported = cc.export(rooftop, "tf2")\nprint(exported.text)\n'
-        'with open(exported.file_name, "wb") as file:\n    file.write(exported.data)\n'
+        "Path(exported.file_name).write_bytes(exported.data)\n"
         "print(cc.check(exported.file_name, against=rooftop).verdict)",
     ),
 )
