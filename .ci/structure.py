@@ -1,0 +1,116 @@
+"""Count and draw the structure of the packages from their imports: `python .ci/structure.py [count|draw] [CHECKOUT]`.
+
+`count` prints, for each folder that has rooms, how many rooms it has, on how many floors they stand (a room stands above all
+that it imports) and how many imports run between them. `draw` prints the layers that pyproject.toml promises, as
+ARCHITECTURE.md shows them. Nothing is imported: the sources are read as text.
+"""
+
+import ast
+import sys
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+PACKAGES = ("calib_core", "app")
+WIDTH = 118
+
+
+def modules(root: Path) -> dict[str, Path]:
+    """Return every module of the packages by its dotted name, packages by their own."""
+    found = {}
+    for package in PACKAGES:
+        for path in sorted((root / package).rglob("*.py")):
+            parts = path.relative_to(root).with_suffix("").parts
+            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def imports(root: Path) -> dict[str, set[str]]:
+    """Return which module imports which, those that a package hands on included."""
+    known = modules(root)
+    graph: dict[str, set[str]] = {}
+    for name, path in known.items():
+        targets: set[str] = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                below = {f"{node.module}.{alias.name}" for alias in node.names} & known.keys()
+                targets |= below or {node.module}
+            elif isinstance(node, ast.Import):
+                targets |= {alias.name for alias in node.names}
+        graph[name] = (targets & known.keys()) - {name}
+    return graph
+
+
+def between_rooms(graph: Mapping[str, set[str]], folder: str) -> dict[str, set[str]]:
+    """Return which room of a folder imports which: its modules, and its packages as one room each."""
+
+    def room(module: str) -> str | None:
+        head, _, rest = module.partition(f"{folder}.")
+        return rest.partition(".")[0] if not head and rest else None
+
+    rooms: dict[str, set[str]] = {own: set() for module in graph if (own := room(module))}
+    for module, targets in graph.items():
+        own = room(module)
+        if own:
+            rooms[own] |= {other for target in targets if (other := room(target)) and other != own}
+    return rooms
+
+
+def floors(rooms: Mapping[str, set[str]]) -> dict[str, int]:
+    """Return the floor of each room, 0 for those that import no other; a circle of imports is an error.
+
+    Raises:
+        ValueError: rooms import each other in a circle.
+    """
+    floor: dict[str, int] = {}
+    while len(floor) < len(rooms):
+        ready = {name for name, below in rooms.items() if name not in floor and below <= floor.keys()}
+        if not ready:
+            raise ValueError("a circle among " + ", ".join(sorted(rooms.keys() - floor.keys())))
+        floor |= {name: 1 + max((floor[other] for other in rooms[name]), default=-1) for name in ready}
+    return floor
+
+
+def counted(root: Path) -> Iterator[str]:
+    """Yield a line per folder with rooms, then the totals."""
+    graph = imports(root)
+    folders = sorted({name.rpartition(".")[0] for name in graph} - {""})
+    yield f"{'folder':<42}{'rooms':>6}{'floors':>8}{'imports between rooms':>23}"
+    for folder in folders:
+        rooms = between_rooms(graph, folder)
+        yield f"{folder:<42}{len(rooms):>6}{1 + max(floors(rooms).values()):>8}{sum(map(len, rooms.values())):>23}"
+    across = sum(name.rpartition(".")[0] != target.rpartition(".")[0] for name in graph for target in graph[name])
+    total = sum(map(len, graph.values()))
+    yield f"{len(folders)} packages, {len(graph)} modules, {total} imports between modules, {across} of them between packages"
+
+
+def drawn(root: Path) -> Iterator[str]:
+    """Yield the layers of every contract in pyproject.toml, the uppermost first."""
+    settings = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = settings["tool"]["importlinter"]["contracts"]
+    for contract in contracts:
+        for container in contract.get("containers", ()) if contract["type"] == "layers" else ():
+            yield container
+            yield from _wrapped(contract["layers"])
+
+
+def _wrapped(layers: list[str]) -> Iterator[str]:
+    line = "   "
+    for number, layer in enumerate(layers):
+        piece = f" {layer}" if number == 0 else f" > {layer}"
+        if len(line + piece) > WIDTH:
+            yield line
+            line = "     "
+        line += piece
+    yield line
+
+
+def main(arguments: list[str]) -> None:
+    """Print what was asked for."""
+    what = arguments[0] if arguments else "count"
+    root = Path(arguments[1]) if len(arguments) > 1 else Path(__file__).resolve().parents[1]
+    print("\n".join((drawn if what == "draw" else counted)(root)))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
