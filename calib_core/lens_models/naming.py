@@ -47,7 +47,7 @@ def written_lens(lens: LensModel, distortion: Values, where: Elsewhere) -> Writt
     names = [known for known in lens.names_elsewhere if known.where == where]
     if not names:
         raise InputError(
-            f"{_TITLES[where]} has no name for the lens model {lens.name}; export with --to json, matlab or numpy instead"
+            f"{_TITLES[where]} has no name for the lens model {lens.name}; json, matlab and numpy files hold every lens"
         )
     for known in names:
         count = len(distortion) if known.coefficients is None else known.coefficients

@@ -16,8 +16,9 @@ from calib_core.lens_models.perspective import project_distorted, unproject_dist
 from calib_core.lens_models.registry import LENS_MODELS
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.paper.pnp import project_points, solve_pnp_ransac
+from calib_core.recordings import open_recording
 from calib_core.results import Calibration
-from calib_core.synthetic import simulate_pairs, typical_camera
+from calib_core.synthetic import SimulationOptions, simulate, simulate_pairs, typical_camera, write_recording
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 
@@ -114,9 +115,27 @@ def test_files_and_formats_that_have_a_name_for_it_carry_it(camera: Camera, file
     assert (imported.camera.model, imported.camera.distortion.tolist()) == ("division", [-0.2])
 
 
+def test_a_recording_needs_a_name_for_it_in_camera_info(
+    camera: Camera, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = SimulationOptions(camera_model="division", placements=1, width_px=160, height_px=90)
+    data = write_recording(simulate(options), tmp_path / "named")
+    with open_recording(data) as recording:
+        read = recording.camera()
+    assert read is not None
+    assert (read.model, read.distortion.tolist()) == ("division", [-0.2])
+
+    monkeypatch.setitem(LENS_MODELS, "division", replace(DIVISION, names_elsewhere=()))
+    with pytest.raises(InputError, match="ROS has no name for the lens model division"):
+        write_recording(simulate(options), tmp_path / "unnamed")
+    assert not (tmp_path / "unnamed").exists()
+
+
 def test_a_format_without_a_name_for_it_refuses_it_in_words(file: CalibrationFile) -> None:
     for name, title in (("kalibr", "Kalibr"), ("opencv", "OpenCV"), ("foxglove", "Foxglove")):
-        with pytest.raises(InputError, match=f"{title} has no name for the lens model division; export with --to json"):
+        with pytest.raises(
+            InputError, match=f"{title} has no name for the lens model division; json, matlab and numpy"
+        ):
             export(file, name)
     with pytest.raises(InputError, match="no place for the distortion of this division lens"):
         export(file, "kitti")
