@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         write_clicks,
         write_pairs,
     )
+    from calib_core.lens_models.lens_model import LensModel
     from calib_core.measurements import Candidate, Pair, RadarScan, RadarScans, ReflectorClick, Unpaired, Unsolvable
     from calib_core.metrics import acc, aed, cdsd
     from calib_core.options import (
@@ -61,6 +62,7 @@ __all__ = [
     "FrameNames",
     "GatingOptions",
     "InputError",
+    "LensModel",
     "LocatingOptions",
     "Metrics",
     "NextPlacement",
@@ -115,6 +117,7 @@ _MODULES = {
         *("check", "export", "read_calibration", "read_camera", "read_clicks", "read_pairs"),
         *("write_calibration", "write_clicks", "write_pairs"),
     ),
+    "lens_models.lens_model": ("LensModel",),
     "measurements": ("Candidate", "Pair", "RadarScan", "RadarScans", "ReflectorClick", "Unpaired", "Unsolvable"),
     "metrics": ("acc", "aed", "cdsd"),
     "options": (

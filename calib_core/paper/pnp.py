@@ -1,6 +1,6 @@
-"""OpenCV's perspective-n-point solvers for all four lens models. The only geometry that imports cv2, and only when called.
+"""OpenCV's perspective-n-point solvers for every lens model. The only geometry that imports cv2, and only when called.
 
-OpenCV knows the pinhole and the Brown-Conrady lenses itself. For the fisheye lens (and for a camera matrix with skew, which
+OpenCV knows the pinhole and the Brown-Conrady lenses itself. For any other lens (and for a camera matrix with skew, which
 OpenCV drops silently) the pixels become points of the plane z = 1 first, and the refinement is our own Levenberg-Marquardt,
 so that what is minimised stays in pixels.
 """
@@ -58,21 +58,23 @@ def project_points(points_radar_m: Points3, camera_from_radar: RigidTransform, c
     Args:
         points_radar_m: (n, 3).
         camera_from_radar: the pose.
-        camera: any model; skew is not known to OpenCV and is refused.
+        camera: any model that OpenCV has a function for; skew is not known to OpenCV and is refused.
 
     Raises:
-        ValueError: the camera matrix has skew.
+        ValueError: the camera matrix has skew, or OpenCV does not have the lens model.
     """
     import cv2
 
     if camera.matrix_px[0, 1] != 0.0 or camera.matrix_px[1, 0] != 0.0:
         raise ValueError("OpenCV cannot project through a camera matrix with skew")
+    if camera.lens.opencv is None:
+        raise ValueError(f"OpenCV cannot project through the lens model {camera.model}")
     points = np.ascontiguousarray(points_radar_m, dtype=np.float64).reshape(-1, 1, 3)
     if not len(points):
         return np.zeros((0, 2))
     rotation_vector = rotation_log(camera_from_radar.rotation).reshape(3, 1)
     translation = np.array(camera_from_radar.translation_m).reshape(3, 1)
-    if camera.model == "equidistant":
+    if camera.lens.opencv == "fisheye.projectPoints":
         pixels, _ = cv2.fisheye.projectPoints(
             points, rotation_vector, translation, np.array(camera.matrix_px), np.array(camera.distortion)
         )
@@ -133,7 +135,7 @@ def solve_pnp_ransac(
     Args:
         points_radar_m: (n, 3), n >= 4.
         pixels_px: (n, 2) where each is seen.
-        camera: any model; with a fisheye lens the threshold is carried to the plane z = 1 by the mean focal length.
+        camera: any model; for one cv2.solvePnP does not know, the mean focal length carries the threshold to the plane z = 1.
         solver: what fits the samples' consensus.
         threshold_px: largest reprojection error of an inlier [px].
         iterations: at most so many samples.
@@ -237,7 +239,7 @@ def _view(points_radar_m: Points3, pixels_px: Points2, camera: Camera) -> _View:
 
 def _known_to_opencv(camera: Camera) -> bool:
     skewed = camera.matrix_px[0, 1] != 0.0 or camera.matrix_px[1, 0] != 0.0
-    return camera.model != "equidistant" and not skewed
+    return camera.lens.opencv == "projectPoints" and not skewed
 
 
 def _flag(solver: PnPSolver) -> int:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
+from calib_core.lens_models.naming import written_lens
 from calib_core.recordings.containers.writing import write_ros1_bag, write_ros2
 from calib_core.synthetic.messages import all_messages, camera_messages, radar_messages
 from calib_core.synthetic.options import Container
@@ -34,7 +35,10 @@ def write_recording(
 
     Raises:
         RecordingError: a file exists already.
+        InputError: ROS has no name for the camera's lens model.
     """
+    camera = recording.camera
+    written_lens(camera.lens, camera.distortion, "camera_info")  # refused before anything is written
     folder.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
     frame_count = len(recording.stage.frame_times.header_ns)

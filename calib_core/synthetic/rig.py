@@ -10,24 +10,12 @@ import numpy as np
 from calib_core.arrays import Matrix33, Vector3
 from calib_core.camera import Camera, CameraModel
 from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.lens_models.registry import LENS_MODELS
 
 __all__ = ["NOMINAL_ROTATION", "Rig", "RigOptions", "nominal_rotation", "radar_stand", "random_rig", "typical_camera"]
 
 NOMINAL_ROTATION = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
 """Optical axes (right, down, forward) in terms of radar axes (forward, left, up): a camera looking where the radar looks."""
-
-_DISTORTION: dict[CameraModel, tuple[float, ...]] = {
-    "pinhole": (),
-    "plumb_bob": (-0.17, 0.032, 0.0006, -0.0004, 0.0),
-    "rational_polynomial": (0.62, 0.21, 0.0005, -0.0003, 0.012, 0.79, 0.33, 0.045),
-    "equidistant": (-0.012, 0.006, -0.004, 0.0009),
-}
-_FIELD_OF_VIEW_DEG: dict[CameraModel, float] = {
-    "pinhole": 75.0,
-    "plumb_bob": 75.0,
-    "rational_polynomial": 75.0,
-    "equidistant": 110.0,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,10 +82,11 @@ def typical_camera(
         model: the lens model; each has distortion a person can see.
         width_px: columns.
         height_px: rows.
-        field_of_view_deg: horizontal field of view before distortion [deg]; None takes 75, for equidistant 110.
+        field_of_view_deg: horizontal field of view before distortion [deg]; None takes the lens model's typical one.
     """
-    half_rad = np.deg2rad(field_of_view_deg or _FIELD_OF_VIEW_DEG[model]) / 2.0
-    focal_px = (width_px / 2.0) / (half_rad if model == "equidistant" else np.tan(half_rad))
+    typical = LENS_MODELS[model].typical
+    half_rad = np.deg2rad(field_of_view_deg or typical.field_of_view_deg) / 2.0
+    focal_px = (width_px / 2.0) / typical.radius_at(half_rad)
     matrix = np.array(
         [
             [focal_px, 0.0, (width_px - 1) / 2.0 + 0.006 * width_px],
@@ -105,7 +94,7 @@ def typical_camera(
             [0.0, 0.0, 1.0],
         ]
     )
-    return Camera(model, width_px, height_px, matrix, np.array(_DISTORTION[model]))
+    return Camera(model, width_px, height_px, matrix, np.array(typical.distortion))
 
 
 def radar_stand(options: RigOptions) -> RigidTransform:

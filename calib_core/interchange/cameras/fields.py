@@ -12,20 +12,11 @@ from calib_core.errors import InputError
 from calib_core.interchange.own.camera_document import camera_of
 from calib_core.interchange.own.documents import CameraDocument
 from calib_core.interchange.syntax.strict_json import checked
+from calib_core.lens_models.naming import lenses_named, opencv_lens
+from calib_core.lens_models.registry import LENS_MODELS
 
 __all__ = ["FoundCamera", "find_cameras", "floats"]
 
-_MODELS = {
-    "": "",
-    "none": "pinhole",
-    "pinhole": "pinhole",
-    "plumb_bob": "plumb_bob",
-    "radtan": "plumb_bob",
-    "rational_polynomial": "rational_polynomial",
-    "equidistant": "equidistant",
-    "fisheye": "equidistant",
-    "kannala_brandt": "equidistant",
-}
 _MATRIX_KEYS = {  # the camera matrix's key -> the distortion's
     "camera_matrix": ("distortion_coefficients", "dist_coeffs", "distortion_coeffs", "dist_coeff"),
     "Camera_Matrix": ("Distortion_Coefficients",),
@@ -70,7 +61,7 @@ class FoundCamera:
             )
         model, distortion = _lens(self.model, self.distortion, source=source, name=self.name)
         try:
-            return Camera(model, *size, np.reshape(self.matrix_px, (3, 3)), np.array(distortion))  # type: ignore[arg-type]
+            return Camera(model, *size, np.reshape(self.matrix_px, (3, 3)), np.array(distortion))
         except ValueError as error:
             raise InputError(f"{source}: {self.name}: {error}; correct it or calibrate the camera again") from None
 
@@ -166,29 +157,29 @@ def _refuse_crop(content: Mapping[str, Any], *, source: str) -> None:
 
 
 def _model(name: str, *, source: str) -> str:
-    if name.lower() not in _MODELS:
-        known = ", ".join(key for key in _MODELS if key)
-        raise InputError(f"{source}: the lens model {name!r} is not supported; known: {known}")
-    return _MODELS[name.lower()]
+    if not name:
+        return ""
+    models = {known: lens.name for lens in LENS_MODELS.values() for known in lens.names_in_files}
+    if name.lower() not in models:
+        raise InputError(f"{source}: the lens model {name!r} is not supported; known: {', '.join(models)}")
+    return models[name.lower()]
 
 
 def _lens(model: str, distortion: tuple[float, ...], *, source: str, name: str) -> tuple[str, tuple[float, ...]]:
     """Settle model and coefficients: OpenCV's number of coefficients tells the model, surplus zeros are dropped."""
-    lengths = {"pinhole": (0,), "plumb_bob": (4, 5), "rational_polynomial": (8,), "equidistant": (4,)}
-    if not model:
-        model = "pinhole" if not distortion else "plumb_bob" if len(distortion) <= 5 else "rational_polynomial"
-    if not distortion and model == "plumb_bob":
-        return "pinhole", ()
-    longest = max(lengths[model])
+    lens = LENS_MODELS[model] if model else opencv_lens(len(distortion))
+    if not distortion:  # ROS calls a pinhole plumb_bob, too
+        lens = next((bare for bare in lenses_named("camera_info", lens.name) if 0 in bare.counts), lens)
+    longest = lens.counts[-1]
     if len(distortion) > longest and not any(distortion[longest:]):
         distortion = distortion[:longest]
-    if len(distortion) not in lengths[model]:
-        wanted = " or ".join(map(str, lengths[model]))
+    if len(distortion) not in lens.counts:
+        wanted = " or ".join(map(str, lens.counts))
         raise InputError(
-            f"{source}: {name}: {model} takes {wanted} distortion coefficients, found {len(distortion)} "
+            f"{source}: {name}: {lens.name} takes {wanted} distortion coefficients, found {len(distortion)} "
             "(thin prism and tilt are not supported); calibrate the camera with that model"
         )
-    return model, distortion
+    return lens.name, distortion
 
 
 def _size(content: Mapping[str, Any], *, source: str) -> tuple[int, int] | None:

@@ -11,6 +11,7 @@ from calib_core.interchange.cameras.fields import FoundCamera, find_cameras
 from calib_core.interchange.syntax.opencv_xml import load_opencv_xml
 from calib_core.interchange.syntax.strict_json import json_object
 from calib_core.interchange.syntax.yaml_text import load_yaml, numbers_text, quoted
+from calib_core.lens_models.naming import written_lens
 
 __all__ = ["camera_info_text", "read_camera", "read_camera_file"]
 
@@ -65,11 +66,12 @@ def read_camera_file(path: str | Path, *, image_size_px: tuple[int, int] | None 
 
 
 def camera_info_text(camera: Camera, name: str = "camera") -> str:
-    """Write ROS's camera_info YAML (camera_calibration): what image pipelines and `--camera` read."""
-    distortion = camera.distortion.tolist() or [0.0] * 5
-    if camera.model == "plumb_bob":
-        distortion = [*distortion, 0.0][:5]
-    model = "plumb_bob" if camera.model == "pinhole" else camera.model
+    """Write ROS's camera_info YAML (camera_calibration): what image pipelines and `--camera` read.
+
+    Raises:
+        InputError: ROS has no name for this lens.
+    """
+    lens = written_lens(camera.lens, camera.distortion, "camera_info")
     projection = np.hstack([camera.matrix_px, np.zeros((3, 1))])
     return "\n".join(
         [
@@ -77,8 +79,8 @@ def camera_info_text(camera: Camera, name: str = "camera") -> str:
             f"image_height: {camera.height_px}",
             f"camera_name: {quoted(name)}",
             *_ros_matrix("camera_matrix", camera.matrix_px),
-            f"distortion_model: {model}",
-            *_ros_matrix("distortion_coefficients", np.array([distortion])),
+            f"distortion_model: {lens.name}",
+            *_ros_matrix("distortion_coefficients", np.array([lens.coefficients])),
             *_ros_matrix("rectification_matrix", np.eye(3)),
             *_ros_matrix("projection_matrix", projection),
             "",

@@ -12,6 +12,7 @@ from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text
 from calib_core.interchange.syntax.zip_archives import pack, unpack
+from calib_core.lens_models.naming import lenses_named, names_in, written_lens
 
 __all__ = ["COLMAP_NOTES", "read_colmap", "write_colmap"]
 
@@ -20,7 +21,6 @@ COLMAP_NOTES = (
     "COLMAP puts the centre of the top-left pixel at (0.5, 0.5), so the principal point is half a pixel larger",
 )
 _HALF_PIXEL = 0.5
-_MODELS = {"PINHOLE": "pinhole", "OPENCV": "plumb_bob", "OPENCV_FISHEYE": "equidistant"}
 
 
 def write_colmap(file: CalibrationFile) -> bytes:
@@ -45,16 +45,11 @@ def write_colmap(file: CalibrationFile) -> bytes:
 
 
 def _colmap_camera(camera: Camera) -> tuple[str, list[float]]:
-    k, d = camera.matrix_px, camera.distortion.tolist()
+    k = camera.matrix_px
     refuse_skew(camera, "COLMAP's models have")
+    lens = written_lens(camera.lens, camera.distortion, "colmap")
     pinhole = [k[0, 0], k[1, 1], k[0, 2] + _HALF_PIXEL, k[1, 2] + _HALF_PIXEL]
-    if camera.model == "pinhole":
-        return "PINHOLE", pinhole
-    if camera.model == "equidistant":
-        return "OPENCV_FISHEYE", pinhole + d
-    if camera.model == "plumb_bob" and not any(d[4:]):
-        return "OPENCV", pinhole + d[:4]
-    return "FULL_OPENCV", pinhole + (d + [0.0] * 8)[:8]
+    return lens.name, [*pinhole, *lens.coefficients]
 
 
 def read_colmap(data: bytes, source: str) -> ImportedCalibration:
@@ -89,18 +84,20 @@ def _first_line(text: str) -> list[str]:
 
 def _camera(words: list[str], *, source: str) -> Camera:
     name = words[1] if len(words) > 1 else ""
-    if name not in (*_MODELS, "FULL_OPENCV"):
-        raise InputError(f"{source}: cameras.txt: the model {name!r} is not supported; known: {', '.join(_MODELS)}")
+    lenses = lenses_named("colmap", name)
+    if not lenses:
+        known = ", ".join(names_in("colmap"))
+        raise InputError(f"{source}: cameras.txt: the model {name!r} is not supported; known: {known}")
     width, height, *parameters = floats(words[2:], source=source, place="cameras.txt")
     if len(parameters) < 4:
         raise InputError(f"{source}: cameras.txt: expected at least 4 parameters, found {len(parameters)}; correct it")
     fx, fy, cx, cy = parameters[:4]
     matrix = np.array([[fx, 0.0, cx - _HALF_PIXEL], [0.0, fy, cy - _HALF_PIXEL], [0.0, 0.0, 1.0]])
     distortion = parameters[4:]
-    model = _MODELS.get(name, "rational_polynomial" if any(distortion[5:]) else "plumb_bob")
-    if model == "plumb_bob":
-        distortion = distortion[:5]
+    lens = next((lens for lens in lenses if not any(distortion[lens.counts[-1] :])), lenses[-1])
+    if not any(distortion[lens.counts[-1] :]):
+        distortion = distortion[: lens.counts[-1]]
     try:
-        return Camera(model, int(width), int(height), matrix, np.array(distortion))  # type: ignore[arg-type]
+        return Camera(lens.name, int(width), int(height), matrix, np.array(distortion))
     except ValueError as error:
         raise InputError(f"{source}: cameras.txt: {error}; correct it") from None

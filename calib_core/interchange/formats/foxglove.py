@@ -13,6 +13,7 @@ from calib_core.interchange.imported import ImportedCalibration, WrittenPose, po
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.json_text import json_text
+from calib_core.lens_models.naming import written_lens
 
 __all__ = ["FOXGLOVE_NOTES", "read_foxglove", "write_foxglove"]
 
@@ -20,14 +21,13 @@ FOXGLOVE_NOTES = (
     "FrameTransform is the pose of the child (camera, optical) in the parent (radar), rotation named x y z w; "
     "a message holds no comment, so the check point is only in calibration.json",
 )
-_LENSES = {"pinhole": "plumb_bob", "equidistant": "kannala_brandt"}
 
 
 def write_foxglove(file: CalibrationFile) -> str:
     """Write one object with both messages, to publish as they are.
 
     Raises:
-        InputError: the camera has skew, for which CameraCalibration has no place.
+        InputError: CameraCalibration has no place for skew, which this camera has, or no name for its lens.
     """
     refuse_skew(file.calibration.camera, "Foxglove's CameraCalibration has")
     radar_from_camera = file.calibration.camera_from_radar.inverse()
@@ -44,16 +44,14 @@ def write_foxglove(file: CalibrationFile) -> str:
 
 
 def _camera_message(camera: Camera, frame: str) -> dict[str, Any]:
-    distortion = camera.distortion.tolist() or [0.0] * 5
-    if camera.model == "plumb_bob":
-        distortion = [*distortion, 0.0][:5]
+    lens = written_lens(camera.lens, camera.distortion, "foxglove")
     return {
         "timestamp": {"sec": 0, "nsec": 0},
         "frame_id": frame,
         "width": camera.width_px,
         "height": camera.height_px,
-        "distortion_model": _LENSES.get(camera.model, camera.model),
-        "D": distortion,
+        "distortion_model": lens.name,
+        "D": list(lens.coefficients),
         "K": camera.matrix_px.ravel().tolist(),
         "R": np.eye(3).ravel().tolist(),
         "P": np.hstack([camera.matrix_px, np.zeros((3, 1))]).ravel().tolist(),

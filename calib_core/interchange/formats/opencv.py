@@ -13,6 +13,7 @@ from calib_core.interchange.formats.statement import hash_comment, stated_check_
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
+from calib_core.lens_models.naming import written_lens
 
 __all__ = ["read_opencv", "write_opencv"]
 
@@ -21,18 +22,17 @@ def write_opencv(file: CalibrationFile) -> str:
     """Write a file that cv::FileStorage of OpenCV 3, 4 and 5 reads.
 
     Raises:
-        InputError: the camera has skew, which OpenCV's projectPoints leaves out without a word.
+        InputError: the camera has skew, which OpenCV's projectPoints leaves out without a word, or a lens OpenCV does not name.
     """
     calibration = file.calibration
     camera, pose = calibration.camera, calibration.camera_from_radar
     refuse_skew(camera, "OpenCV's camera models have")
-    distortion = camera.distortion if len(camera.distortion) else np.zeros(5)
-    model = "plumb_bob" if camera.model == "pinhole" else camera.model
+    lens = written_lens(camera.lens, camera.distortion, "opencv")
     meaning = "R and T carry radar points into the camera (as projectPoints and stereoCalibrate use them); rvec is R's"
     check = file.check_point
     matrices = [
         ("camera_matrix", camera.matrix_px),
-        ("distortion_coefficients", distortion[None, :]),
+        ("distortion_coefficients", np.array([lens.coefficients])),
         ("R", pose.rotation),
         ("T", pose.translation_m[:, None]),
         ("rvec", rotation_log(pose.rotation)[:, None]),
@@ -45,7 +45,7 @@ def write_opencv(file: CalibrationFile) -> str:
         + f"equation: {quoted(EQUATION)}\n"
         + f"radar_frame: {quoted(file.frames.radar)}\ncamera_frame: {quoted(file.frames.camera)}\n"
         + f"image_width: {camera.width_px}\nimage_height: {camera.height_px}\n"
-        + f"distortion_model: {quoted(model)}\n"
+        + f"distortion_model: {quoted(lens.name)}\n"
         + "".join(_matrix(key, matrix) for key, matrix in matrices)
     )
 

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
@@ -22,6 +21,7 @@ from calib_core.interchange.imported import (
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, quaternion_xyzw_from_matrix, rpy_from_matrix
 from calib_core.interchange.syntax.yaml_text import number_text, numbers_text, quoted
+from calib_core.lens_models.naming import written_lens
 
 __all__ = [
     "read_autoware",
@@ -170,7 +170,8 @@ def write_kalibr(file: CalibrationFile) -> str:
     """
     calibration = file.calibration
     camera = calibration.camera
-    model, coefficients = _kalibr_lens(camera)
+    refuse_skew(camera, "Kalibr's pinhole model has")
+    lens = written_lens(camera.lens, camera.distortion, "kalibr")
     k = camera.matrix_px
     rows = "".join(f"  - [{numbers_text(row)}]\n" for row in calibration.camera_from_radar.as_matrix())
     meaning = (
@@ -180,25 +181,11 @@ def write_kalibr(file: CalibrationFile) -> str:
         hash_comment(statement(file, meaning))
         + "cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n"
         + f"  intrinsics: [{numbers_text((k[0, 0], k[1, 1], k[0, 2], k[1, 2]))}]\n"
-        + f"  distortion_model: {model}\n  distortion_coeffs: [{numbers_text(coefficients)}]\n"
+        + f"  distortion_model: {lens.name}\n  distortion_coeffs: [{numbers_text(lens.coefficients)}]\n"
         + f"  resolution: [{camera.width_px}, {camera.height_px}]\n"
         + f"  rostopic: {quoted(file.provenance.image_topic or '')}\n"
         + f"  T_cam_radar:\n{rows}"
     )
-
-
-def _kalibr_lens(camera: Camera) -> tuple[str, list[float]]:
-    distortion = camera.distortion.tolist()
-    refuse_skew(camera, "Kalibr's pinhole model has")
-    if camera.model == "rational_polynomial" or (camera.model == "plumb_bob" and any(distortion[4:])):
-        held = "k3" if camera.model == "plumb_bob" else "k3 to k6"
-        raise InputError(
-            f"Kalibr's radtan model has no {held}, which this camera uses; export with --to opencv, "
-            "or calibrate the camera with k1 k2 p1 p2 only"
-        )
-    if camera.model == "pinhole":
-        return "none", []
-    return ("equidistant" if camera.model == "equidistant" else "radtan"), distortion[:4]
 
 
 def read_kalibr(content: Mapping[str, Any], text: str, source: str) -> ImportedCalibration:

@@ -8,6 +8,7 @@ from typing import Annotated, Final, Literal
 import msgspec
 from msgspec import Meta, Struct, field
 
+from calib_core.camera import CameraModel
 from calib_core.options import CalibrationOptions
 
 __all__ = [
@@ -89,7 +90,7 @@ class ClicksDocument(Struct, frozen=True, forbid_unknown_fields=True):
 class CameraDocument(Struct, frozen=True, forbid_unknown_fields=True):
     """A calibrated camera; coefficients in OpenCV's order."""
 
-    model: Literal["pinhole", "plumb_bob", "rational_polynomial", "equidistant"]
+    model: CameraModel
     width_px: Annotated[int, Meta(ge=1)]
     height_px: Annotated[int, Meta(ge=1)]
     matrix_px: Matrix33

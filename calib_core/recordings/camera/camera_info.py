@@ -1,19 +1,19 @@
 """Intrinsics from sensor_msgs/CameraInfo."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from calib_core.arrays import Matrix33
 from calib_core.camera import Camera, CameraModel
+from calib_core.lens_models.naming import lenses_of_opencv, names_in, opencv_lens
+from calib_core.lens_models.registry import LENS_MODELS
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.results import DataWarning
 
 __all__ = ["CameraReading", "camera_from_info", "is_camera_info"]
-
-_FISHEYE = ("equidistant", "fisheye", "kannala_brandt", "kannala_brandt4")
-_BROWN_CONRADY = ("plumb_bob", "rational_polynomial", "radtan", "brown_conrady", "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,22 +71,38 @@ def _none(topic: str, code: str, what: str) -> CameraReading:
 
 def _model(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np.ndarray] | str":
     """Return the lens model and as many coefficients as it takes, or what is wrong."""
-    count = len(distortion)
     if not np.all(np.isfinite(distortion)):
         return "has distortion coefficients that are not numbers"
-    if name in _FISHEYE:
-        if count < 4 or np.any(distortion[4:]):
-            return f"says '{name}' with {count} coefficients; 4 are expected"
-        return "equidistant", distortion[:4]
-    if name not in _BROWN_CONRADY:
-        return f"has the lens model '{name}'; plumb_bob, rational_polynomial and equidistant are known"
+    lens = next((lens for lens in LENS_MODELS.values() if name in lens.names_in_messages), None)
+    if lens is None:
+        return f"has the lens model '{name}'; {_listed(names_in('camera_info'), 'and')} are known"
+    if lens.opencv == "projectPoints":
+        return _model_by_count(name, distortion)
+    kept = next((count for count in reversed(lens.counts) if count <= len(distortion)), None)
+    if kept is None or np.any(distortion[kept:]):
+        expected = _listed([str(count) for count in lens.counts], "or")
+        return f"says '{name}' with {len(distortion)} coefficients; {expected} are expected"
+    return lens.name, distortion[:kept]
+
+
+def _model_by_count(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np.ndarray] | str":
+    """Go by the number of coefficients alone, as OpenCV does: drivers give these lens models one another's names."""
     if not np.any(distortion):
-        return "pinhole", np.zeros(0)
-    if count in (4, 5):
-        return "plumb_bob", distortion
-    if count >= 8 and not np.any(distortion[8:]):
-        return "rational_polynomial", distortion[:8]
-    return f"says '{name or 'no model'}' with {count} coefficients; 4, 5 or 8 are known"
+        return opencv_lens(0).name, np.zeros(0)
+    lenses = lenses_of_opencv()
+    longest = lenses[-1].counts[-1]
+    if not np.any(distortion[longest:]):
+        distortion = distortion[:longest]
+    lens = next((lens for lens in lenses if len(distortion) in lens.counts), None)
+    if lens is None:
+        known = _listed([str(count) for lens in lenses for count in lens.counts if count], "or")
+        return f"says '{name or 'no model'}' with {len(distortion)} coefficients; {known} are known"
+    return lens.name, distortion
+
+
+def _listed(words: Sequence[str], conjunction: str) -> str:
+    *first, last = words
+    return f"{', '.join(first)} {conjunction} {last}" if first else last
 
 
 def _published(message: Message, matrix: Matrix33) -> tuple[Matrix33, int, int]:

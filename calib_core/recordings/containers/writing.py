@@ -10,6 +10,7 @@ import numpy as np
 from calib_core.arrays import frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
+from calib_core.lens_models.naming import written_lens
 from calib_core.measurements import TimeNs, time_parts
 
 __all__ = [
@@ -308,11 +309,9 @@ class _Builder:
         camera = body.camera
         projection = np.zeros((3, 4))
         projection[:, :3] = camera.matrix_px
-        distortion = np.zeros(5) if camera.model == "pinhole" else camera.distortion
-        if camera.model == "plumb_bob" and len(distortion) == 4:
-            distortion = np.append(distortion, 0.0)
+        lens = written_lens(camera.lens, camera.distortion, "camera_info")
         arrays = {
-            "D": distortion,
+            "D": np.array(lens.coefficients),
             "K": camera.matrix_px.reshape(-1),
             "R": np.eye(3).reshape(-1),
             "P": projection.reshape(-1),
@@ -323,7 +322,7 @@ class _Builder:
             header=self._header(body),
             height=camera.height_px,
             width=camera.width_px,
-            distortion_model="plumb_bob" if camera.model == "pinhole" else camera.model,
+            distortion_model=lens.name,
             **{(name if self.generation == 1 else name.lower()): values for name, values in arrays.items()},
             binning_x=0,
             binning_y=0,

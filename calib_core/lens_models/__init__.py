@@ -1,0 +1,1 @@
+"""Lens models: how each projects and what other software calls it, one module per family; `registry` lists them."""

@@ -1,0 +1,107 @@
+"""The Brown-Conrady lens models: `pinhole`, `plumb_bob` and `rational_polynomial`, which share one formula."""
+
+import numpy as np
+
+from calib_core.arrays import Points2, Points3, Values
+from calib_core.lens_models.lens_model import LensModel, NameElsewhere, TypicalLens
+from calib_core.lens_models.perspective import project_distorted, unproject_distorted
+
+__all__ = ["PINHOLE", "PLUMB_BOB", "RATIONAL_POLYNOMIAL"]
+
+_COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+
+
+def _project(points: np.ndarray, distortion: Values) -> tuple[np.ndarray, np.ndarray]:
+    return project_distorted(points, _padded(distortion), _distort)
+
+
+def _unproject(plane: Points2, distortion: Values) -> Points3:
+    return unproject_distorted(plane, _padded(distortion), _distort)
+
+
+def _padded(distortion: Values) -> list[float]:
+    return [*distortion.tolist(), *[0.0] * (8 - len(distortion))]
+
+
+def _distort(x: Values, y: Values, k: list[float]) -> tuple[tuple[Values, Values], tuple[Values, Values, Values]]:
+    """Distort ideal image-plane points by the rational Brown-Conrady model.
+
+    Returns:
+        The distorted x and y, and the entries xx, xy = yx and yy of the Jacobian, which is symmetric.
+    """
+    k1, k2, p1, p2, k3, k4, k5, k6 = k
+    x2, y2, xy = x * x, y * y, x * y
+    r2 = x2 + y2
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    d_radial = k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2)  # d radial / d r2
+    if k4 or k5 or k6:
+        bottom = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        radial = radial / bottom
+        d_radial = (d_radial - radial * (k4 + r2 * (2.0 * k5 + 3.0 * k6 * r2))) / bottom
+    distorted_x = x * radial + 2.0 * p1 * xy + p2 * (r2 + 2.0 * x2)
+    distorted_y = y * radial + p1 * (r2 + 2.0 * y2) + 2.0 * p2 * xy
+    d_xx = radial + 2.0 * x2 * d_radial + 2.0 * p1 * y + 6.0 * p2 * x
+    d_yy = radial + 2.0 * y2 * d_radial + 6.0 * p1 * y + 2.0 * p2 * x
+    d_xy = 2.0 * xy * d_radial + 2.0 * p1 * x + 2.0 * p2 * y
+    return (distorted_x, distorted_y), (d_xx, d_xy, d_yy)
+
+
+PINHOLE = LensModel(
+    name="pinhole",
+    coefficients=(),
+    counts=(0,),
+    project=_project,
+    unproject=_unproject,
+    is_perspective=True,
+    opencv="projectPoints",
+    typical=TypicalLens(),
+    names_elsewhere=(
+        NameElsewhere("camera_info", "plumb_bob", 5),
+        NameElsewhere("kalibr", "none", 0),
+        NameElsewhere("opencv", "plumb_bob", 5),
+        NameElsewhere("colmap", "PINHOLE", 0),
+        NameElsewhere("foxglove", "plumb_bob", 5),
+    ),
+    names_in_files=("none", "pinhole"),
+)
+
+PLUMB_BOB = LensModel(
+    name="plumb_bob",
+    coefficients=_COEFFICIENTS[:5],
+    counts=(4, 5),
+    project=_project,
+    unproject=_unproject,
+    is_perspective=True,
+    opencv="projectPoints",
+    typical=TypicalLens((-0.17, 0.032, 0.0006, -0.0004, 0.0)),
+    names_elsewhere=(
+        NameElsewhere("camera_info", "plumb_bob", 5),
+        NameElsewhere("kalibr", "radtan", 4),
+        NameElsewhere("opencv", "plumb_bob"),
+        NameElsewhere("colmap", "OPENCV", 4),
+        NameElsewhere("colmap", "FULL_OPENCV", 8),
+        NameElsewhere("foxglove", "plumb_bob", 5),
+    ),
+    names_in_files=("plumb_bob", "radtan"),
+    names_in_messages=("plumb_bob", "radtan", "brown_conrady", ""),
+)
+
+RATIONAL_POLYNOMIAL = LensModel(
+    name="rational_polynomial",
+    coefficients=_COEFFICIENTS,
+    counts=(8,),
+    project=_project,
+    unproject=_unproject,
+    is_perspective=True,
+    opencv="projectPoints",
+    typical=TypicalLens((0.62, 0.21, 0.0005, -0.0003, 0.012, 0.79, 0.33, 0.045)),
+    names_elsewhere=(
+        NameElsewhere("camera_info", "rational_polynomial", 8),
+        NameElsewhere("kalibr", "radtan", 4),
+        NameElsewhere("opencv", "rational_polynomial", 8),
+        NameElsewhere("colmap", "FULL_OPENCV", 8),
+        NameElsewhere("foxglove", "rational_polynomial", 8),
+    ),
+    names_in_files=("rational_polynomial",),
+    names_in_messages=("rational_polynomial",),
+)
