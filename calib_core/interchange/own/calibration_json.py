@@ -23,12 +23,14 @@ from calib_core.interchange.own.angle_map_document import angle_map_document, an
 from calib_core.interchange.own.camera_document import camera_document, camera_of
 from calib_core.interchange.own.provenance_document import provenance_document, provenance_of
 from calib_core.interchange.own.unknown_results import unknown_results, with_unknown
+from calib_core.interchange.syntax.content import decoded
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import json_object, parse_document
 from calib_core.measurements import ReflectorClick, TimeNs, Unpaired, time_from_parts, time_parts
 from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics, PairResult
 
 __all__ = [
+    "AGREEMENT",
     "COVARIANCE_CONVENTION",
     "calibration_file_of",
     "calibration_text",
@@ -43,7 +45,8 @@ COVARIANCE_CONVENTION = (
     "in camera axes: t = t_hat + dt, R = Exp(dtheta) R_hat"
 )
 _NAN = float("nan")
-_AGREEMENT = 1e-5
+AGREEMENT = 1e-5
+"""How far two statements of one transform may be apart, in any entry of their matrices."""
 
 
 def calibration_text(
@@ -117,17 +120,18 @@ _KEY_ORDER = (
 )
 
 
-def read_calibration(text: str, source: str = "calibration") -> CalibrationFile:
-    """Read calibration-1 text. Results may carry more keys than we know; the camera and the options may not.
+def read_calibration(content: str | bytes, source: str = "calibration") -> CalibrationFile:
+    """Read calibration-1. Results may carry more keys than we know; the camera and the options may not.
 
     Raises:
         InputError: the file, the place in it and what to do; also when its two transforms or a quaternion disagree.
     """
+    text = decoded(content, source=source)
     document = parse_document(text, documents.CalibrationDocument, source=source)
     camera_from_radar = transform_of(document.camera_from_radar, source=source, place="camera_from_radar")
     if document.radar_from_camera is not None:
         inverse = transform_of(document.radar_from_camera, source=source, place="radar_from_camera").inverse()
-        if np.abs(inverse.as_matrix() - camera_from_radar.as_matrix()).max() > _AGREEMENT:
+        if np.abs(inverse.as_matrix() - camera_from_radar.as_matrix()).max() > AGREEMENT:
             raise InputError(
                 f"{source}: radar_from_camera: is not the inverse of camera_from_radar; "
                 "cocalib check tells which is wrong: correct it or remove radar_from_camera"
@@ -200,7 +204,7 @@ def _same_rotation(quaternion_wxyz: tuple[float, ...], transform: RigidTransform
     quaternion = np.array(quaternion_wxyz)
     if not quaternion.any():
         return False
-    return bool(np.abs(matrix_from_quaternion_wxyz(quaternion) - transform.rotation).max() <= _AGREEMENT)
+    return bool(np.abs(matrix_from_quaternion_wxyz(quaternion) - transform.rotation).max() <= AGREEMENT)
 
 
 def _known(value: float) -> float | None:
