@@ -17,6 +17,7 @@ from calib_core.interchange.formats.kalibr import KALIBR
 from calib_core.interchange.formats.kitti import KITTI
 from calib_core.interchange.formats.nuscenes import NUSCENES
 from calib_core.interchange.formats.opencv import OPENCV
+from calib_core.interchange.formats.plugins import plugin_formats
 from calib_core.interchange.formats.ros.launch_files import TF1_LAUNCH, TF2_LAUNCH_PY, TF2_LAUNCH_XML
 from calib_core.interchange.formats.ros.tf2_command import TF2
 from calib_core.interchange.formats.ros.urdf import URDF
@@ -55,17 +56,19 @@ _ASKED_FIRST = (
     TF2_LAUNCH_PY,  # names the publisher, as TF2 does
 )
 _ASKED_LAST = (MATLAB, NUMPY)  # take any mat file and any archive, to say what is wrong with it
+_RESERVED = frozenset({"list", TRUTH.name, *(known.name for known in FORMATS)})
 
 
 def written_formats() -> tuple[Format, ...]:
-    """Return every format that can be written: ours."""
+    """Return every format that can be written: ours, then those that installed packages add."""
     return tuple(_written())
 
 
 def readers() -> Iterator[Reads]:
-    """Yield how each format is read, in the order in which they are asked."""
+    """Yield how each format is read, in the order in which they are asked; packages are looked for after most of ours."""
     ours = [known for known in FORMATS if known not in (*_ASKED_FIRST, *_ASKED_LAST)]
-    yield from _reads(*_ASKED_FIRST, *ours, *_ASKED_LAST)
+    yield from _reads(*_ASKED_FIRST, *ours)
+    yield from _reads(*plugin_formats(_RESERVED), *_ASKED_LAST)
 
 
 def format_named(name: str) -> Format:
@@ -86,6 +89,7 @@ def format_named(name: str) -> Format:
 
 def _written() -> Iterator[Format]:
     yield from FORMATS
+    yield from (added for added in plugin_formats(_RESERVED) if added.write is not None)
 
 
 def _reads(*formats: Format) -> Iterator[Reads]:
