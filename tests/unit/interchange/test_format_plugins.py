@@ -44,11 +44,11 @@ PARAMETERS = '''
 
     def read(content, source):
         rows = np.reshape(content.mapping["/radar_camera"]["ros__parameters"]["camera_from_radar"], (4, 4))
-        return ImportedCalibration("ros2-param", WrittenPose("matrix", rows[:3, :3], rows[:3, 3], "camera_from_radar"))
+        return ImportedCalibration("acme-params", WrittenPose("matrix", rows[:3, :3], rows[:3, 3], "camera_from_radar"))
 
 
     PARAMETERS = Format(
-        name="ros2-param", title="ROS 2 parameters", numbers="rows of camera_from_radar", file_name="params.yaml",
+        name="acme-params", title="ROS 2 parameters", numbers="rows of camera_from_radar", file_name="params.yaml",
         camera="none", comment="none", write=write, reads=Reads(recognizes, read), notes=("carries the pose only",),
     )
 '''
@@ -113,10 +113,10 @@ def test_a_format_of_an_installed_package_is_written_read_and_checked(
 ) -> None:
     installed()
 
-    written = export(file, "ros2-param")
+    written = export(file, "acme-params")
 
     assert written.file_name == "params.yaml"
-    assert read_any(written.data).format == "ros2-param"
+    assert read_any(written.data).format == "acme-params"
     assert check(read_any(written.data), against=imported(file)).verdict == "right"
 
 
@@ -125,11 +125,11 @@ def test_it_stands_behind_ours_in_the_list_of_the_command_and_of_the_page(
 ) -> None:
     installed()
 
-    assert [known.name for known in written_formats()] == [*(known.name for known in FORMATS), "ros2-param"]
-    assert (format_rows()[-1].key, format_rows()[-1].label) == ("ros2-param", "ROS 2 parameters")
-    assert export_preview(file, "ros2-param", "", "drive").check_is_good
+    assert [known.name for known in written_formats()] == [*(known.name for known in FORMATS), "acme-params"]
+    assert (format_rows()[-1].key, format_rows()[-1].label) == ("acme-params", "ROS 2 parameters")
+    assert export_preview(file, "acme-params", "", "drive").check_is_good
     assert run(["export", "--to", "list"]) == 0
-    assert capsys.readouterr().out.splitlines()[-1].split(None, 1) == ["ros2-param", "ROS 2 parameters"]
+    assert capsys.readouterr().out.splitlines()[-1].split(None, 1) == ["acme-params", "ROS 2 parameters"]
 
 
 def test_one_entry_point_may_name_several(installed: Install) -> None:
@@ -138,7 +138,7 @@ def test_one_entry_point_may_name_several(installed: Install) -> None:
         value="BOTH",
     )
 
-    assert [known.name for known in written_formats()[-2:]] == ["ros2-param", "two"]
+    assert [known.name for known in written_formats()[-2:]] == ["acme-params", "two"]
 
 
 def test_a_binary_format_is_told_by_its_bytes_and_previewed_by_its_size(
@@ -160,10 +160,10 @@ def test_a_binary_format_is_told_by_its_bytes_and_previewed_by_its_size(
         ("X = (", "X", "cannot be loaded (SyntaxError"),
         ("", "X", "cannot be loaded (AttributeError"),
         ("X = 3", "X", "acme_params:X is neither a Format nor a tuple of them"),
-        (PARAMETERS.replace('"ros2-param", title', '"tf2", title'), "PARAMETERS", "there is a format 'tf2' already"),
-        (PARAMETERS.replace('"ros2-param", title', '"list", title'), "PARAMETERS", "there is a format 'list' already"),
+        (PARAMETERS.replace('"acme-params", title', '"tf2", title'), "PARAMETERS", "there is a format 'tf2' already"),
+        (PARAMETERS.replace('"acme-params", title', '"list", title'), "PARAMETERS", "there is a format 'list' already"),
         (
-            PARAMETERS.replace('"ros2-param", title', '"a/b", title'),
+            PARAMETERS.replace('"acme-params", title', '"a/b", title'),
             "PARAMETERS",
             "the name 'a/b' of its format is not",
         ),
@@ -194,17 +194,17 @@ def test_a_writer_that_fails_is_an_error_in_words(
     installed(module=PARAMETERS.replace("return f", "return unknown + f" if "Name" in words else broken))
 
     with pytest.raises(InputError) as refusal:
-        export(file, "ros2-param")
+        export(file, "acme-params")
 
-    assert str(refusal.value) == f"the format ros2-param of the package acme-params 1.2 {words}; tell its authors"
+    assert str(refusal.value) == f"the format acme-params of the package acme-params 1.2 {words}; tell its authors"
 
 
 def test_a_reader_that_fails_is_an_error_in_words_and_a_recognizer_that_fails_takes_nothing(
     installed: Install, file: CalibrationFile, caplog: pytest.LogCaptureFixture
 ) -> None:
     installed(module=PARAMETERS.replace("import numpy as np", ""))
-    with pytest.raises(InputError, match=r"file: the format ros2-param of the package acme-params 1\.2 failed \(Name"):
-        read_any(export(file, "ros2-param").data, "file")
+    with pytest.raises(InputError, match=r"file: the format acme-params of the package acme-params 1\.2 failed \(Name"):
+        read_any(export(file, "acme-params").data, "file")
 
     with pytest.raises(InputError, match="file: no pose of a camera and a radar in it"):
         read_any("/radar_camera: 3", "file")
