@@ -117,7 +117,7 @@ CELLS: tuple[tuple[str, str], ...] = (
     ),
     (
         "code",
-        'exported = cc.export(rooftop, "tf2")\nprint(exported.text)\n'
+        'exported = cc.export(rooftop, "tf2")\nprint(exported.content)\n'
         "Path(exported.file_name).write_bytes(exported.data)\n"
         "print(cc.check(exported.file_name, against=rooftop).verdict)",
     ),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from app.cli.flags import File, Switch
-from app.cli.output import read_text, write_whole
+from app.cli.output import write_whole
 from calib_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,11 +40,12 @@ class Export:
 
     def run(self) -> int:
         """Write the export; return the exit code."""
-        from calib_core.interchange import FORMATS, ExportBytes, export, format_named, parent_pose
+        from calib_core.interchange import export, format_named, parent_pose, written_formats
 
         if self.to == "list":
-            width = max(len(known.name) for known in FORMATS)
-            print("\n".join(f"{known.name:<{width}}  {known.title}" for known in FORMATS))
+            formats = written_formats()
+            width = max(len(known.name) for known in formats)
+            print("\n".join(f"{known.name:<{width}}  {known.title}" for known in formats))
             return 0
         format_named(self.to)
         if len(self.calibration) != 1:
@@ -58,23 +59,24 @@ class Export:
             target = self.out / written.file_name if self.out.is_dir() else self.out
             write_whole(target, written.data)
             print(f"written to {target}")
-        elif isinstance(written, ExportBytes):
+        elif isinstance(written.content, bytes):
             raise InputError(f"{self.to} is a binary format; say where it goes: --out {written.file_name}")
         else:
-            print(written.text, end="")
+            print(written.content, end="")
         return 0
 
 
 def _own_calibration(path: Path) -> "CalibrationFile":
-    from calib_core.interchange import read_any_file, read_calibration
+    from calib_core.interchange import calibration_bytes, read_any, read_calibration
 
-    found = read_any_file(path)
+    data = calibration_bytes(path)
+    found = read_any(data, str(path))
     if found.file is None:
         raise InputError(
             f"{path}: is {found.format}, and export takes calibration-1; make one of it first: "
             f"cocalib import {path.name} --out calibration.json"
         )
-    return read_calibration(read_text(path), source=str(path))
+    return read_calibration(data, str(path))
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,13 +32,13 @@ class Import:
 
     def run(self) -> int:
         """Write the calibration; return the exit code."""
-        from calib_core.interchange import Provenance, adopt, read_any_file, read_camera_file
+        from calib_core.interchange import Provenance, adopt, calibration_bytes, read_any, read_camera_file
         from calib_core.interchange import write_calibration as write
         from calib_core.results import InputFile
 
-        found = read_any_file(self.calibration)
+        data = calibration_bytes(self.calibration)
+        found = read_any(data, str(self.calibration))
         camera = read_camera_file(self.camera) if self.camera else None
-        data = self.calibration.read_bytes()
         origin = InputFile(self.calibration.name, len(data), hashlib.sha256(data).hexdigest())
         file = adopt(found, str(self.calibration), camera=camera, provenance=Provenance(inputs=(origin,)))
         for note in found.notes:

@@ -13,15 +13,17 @@ from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
 from calib_core.interchange.check.report import CheckReport, Verdict, check
 from calib_core.interchange.contents import contents_text
-from calib_core.interchange.exporting import ExportBytes, ExportText, export
-from calib_core.interchange.formats.registry import FORMATS, Format, format_named
-from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
-from calib_core.interchange.importing import imported, read_any, read_any_file
+from calib_core.interchange.exporting import Export, export
+from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.formats.registry import FORMATS, format_named, written_formats
+from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
+from calib_core.interchange.importing import calibration_bytes, read_any, read_any_file
 from calib_core.interchange.own.calibration_json import calibration_text, read_calibration, write_calibration
 from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
 from calib_core.interchange.own.pairs_json import PairsFile, read_pairs, write_pairs
 from calib_core.interchange.parent_pose import parent_pose
+from calib_core.interchange.syntax.content import Content
 
 __all__ = [
     "CALIBRATION_SCHEMA",
@@ -31,19 +33,21 @@ __all__ = [
     "CheckReport",
     "CheckResult",
     "Comparison",
-    "ExportBytes",
-    "ExportText",
+    "Content",
+    "Export",
     "Format",
     "FrameNames",
     "ImportedCalibration",
     "PairsFile",
     "PixelDifference",
     "Provenance",
+    "Reads",
     "StatedCheckPoint",
     "Verdict",
     "WrittenPose",
     "adopt",
     "adopted_calibration",
+    "calibration_bytes",
     "calibration_text",
     "camera_info_text",
     "check",
@@ -67,4 +71,5 @@ __all__ = [
     "write_calibration",
     "write_clicks",
     "write_pairs",
+    "written_formats",
 ]

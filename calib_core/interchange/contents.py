@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from calib_core.interchange.exporting import ExportBytes, ExportText
+from calib_core.interchange.exporting import Export
 from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.zip_archives import unpack
 
@@ -15,15 +15,18 @@ __all__ = ["contents_text"]
 _MAT_TEXT_BYTES = 116
 
 
-def contents_text(written: ExportText | ExportBytes) -> str:
+def contents_text(written: Export) -> str:
     """Return a text file as it is, and what a binary file holds, one member after the other."""
-    if isinstance(written, ExportText):
-        return written.text
-    if written.data.startswith(b"PK"):
-        members = unpack(written.data, source=written.file_name)
+    content = written.content
+    if isinstance(content, str):
+        return content
+    if content.startswith(b"PK"):
+        members = unpack(content, source=written.file_name)
         return "\n".join(_member(name, data) for name, data in members.items())
-    comment = written.data[:_MAT_TEXT_BYTES].decode("ascii", errors="replace").rstrip("\0 ")
-    return "\n".join([comment, "", *_variables(load_mat(written.data, source=written.file_name))]) + "\n"
+    if content.startswith(b"MATLAB"):
+        comment = content[:_MAT_TEXT_BYTES].decode("ascii", errors="replace").rstrip("\0 ")
+        return "\n".join([comment, "", *_variables(load_mat(content, source=written.file_name))]) + "\n"
+    return f"binary, {len(content):,} bytes\n"  # a format of an installed package, whose layout we do not know
 
 
 def _member(name: str, data: bytes) -> str:

@@ -9,10 +9,10 @@ from calib_core.interchange.calibration_file import CalibrationFile, FrameNames,
 from calib_core.interchange.cameras.files import read_camera_file
 from calib_core.interchange.check import report as reports
 from calib_core.interchange.check.pair_residuals import read_check_pairs_file
-from calib_core.interchange.exporting import ExportBytes, ExportText
+from calib_core.interchange.exporting import Export
 from calib_core.interchange.exporting import export as export_file
-from calib_core.interchange.imported import ImportedCalibration
-from calib_core.interchange.importing import imported, read_any_file
+from calib_core.interchange.imported import ImportedCalibration, imported
+from calib_core.interchange.importing import read_any_file
 from calib_core.interchange.own import calibration_json, clicks_json, pairs_json
 from calib_core.measurements import ReflectorClick
 from calib_core.options import NoiseOptions
@@ -125,7 +125,7 @@ def write_calibration(
 
 def export(
     calibration: Calibration | CalibrationFile, name: str, *, frames: FrameNames | None = None, rectified: bool = False
-) -> ExportText | ExportBytes:
+) -> Export:
     """Write a calibration in the format of another tool.
 
     Args:

@@ -22,6 +22,7 @@ __all__ = [
     "Roles",
     "StatedCheckPoint",
     "WrittenPose",
+    "imported",
     "looks_like_camera",
     "looks_like_radar",
     "posed_between",
@@ -166,6 +167,19 @@ class ImportedCalibration:
         except ValueError as error:
             raise InputError(f"{source}: {error}; a proper rotation is needed") from None
         return self
+
+
+def imported(file: CalibrationFile) -> ImportedCalibration:
+    """Return a calibration of ours as if it had been read from its file."""
+    pose, check = file.calibration.camera_from_radar, file.check_point
+    return ImportedCalibration(
+        "json",
+        WrittenPose("matrix", pose.rotation, pose.translation_m, "camera_from_radar"),
+        camera=file.calibration.camera,
+        frames=file.frames,
+        check_point=StatedCheckPoint(check.radar_m, pixel_px=check.pixel_px) if check else None,
+        file=file,
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """The commands on good input."""
 
 import json
+import os
 import re
 from collections.abc import Callable
 from functools import partial
@@ -132,6 +133,22 @@ def test_export_of_another_stacks_file_says_how_to_come_to_a_calibration(
     assert refused.code == 2
     assert "is tf2, and export takes calibration-1" in refused.err
     assert "cocalib import old.sh --out calibration.json" in refused.err
+
+
+@pytest.mark.parametrize("command", [["export", "--to", "urdf"], ["import"]], ids=["export", "import"])
+def test_a_file_is_read_once_so_a_pipe_will_do(
+    cocalib: Cocalib, calibration: Path, tmp_path: Path, command: list[str]
+) -> None:
+    out = tmp_path / "out"
+    reading, writing = os.pipe()
+    os.write(writing, calibration.read_bytes())
+    os.close(writing)
+    try:
+        answer = cocalib(command[0], f"/dev/fd/{reading}", *command[1:], "--out", out)
+    finally:
+        os.close(reading)
+    assert answer.code == 0, answer.err
+    assert cocalib("check", out, "--against", calibration).code == 0
 
 
 def test_export_without_out_prints_and_into_a_folder_names_itself(

@@ -10,11 +10,9 @@ from app.view import sentence, warning_in_sentences
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange import (
-    FORMATS,
     CalibrationFile,
     CheckReport,
-    ExportBytes,
-    ExportText,
+    Export,
     check,
     contents_text,
     export,
@@ -22,6 +20,7 @@ from calib_core.interchange import (
     imported,
     parent_pose,
     read_any,
+    written_formats,
 )
 from calib_core.results import DataWarning
 
@@ -112,7 +111,8 @@ class NoPreview:
 def format_rows() -> tuple[FormatRow, ...]:
     """Return the list of formats."""
     return tuple(
-        FormatRow(form.name, form.title, form.write_in_parent is not None, form.is_for_rectified) for form in FORMATS
+        FormatRow(form.name, form.title, form.write_in_parent is not None, form.is_for_rectified)
+        for form in written_formats()
     )
 
 
@@ -144,7 +144,7 @@ def rectified_in(query: str) -> bool:
     return given == "1"
 
 
-def exported(file: CalibrationFile, key: str, query: str) -> ExportText | ExportBytes:
+def exported(file: CalibrationFile, key: str, query: str) -> Export:
     """Write a calibration in a format, with the pose and the word about the pictures that the address may hold.
 
     Raises:
@@ -174,7 +174,7 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         key=key,
         file_name=f"{_slug(recording_name)}_{written.file_name}",
         text=contents_text(written),
-        is_binary=isinstance(written, ExportBytes),
+        is_binary=isinstance(written.content, bytes),
         size_bytes=len(written.data),
         numbers=sentence(form.numbers),
         notes=tuple(sentence(note) for note in written.notes),

@@ -19,7 +19,7 @@ from app.web.channel.export_preview import NoPreview, export_preview, exported, 
 from app.web.channel.radar_survey import Survey
 from app.workspace import Workspace
 from calib_core.errors import CalibrationError
-from calib_core.interchange import FORMATS, CalibrationFile, read_calibration
+from calib_core.interchange import CalibrationFile, read_calibration, written_formats
 from calib_core.measurements import MIN_PAIRS, Unsolvable
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
@@ -141,13 +141,14 @@ class _Downloads:
 
     def by_path(self) -> Mapping[str, Callable[[str], Reply]]:
         """Return the makers of all answers, each given the query."""
+        formats = written_formats()
         return {
             "/api/calibration.json": self._calibration,
             "/api/clicks.json": self._clicks,
             "/api/formats.json": _formats,
             "/api/activity.json": self._activity,
-            **{f"/api/export/{form.name}": partial(self._export, form.name) for form in FORMATS},
-            **{f"/api/preview/{form.name}": partial(self._preview, form.name) for form in FORMATS},
+            **{f"/api/export/{form.name}": partial(self._export, form.name) for form in formats},
+            **{f"/api/preview/{form.name}": partial(self._preview, form.name) for form in formats},
         }
 
     def _calibration(self, _query: str) -> Reply:

@@ -7,23 +7,25 @@ from calib_core.errors import InputError
 from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.own.camera_document import refuse_skew
+from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
-from calib_core.interchange.syntax.zip_archives import pack, unpack
+from calib_core.interchange.syntax.zip_archives import pack
 from calib_core.lens_models.naming import lenses_named, names_in, written_lens
 
-__all__ = ["COLMAP_NOTES", "read_colmap", "write_colmap"]
+__all__ = ["COLMAP"]
 
-COLMAP_NOTES = (
+_NOTES = (
     "unpack it into a folder: cameras.txt, images.txt and points3D.txt; the world frame is the radar's; "
     "COLMAP puts the centre of the top-left pixel at (0.5, 0.5), so the principal point is half a pixel larger",
 )
 _HALF_PIXEL = 0.5
 
 
-def write_colmap(file: CalibrationFile) -> bytes:
+def _write(file: CalibrationFile) -> bytes:
     """Write the three text files of a COLMAP model, zipped.
 
     Raises:
@@ -52,13 +54,17 @@ def _colmap_camera(camera: Camera) -> tuple[str, list[float]]:
     return lens.name, [*pinhole, *lens.coefficients]
 
 
-def read_colmap(data: bytes, source: str) -> ImportedCalibration:
+def _recognizes(content: Content) -> bool:
+    return any("images.txt" in name for name in content.members)
+
+
+def _read(content: Content, source: str) -> ImportedCalibration:
     """Read the image of a zipped COLMAP text model and its camera.
 
     Raises:
         InputError: a file or a number is missing, or there are several images.
     """
-    members = {name.rsplit("/", 1)[-1]: content for name, content in unpack(data, source=source).items()}
+    members = {name.rsplit("/", 1)[-1]: data for name, data in content.members.items()}
     if not {"cameras.txt", "images.txt"} <= set(members):
         raise InputError(f"{source}: no cameras.txt and images.txt in it; give a zipped COLMAP text model")
     text = members["images.txt"].decode("utf-8", errors="replace")
@@ -101,3 +107,16 @@ def _camera(words: list[str], *, source: str) -> Camera:
         return Camera(lens.name, int(width), int(height), matrix, np.array(distortion))
     except ValueError as error:
         raise InputError(f"{source}: cameras.txt: {error}; correct it") from None
+
+
+COLMAP = Format(
+    name="colmap",
+    title="COLMAP text model",
+    numbers="world (radar) into camera, quaternion w x y z; principal point half a pixel larger",
+    file_name="colmap.zip",
+    camera="lens",
+    comment="#",
+    notes=_NOTES,
+    write=_write,
+    reads=Reads(_recognizes, _read),
+)

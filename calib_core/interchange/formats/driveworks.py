@@ -9,13 +9,15 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, rpy_from_matrix
+from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.json_text import json_text
 
-__all__ = ["DRIVEWORKS_NOTES", "is_rig", "read_driveworks", "write_driveworks", "write_driveworks_in_rig"]
+__all__ = ["DRIVEWORKS"]
 
-DRIVEWORKS_NOTES = (
+_NOTES = (
     "nominalSensor2Rig_FLU is the sensor's pose in the rig: metres, roll-pitch-yaw in degrees about fixed axes, the camera with "
     "body axes (x forward, y left, z up); the radar is the rig's origin (parent_from_radar places it elsewhere)",
     "carries the pose only: copy the two poses into your rig, whose other fields are yours; JSON has no comments, so the check "
@@ -25,12 +27,12 @@ _POSE = "nominalSensor2Rig_FLU"
 _CORRECTIONS = ("correction_rig_T", "correction_sensor_R_FLU")
 
 
-def write_driveworks(file: CalibrationFile) -> str:
+def _write(file: CalibrationFile) -> str:
     """Write rig.json with the radar at the rig's origin."""
-    return write_driveworks_in_rig(file, RigidTransform.identity())
+    return _write_in_rig(file, RigidTransform.identity())
 
 
-def write_driveworks_in_rig(file: CalibrationFile, rig_from_radar: RigidTransform) -> str:
+def _write_in_rig(file: CalibrationFile, rig_from_radar: RigidTransform) -> str:
     """Write rig.json: a radar and a camera, each posed in the rig."""
     rig_from_link = rig_from_radar @ file.calibration.camera_from_radar.inverse() @ LINK_FROM_OPTICAL.inverse()
     sensors = [
@@ -46,18 +48,18 @@ def _sensor(name: str, protocol: str, rig_from_sensor: RigidTransform) -> dict[s
     return {"name": name, "protocol": protocol, "parameter": "", "properties": {}, _POSE: pose}
 
 
-def is_rig(content: Any) -> bool:
-    """Tell whether JSON is a rig of sensors."""
-    return isinstance(content, Mapping) and isinstance(content.get("rig"), Mapping) and "sensors" in content["rig"]
+def _recognizes(content: Content) -> bool:
+    rig = content.json_mapping.get("rig")
+    return isinstance(rig, Mapping) and "sensors" in rig
 
 
-def read_driveworks(content: Mapping[str, Any], source: str) -> ImportedCalibration:
+def _read(content: Content, source: str) -> ImportedCalibration:
     """Read a rig that holds one radar and one camera, by their protocols.
 
     Raises:
         InputError: it holds others, a number is missing, or a pose has corrections beside it.
     """
-    listed = content["rig"]["sensors"]
+    listed = content.mapping["rig"]["sensors"]
     sensors = [sensor for sensor in listed if isinstance(sensor, Mapping)] if isinstance(listed, list) else []
     radars, cameras = (
         [sensor for sensor in sensors if str(sensor.get("protocol", "")).startswith(kind)]
@@ -93,3 +95,17 @@ def _posed(sensor: Mapping[str, Any], *, source: str) -> WrittenPose:
 def _numbers(value: Any) -> list[Any]:
     inner = value.get("roll-pitch-yaw") if isinstance(value, Mapping) else value
     return list(inner) if isinstance(inner, list) else [inner]
+
+
+DRIVEWORKS = Format(
+    name="driveworks",
+    title="NVIDIA DriveWorks rig",
+    numbers="pose of each sensor in the rig, roll pitch yaw in degrees about fixed axes; the camera with body axes",
+    file_name="rig.json",
+    camera="none",
+    comment="none",
+    notes=_NOTES,
+    write=_write,
+    write_in_parent=_write_in_rig,
+    reads=Reads(_recognizes, _read),
+)

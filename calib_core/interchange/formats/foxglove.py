@@ -9,21 +9,23 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import find_cameras, floats
+from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
+from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.lens_models.naming import written_lens
 
-__all__ = ["FOXGLOVE_NOTES", "read_foxglove", "write_foxglove"]
+__all__ = ["FOXGLOVE"]
 
-FOXGLOVE_NOTES = (
+_NOTES = (
     "FrameTransform is the pose of the child (camera, optical) in the parent (radar), rotation named x y z w; "
     "a message holds no comment, so the check point is only in calibration.json",
 )
 
 
-def write_foxglove(file: CalibrationFile) -> str:
+def _write(file: CalibrationFile) -> str:
     """Write one object with both messages, to publish as they are.
 
     Raises:
@@ -58,13 +60,20 @@ def _camera_message(camera: Camera, frame: str) -> dict[str, Any]:
     }
 
 
-def read_foxglove(content: Mapping[str, Any], source: str) -> ImportedCalibration:
+def _recognizes(content: Content) -> bool:
+    return "FrameTransform" in content.json_mapping or "parent_frame_id" in content.json_mapping
+
+
+def _read(content: Content, source: str) -> ImportedCalibration:
     """Read a FrameTransform, alone or beside a CameraCalibration.
 
     Raises:
         InputError: a frame's name or a number is missing.
     """
-    message = content.get("FrameTransform", content)
+    messages = content.mapping
+    message = messages.get("FrameTransform", messages)
+    if not isinstance(message, Mapping):
+        message = {}
     parent, child = (str(message.get(key) or "") for key in ("parent_frame_id", "child_frame_id"))
     if not parent or not child:
         raise InputError(f"{source}: parent_frame_id or child_frame_id is missing; name both frames")
@@ -77,7 +86,7 @@ def read_foxglove(content: Mapping[str, Any], source: str) -> ImportedCalibratio
             [floats(block.get(k), source=source, place=f"FrameTransform.{part}.{k}", length=1)[0] for k in keys]
         )
     roles = posed_between(parent, child, None)
-    cameras = find_cameras(content, source=source) if "CameraCalibration" in content else ()
+    cameras = find_cameras(messages, source=source) if "CameraCalibration" in messages else ()
     return ImportedCalibration(
         "foxglove",
         WrittenPose("quaternion_xyzw", np.array(numbers[1]), np.array(numbers[0]), roles.direction, roles.axes),
@@ -85,3 +94,16 @@ def read_foxglove(content: Mapping[str, Any], source: str) -> ImportedCalibratio
         frames=roles.frames,
         notes=roles.notes,
     ).checked(source)
+
+
+FOXGLOVE = Format(
+    name="foxglove",
+    title="Foxglove messages",
+    numbers="FrameTransform: pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
+    file_name="foxglove.json",
+    camera="lens",
+    comment="none",
+    notes=_NOTES,
+    write=_write,
+    reads=Reads(_recognizes, _read),
+)

@@ -9,16 +9,18 @@ from calib_core.errors import InputError
 from calib_core.geometry import rotation_log
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
 from calib_core.interchange.cameras.fields import find_cameras, floats
+from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.camera_document import refuse_skew
+from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.lens_models.naming import written_lens
 
-__all__ = ["read_opencv", "write_opencv"]
+__all__ = ["OPENCV"]
 
 
-def write_opencv(file: CalibrationFile) -> str:
+def _write(file: CalibrationFile) -> str:
     """Write a file that cv::FileStorage of OpenCV 3, 4 and 5 reads.
 
     Raises:
@@ -56,34 +58,51 @@ def _matrix(key: str, matrix: np.ndarray) -> str:
     return f"{key}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {data} ]\n"
 
 
-def read_opencv(content: Mapping[str, Any], text: str, source: str) -> ImportedCalibration:
+def _recognizes(content: Content) -> bool:
+    return "R" in content.mapping and "T" in content.mapping
+
+
+def _read(content: Content, source: str) -> ImportedCalibration:
     """Read R and T, and the camera where there is one.
 
     Raises:
         InputError: a number is missing.
     """
-    rotation = floats(content["R"], source=source, place="R", length=9)
-    translation_m = floats(content["T"], source=source, place="T", length=3)
-    cameras = find_cameras(content, source=source)
+    values = content.mapping
+    rotation = floats(values["R"], source=source, place="R", length=9)
+    translation_m = floats(values["T"], source=source, place="T", length=3)
+    cameras = find_cameras(values, source=source)
     has_size = len(cameras) == 1 and cameras[0].size_px is not None
-    frames = stated_frames(text)
-    if content.get("radar_frame") and content.get("camera_frame"):
-        frames = FrameNames(str(content["radar_frame"]), str(content["camera_frame"]))
+    frames = stated_frames(content.text)
+    if values.get("radar_frame") and values.get("camera_frame"):
+        frames = FrameNames(str(values["radar_frame"]), str(values["camera_frame"]))
     notes = () if frames else ("the file does not name its frames; took R and T as p_camera = R p_radar + T",)
     return ImportedCalibration(
         "opencv",
         WrittenPose("matrix", np.reshape(rotation, (3, 3)), np.array(translation_m), "camera_from_radar"),
         camera=cameras[0].camera(image_size_px=None, source=source) if has_size else None,
         frames=frames,
-        check_point=_check_point(content, source) or stated_check_point(text),
+        check_point=_check_point(values, source) or stated_check_point(content.text),
         notes=notes,
     ).checked(source)
 
 
-def _check_point(content: Mapping[str, Any], source: str) -> StatedCheckPoint | None:
+def _check_point(values: Mapping[str, Any], source: str) -> StatedCheckPoint | None:
     try:
-        radar_m = floats(content["check_point_radar_m"], source=source, place="check_point_radar_m", length=3)
-        pixel_px = floats(content["check_point_pixel_px"], source=source, place="check_point_pixel_px", length=2)
+        radar_m = floats(values["check_point_radar_m"], source=source, place="check_point_radar_m", length=3)
+        pixel_px = floats(values["check_point_pixel_px"], source=source, place="check_point_pixel_px", length=2)
     except (KeyError, InputError):
         return None
     return StatedCheckPoint(np.array(radar_m), pixel_px=np.array(pixel_px))
+
+
+OPENCV = Format(
+    name="opencv",
+    title="OpenCV FileStorage",
+    numbers="R, T, rvec carry radar points into the camera",
+    file_name="radar_camera.yml",
+    camera="lens",
+    comment="#",
+    write=_write,
+    reads=Reads(_recognizes, _read),
+)

@@ -9,7 +9,10 @@ from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, F
 from calib_core.interchange.imported import StatedCheckPoint
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 
-__all__ = ["hash_comment", "stated_check_point", "stated_frames", "statement", "xml_comment"]
+__all__ = ["POSE_ONLY", "hash_comment", "stated_check_point", "stated_frames", "statement", "xml_comment"]
+
+POSE_ONLY = "carries the pose only: keep your camera_info, or export opencv too, which carries the camera"
+"""A note of every format that holds nothing of the camera."""
 
 _STRING = r'"(?:[^"\\]|\\.)*"'
 _FRAMES = re.compile(rf"radar frame ({_STRING}) \(.*?\), camera frame ({_STRING}) \(")

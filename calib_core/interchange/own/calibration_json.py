@@ -23,12 +23,14 @@ from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nest
 from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
 from calib_core.interchange.own.provenance_document import provenance_document, provenance_of
 from calib_core.interchange.own.unknown_results import unknown_results, with_unknown
+from calib_core.interchange.syntax.content import decoded
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import json_object, parse_document
 from calib_core.measurements import ReflectorClick, Unpaired
 from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
 
 __all__ = [
+    "AGREEMENT",
     "COVARIANCE_CONVENTION",
     "calibration_file",
     "calibration_file_of",
@@ -43,7 +45,8 @@ COVARIANCE_CONVENTION = (
     "6x6, row-major, order (x, y, z, rotX, rotY, rotZ) [m, rad], of the error (dt, dtheta) of camera_from_radar "
     "in camera axes: t = t_hat + dt, R = Exp(dtheta) R_hat"
 )
-_AGREEMENT = 1e-5
+AGREEMENT = 1e-5
+"""How far two statements of one transform may be apart, in any entry of their matrices."""
 
 
 def calibration_text(
@@ -129,17 +132,18 @@ _KEY_ORDER = (
 )
 
 
-def read_calibration(text: str, source: str = "calibration") -> CalibrationFile:
-    """Read calibration-1 text. Results may carry more keys than we know; the camera and the options may not.
+def read_calibration(content: str | bytes, source: str = "calibration") -> CalibrationFile:
+    """Read calibration-1. Results may carry more keys than we know; the camera and the options may not.
 
     Raises:
         InputError: the file, the place in it and what to do; also when its two transforms or a quaternion disagree.
     """
+    text = decoded(content, source=source)
     document = parse_document(text, documents.CalibrationDocument, source=source)
     camera_from_radar = transform_of(document.camera_from_radar, source=source, place="camera_from_radar")
     if document.radar_from_camera is not None:
         inverse = transform_of(document.radar_from_camera, source=source, place="radar_from_camera").inverse()
-        if np.abs(inverse.as_matrix() - camera_from_radar.as_matrix()).max() > _AGREEMENT:
+        if np.abs(inverse.as_matrix() - camera_from_radar.as_matrix()).max() > AGREEMENT:
             raise InputError(
                 f"{source}: radar_from_camera: is not the inverse of camera_from_radar; "
                 "cocalib check tells which is wrong: correct it or remove radar_from_camera"
@@ -212,7 +216,7 @@ def _same_rotation(quaternion_wxyz: tuple[float, ...], transform: RigidTransform
     quaternion = np.array(quaternion_wxyz)
     if not quaternion.any():
         return False
-    return bool(np.abs(matrix_from_quaternion_wxyz(quaternion) - transform.rotation).max() <= _AGREEMENT)
+    return bool(np.abs(matrix_from_quaternion_wxyz(quaternion) - transform.rotation).max() <= AGREEMENT)
 
 
 def _transform_document(transform: RigidTransform) -> documents.TransformDocument:

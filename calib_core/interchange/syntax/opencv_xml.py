@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 from calib_core.errors import InputError
 
-__all__ = ["load_opencv_xml", "parse_xml"]
+__all__ = ["is_file_storage", "load_opencv_xml", "opencv_values", "parse_xml"]
 
 _MAX_CHARACTERS = 4 * 1024 * 1024
 
@@ -33,8 +33,18 @@ def load_opencv_xml(text: str, *, source: str) -> dict[str, Any]:
         InputError: it is other XML.
     """
     root = parse_xml(text, source=source)
-    if root.tag != "opencv_storage":
+    if not is_file_storage(root):
         raise InputError(f"{source}: XML with <{root.tag}>; expected OpenCV's <opencv_storage>")
+    return opencv_values(root)
+
+
+def is_file_storage(root: ElementTree.Element) -> bool:
+    """Tell whether XML is OpenCV's FileStorage."""
+    return root.tag == "opencv_storage"
+
+
+def opencv_values(root: ElementTree.Element) -> dict[str, Any]:
+    """Return the values of FileStorage XML that is parsed already."""
     return {child.tag: _value(child) for child in root}
 
 

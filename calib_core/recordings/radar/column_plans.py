@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from calib_core.recordings.radar.columns import ColumnPlan, plan_columns
-from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind
+from calib_core.recordings.radar.plugins import all_decoders
+from calib_core.recordings.radar.registry import Decoder, MessageKind
 
 __all__ = ["find_decoder", "plan_for", "plan_like"]
 
@@ -17,7 +18,7 @@ def find_decoder(kind: MessageKind, names: Iterable[str]) -> Decoder | None:
         names: as the message spells them; nested ones dotted, arrays included.
     """
     have = {name.lower() for name in names}
-    fitting = [d for d in DECODERS if d.kind == kind and have.issuperset(field.lower() for field in d.fields)]
+    fitting = [d for d in all_decoders() if d.kind == kind and have.issuperset(field.lower() for field in d.fields)]
     return max(fitting, key=lambda decoder: len(decoder.fields), default=None)
 
 

@@ -71,6 +71,17 @@ class Decoder:
     count_field: str | None = None
     shared_with_lidars: bool = False
 
+    def __post_init__(self) -> None:
+        if isinstance(self.fields, str) or isinstance(self.polar, str) or isinstance(self.needed, str):
+            raise ValueError(f"{self.name}: fields, polar and needed are tuples of names")
+        used = (*self.polar, *self.needed, self.doppler, self.amplitude_field, self.covariance)
+        known = {name.lower() for name in self.fields}
+        missing = [name for name in used if name is not None and name.lower() not in known]
+        if missing:
+            raise ValueError(
+                f"{self.name}: {', '.join(missing)} must be among its fields, or messages without fit it too"
+            )
+
 
 def _f(words: str) -> tuple[str, ...]:
     return tuple(words.split())

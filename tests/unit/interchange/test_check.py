@@ -293,6 +293,7 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
         ("def generate_launch_description(): return []", "no arguments"),
         ("Tr_velo_to_cam: 1 2 3\n", "Tr_velo_to_cam: expected 12 numbers, found 3"),
         ('{"parent_frame_id": "radar"}', "parent_frame_id or child_frame_id is missing"),
+        ('{"FrameTransform": 3}', "parent_frame_id or child_frame_id is missing"),
         ("child_frame_id: camera\n", "a stamped transform needs header.frame_id"),
         ("R: [1, 0, 0]\nT: [0, 0, 0]\n", "R: expected 9 numbers, found 3"),
     ],

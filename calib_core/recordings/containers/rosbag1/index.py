@@ -8,7 +8,7 @@ import numpy as np
 
 from calib_core.recordings.containers.chunks import Chunk
 from calib_core.recordings.containers.positioned_reads import FileBytes
-from calib_core.recordings.containers.rosbag1.recovery import fields_of
+from calib_core.recordings.containers.rosbag1.records import fields_of
 from calib_core.recordings.containers.rosbag1.tail import ChunkInfo, damaged
 from calib_core.recordings.containers.sources import MessageIndex
 

@@ -11,7 +11,8 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.containers.chunks import ChannelFilter, ChunkedSource
 from calib_core.recordings.containers.recovery_warnings import about_recovery
 from calib_core.recordings.containers.rosbag1.index import read_indexes
-from calib_core.recordings.containers.rosbag1.recovery import fields_of, scan_bag
+from calib_core.recordings.containers.rosbag1.records import fields_of
+from calib_core.recordings.containers.rosbag1.recovery import scan_bag
 from calib_core.recordings.containers.rosbag1.tail import (
     CONNECTION,
     ChunkInfo,

@@ -13,8 +13,9 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.containers.chunks import Chunk
 from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
+from calib_core.recordings.containers.rosbag1.records import fields_of
 
-__all__ = ["FoundInBag", "Record", "fields_of", "scan_bag"]
+__all__ = ["FoundInBag", "Record", "scan_bag"]
 
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
 _U32 = struct.Struct("<I")
@@ -62,20 +63,6 @@ class FoundInBag:
     damaged_chunks: int = 0
     fault: str = ""
     tried: int = 0
-
-
-def fields_of(raw: bytes) -> dict[str, bytes] | None:
-    """Split a record header into its name=value fields; None where it is not one."""
-    fields: dict[str, bytes] = {}
-    place = 0
-    while place + 4 <= len(raw):
-        length = _U32.unpack_from(raw, place)[0]
-        name, equals, value = raw[place + 4 : place + 4 + length].partition(b"=")
-        if not equals or place + 4 + length > len(raw):
-            return None
-        fields[name.decode("ascii", "replace")] = value
-        place += 4 + length
-    return fields if place == len(raw) else None
 
 
 def _record(stretch: Stretch, place: int) -> Record | None:

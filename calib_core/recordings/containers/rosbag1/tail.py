@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from calib_core.errors import RecordingError
 from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, Stretch
-from calib_core.recordings.containers.rosbag1.recovery import fields_of
+from calib_core.recordings.containers.rosbag1.records import fields_of
 from calib_core.recordings.containers.sources import Channel
 
 __all__ = ["CONNECTION", "ChunkInfo", "channel_of", "counts_of", "damaged", "first_chunks", "read_tail"]

@@ -9,7 +9,14 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.formats.statement import stated_check_point, stated_frames, statement, xml_comment
+from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.formats.statement import (
+    POSE_ONLY,
+    stated_check_point,
+    stated_frames,
+    statement,
+    xml_comment,
+)
 from calib_core.interchange.formats.transform_choice import Ends, the_one_between
 from calib_core.interchange.imported import (
     ImportedCalibration,
@@ -24,13 +31,13 @@ from calib_core.interchange.rotations import (
     matrix_from_rpy,
     rpy_from_matrix,
 )
-from calib_core.interchange.syntax.opencv_xml import parse_xml
+from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
-__all__ = ["read_urdf", "write_urdf"]
+__all__ = ["URDF"]
 
 
-def write_urdf(file: CalibrationFile) -> str:
+def _write(file: CalibrationFile) -> str:
     """Write a robot of three links; copy its two joints into yours."""
     frames = file.frames
     radar_from_camera = file.calibration.camera_from_radar.inverse()
@@ -61,14 +68,18 @@ def _joint(parent: str, child: str, parent_from_child: RigidTransform, rpy_rad: 
     )
 
 
-def read_urdf(text: str, source: str) -> ImportedCalibration:
+def _recognizes(content: Content) -> bool:
+    return content.root.tag == "robot"
+
+
+def _read(content: Content, source: str) -> ImportedCalibration:
     """Read the joint between radar and camera, and the optical joint on it where there is one.
 
     Raises:
         InputError: no such joint, or it is not fixed.
     """
-    joints = [joint for joint in parse_xml(text, source=source).iter("joint") if _ends(joint) != ("", "")]
-    stated = stated_frames(text)
+    joints = [joint for joint in content.root.iter("joint") if _ends(joint) != ("", "")]
+    stated = stated_frames(content.text)
     between = [joint for joint in joints if _is_between(joint, stated)]
     if not between:
         raise InputError(f"{source}: no joint between a radar and a camera in it; name its links so, for example radar")
@@ -88,7 +99,7 @@ def read_urdf(text: str, source: str) -> ImportedCalibration:
         format="urdf",
         pose=WrittenPose("rpy", np.array(rpy_rad), np.array(translation_m), roles.direction, axes),
         frames=frames,
-        check_point=stated_check_point(text),
+        check_point=stated_check_point(content.text),
         notes=notes,
     ).checked(source)
 
@@ -125,3 +136,16 @@ def _refuse_odd_optical(joint: Element, *, source: str) -> None:
             f"{source}: the joint {joint.get('name')!r} is not the standard optical one (rpy -pi/2 0 -pi/2, no offset); "
             "give the pose of the optical frame itself"
         )
+
+
+URDF = Format(
+    name="urdf",
+    title="URDF: camera_link and optical frame",
+    numbers="pose of camera_link (body axes) in the radar, roll pitch yaw about fixed axes; then the optical joint",
+    file_name="radar_camera.urdf",
+    camera="none",
+    comment="<!-- -->",
+    notes=(POSE_ONLY,),
+    write=_write,
+    reads=Reads(_recognizes, _read),
+)

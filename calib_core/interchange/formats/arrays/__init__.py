@@ -1,0 +1,1 @@
+"""Plain arrays: text, NumPy's npz, MATLAB's mat."""

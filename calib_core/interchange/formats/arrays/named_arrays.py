@@ -1,0 +1,58 @@
+"""A calibration from arrays with names, as npz and mat files hold them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.interchange.calibration_file import FrameNames
+from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
+
+__all__ = ["from_arrays"]
+
+
+def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> ImportedCalibration:
+    """Return the calibration in arrays that hold camera_from_radar, or R and t.
+
+    Args:
+        arrays: by their names.
+        name: of the format.
+        source: what to call the file in an error.
+
+    Raises:
+        InputError: they hold neither, or no rotation.
+    """
+    try:
+        if "camera_from_radar" in arrays:
+            rows = np.asarray(arrays["camera_from_radar"], dtype=np.float64).reshape(-1, 4)
+            rotation, translation_m = rows[:3, :3], rows[:3, 3]
+        else:
+            rotation = np.asarray(arrays["R"], dtype=np.float64)
+            translation_m = np.asarray(arrays["t"], dtype=np.float64).ravel()
+        pose = WrittenPose("matrix", rotation, translation_m, "camera_from_radar")
+        named = "radar_frame" in arrays and "camera_frame" in arrays
+        check = None
+        if "check_point_radar_m" in arrays and "check_point_pixel_px" in arrays:
+            check = StatedCheckPoint(
+                np.ravel(arrays["check_point_radar_m"]), pixel_px=np.ravel(arrays["check_point_pixel_px"])
+            )
+        return ImportedCalibration(
+            name,
+            pose,
+            camera=_camera(arrays),
+            frames=FrameNames(str(arrays["radar_frame"]), str(arrays["camera_frame"])) if named else None,
+            check_point=check,
+            notes=() if named else ("the file names no frames; took it as p_camera = R p_radar + t",),
+        ).checked(source)
+    except (KeyError, ValueError, TypeError, IndexError) as error:
+        raise InputError(f"{source}: needs camera_from_radar (4x4), or R and t ({error}); export it again") from None
+
+
+def _camera(arrays: Mapping[str, Any]) -> Camera | None:
+    if not {"K", "D", "image_size_px", "camera_model"} <= set(arrays):
+        return None
+    width_px, height_px = np.ravel(arrays["image_size_px"]).tolist()
+    model: Any = str(arrays["camera_model"])
+    return Camera(model, int(width_px), int(height_px), np.asarray(arrays["K"]), np.ravel(arrays["D"]))

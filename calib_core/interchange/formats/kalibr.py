@@ -1,0 +1,87 @@
+"""Kalibr's camera chain, with our key T_cam_radar: Kalibr itself has none for radars."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from calib_core.errors import InputError
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.cameras.fields import find_cameras, floats
+from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
+from calib_core.interchange.imported import ImportedCalibration, WrittenPose
+from calib_core.interchange.own.camera_document import refuse_skew
+from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
+from calib_core.lens_models.naming import written_lens
+
+__all__ = ["KALIBR"]
+
+_NOTES = ("T_cam_radar is our key: Kalibr itself has none for radars",)
+
+
+def _write(file: CalibrationFile) -> str:
+    """Write a camera chain of one camera, with T_cam_radar beside Kalibr's own keys.
+
+    Raises:
+        InputError: Kalibr has no model for this lens.
+    """
+    calibration = file.calibration
+    camera = calibration.camera
+    refuse_skew(camera, "Kalibr's pinhole model has")
+    lens = written_lens(camera.lens, camera.distortion, "kalibr")
+    k = camera.matrix_px
+    rows = "".join(f"  - [{numbers_text(row)}]\n" for row in calibration.camera_from_radar.as_matrix())
+    meaning = (
+        "T_cam_radar carries radar points into the camera (our key, after Kalibr's T_cam_imu); rows of a 4x4 matrix"
+    )
+    return (
+        hash_comment(statement(file, meaning))
+        + "cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n"
+        + f"  intrinsics: [{numbers_text((k[0, 0], k[1, 1], k[0, 2], k[1, 2]))}]\n"
+        + f"  distortion_model: {lens.name}\n  distortion_coeffs: [{numbers_text(lens.coefficients)}]\n"
+        + f"  resolution: [{camera.width_px}, {camera.height_px}]\n"
+        + f"  rostopic: {quoted(file.provenance.image_topic or '')}\n"
+        + f"  T_cam_radar:\n{rows}"
+    )
+
+
+def _recognizes(content: Content) -> bool:
+    return any("T_cam_radar" in value for value in content.mapping.values() if isinstance(value, Mapping))
+
+
+def _read(content: Content, source: str) -> ImportedCalibration:
+    """Read the camera of a chain that holds T_cam_radar.
+
+    Raises:
+        InputError: a number is missing, or several cameras hold one.
+    """
+    chain = content.mapping
+    key, *others = [key for key, value in chain.items() if isinstance(value, Mapping) and "T_cam_radar" in value]
+    if others:
+        raise InputError(
+            f"{source}: T_cam_radar stands in {key}, {', '.join(map(str, others))}; keep the camera that is meant"
+        )
+    matrix = floats(chain[key]["T_cam_radar"], source=source, place=f"{key}.T_cam_radar", length=16)
+    rows = np.reshape(matrix, (4, 4))
+    cameras = find_cameras({key: chain[key]}, source=source) if "intrinsics" in chain[key] else ()
+    return ImportedCalibration(
+        "kalibr",
+        WrittenPose("matrix", rows[:3, :3], rows[:3, 3], "camera_from_radar"),
+        camera=cameras[0].camera(image_size_px=None, source=source) if cameras else None,
+        frames=stated_frames(content.text),
+        check_point=stated_check_point(content.text),
+    ).checked(source)
+
+
+KALIBR = Format(
+    name="kalibr",
+    title="Kalibr camera chain",
+    numbers="T_cam_radar carries radar points into the camera; our key, Kalibr has none for radars",
+    file_name="camchain.yaml",
+    camera="lens",
+    comment="#",
+    notes=_NOTES,
+    write=_write,
+    reads=Reads(_recognizes, _read),
+)

@@ -1,0 +1,1 @@
+"""ROS: static transforms as a command and as launch files, and URDF."""

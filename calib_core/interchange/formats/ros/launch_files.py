@@ -1,0 +1,149 @@
+"""Launch files with a static transform: of ROS 2 in Python and in XML, and of ROS 1. One reader takes both kinds of XML."""
+
+import ast
+import shlex
+from xml.sax.saxutils import quoteattr
+
+from calib_core.errors import InputError
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.formats.ros.static_transform import (
+    LABELS,
+    NUMBERS,
+    PUBLISHER,
+    from_publishers,
+    meaning,
+    pose_numbers,
+)
+from calib_core.interchange.formats.statement import POSE_ONLY, hash_comment, statement, xml_comment
+from calib_core.interchange.imported import ImportedCalibration
+from calib_core.interchange.syntax.content import Content
+
+__all__ = ["TF1_LAUNCH", "TF2_LAUNCH_PY", "TF2_LAUNCH_XML"]
+
+
+def _write_python(file: CalibrationFile) -> str:
+    """Write a ROS 2 launch file in Python."""
+    arguments = [part for pair in zip(LABELS, pose_numbers(file), strict=True) for part in pair]
+    arguments += ["--frame-id", file.frames.radar, "--child-frame-id", file.frames.camera]
+    rows = [f"                    {a!a}, {b!a},\n" for a, b in zip(arguments[::2], arguments[1::2], strict=True)]
+    return (
+        hash_comment(statement(file, meaning(file)))
+        + "from launch import LaunchDescription\n"
+        + "from launch_ros.actions import Node\n\n\n"
+        + "def generate_launch_description():\n"
+        + "    return LaunchDescription(\n        [\n            Node(\n"
+        + f'                package="tf2_ros",\n                executable="{PUBLISHER}",\n'
+        + "                arguments=[\n"
+        + "".join(rows)
+        + "                ],\n            )\n        ]\n    )\n"
+    )
+
+
+def _write_ros2_xml(file: CalibrationFile) -> str:
+    """Write a ROS 2 launch file in XML."""
+    flags = [f"{label} {number}" for label, number in zip(LABELS, pose_numbers(file), strict=True)]
+    frames = f"--frame-id {shlex.quote(file.frames.radar)} --child-frame-id {shlex.quote(file.frames.camera)}"
+    arguments = quoteattr(" ".join([*flags, frames]))
+    return (
+        '<?xml version="1.0"?>\n'
+        + xml_comment(statement(file, meaning(file)))
+        + f'<launch>\n  <node pkg="tf2_ros" exec="{PUBLISHER}" args={arguments}/>\n</launch>\n'
+    )
+
+
+def _write_ros1_xml(file: CalibrationFile) -> str:
+    """Write a ROS 1 launch file; tf2_ros takes x y z qx qy qz qw parent child, and latches it."""
+    names = [shlex.quote(name) for name in (file.frames.radar, file.frames.camera)]
+    arguments = quoteattr(" ".join([*pose_numbers(file), *names]))
+    return (
+        '<?xml version="1.0"?>\n'
+        + xml_comment(statement(file, meaning(file)))
+        + f'<launch>\n  <node pkg="tf2_ros" type="{PUBLISHER}" name="camera_in_radar" args={arguments}/>\n</launch>\n'
+    )
+
+
+def _recognizes_python(content: Content) -> bool:
+    return content.syntax == "lines" and "generate_launch_description" in content.text
+
+
+def _read_python(content: Content, source: str) -> ImportedCalibration:
+    """Read the arguments out of a ROS 2 launch file in Python, without running it.
+
+    Raises:
+        InputError: there are none, or they are not plain text.
+    """
+    try:
+        tree = ast.parse(content.text)
+    except (SyntaxError, ValueError, RecursionError) as error:
+        raise InputError(f"{source}: not Python ({error}); correct it there") from None
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.keyword) and node.arg == "arguments" and isinstance(node.value, ast.List):
+            words = [str(item.value) for item in node.value.elts if isinstance(item, ast.Constant)]
+            if len(words) == len(node.value.elts):
+                found.append(words)
+    if found:
+        return from_publishers(found, content.text, source=source, name="tf2-launch-py")
+    raise InputError(f"{source}: no arguments=[...] of plain strings in it; give a file with a {PUBLISHER}")
+
+
+def _recognizes_xml(content: Content) -> bool:
+    return content.root.tag == "launch"
+
+
+def _read_xml(content: Content, source: str) -> ImportedCalibration:
+    """Read a launch file of ROS 2 or ROS 1.
+
+    Raises:
+        InputError: there is no static_transform_publisher in it.
+    """
+    nodes = content.root.iter("node")
+    publishers = [node for node in nodes if PUBLISHER in (node.get("exec"), node.get("type"))]
+    if not publishers:
+        raise InputError(f"{source}: no <node> that runs {PUBLISHER}; give a file with one")
+    try:
+        found = [shlex.split(node.get("args", "")) for node in publishers]
+    except ValueError as error:
+        raise InputError(f"{source}: args cannot be split ({error}); correct its quotes") from None
+    name = "tf2-launch-xml" if publishers[0].get("exec") else "tf1-launch"
+    return from_publishers(found, content.text, source=source, name=name)
+
+
+_READS_XML = Reads(_recognizes_xml, _read_xml)
+
+TF2_LAUNCH_PY = Format(
+    name="tf2-launch-py",
+    title="ROS 2 launch file, Python",
+    numbers=NUMBERS,
+    file_name="radar_camera.launch.py",
+    camera="none",
+    comment="#",
+    notes=(POSE_ONLY,),
+    write=_write_python,
+    reads=Reads(_recognizes_python, _read_python),
+)
+
+TF2_LAUNCH_XML = Format(
+    name="tf2-launch-xml",
+    title="ROS 2 launch file, XML",
+    numbers=NUMBERS,
+    file_name="radar_camera.launch.xml",
+    camera="none",
+    comment="<!-- -->",
+    notes=(POSE_ONLY,),
+    write=_write_ros2_xml,
+    reads=_READS_XML,
+)
+
+TF1_LAUNCH = Format(
+    name="tf1-launch",
+    title="ROS 1 launch file",
+    numbers=NUMBERS,
+    file_name="radar_camera.launch",
+    camera="none",
+    comment="<!-- -->",
+    notes=(POSE_ONLY,),
+    write=_write_ros1_xml,
+    reads=_READS_XML,
+)

@@ -1,0 +1,133 @@
+"""The arguments of tf2's static_transform_publisher, in every form people write them: the pose of the child in the parent."""
+
+import re
+import shlex
+
+import numpy as np
+
+from calib_core.errors import InputError
+from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.formats.statement import stated_check_point, stated_frames
+from calib_core.interchange.formats.transform_choice import Ends, the_one_between
+from calib_core.interchange.imported import Form, ImportedCalibration, WrittenPose, posed_between
+from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
+from calib_core.interchange.syntax.yaml_text import number_text
+
+__all__ = ["LABELS", "NUMBERS", "PUBLISHER", "from_publishers", "meaning", "pose_numbers"]
+
+PUBLISHER = "static_transform_publisher"
+LABELS = ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")
+NUMBERS = "pose of the child (camera, optical) in the parent (radar); quaternion x y z w"
+
+
+def meaning(file: CalibrationFile) -> str:
+    """Say what the numbers are, for the statement a file opens with."""
+    parent, child = file.frames.radar, file.frames.camera
+    return f"the numbers are the pose of the child {child} in the parent {parent}; quaternion order x y z w"
+
+
+def pose_numbers(file: CalibrationFile) -> list[str]:
+    """Return x, y, z [m] and the quaternion x, y, z, w of the camera in the radar frame, in the order of LABELS."""
+    radar_from_camera = file.calibration.camera_from_radar.inverse()
+    quaternion = quaternion_xyzw_from_matrix(radar_from_camera.rotation)
+    return [number_text(value) for value in (*radar_from_camera.translation_m, *quaternion)]
+
+
+def from_publishers(found: list[list[str]], text: str, *, source: str, name: str) -> ImportedCalibration:
+    """Return the calibration that one of several publishers states: the one between the radar and the camera.
+
+    Args:
+        found: the arguments of each publisher.
+        text: of the file, which may name the frames in words.
+        source: what to call the file in an error.
+        name: of the format.
+
+    Raises:
+        InputError: there is none, more than one, or its arguments are no pose between two frames.
+    """
+    return _from_arguments(_chosen(found, text, source=source), text, source=source, name=name)
+
+
+def _chosen(found: list[list[str]], text: str, *, source: str) -> list[str]:
+    """Return the arguments of the one publisher that is between the radar and the camera."""
+    if not found:
+        return []
+    return found[the_one_between([_ends(words) for words in found], stated_frames(text), source=source)]
+
+
+def _ends(arguments: list[str]) -> Ends:
+    flags = _flags(arguments)
+    if flags:
+        return Ends(flags.get("frame-id", ""), flags.get("child-frame-id", ""))
+    words = [word for word in arguments if ":=" not in word]
+    names = words[-3:-1] if words and _is_number(words[-1]) else words[-2:]
+    return Ends(*names) if len(names) == 2 else Ends("", "")
+
+
+def _from_arguments(arguments: list[str], text: str, *, source: str, name: str) -> ImportedCalibration:
+    flags = _flags(arguments)
+    if flags:
+        parent, child = flags.pop("frame-id", ""), flags.pop("child-frame-id", "")
+        form, rotation, translation = _by_name(flags, source=source)
+    elif len(arguments) >= 8:
+        form, rotation, translation, parent, child = _by_place(arguments, source=source)
+    else:
+        raise InputError(f"{source}: no {PUBLISHER} with a pose and two frames in it; give a command or a launch file")
+    if not parent or not child:
+        raise InputError(f"{source}: a frame's name is missing; add --frame-id and --child-frame-id")
+    roles = posed_between(parent.lstrip("/"), child.lstrip("/"), stated_frames(text))
+    return ImportedCalibration(
+        format=name,
+        pose=WrittenPose(form, np.array(rotation), np.array(translation), roles.direction, roles.axes),
+        frames=roles.frames,
+        check_point=stated_check_point(text),
+        notes=roles.notes,
+    ).checked(source)
+
+
+def _flags(arguments: list[str]) -> dict[str, str]:
+    """Return the named arguments: "--x 1" and "--x=1"."""
+    joined = " ".join(shlex.quote(word) for word in arguments)
+    words = shlex.split(re.sub(r"(^| )(--[a-z-]+)=", r"\1\2 ", joined))
+    return {
+        words[index][2:]: words[index + 1]
+        for index in range(len(words) - 1)
+        if words[index].startswith("--") and words[index][2:3].isalpha()
+    }
+
+
+def _by_name(flags: dict[str, str], *, source: str) -> tuple[Form, tuple[float, ...], tuple[float, ...]]:
+    def numbers(*labels: str) -> tuple[float, ...]:
+        return tuple(
+            value
+            for label in labels
+            for value in floats(flags.get(label, "1" if label == "qw" else "0"), source=source, place=f"--{label}")
+        )
+
+    translation = numbers("x", "y", "z")
+    if {"qx", "qy", "qz", "qw"} & set(flags):
+        return "quaternion_xyzw", numbers("qx", "qy", "qz", "qw"), translation
+    return "rpy", numbers("roll", "pitch", "yaw"), translation
+
+
+def _by_place(arguments: list[str], *, source: str) -> tuple[Form, tuple[float, ...], tuple[float, ...], str, str]:
+    """Read the positional form: x y z, then yaw pitch roll (this order) or qx qy qz qw, the frames, perhaps a period."""
+    words = [word for word in arguments if ":=" not in word]
+    angles = len(words) == 8 or (len(words) == 9 and not _is_number(words[6]))
+    count = 6 if angles else 7
+    if not count + 2 <= len(words) <= count + 3:
+        raise InputError(
+            f"{source}: expected 6 or 7 numbers and two frames, found {len(words)} words; correct the command"
+        )
+    numbers = floats(words[:count], source=source, place="the command's numbers")
+    rotation = numbers[5:2:-1] if angles else numbers[3:]
+    return "rpy" if angles else "quaternion_xyzw", rotation, numbers[:3], words[count], words[count + 1]
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

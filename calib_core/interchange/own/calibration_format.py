@@ -1,0 +1,60 @@
+"""calibration-1 as one format among the others: read so that a check can tell which part of a file is wrong."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from calib_core.errors import InputError
+from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.imported import ImportedCalibration, imported
+from calib_core.interchange.own.calibration_json import (
+    AGREEMENT,
+    calibration_file_of,
+    kept_results,
+    transform_of,
+    write_calibration,
+)
+from calib_core.interchange.own.documents import CalibrationDocument, TransformDocument
+from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.syntax.strict_json import parse_document
+
+__all__ = ["CALIBRATION_1"]
+
+
+def _recognizes(content: Content) -> bool:
+    return str(content.json_mapping.get("schema", "")).startswith("cocalib/calibration-")
+
+
+def _read(content: Content, source: str) -> ImportedCalibration:
+    """Read calibration-1 with its contradictions as faults."""
+    document = parse_document(content.text, CalibrationDocument, source=source)
+    stated = document.camera_from_radar
+    bare = TransformDocument(stated.rotation, stated.translation_m)
+    pose = transform_of(bare, source=source, place="camera_from_radar")
+    faults = []
+    try:
+        transform_of(stated, source=source, place="camera_from_radar")
+    except InputError:
+        faults.append("camera_from_radar.quaternion_wxyz is another rotation than camera_from_radar.rotation")
+    if document.radar_from_camera is not None:
+        try:
+            inverse = transform_of(document.radar_from_camera, source=source, place="radar_from_camera").inverse()
+            if np.abs(inverse.as_matrix() - pose.as_matrix()).max() > AGREEMENT:
+                faults.append("radar_from_camera is not the inverse of camera_from_radar")
+        except InputError:
+            faults.append("radar_from_camera holds two rotations, or none")
+    file = calibration_file_of(document, pose, source=source)
+    kept = kept_results(content.text, source=source)
+    return replace(imported(replace(file, unknown=kept)), faults=tuple(faults))
+
+
+CALIBRATION_1 = Format(
+    name="json",
+    title="cocalib's own calibration-1",
+    numbers="camera_from_radar and its inverse, both as matrix, translation and quaternion w x y z",
+    file_name="calibration.json",
+    camera="lens",
+    comment="keys",
+    write=write_calibration,
+    reads=Reads(_recognizes, _read),
+)

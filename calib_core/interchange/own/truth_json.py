@@ -1,0 +1,45 @@
+"""What a simulation holds for true (truth-1), read to compare a calibration with; only the simulator writes it."""
+
+from collections.abc import Mapping
+
+from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.imported import TRUTH_FORMAT, ImportedCalibration, WrittenPose
+from calib_core.interchange.own.calibration_json import transform_of
+from calib_core.interchange.own.camera_document import camera_of
+from calib_core.interchange.own.documents import CameraDocument, TransformDocument
+from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.syntax.strict_json import checked
+
+__all__ = ["TRUTH"]
+
+_SCHEMA = "cocalib/truth-1"
+
+
+def _recognizes(content: Content) -> bool:
+    return content.json_mapping.get("schema") == _SCHEMA
+
+
+def _read(content: Content, source: str) -> ImportedCalibration:
+    truth = content.mapping
+    stated = checked(truth.get("camera_from_radar") or {}, TransformDocument, source=source, place="camera_from_radar")
+    pose = transform_of(stated, source=source, place="camera_from_radar")
+    camera = truth.get("camera")
+    return ImportedCalibration(
+        TRUTH_FORMAT,
+        WrittenPose("matrix", pose.rotation, pose.translation_m, "camera_from_radar"),
+        camera=camera_of(checked(camera, CameraDocument, source=source, place="camera"), source=source)
+        if isinstance(camera, Mapping)
+        else None,
+    )
+
+
+TRUTH = Format(
+    name=TRUTH_FORMAT,
+    title="truth-1 of a simulation",
+    numbers="camera_from_radar as matrix, translation and quaternion w x y z",
+    file_name="truth.json",
+    camera="lens",
+    comment="keys",
+    write=None,
+    reads=Reads(_recognizes, _read),
+)

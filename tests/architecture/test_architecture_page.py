@@ -1,0 +1,52 @@
+"""ARCHITECTURE.md draws the layers that pyproject.toml promises, and names folders that exist."""
+
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def structure(project_root: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location("structure", project_root / ".ci" / "structure.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def page(project_root: Path) -> str:
+    return (project_root / "ARCHITECTURE.md").read_text(encoding="utf-8")
+
+
+def test_the_drawing_is_the_one_the_contracts_give(structure: ModuleType, page: str, project_root: Path) -> None:
+    drawing = page.partition("## Layers")[2].split("```\n")[1]
+    assert drawing.splitlines() == list(structure.drawn(project_root)), "python .ci/structure.py draw"
+
+
+def test_every_folder_with_rooms_has_a_contract(structure: ModuleType, project_root: Path) -> None:
+    graph = structure.imports(project_root)
+    folders = {name.rpartition(".")[0] for name in graph} - {""}
+    rooms = {folder: structure.between_rooms(graph, folder) for folder in folders}
+    drawn = {line for line in structure.drawn(project_root) if not line.startswith(" ")}
+    assert {folder for folder, inside in rooms.items() if any(inside.values())} - drawn == set()
+
+
+def test_rooms_import_each_other_in_no_circle(structure: ModuleType, project_root: Path) -> None:
+    graph = structure.imports(project_root)
+    for folder in {name.rpartition(".")[0] for name in graph} - {""}:
+        structure.floors(structure.between_rooms(graph, folder))
+    with pytest.raises(ValueError, match="a circle among a, b"):
+        structure.floors({"a": {"b"}, "b": {"a"}, "c": set()})
+
+
+def test_the_paths_it_names_exist(page: str, project_root: Path) -> None:
+    named = set(re.findall(r"`((?:app|calib_core|static|docs|tests|\.ci)/[\w./]+)`", page))
+    assert len(named) > 15
+    assert {
+        path for path in named if not (project_root / path).exists() and not (project_root / f"{path}.py").exists()
+    } <= {"calib_core/lens_models/"}

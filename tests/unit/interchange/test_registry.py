@@ -1,0 +1,75 @@
+"""The table of formats: a reader beside every writer, and one order in which they are asked."""
+
+from pathlib import Path
+
+import pytest
+
+from calib_core.interchange import FORMATS, CalibrationFile, Format, export, read_any, read_calibration
+from calib_core.interchange.formats.registry import readers
+from calib_core.interchange.syntax.content import Content, readings
+from calib_core.interchange.syntax.zip_archives import pack
+
+
+@pytest.fixture(scope="module")
+def file(project_root: Path) -> CalibrationFile:
+    return read_calibration((project_root / "tests/golden/calibration-1.json").read_bytes())
+
+
+@pytest.mark.parametrize("known", FORMATS, ids=lambda known: known.name)
+def test_what_a_format_writes_it_recognizes_and_reads_itself(file: CalibrationFile, known: Format) -> None:
+    data = export(file, known.name, rectified=known.is_for_rectified).data
+
+    assert known.reads is not None
+    recognized = next(reading for reading in readings(data, source="file") if known.reads.recognizes(reading))
+    assert known.reads.read(recognized, "file").format == known.name
+    assert next(reader for reader in readers() if reader.recognizes(recognized)) == known.reads
+
+
+def test_every_reader_is_asked() -> None:
+    assert {known.reads for known in FORMATS} < set(readers())
+
+
+@pytest.mark.parametrize(
+    ("content", "syntaxes"),
+    [
+        (pack({"a.txt": b""}), ["archive"]),
+        (b"\xff\xff\x80", ["bytes"]),
+        (b'\xef\xbb\xbf{"a": 1}', ["json"]),
+        ("[]", ["json"]),
+        (" <robot/>", ["xml"]),
+        ("a: 1\r\n", ["lines", "yaml"]),
+        ("a: 1".encode("utf-16"), ["lines", "yaml"]),
+        ("", ["lines", "yaml"]),
+    ],
+)
+def test_the_syntax_is_told_by_the_first_bytes(content: str | bytes, syntaxes: list[str]) -> None:
+    assert [reading.syntax for reading in readings(content, source="file")] == syntaxes
+
+
+def test_what_a_syntax_does_not_have_is_empty() -> None:
+    (xml,) = readings("<robot/>", source="file")
+    lines, yaml = readings("# words\n\na: 1\n", source="file")
+
+    assert (xml.root.tag, dict(xml.mapping), xml.lines) == ("robot", {}, ())
+    assert (lines.lines, dict(lines.mapping), lines.root.tag) == (("a: 1",), {}, "")
+    assert (dict(yaml.mapping), dict(yaml.json_mapping)) == ({"a": 1}, {})
+    assert dict(Content("json", value=[1]).mapping) == {}
+
+
+@pytest.mark.parametrize(
+    ("content", "name"),
+    [
+        ("# generate_launch_description\narguments=['0','0','0','0','0','0','radar','camera']", "tf2-launch-py"),
+        (
+            '{"parent_frame_id": "radar", "child_frame_id": "camera", "translation": {"x": 0, "y": 0, "z": 0}, '
+            '"rotation": {"x": 0, "y": 0, "z": 0, "w": 1}}',
+            "foxglove",
+        ),
+        ("R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nT: [0, 0, 0]\nchild_frame_id: camera\n", "opencv"),
+    ],
+)
+def test_content_that_fits_two_formats_is_of_the_narrower_one(content: str, name: str) -> None:
+    if name == "tf2-launch-py":
+        content = content.replace("arguments", "static_transform_publisher(arguments") + ")"
+
+    assert read_any(content).format == name
