@@ -1,9 +1,14 @@
 """Array types that name their shape, and the one way an array enters a value."""
 
-from typing import Any, TypeAlias
+import os
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+
+if TYPE_CHECKING or os.environ.get("COCALIB_ARRAY_TYPES") == "checked":
+    from jaxtyping import Bool, Float64, Int64
+else:  # importing jaxtyping takes half as long as NumPy; only a test that checks shapes at run time needs it
+    Bool = Float64 = Int64 = Annotated
 
 __all__ = [
     "Flags",
