@@ -1,13 +1,12 @@
 """Array types that name their shape, and the one way an array enters a value."""
 
-import os
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 
-if TYPE_CHECKING or os.environ.get("COCALIB_ARRAY_TYPES") == "checked":
+if TYPE_CHECKING:
     from jaxtyping import Bool, Float64, Int64
-else:  # importing jaxtyping takes half as long as NumPy; only a test that checks shapes at run time needs it
+else:  # to type checkers jaxtyping's names are Annotated too, and importing it takes half as long as NumPy
     Bool = Float64 = Int64 = Annotated
 
 __all__ = [
