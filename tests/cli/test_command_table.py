@@ -60,9 +60,9 @@ def test_a_tyro_without_those_events_still_runs_commands_and_refuses_in_its_own_
     monkeypatch.setattr(tyro_hook, "_PRIVATE", "tyro._errors_of_tomorrow")
     assert tyro_hook.missing_parts() == ("tyro._errors_of_tomorrow",)
     assert cocalib("export").code == 0
-    answer = cocalib("export", "--tooo", "tf2")
+    answer = cocalib("export", "--bogus", "tf2")
     assert answer.code == 2
-    assert "--tooo" in answer.err
+    assert "--bogus" in answer.err
 
 
 def imported_after(*arguments: str) -> set[str]:
