@@ -13,8 +13,8 @@ from app.cli.tyro_hook import flags_of
 PROSE = {"again", "cookie", "therefore", "wrote"}
 """Words that follow the program's name in sentences that tell nobody to type anything."""
 
-OTHER_PROGRAMS = {"--force-reinstall"}
-"""Options of programs that are not ours."""
+OTHER_PROGRAMS = {f"--{name}" for name in ("frame-id", "child-frame-id", "qx", "qy", "qz", "qw")}
+"""Options of programs that are not ours: of ROS's static_transform_publisher."""
 
 _COMMAND = re.compile(r"(?<![\w/.-])cocalib[ \t]+(?P<command>[a-z][\w-]*)(?P<rest>[^\n`;()]*)")
 _FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9.-]*[a-z0-9]")
