@@ -7,7 +7,7 @@ from typing import Annotated, TypeAlias
 
 import tyro
 
-from app.cli.flags import called
+from app.cli.flags import called, same
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 from calib_core.recordings import RecordingOptions
 
@@ -20,11 +20,11 @@ Recordings: TypeAlias = Annotated[tuple[Path, ...], tyro.conf.Positional, called
 class TopicFlags(RecordingOptions):
     """RecordingOptions with their values named; what each means is told there."""
 
-    radar_topic: Annotated[str | None, called("TOPIC")] = None
-    image_topic: Annotated[str | None, called("TOPIC")] = None
-    camera_info_topic: Annotated[str | None, called("TOPIC")] = None
-    radar_axes: Annotated[str | None, called("AXES")] = None
-    video_start: Annotated[str | None, called("TIME")] = None
+    radar_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "radar_topic")
+    image_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "image_topic")
+    camera_info_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "camera_info_topic")
+    radar_axes: Annotated[str | None, called("AXES")] = same(RecordingOptions, "radar_axes")
+    video_start: Annotated[str | None, called("TIME")] = same(RecordingOptions, "video_start")
 
 
 Topics: TypeAlias = Annotated[TopicFlags, tyro.conf.arg(name="")]

@@ -6,7 +6,7 @@ from typing import Annotated, TypeAlias
 
 import tyro
 
-from app.cli.flags import called
+from app.cli.flags import called, same
 from app.cli.output import progress_bar
 from calib_core.errors import InputError
 from calib_core.synthetic import Container, SimulationOptions
@@ -18,7 +18,7 @@ __all__ = ["Simulate"]
 class SimulationFlags(SimulationOptions):
     """SimulationOptions with a value named; what each means is told there."""
 
-    field_of_view_deg: Annotated[float | None, called("FLOAT")] = None
+    field_of_view_deg: Annotated[float | None, called("FLOAT")] = same(SimulationOptions, "field_of_view_deg")
 
 
 Simulation: TypeAlias = Annotated[SimulationFlags, tyro.conf.arg(name=""), tyro.conf.FlagConversionOff]

@@ -94,7 +94,7 @@ def test_the_pages_promise_what_can_be_typed(page: str, project_root: Path) -> N
     [
         ("or find them with cocalib intrinsics", ["cocalib intrinsics"]),
         ("check it: cocalib open RECORDING --calibration FILE, and click", []),
-        ("cocalib open RECORDING --calibraton FILE", ["cocalib open --calibraton"]),
+        ("cocalib open RECORDING --calibrations FILE", ["cocalib open --calibrations"]),
         ("a calibration that cocalib wrote", []),
         ("cocalib export {} --to FORMAT [--out FILE]", []),
     ],

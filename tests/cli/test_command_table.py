@@ -1,5 +1,6 @@
 """The table of commands says what the commands are, and the command line says no more than the table."""
 
+import dataclasses
 import inspect
 import re
 import subprocess
@@ -11,6 +12,8 @@ import pytest
 
 from app.cli import tyro_hook
 from app.cli.commands import COMMANDS, Command
+from app.option_changes import option_groups
+from calib_core.recordings import RecordingOptions
 
 Cocalib = Callable[..., Any]
 
@@ -44,6 +47,15 @@ def test_the_options_of_a_command_are_those_its_help_shows(cocalib: Cocalib, com
     assert shown.code == 0
     assert shown.out.startswith(f"usage: cocalib {command.name} ")
     assert {*tyro_hook.flags_of(command.load()), "--help"} == set(re.findall(r"(?<!\S)--[a-z][a-z.-]*", shown.out))
+
+
+@pytest.mark.parametrize("command", ["open", "solve"])
+def test_the_help_has_the_text_of_every_option(cocalib: Cocalib, command: str) -> None:
+    words = " ".join(re.sub("[│╭╮╰╯─]", " ", cocalib(command, "--help").out).split())
+    told = [description.hint for group in option_groups() for description in group.options]
+    told += [field.metadata["help"] for field in dataclasses.fields(RecordingOptions)]
+    assert len(told) > 25
+    assert [text for text in told if text not in words] == ["Tape-measured camera position, if there is one."]
 
 
 def test_tyro_still_has_the_private_events_that_wrong_usage_is_worded_from() -> None:
