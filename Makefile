@@ -1,9 +1,10 @@
 # People and CI type the same commands. Needs python3 (3.11 to 3.14) with its venv module, and make.
 PYTHON ?= python3
+LOWEST_PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help env dev demo test check lock bench bench-accuracy sample picture clean
+.PHONY: help env dev demo test test-lowest test-newest check lock bench bench-accuracy sample picture clean
 
 help:  ## Say what can be typed.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -15,7 +16,7 @@ dev: $(VENV)/.dev  ## The same, with what the tests and checks need.
 $(BIN)/python:
 	@PYTHON="$(PYTHON)" VENV="$(VENV)" sh .ci/make_venv
 
-$(VENV)/.runtime: requirements/runtime.txt pyproject.toml | $(BIN)/python
+$(VENV)/.runtime: requirements/runtime.txt pyproject.toml app/launcher.py | $(BIN)/python
 	@VENV="$(VENV)" sh .ci/install requirements/runtime.txt
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
@@ -38,10 +39,17 @@ check: dev  ## Style, types, layers, frame names, spelling.
 	$(BIN)/lint-imports
 	$(BIN)/typos
 	$(BIN)/pytest -q tests/architecture
+	@$(BIN)/python .ci/installed_size
 
 test: dev  ## Every test, the browser ones included.
 	@$(BIN)/python tests/find_browser.py --install
 	$(BIN)/pytest
+
+test-lowest:  ## A part of the tests with the lowest versions that pyproject.toml allows (needs python3.11 and the package index).
+	@$(LOWEST_PYTHON) .ci/test_bounds lowest
+
+test-newest:  ## The same with the newest versions that it allows.
+	@$(PYTHON) .ci/test_bounds newest
 
 bench: dev  ## Speed, as ratios within one run; writes docs/speed.md. BENCH=--large opens 5 GB and 100 GB as well.
 	@$(BIN)/python tests/find_browser.py --install
@@ -61,4 +69,4 @@ lock: dev  ## Pin every dependency again, with hashes and without addresses (nee
 	@sh .ci/lock
 
 clean:  ## Remove what make env and the tests left.
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache dist
+	rm -rf $(VENV) $(VENV)-lowest $(VENV)-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache dist

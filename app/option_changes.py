@@ -3,7 +3,6 @@
 An option's name is its path in CalibrationOptions, such as "gating.max_range_m".
 """
 
-import ast
 import dataclasses
 import difflib
 import inspect
@@ -16,7 +15,6 @@ from typing import Any, Literal, TypeAlias
 
 import msgspec
 
-import calib_core.options
 from calib_core.errors import OptionError
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 
@@ -35,31 +33,6 @@ __all__ = [
 
 OptionKind: TypeAlias = Literal["number", "integer", "yes-no", "choice", "camera-position"]
 OptionValue: TypeAlias = bool | int | float | str | CameraPositionPrior | None
-
-RANGES: Mapping[str, tuple[float, float]] = {
-    "gating.max_speed_mps": (0.0, 100.0),
-    "gating.min_range_m": (0.0, 1000.0),
-    "gating.max_range_m": (0.1, 1000.0),
-    "locating.window_s": (0.01, 60.0),
-    "locating.max_candidates": (1, 50),
-    "locating.max_time_gap_s": (0.0, 60.0),
-    "noise.sigma_px": (0.01, 1000.0),
-    "noise.sigma_range_m": (1e-4, 10.0),
-    "noise.sigma_azimuth_deg": (1e-3, 45.0),
-    "noise.sigma_elevation_deg": (1e-3, 45.0),
-    "solving.camera_position.position_m": (-100.0, 100.0),
-    "solving.camera_position.sigma_m": (1e-4, 10.0),
-    "solving.nominal_camera_distance_m": (0.01, 100.0),
-    "solving.seed": (0, 2**32 - 1),
-    "paper.z_score_threshold": (0.01, 100.0),
-    "paper.window_s": (0.01, 60.0),
-    "paper.max_range_m": (0.1, 1000.0),
-    "paper.max_speed_mps": (0.0, 100.0),
-    "paper.ransac_threshold_px": (0.01, 1000.0),
-    "paper.ransac_iterations": (1, 1_000_000),
-    "paper.ransac_confidence": (0.01, 0.999999),
-}
-"""The smallest and largest value of each number, both allowed."""
 
 _UNITS = {"_mps": "m/s", "_px": "px", "_deg": "deg", "_rad": "rad", "_db": "dB", "_m": "m", "_s": "s"}
 
@@ -85,7 +58,7 @@ class OptionDescription:
         path: the option's name, such as "noise.sigma_px".
         label: the same in words, without the unit.
         unit: "" where it has none.
-        hint: one sentence, from the option's own docstring.
+        hint: one sentence, as the option's field has it.
         kind: which field to draw.
         choices: of a "choice".
         low: smallest value; None where there is none.
@@ -123,9 +96,8 @@ class OptionGroup:
 class _Leaf:
     path: str
     owner: type
-    name: str
+    field: dataclasses.Field[Any]
     type: Any
-    default: Any
 
 
 def changes_from_tree(tree: object) -> tuple[OptionChange, ...]:
@@ -171,12 +143,12 @@ def checked_options(options: CalibrationOptions) -> CalibrationOptions:
     """
     for leaf in _leaves().values():
         group = leaf.path.rpartition(".")[0]
-        value = getattr(getattr(options, group) if group else options, leaf.name)
+        value = getattr(getattr(options, group) if group else options, leaf.field.name)
         if _kind(leaf) == "choice" and value not in typing.get_args(leaf.type):
             choices = " or ".join(typing.get_args(leaf.type))
             raise OptionError(f"option {leaf.path}: '{value}' is not one of its values; choose {choices}")
         for name, number in _numbers(leaf.path, value):
-            low, high = RANGES.get(name, (-math.inf, math.inf))
+            low, high = RANGES[name]
             if not (math.isfinite(number) and low <= number <= high):
                 raise OptionError(
                     f"option {name}: {number:g} is out of range; give {low:g} to {high:g}{_unit_of(name)}"
@@ -191,7 +163,7 @@ def checked_options(options: CalibrationOptions) -> CalibrationOptions:
 
 @cache
 def option_groups() -> tuple[OptionGroup, ...]:
-    """Describe every option once: labels and units from the names, hints from the docstrings, ranges from RANGES."""
+    """Describe every option once: labels and units from the names, hints and ranges from the fields."""
     groups: dict[str, list[OptionDescription]] = {}
     owners: dict[str, type] = {}
     for leaf in _leaves().values():
@@ -201,14 +173,14 @@ def option_groups() -> tuple[OptionGroup, ...]:
         groups.setdefault(group, []).append(
             OptionDescription(
                 path=leaf.path,
-                label=_label(leaf.name),
-                unit=_unit(leaf.name),
-                hint=_docstrings()[leaf.owner.__name__, leaf.name],
+                label=_label(leaf.field.name),
+                unit=_unit(leaf.field.name),
+                hint=leaf.field.metadata["help"],
                 kind=_kind(leaf),
                 choices=typing.get_args(leaf.type) if _kind(leaf) == "choice" else (),
                 low=low,
                 high=high,
-                default=leaf.default,
+                default=typing.cast(OptionValue, leaf.field.default),
             )
         )
     ordered = sorted(groups.items(), key=lambda item: item[0] != "")
@@ -239,7 +211,7 @@ def _unknown(path: str) -> OptionError:
         by_name = {name.rpartition(".")[2]: name for name in known}
         near = [by_name[name] for name in difflib.get_close_matches(path.rpartition(".")[2], by_name, n=1)]
     advice = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
-    return OptionError(f"there is no option '{path[:80]}'; {advice}")
+    return OptionError(f"unknown option '{path[:80]}'; {advice}")
 
 
 @cache
@@ -247,18 +219,26 @@ def _leaves() -> Mapping[str, _Leaf]:
     """Every option that can be set on its own, by path; a camera position is set as a whole."""
     leaves: dict[str, _Leaf] = {}
     top = typing.get_type_hints(CalibrationOptions)
-    for top_field in dataclasses.fields(CalibrationOptions):
-        group = top[top_field.name]
+    for field in dataclasses.fields(CalibrationOptions):
+        group = top[field.name]
         if not dataclasses.is_dataclass(group):
-            leaves[top_field.name] = _Leaf(
-                top_field.name, CalibrationOptions, top_field.name, group, getattr(CalibrationOptions(), top_field.name)
-            )
+            leaves[field.name] = _Leaf(field.name, CalibrationOptions, field, group)
             continue
         hints = typing.get_type_hints(group)
         for option in dataclasses.fields(group):
-            path = f"{top_field.name}.{option.name}"
-            leaves[path] = _Leaf(path, typing.cast(type, group), option.name, hints[option.name], option.default)
+            path = f"{field.name}.{option.name}"
+            leaves[path] = _Leaf(path, typing.cast(type, group), option, hints[option.name])
     return leaves
+
+
+def _ranges() -> Iterator[tuple[str, tuple[float, float]]]:
+    """Yield the range of every number, by the name that `_numbers` gives it."""
+    for leaf in _leaves().values():
+        if _kind(leaf) in ("number", "integer"):
+            yield leaf.path, (leaf.field.metadata["low"], leaf.field.metadata["high"])
+        elif _kind(leaf) == "camera-position":
+            for part in dataclasses.fields(CameraPositionPrior):
+                yield f"{leaf.path}.{part.name}", (part.metadata["low"], part.metadata["high"])
 
 
 def _kind(leaf: _Leaf) -> OptionKind:
@@ -279,22 +259,6 @@ def _numbers(path: str, value: object) -> Iterator[tuple[str, float]]:
         yield path, value
 
 
-@cache
-def _docstrings() -> Mapping[tuple[str, str], str]:
-    """Read the text below each field of the options' source: (class, field) -> text in one line."""
-    texts: dict[tuple[str, str], str] = {}
-    for node in ast.parse(inspect.getsource(calib_core.options)).body:
-        if not isinstance(node, ast.ClassDef):
-            continue
-        for statement, below in zip(node.body, [*node.body[1:], None], strict=True):
-            if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
-                text = (
-                    below.value.value if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) else ""
-                )
-                texts[node.name, statement.target.id] = " ".join(str(text).split())
-    return texts
-
-
 def _unit(name: str) -> str:
     return next((unit for suffix, unit in _UNITS.items() if name.endswith(suffix)), "")
 
@@ -307,3 +271,7 @@ def _unit_of(path: str) -> str:
 def _label(name: str) -> str:
     suffix = next((suffix for suffix in _UNITS if name.endswith(suffix)), "")
     return name.removesuffix(suffix).replace("_", " ")
+
+
+RANGES: Mapping[str, tuple[float, float]] = dict(_ranges())
+"""The smallest and largest value of each number, both allowed, as the options' fields have them."""

@@ -77,7 +77,7 @@ def solve_clicks(
         return Unsolvable(
             "no-camera",
             "the camera's intrinsics are missing: the recording has none that can be used",
-            "start again with --camera FILE (camera_info YAML, OpenCV, Kalibr), or calibrate them with cocalib intrinsics",
+            "calibrate the camera with OpenCV, Kalibr or ROS camera_calibration, and start again with --camera FILE",
         )
     times = sorted({click.image_time for click in clicks})
     scans = recording.radar_scans_around(times, half_window_s(options))

@@ -1,9 +1,13 @@
 """Array types that name their shape, and the one way an array enters a value."""
 
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float64, Int64
+else:  # to type checkers jaxtyping's names are Annotated too, and importing it takes half as long as NumPy
+    Bool = Float64 = Int64 = Annotated
 
 __all__ = [
     "Flags",

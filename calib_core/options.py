@@ -1,7 +1,8 @@
 """Every option of the core, once: these are the flags, the page's fields and the provenance in the exported file."""
 
+import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 __all__ = [
     "CalibrationOptions",
@@ -12,103 +13,130 @@ __all__ = [
     "NoiseOptions",
     "PaperOptions",
     "SolvingOptions",
+    "option",
 ]
 
 Method = Literal["default", "paper"]
+
+
+def option(default: Any, text: str, *, low: float = -math.inf, high: float = math.inf) -> Any:
+    """Make the field of an option; what is said of it is kept in the field's metadata.
+
+    Args:
+        default: the value when nobody sets it.
+        text: one sentence for people: the help of the flag and the hint on the page. Its unit is in the field's name.
+        low: the smallest number allowed.
+        high: the largest number allowed.
+    """
+    return field(default=default, metadata={"help": text, "low": low, "high": high})
 
 
 @dataclass(frozen=True, slots=True)
 class GatingOptions:
     """Which returns can be the reflector."""
 
-    max_speed_mps: float = 0.05
-    """Largest absolute Doppler speed of a static return [m/s]; the paper keeps exactly 0."""
-    min_range_m: float = 0.5
-    """Nearest return kept [m]."""
-    max_range_m: float = 60.0
-    """Farthest return kept [m]; the paper uses 20."""
+    max_speed_mps: float = option(
+        0.05, "Largest absolute Doppler speed of a static return [m/s]; the paper keeps exactly 0.", low=0.0, high=100.0
+    )
+    min_range_m: float = option(0.5, "Nearest return kept [m].", low=0.0, high=1000.0)
+    max_range_m: float = option(60.0, "Farthest return kept [m]; the paper uses 20.", low=0.1, high=1000.0)
 
 
 @dataclass(frozen=True, slots=True)
 class LocatingOptions:
     """How the returns around one click become candidates."""
 
-    window_s: float = 3.0
-    """Length of the window centred on the scan nearest to the click [s] (paper: 3 s)."""
-    max_candidates: int = 6
-    """How many candidates a click keeps."""
-    max_time_gap_s: float = 1.5
-    """A click farther than this from any scan stays unpaired [s]."""
+    window_s: float = option(
+        3.0, "Length of the window centred on the scan nearest to the click [s] (paper: 3 s).", low=0.01, high=60.0
+    )
+    max_candidates: int = option(6, "How many candidates a click keeps.", low=1, high=50)
+    max_time_gap_s: float = option(
+        1.5, "A click farther than this from any scan stays unpaired [s].", low=0.0, high=60.0
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseOptions:
     """Standard deviations assumed where the message has none; the solver then estimates by how much they are off."""
 
-    sigma_px: float = 2.0
-    """Of a click, per axis [px]."""
-    sigma_range_m: float = 0.03
-    """Of a placement's range [m]."""
-    sigma_azimuth_deg: float = 0.5
-    """Of a placement's azimuth [deg]; angle bins and calibration included: scatter in the window understates it."""
-    sigma_elevation_deg: float = 1.0
-    """Of a placement's elevation [deg]."""
-    estimate_scale: bool = True
-    """Estimate the noise level from the residuals (variance components) once there are enough pairs."""
+    sigma_px: float = option(2.0, "Of a click, per axis [px].", low=0.01, high=1000.0)
+    sigma_range_m: float = option(0.03, "Of a placement's range [m].", low=1e-4, high=10.0)
+    sigma_azimuth_deg: float = option(
+        0.5,
+        "Of a placement's azimuth [deg]; angle bins and calibration included: scatter in the window understates it.",
+        low=1e-3,
+        high=45.0,
+    )
+    sigma_elevation_deg: float = option(1.0, "Of a placement's elevation [deg].", low=1e-3, high=45.0)
+    estimate_scale: bool = option(
+        True, "Estimate the noise level from the residuals (variance components) once there are enough pairs."
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class CameraPositionPrior:
     """A tape-measured camera position: the most valuable extra fact there is."""
 
-    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Camera centre in the radar frame: forward, left, up [m]."""
-    sigma_m: float = 0.01
-    """How well it is known, per axis [m]."""
+    position_m: tuple[float, float, float] = option(
+        (0.0, 0.0, 0.0), "Camera centre in the radar frame: forward, left, up [m].", low=-100.0, high=100.0
+    )
+    sigma_m: float = option(0.01, "How well it is known, per axis [m].", low=1e-4, high=10.0)
 
 
 @dataclass(frozen=True, slots=True)
 class SolvingOptions:
     """How pairs become a pose (default method)."""
 
-    camera_position: CameraPositionPrior | None = None
-    """Tape-measured camera position, if there is one."""
-    nominal_camera_distance_m: float = 1.0
-    """Rough distance between the sensors [m]: a wide prior that only tells a pose from its mirror image."""
-    seed: int = 1
-    """Of every random draw; the same seed gives the same bytes."""
+    camera_position: CameraPositionPrior | None = option(None, "Tape-measured camera position, if there is one.")
+    nominal_camera_distance_m: float = option(
+        1.0,
+        "Rough distance between the sensors [m]: a wide prior that only tells a pose from its mirror image.",
+        low=0.01,
+        high=100.0,
+    )
+    seed: int = option(1, "Of every random draw; the same seed gives the same bytes.", low=0, high=2**32 - 1)
 
 
 @dataclass(frozen=True, slots=True)
 class PaperOptions:
     """What Algorithm 1 of the paper leaves open."""
 
-    z_score_threshold: float = 1.0
-    """Largest absolute z-score per axis of a return that is averaged; the authors use 1."""
-    z_score_axes: Literal["separately", "in-turn"] = "separately"
-    """Each axis judged over the whole window, or as the authors do: y over what x left, z over what y left."""
-    window: Literal["centred", "whole-second"] = "centred"
-    """Centred on the nearest stamp as the paper prints, or the authors' 1 s to either side of that stamp's whole second."""
-    window_s: float = 3.0
-    """Length of the centred window [s]."""
-    max_range_m: float = 20.0
-    """Range filter of Algorithm 1 [m]."""
-    max_speed_mps: float = 0.0
-    """Velocity filter of Algorithm 1 [m/s]: exactly 0 as printed."""
-    ransac_threshold_px: float = 8.0
-    """Reprojection error of a RANSAC inlier [px]; the paper gives none, the authors use OpenCV's 8."""
-    ransac_iterations: int = 10_000
-    """RANSAC iterations; the paper gives none, the authors use 10,000 for the iterative solver."""
-    ransac_confidence: float = 0.99
-    """RANSAC stops early at this confidence."""
+    z_score_threshold: float = option(
+        1.0, "Largest absolute z-score per axis of a return that is averaged; the authors use 1.", low=0.01, high=100.0
+    )
+    z_score_axes: Literal["separately", "in-turn"] = option(
+        "separately",
+        "Each axis judged over the whole window, or as the authors do: y over what x left, z over what y left.",
+    )
+    window: Literal["centred", "whole-second"] = option(
+        "centred",
+        "Centred on the nearest stamp as the paper prints, or the authors' 1 s to either side of that stamp's whole second.",
+    )
+    window_s: float = option(3.0, "Length of the centred window [s].", low=0.01, high=60.0)
+    max_range_m: float = option(20.0, "Range filter of Algorithm 1 [m].", low=0.1, high=1000.0)
+    max_speed_mps: float = option(
+        0.0, "Velocity filter of Algorithm 1 [m/s]: exactly 0 as printed.", low=0.0, high=100.0
+    )
+    ransac_threshold_px: float = option(
+        8.0,
+        "Reprojection error of a RANSAC inlier [px]; the paper gives none, the authors use OpenCV's 8.",
+        low=0.01,
+        high=1000.0,
+    )
+    ransac_iterations: int = option(
+        10_000,
+        "RANSAC iterations; the paper gives none, the authors use 10,000 for the iterative solver.",
+        low=1,
+        high=1_000_000,
+    )
+    ransac_confidence: float = option(0.99, "RANSAC stops early at this confidence.", low=0.01, high=0.999999)
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationOptions:
     """Everything that steers a calibration."""
 
-    method: Method = "default"
-    """The robust estimator, or the paper's Algorithm 1 as printed."""
+    method: Method = option("default", "The robust estimator, or the paper's Algorithm 1 as printed.")
     gating: GatingOptions = field(default_factory=GatingOptions)
     locating: LocatingOptions = field(default_factory=LocatingOptions)
     noise: NoiseOptions = field(default_factory=NoiseOptions)

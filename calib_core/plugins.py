@@ -48,7 +48,7 @@ def load_plugins(group: str, kind: type[Value]) -> tuple[Plugin[Value], ...]:
         try:
             if _lies_here(entry.module):
                 here = f"{entry.module} lies in the current folder, from which nothing is loaded"
-                warn_left_out(distribution, here, "start cocalib in another folder")
+                warn_left_out(distribution, here, "start the program in another folder")
                 continue
             loaded: Any = entry.load()
         except (Exception, SystemExit) as error:  # noqa: BLE001  a package's code may raise anything

@@ -1,51 +1,18 @@
 """The command line: reads what was typed, runs it, and turns every refusal into one line and an exit code.
 
 Exit codes: 0 done; 1 the data cannot give a calibration; 2 wrong usage or unreadable input.
+Only what the typed command needs is imported: the version and the overview come without NumPy and tyro.
 """
 
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Any
+from difflib import get_close_matches
 
-import tyro
+from app.cli.commands import COMMANDS, PROGRAM, overview
+from calib_core.errors import CalibrationError, InputError
 
-from app.cli.export import Check, Export
-from app.cli.import_file import Import
-from app.cli.info import Info
-from app.cli.open import Demo, Open
-from app.cli.output import refuse
-from app.cli.simulate import Simulate
-from app.cli.solve import Solve
-from app.cli.usage import read_command
-from app.cli.video import Video
-from calib_core.errors import CalibrationError
-
-__all__ = ["run"]
-
-_DESCRIPTION = "Radar-camera calibration: click the corner reflector, get camera_from_radar and how far to trust it."
-
-_Command = (
-    Annotated[Demo, tyro.conf.subcommand("demo")]
-    | Annotated[Open, tyro.conf.subcommand("open")]
-    | Annotated[Info, tyro.conf.subcommand("info")]
-    | Annotated[Solve, tyro.conf.subcommand("solve")]
-    | Annotated[Export, tyro.conf.subcommand("export")]
-    | Annotated[Check, tyro.conf.subcommand("check")]
-    | Annotated[Import, tyro.conf.subcommand("import")]
-    | Annotated[Video, tyro.conf.subcommand("video")]
-    | Annotated[Simulate, tyro.conf.subcommand("simulate")]
-)
-
-
-def _parse(arguments: Sequence[str]) -> Any:
-    return tyro.cli(
-        _Command,
-        prog="cocalib",
-        description=_DESCRIPTION,
-        args=list(arguments),
-        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff),
-    )
+__all__ = ["refuse", "run"]
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -57,14 +24,8 @@ def run(arguments: Sequence[str]) -> int:
     Returns:
         The exit code: 0, 1 or 2.
     """
-    if list(arguments) == ["--version"]:
-        from app.resources import version
-
-        print(f"cocalib {version()}")
-        return 0
     try:
-        command = read_command(_parse, list(arguments) or ["--help"])
-        return int(command.run())
+        return _run(*arguments)
     except CalibrationError as error:
         return refuse(str(error))
     except BrokenPipeError:  # whoever read our output has seen enough
@@ -75,3 +36,33 @@ def run(arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         print(file=sys.stderr)
         return 130
+
+
+def refuse(reason: str) -> int:
+    """Say on stderr, in one line, why a command cannot run; return exit code 2."""
+    print(f"{PROGRAM}: {' '.join(reason.split())}", file=sys.stderr)
+    return 2
+
+
+def _run(first: str = "--help", *others: str) -> int:
+    if first in ("-h", "--help"):
+        print(overview())
+        return 0
+    if first == "--version":
+        from app.resources import version
+
+        print(f"{PROGRAM} {version()}")
+        return 0
+    if first not in COMMANDS:
+        raise InputError(f"{_unknown(first)}; see {PROGRAM} --help")
+    from app.cli.usage import read_command
+
+    return read_command(COMMANDS[first], others).run()
+
+
+def _unknown(first: str) -> str:
+    """Say that what was typed first is no command, and what may have been meant."""
+    if first.startswith("-"):
+        return f"unknown option {first.split('=')[0]}; a command comes first: {', '.join(COMMANDS)}"
+    near = get_close_matches(first, COMMANDS, n=1)
+    return f"unknown command '{first}'; " + (f"did you mean '{near[0]}'?" if near else f"known: {', '.join(COMMANDS)}")

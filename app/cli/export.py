@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.cli.flags import File, Switch
+from app.cli.flags import File, Switch, called
 from app.cli.output import write_whole
 from calib_core.errors import InputError
 
@@ -21,9 +21,7 @@ __all__ = ["Check", "Export"]
 class Export:
     """Write a calibration as another stack reads it; `--to list` names the formats."""
 
-    calibration: Annotated[
-        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="CALIBRATION.json", help_behavior_hint="")
-    ] = ()
+    calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("CALIBRATION.json")] = ()
     """A calibration that cocalib wrote (cocalib/calibration-1 JSON)."""
     to: Annotated[str, tyro.conf.arg(metavar="FORMAT")] = "list"
     """The format: tf2, urdf, ...; "list" names them all."""
@@ -31,7 +29,7 @@ class Export:
     """Where it goes, a file or a folder; without it, text goes to stdout."""
     parent_from_radar: Annotated[
         tuple[float, float, float, float, float, float, float] | None,
-        tyro.conf.arg(metavar="X Y Z QX QY QZ QW", help_behavior_hint=""),
+        called("X Y Z QX QY QZ QW"),
     ] = None
     """Pose of the radar in the third frame of autoware (kit), driveworks (rig), nuscenes (ego): metres, quaternion, w last."""
 

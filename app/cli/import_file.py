@@ -10,11 +10,11 @@ import tyro
 
 from app.cli.flags import File, NewFile
 from app.cli.output import write_whole
-from calib_core.camera import Camera
 from calib_core.errors import InputError
 
 if TYPE_CHECKING:
     from app.view import Reference
+    from calib_core.camera import Camera
 
 __all__ = ["Import", "camera_in", "reference_from"]
 
@@ -48,7 +48,7 @@ class Import:
         return 0
 
 
-def camera_in(path: Path, width_px: int, height_px: int) -> Camera | None:
+def camera_in(path: Path, width_px: int, height_px: int) -> "Camera | None":
     """Return the camera in a calibration file if it is one of this image size, else None.
 
     Raises:
@@ -61,7 +61,7 @@ def camera_in(path: Path, width_px: int, height_px: int) -> Camera | None:
     return camera if fits else None
 
 
-def reference_from(path: Path, camera: Camera | None) -> "Reference":
+def reference_from(path: Path, camera: "Camera | None") -> "Reference":
     """Return the calibration in a file, to be looked at through the camera of the recording.
 
     Raises:

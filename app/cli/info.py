@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from app.cli.flags import Recordings, Switch, TopicFlags, Topics
+from app.cli.flags import Switch
+from app.cli.recording_flags import Recordings, TopicFlags, Topics
 
 __all__ = ["Info"]
 

@@ -11,19 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.cli.flags import (
-    CameraPosition,
-    File,
-    Folder,
-    MeasuredCamera,
-    Options,
-    Recordings,
-    Switch,
-    TopicFlags,
-    Topics,
-)
+from app.cli.flags import File, Folder, Switch, called
 from app.cli.import_file import camera_in, reference_from
 from app.cli.output import read_text, required_camera
+from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.options import CalibrationOptions
@@ -49,7 +40,7 @@ class ServingFlags:
     """Address to bind; anything but loopback lets other machines in, who then need the token."""
     port: int = 8080
     """Port; the next free one when it is taken, and 0 takes any."""
-    token: Annotated[str | None, tyro.conf.arg(metavar="TOKEN", help_behavior_hint="")] = None
+    token: Annotated[str | None, called("TOKEN")] = None
     """The token to ask for; without it, one is made and printed in the link."""
     no_browser: Switch = False
     """Print the link and do not open a browser."""

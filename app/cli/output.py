@@ -1,23 +1,23 @@
-"""What commands share: reading and writing files, refusing in one line, and what a recording must bring."""
+"""What commands share: reading and writing files, and what a recording must bring."""
 
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app import whole_file
-from app.solving import camera_for
-from app.view import sentence
-from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.measurements import TimeNs, Unsolvable, time_parts
-from calib_core.recordings import Recording
+
+if TYPE_CHECKING:
+    from calib_core.camera import Camera
+    from calib_core.measurements import TimeNs, Unsolvable
+    from calib_core.recordings import Recording
 
 __all__ = [
     "explain_unsolvable",
     "progress_bar",
     "read_text",
-    "refuse",
     "required_camera",
     "seconds_text",
     "write_whole",
@@ -26,14 +26,10 @@ __all__ = [
 _MAX_TEXT_BYTES = 64 * 1024 * 1024
 
 
-def refuse(reason: str) -> int:
-    """Say on stderr, in one line, why a command cannot run; return exit code 2."""
-    print(f"cocalib: {' '.join(reason.split())}", file=sys.stderr)
-    return 2
-
-
-def explain_unsolvable(outcome: Unsolvable) -> int:
+def explain_unsolvable(outcome: "Unsolvable") -> int:
     """Say on stderr why the data cannot give a calibration, what would help, and which clicks found no radar; return 1."""
+    from app.view import sentence
+
     print(f"cocalib: no calibration: {sentence(outcome.reason)} {sentence(outcome.hint)}", file=sys.stderr)
     for click in outcome.unpaired:
         print(f"  click {click.id}: {sentence(click.reason)} {sentence(click.hint)}", file=sys.stderr)
@@ -70,12 +66,14 @@ def write_whole(path: Path, content: str | bytes) -> None:
         raise InputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
 
 
-def required_camera(recording: Recording, camera_file: Path | None) -> Camera:
+def required_camera(recording: "Recording", camera_file: Path | None) -> "Camera":
     """Return the intrinsics: the file's where one is given, else the recording's.
 
     Raises:
         InputError: there are none.
     """
+    from app.solving import camera_for
+
     camera = camera_for(recording, camera_file)
     if camera is None:
         found = (
@@ -109,7 +107,9 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def seconds_text(time: TimeNs) -> str:
+def seconds_text(time: "TimeNs") -> str:
     """Write a stamp as seconds with all its digits."""
+    from calib_core.measurements import time_parts
+
     sec, nanosec = time_parts(time)
     return f"{sec}.{nanosec:09d} s"

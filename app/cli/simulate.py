@@ -2,16 +2,26 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeAlias
 
 import tyro
 
-from app.cli.flags import Simulation, SimulationFlags
+from app.cli.flags import called, same
 from app.cli.output import progress_bar
 from calib_core.errors import InputError
-from calib_core.synthetic import Container
+from calib_core.synthetic import Container, SimulationOptions
 
 __all__ = ["Simulate"]
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationFlags(SimulationOptions):
+    """SimulationOptions with a value named; what each means is told there."""
+
+    field_of_view_deg: Annotated[float | None, called("FLOAT")] = same(SimulationOptions, "field_of_view_deg")
+
+
+Simulation: TypeAlias = Annotated[SimulationFlags, tyro.conf.arg(name=""), tyro.conf.FlagConversionOff]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.cli.flags import CameraPosition, File, MeasuredCamera, Options, Recordings, TopicFlags, Topics
+from app.cli.flags import File
 from app.cli.output import explain_unsolvable, read_text, required_camera, seconds_text, write_whole
+from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from app.view import summary_lines
 from calib_core.camera import Camera
 from calib_core.errors import InputError

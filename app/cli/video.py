@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from app.cli.flags import NewFile, Recordings, TopicFlags, Topics
+from app.cli.flags import NewFile
 from app.cli.output import progress_bar, seconds_text
+from app.cli.recording_flags import Recordings, TopicFlags, Topics
 
 __all__ = ["Video"]
 

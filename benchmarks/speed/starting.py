@@ -1,16 +1,19 @@
 """How long imports and commands take to start."""
 
-import statistics
+import os
+import resource
 import subprocess
 import sys
-import time
+import tempfile
 from pathlib import Path
 
 from benchmarks.speed.rows import Row, Table
 
 __all__ = ["measure_starting"]
 
-_REPEATS = 5
+_REPEATS = 7
+_AIM_RATIO = 2.0
+_AIM_S = 0.3
 
 
 def measure_starting(sample: Path) -> Table:
@@ -22,26 +25,36 @@ def measure_starting(sample: Path) -> Table:
         "`import numpy`": [*python, "import numpy"],
         "`import calib_core.calibration`": [*python, "import calib_core.calibration"],
         "`cocalib --version`": [*command, "--version"],
+        "`cocalib --help`": [*command, "--help"],
+        "`cocalib info --help`": [*command, "info", "--help"],
         "`cocalib info` on the sample": [*command, "info", *bags],
         "`cocalib solve` on the sample, 20 clicks": [*command, "solve", *bags, "--clicks", str(sample / "clicks.json")],
     }
-    seconds = {name: _median_s(job) for name, job in jobs.items()}
-    base = seconds["`import numpy`"]
+    with tempfile.TemporaryDirectory() as bytecode:
+        # Bytecode is kept, as in any installation, whatever this shell says about it; the first round writes it.
+        environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+        environment["PYTHONPYCACHEPREFIX"] = bytecode
+        rounds = [{name: _processor_s(job, environment) for name, job in jobs.items()} for _ in range(_REPEATS + 1)][1:]
+    seconds = {name: min(times[name] for times in rounds) for name in jobs}
+    base_s = seconds["`import numpy`"]
     rows = tuple(
-        Row(name, f"{value * 1000:.0f} ms", f"{value / base:.1f} x NumPy's import", *_aim(name, value / base))
-        for name, value in seconds.items()
+        Row(name, f"{value_s * 1000:.0f} ms", f"{value_s / base_s:.1f} x NumPy's import", *_aim(name, value_s, base_s))
+        for name, value_s in seconds.items()
     )
-    return Table("Starting", f"A fresh process each time, medians of {_REPEATS}.", rows)
+    how = f"A fresh process each time, in turn; time of the processor, user and system, the least of {_REPEATS}."
+    return Table("Starting", how, rows)
 
 
-def _aim(name: str, ratio: float) -> tuple[str, bool]:
-    return ("at most 2 x", ratio <= 2.0) if "calib_core" in name else ("", True)
+def _aim(name: str, value_s: float, base_s: float) -> tuple[str, bool]:
+    if "calib_core" in name:
+        return f"at most {_AIM_RATIO:g} x", value_s <= _AIM_RATIO * base_s
+    if name in ("`cocalib --version`", "`cocalib --help`"):
+        return f"under {_AIM_S * 1000:.0f} ms", value_s < _AIM_S
+    return "", True
 
 
-def _median_s(job: list[str]) -> float:
-    times_s = []
-    for _ in range(_REPEATS):
-        start = time.perf_counter()
-        subprocess.run(job, check=True, capture_output=True)
-        times_s.append(time.perf_counter() - start)
-    return statistics.median(times_s)
+def _processor_s(job: list[str], environment: dict[str, str]) -> float:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(job, check=True, capture_output=True, env=environment)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

@@ -42,7 +42,9 @@ class Hypotheses:
         return RigidTransform(rotation, -rotation @ self.centres_m[index])
 
 
-def initial_poses(measurements: PairMeasurements, *, most: int, rng: np.random.Generator) -> tuple[RigidTransform, ...]:
+def initial_poses(
+    measurements: PairMeasurements, *, most: int, rng: "np.random.Generator"
+) -> tuple[RigidTransform, ...]:
     """Draw hypotheses, score them against the pairs and return the best that differ from one another.
 
     Args:
@@ -73,7 +75,7 @@ class _Draws:
     rows: Indices
 
 
-def _draws(measurements: PairMeasurements, usable: Indices, size: int, rng: np.random.Generator) -> _Draws:
+def _draws(measurements: PairMeasurements, usable: Indices, size: int, rng: "np.random.Generator") -> _Draws:
     """Draw groups of distinct pairs, and of each pair a candidate by its score."""
     wanted = _TWO_POINT_DRAWS if size == 2 else _THREE_POINT_DRAWS
     if size == 2 and len(usable) * (len(usable) - 1) // 2 <= wanted and measurements.one_to_one:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from calib_core.errors import MessageError, RecordingError
+from calib_core.options import option
 from calib_core.recordings.radar.list_messages import PointLayout
 from calib_core.recordings.time.clocks import Clock
 from calib_core.recordings.topics import Topic, TopicKind
@@ -23,18 +24,22 @@ _NOT_PICTURES = ("depth", "disparity", "mask", "infra", "debug")
 class RecordingOptions:
     """How to open a recording."""
 
-    radar_topic: str | None = None
-    """The radar's topic; guessed when not given."""
-    image_topic: str | None = None
-    """The camera's image topic; guessed when not given."""
-    camera_info_topic: str | None = None
-    """The topic with the camera's intrinsics; the one beside the images when not given."""
-    radar_axes: str | None = None
-    """Where the radar message's x, y and z point, such as forward,right,up; add degrees or radians for its angles."""
-    video_start: str | None = None
-    """When a video's first frame was taken: seconds since 1970, or a date such as 2024-05-01T12:00:00.25+02:00."""
-    clock: Clock = "auto"
-    """Times to go by: stamps in the messages, receive times, or auto: stamps unless they cannot be right."""
+    radar_topic: str | None = option(None, "The radar's topic; guessed when not given.")
+    image_topic: str | None = option(None, "The camera's image topic; guessed when not given.")
+    camera_info_topic: str | None = option(
+        None, "The topic with the camera's intrinsics; the one beside the images when not given."
+    )
+    radar_axes: str | None = option(
+        None,
+        "Where the radar message's x, y and z point, such as forward,right,up; add degrees or radians for its angles.",
+    )
+    video_start: str | None = option(
+        None,
+        "When a video's first frame was taken: seconds since 1970, or a date such as 2024-05-01T12:00:00.25+02:00.",
+    )
+    clock: Clock = option(
+        "auto", "Times to go by: stamps in the messages, receive times, or auto: stamps unless they cannot be right."
+    )
 
 
 def _no_counts() -> dict[str, int]:

@@ -1,10 +1,11 @@
 """Every option of a simulated recording: these are the flags of `cocalib simulate`."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 from calib_core.camera import CameraModel
 from calib_core.errors import OptionError
+from calib_core.options import option
 from calib_core.synthetic.rig import RigOptions
 
 __all__ = ["Clutter", "Container", "RadarMessage", "RadarName", "SceneName", "SimulationOptions"]
@@ -20,57 +21,46 @@ Container = Literal["ros1", "mcap", "db3"]
 class SimulationOptions:
     """What is simulated; the same options give the same bytes."""
 
-    scene: SceneName = "rooftop"
-    """Where it happens: a rooftop, an open field, a narrow aisle between shelves, a yard with a checkerboard wall."""
-    radar: RadarName = "awr1843"
-    """A TI AWR1843 with its bins, or a finer imaging radar."""
-    placements: int = 20
-    """How often the reflector is put down."""
-    dwell_s: float = 6.0
-    """How long it stays each time, from being released to being picked up again [s]."""
-    heights: bool = False
-    """Put it on a tripod of varying height instead of on the ground."""
-    clutter: Clutter = "scene"
-    """Static radar returns: none, what the scene shows, or also strong objects nobody sees."""
-    person: bool = True
-    """Whether a person carries the reflector; without, it is simply there."""
-    camera_model: CameraModel = "plumb_bob"
-    """Lens model."""
-    field_of_view_deg: float | None = None
-    """Horizontal field of view before distortion [deg]; without it 75, for equidistant 110."""
-    width_px: int = 1280
-    """Columns of the image."""
-    height_px: int = 720
-    """Rows of the image."""
-    camera_rate_hz: float = 5.0
-    """Frames per second."""
-    radar_rate_hz: float = 10.0
-    """Scans per second."""
-    angle_bins: bool = True
-    """Report azimuths on the lattice of the radar's angle bins; otherwise the peak is interpolated."""
-    radar_message: RadarMessage = "filled"
-    """In ROS 1 bags: one RadarScan message per return, all fields filled ("filled") or range, bearing, Doppler bin and
-    intensity left zero as the stock driver does ("stock"), or one PointCloud2 per scan ("cloud")."""
-    raw_images: bool = False
-    """Write sensor_msgs/Image instead of JPEG."""
-    jpeg_quality: int = 85
-    """JPEG quality, 1 to 100."""
-    sensor_noise_grey: float = 0.0
-    """Standard deviation of the camera's noise [grey levels of 255]; costs JPEG bytes."""
-    stamp_jitter_s: float = 0.002
-    """Standard deviation of both sensors' timing [s]."""
-    dropped_share: float = 0.01
-    """Share of frames and of scans that never arrive."""
-    clock_offset_s: float = 0.0
-    """By how much the radar's stamps are ahead of the camera's clock [s]."""
-    click_sigma_px: float = 0.7
-    """Standard deviation of the example clicks, per axis [px]."""
-    start_s: int = 1_760_000_000
-    """When the recording starts [s since 1970]."""
-    seed: int = 1
-    """Of every random draw."""
-    rig: RigOptions = field(default_factory=RigOptions)
-    """How the sensors are mounted."""
+    scene: SceneName = option(
+        "rooftop",
+        "Where it happens: a rooftop, an open field, a narrow aisle between shelves, a yard with a checkerboard wall.",
+    )
+    radar: RadarName = option("awr1843", "A TI AWR1843 with its bins, or a finer imaging radar.")
+    placements: int = option(20, "How often the reflector is put down.")
+    dwell_s: float = option(6.0, "How long it stays each time, from being released to being picked up again [s].")
+    heights: bool = option(False, "Put it on a tripod of varying height instead of on the ground.")
+    clutter: Clutter = option(
+        "scene", "Static radar returns: none, what the scene shows, or also strong objects nobody sees."
+    )
+    person: bool = option(True, "Whether a person carries the reflector; without, it is simply there.")
+    camera_model: CameraModel = option("plumb_bob", "Lens model.")
+    field_of_view_deg: float | None = option(
+        None, "Horizontal field of view before distortion [deg]; without it 75, for equidistant 110."
+    )
+    width_px: int = option(1280, "Columns of the image.")
+    height_px: int = option(720, "Rows of the image.")
+    camera_rate_hz: float = option(5.0, "Frames per second.")
+    radar_rate_hz: float = option(10.0, "Scans per second.")
+    angle_bins: bool = option(
+        True, "Report azimuths on the lattice of the radar's angle bins; otherwise the peak is interpolated."
+    )
+    radar_message: RadarMessage = option(
+        "filled",
+        'In ROS 1 bags: one RadarScan message per return, all fields filled ("filled") or range, bearing, Doppler bin and '
+        'intensity left zero as the stock driver does ("stock"), or one PointCloud2 per scan ("cloud").',
+    )
+    raw_images: bool = option(False, "Write sensor_msgs/Image instead of JPEG.")
+    jpeg_quality: int = option(85, "JPEG quality, 1 to 100.")
+    sensor_noise_grey: float = option(
+        0.0, "Standard deviation of the camera's noise [grey levels of 255]; costs JPEG bytes."
+    )
+    stamp_jitter_s: float = option(0.002, "Standard deviation of both sensors' timing [s].")
+    dropped_share: float = option(0.01, "Share of frames and of scans that never arrive.")
+    clock_offset_s: float = option(0.0, "By how much the radar's stamps are ahead of the camera's clock [s].")
+    click_sigma_px: float = option(0.7, "Standard deviation of the example clicks, per axis [px].")
+    start_s: int = option(1_760_000_000, "When the recording starts [s since 1970].")
+    seed: int = option(1, "Of every random draw.")
+    rig: RigOptions = option(RigOptions(), "How the sensors are mounted.")
 
     def __post_init__(self) -> None:
         _require(self.placements >= 1, "placements", self.placements, "at least 1")

@@ -11,6 +11,7 @@ from calib_core.arrays import Matrix33, Vector3
 from calib_core.camera import Camera, CameraModel
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.lens_models.registry import LENS_MODELS
+from calib_core.options import option
 
 __all__ = ["NOMINAL_ROTATION", "Rig", "RigOptions", "nominal_rotation", "radar_stand", "random_rig", "typical_camera"]
 
@@ -22,16 +23,15 @@ NOMINAL_ROTATION = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
 class RigOptions:
     """How the sensors are mounted; the truth is drawn around these values."""
 
-    radar_height_m: float = 1.2
-    """Height of the radar above the ground [m]."""
-    radar_tilt_deg: float = 10.0
-    """How far the radar looks down [deg]."""
-    camera_offset_m: tuple[float, float, float] = (0.0, 0.0, 0.045)
-    """Nominal camera centre in the radar frame: forward, left, up [m]."""
-    camera_offset_sigma_m: float = 0.01
-    """Standard deviation of the true camera centre about it, per axis [m]."""
-    camera_angle_sigma_deg: float = 3.0
-    """Standard deviation of the true rotation about looking where the radar looks, per axis [deg]."""
+    radar_height_m: float = option(1.2, "Height of the radar above the ground [m].")
+    radar_tilt_deg: float = option(10.0, "How far the radar looks down [deg].")
+    camera_offset_m: tuple[float, float, float] = option(
+        (0.0, 0.0, 0.045), "Nominal camera centre in the radar frame: forward, left, up [m]."
+    )
+    camera_offset_sigma_m: float = option(0.01, "Standard deviation of the true camera centre about it, per axis [m].")
+    camera_angle_sigma_deg: float = option(
+        3.0, "Standard deviation of the true rotation about looking where the radar looks, per axis [deg]."
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-HEAVY = ("viser", "cv2", "rosbags", "rerun", "scipy", "websockets", "tyro")
+HEAVY = ("viser", "cv2", "rosbags", "rerun", "scipy", "websockets", "tyro", "jaxtyping", "asyncio", "unittest")
 
 
 def heavy_modules_after(statement: str) -> str:
@@ -28,6 +28,13 @@ def test_the_mathematics_imports_nothing_heavy(project_root: Path) -> None:
     modules = sorted(".".join(file.relative_to(project_root).with_suffix("").parts) for file in files)
     assert {"calib_core.camera", "calib_core.paper.pnp", "calib_core.estimation.errors_in_variables"} <= set(modules)
     assert heavy_modules_after("".join(f"import {module}\n" for module in modules)) == ""
+
+
+def test_numpy_draws_no_random_numbers_before_they_are_asked_for() -> None:
+    """NumPy imports its random part, and OpenSSL with it, when it is first named: a quoted annotation does not name it."""
+    code = "import calib_core.calibration, sys\nprint('numpy.random' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
 
 
 def test_session_and_view_import_nothing_heavy() -> None:

@@ -1,5 +1,6 @@
 """The wheel is built, installed into an empty environment and started there."""
 
+import ast
 import json
 import os
 import re
@@ -67,7 +68,11 @@ def test_the_wheel_carries_the_page_and_the_sample(wheel: Path) -> None:
     assert {"app/static/index.html", "app/sample_data/rooftop/radar.bag", "app/sample_data/rooftop/camera.bag"} <= names
     assert "calib_core/interchange/published/calibration-1.schema.json" in names
     assert {"app/py.typed", "calib_core/py.typed"} <= names
-    assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"app", "calib_core"}
+    assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {
+        "app",
+        "calib_core",
+        "cocalib_launcher.py",
+    }
     assert not any("__pycache__" in name or "/tests/" in name for name in names)
 
 
@@ -79,6 +84,35 @@ def test_the_installed_command_finds_its_own_page_and_sample(installed: Path, tm
     assert len(printed) == 2
     for line in printed:
         assert Path(line).is_relative_to(installed), "found in the checkout, not in the wheel"
+
+
+@pytest.mark.parametrize("rival", ["app.py", "app/__init__.py", "calib_core.py", "calib_core/__init__.py"])
+@pytest.mark.parametrize("kind", ["wheel", "editable"])
+def test_another_module_called_app_does_not_stop_the_command(
+    kind: str, rival: str, installed: Path, tmp_path: Path
+) -> None:
+    command = installed / "bin" / "cocalib" if kind == "wheel" else Path(sys.executable).with_name("cocalib")
+    assert command.is_file(), "cocalib is not installed into the environment of the tests: make dev"
+    (tmp_path / rival).parent.mkdir(exist_ok=True)
+    (tmp_path / rival).write_text("raise SystemExit('another program')\n")
+    for path in (str(tmp_path), ".", ""):  # an empty entry is the current folder
+        done = subprocess.run(
+            [command, "check", "absent.json"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join([path, str(tmp_path / "elsewhere")])},
+        )
+        assert done.stderr.startswith("cocalib: absent.json"), (path, done.stderr)
+        assert done.returncode == 2
+
+
+def test_the_launcher_imports_nothing_of_ours_before_it_has_found_it(project_root: Path) -> None:
+    tree = ast.parse((project_root / "app" / "launcher.py").read_text(encoding="utf-8"))
+    at_the_top = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    names = {name.name for node in at_the_top if isinstance(node, ast.Import) for name in node.names}
+    names |= {str(node.module) for node in at_the_top if isinstance(node, ast.ImportFrom)}
+    assert {name.split(".")[0] for name in names} <= set(sys.stdlib_module_names)
 
 
 def test_the_installed_command_serves_its_page(installed: Path, tmp_path: Path) -> None:

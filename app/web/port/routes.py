@@ -17,6 +17,7 @@ from app.solving import calibration_text
 from app.view import sentence
 from app.web.channel.export_preview import NoPreview, export_preview, exported, format_rows
 from app.web.channel.radar_survey import Survey
+from app.web.port.viser_hook import client_page
 from app.workspace import Workspace
 from calib_core.errors import CalibrationError
 from calib_core.interchange import CalibrationFile, read_calibration, written_formats
@@ -50,15 +51,6 @@ _VISER_POLICY = (
     "form-action 'none'; frame-ancestors 'self'"
 )
 _VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
-_VISER_STYLE = b"""<style>
-.mantine-Notifications-root, .mantine-Paper-root, [data-portal], [data-dock-root] > :not(:first-child) {
-  display: none !important;
-}
-html, body, #root, #root div { background-color: transparent !important; }
-html { background: #0d1014 !important; }
-html[data-theme="light"] { background: #e4e8ed !important; }
-</style>
-</head>"""
 
 
 class Surveyor(Protocol):
@@ -210,13 +202,8 @@ def _file_of(text: str) -> CalibrationFile:
 
 @cache
 def _viser_page() -> Reply:
-    """Return viser's own client, its panels hidden, for our page has them, and its drawing paced (static/pace.js)."""
-    import viser
-
-    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
-    page = page.replace(b"<head>", b'<head><script src="../../pace.js"></script>', 1).replace(
-        b"</head>", _VISER_STYLE, 1
-    )
+    """Return viser's own client, its drawing paced (static/pace.js)."""
+    page = client_page("../../pace.js")
     body = gzip.compress(page, mtime=0)
     return _reply(body, _TYPES[".html"], policy=_VISER_POLICY, more=(("Content-Encoding", "gzip"),))
 

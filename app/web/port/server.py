@@ -2,13 +2,12 @@
 
 import asyncio
 import contextlib
-import io
 import os
 import secrets
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
 import websockets
@@ -21,8 +20,9 @@ from app.web.channel.channel import Channel, Socket
 from app.web.channel.hub import Hub
 from app.web.port import guard as doors
 from app.web.port.routes import Reply, Routes, refusal
-from app.web.port.viser_hook import ProcessRequest, SocketHandler, start_viser
+from app.web.port.viser_hook import path_of_client, start_viser, stop_viser
 from app.web.port.waiting import WaitingRoom
+from app.web.port.websockets_hook import ProcessRequest, SocketHandler
 from app.web.view3d.scene import FIELD_OF_VIEW_RAD, LOOK_AT, STAND_AT, TabScene
 from app.workspace import Workspace
 from calib_core.recordings import EncodedImage, Recording
@@ -127,8 +127,7 @@ class RunningServer:
         if self._hub is not None:
             asyncio.run_coroutine_threadsafe(self._hub.end(), self._viser.get_event_loop()).result()
             self._hub.steps.shutdown(wait=True, cancel_futures=True)
-        with contextlib.redirect_stdout(io.StringIO()):  # viser says that it stopped
-            self._viser.stop()
+        stop_viser(self._viser)
         self._executor.shutdown(wait=True, cancel_futures=True)
 
     def _wrap_request(self, _viser_files: object) -> ProcessRequest:
@@ -219,9 +218,7 @@ def _redirect(admitted: doors.Admitted) -> Response:
 
 def _tab_of(server: "viser.ViserServer", client_id: int) -> str:
     """Return the name of the tab that a 3D view belongs to: it is the last part of its address."""
-    connections: dict[Any, ServerConnection] = server._websock_server._live_connections
-    request = connections[client_id].request if client_id in connections else None
-    return request.path.partition("?")[0].rstrip("/").rpartition("/")[2] if request else ""
+    return path_of_client(server, client_id).partition("?")[0].rstrip("/").rpartition("/")[2]
 
 
 def _cookie_key() -> bytes:

@@ -1,41 +1,34 @@
-"""Viser's port made ours: wrap websockets' `serve` while ViserServer starts, so that one port carries both.
+"""viser, and all that is private to it: its server on our port, its connections, and its own page.
 
-Viser has no public way to add routes. The wrap lasts for the constructor only; tests/unit/app/web/port/test_server.py is
-the contract that breaks first when a new viser starts its server in another way.
+viser has no public way to add routes, to forbid public tunnels, or to tell which page a client belongs to.
+`missing_parts` names what a new viser lacks; then nothing is served, for an unguarded port would be worse than none.
+tests/unit/app/web/port/test_viser_hook.py and test_server.py are the contract.
 """
 
 import contextlib
 import io
-import logging
-import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import websockets.asyncio.server as websocket_server
-from websockets.asyncio.server import ServerConnection
-from websockets.http11 import Request, Response
+from app.resources import InstallationError
+from app.web.port.websockets_hook import ProcessRequest, SocketHandler, wrapped_serve
 
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["ProcessRequest", "SocketHandler", "start_viser"]
+__all__ = ["client_page", "missing_parts", "path_of_client", "start_viser", "stop_viser"]
 
-ProcessRequest = Callable[[ServerConnection, Request], Awaitable[Response | None]]
-SocketHandler = Callable[[ServerConnection], Awaitable[None]]
-
-_one_at_a_time = threading.Lock()
-
-
-class _NoHandshakeNoise(logging.Filter):
-    """Drop what every port scan and every refused request would print; real failures of a handler pass.
-
-    A client that leaves in the middle of a request trips an assertion of websockets: that is no failure of ours either.
-    """
-
-    def filter(self, record: logging.LogRecord) -> bool:
-        text = record.getMessage()
-        left = text == "unexpected internal error" and record.exc_info and record.exc_info[0] is AssertionError
-        return not left and "handshake" not in text and "connection rejected" not in text
+_TUNNEL_MESSAGES = ("ShareUrlRequest", "ShareUrlDisconnect")
+_STYLE = """<style>
+.mantine-Notifications-root, .mantine-Paper-root, [data-portal], [data-dock-root] > :not(:first-child) {
+  display: none !important;
+}
+html, body, #root, #root div { background-color: transparent !important; }
+html { background: #0d1014 !important; }
+html[data-theme="light"] { background: #e4e8ed !important; }
+</style>
+</head>"""
 
 
 def start_viser(
@@ -54,32 +47,74 @@ def start_viser(
         wrap_handler: given viser's WebSocket handler, returns the one to use.
 
     Raises:
-        RuntimeError: viser did not start its server by `websockets.asyncio.server.serve`.
+        InstallationError: this viser starts its server in another way, or lacks a part that is needed.
     """
     import viser
+
+    with (
+        wrapped_serve(wrap_request, wrap_handler) as used,
+        contextlib.redirect_stdout(io.StringIO()),  # viser prints an address that lacks the token
+    ):
+        server = viser.ViserServer(host=host, port=port, verbose=False)
+    if not used.is_set():
+        stop_viser(server)
+        raise _unknown_viser("it does not start its server by websockets.asyncio.server.serve")
+    if missing := missing_parts(server):
+        stop_viser(server)
+        raise _unknown_viser(f"it has no {', '.join(missing)}")
+    # Any client could ask viser to open a public tunnel; nobody can here.
+    for name in _TUNNEL_MESSAGES:
+        server._websock_server.unregister_handler(getattr(viser._messages, name))
+    return server
+
+
+def stop_viser(server: "viser.ViserServer") -> None:
+    """Stop a server of viser without its saying so."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def path_of_client(server: "viser.ViserServer", client_id: int) -> str:
+    """Return the path and query under which a client has connected; "" once it has left."""
+    connection = server._websock_server._live_connections.get(client_id)
+    return connection.request.path if connection is not None and connection.request is not None else ""
+
+
+def client_page(script: str) -> bytes:
+    """Return viser's own page, its panels hidden, for our page has them.
+
+    Args:
+        script: address of a script of ours that runs before viser's.
+    """
+    page = _client_file().read_bytes()
+    page = page.replace(b"<head>", f'<head><script src="{script}"></script>'.encode(), 1)
+    return page.replace(b"</head>", _STYLE.encode(), 1)
+
+
+def missing_parts(server: "viser.ViserServer") -> tuple[str, ...]:
+    """Name the private parts of viser that are used here and that a server of the installed viser does not have."""
     from viser import _messages
 
-    original, hooked = websocket_server.serve, threading.Event()
+    sockets = getattr(server, "_websock_server", None)
+    parts = {
+        **{f"viser._messages.{name}": hasattr(_messages, name) for name in _TUNNEL_MESSAGES},
+        "ViserServer._websock_server": sockets is not None,
+        "ViserServer._websock_server.unregister_handler": hasattr(sockets, "unregister_handler"),
+        "ViserServer._websock_server._live_connections": hasattr(sockets, "_live_connections"),
+        "viser/client/build/index.html": _client_file().is_file(),
+    }
+    return tuple(name for name, found in parts.items() if not found)
 
-    def serve(handler: SocketHandler, *args: Any, **kwargs: Any) -> Any:
-        hooked.set()
-        logger = logging.getLogger("cocalib.port")
-        if not logger.filters:
-            logger.addFilter(_NoHandshakeNoise())
-        kwargs["process_request"] = wrap_request(kwargs.get("process_request"))
-        kwargs["logger"] = logger
-        return original(wrap_handler(handler), *args, **kwargs)
 
-    with _one_at_a_time, contextlib.redirect_stdout(io.StringIO()):  # viser prints an address that lacks the token
-        websocket_server.serve = serve  # type: ignore[assignment, misc]
-        try:
-            server = viser.ViserServer(host=host, port=port, verbose=False)
-        finally:
-            websocket_server.serve = original  # type: ignore[misc]
-    if not hooked.is_set():
-        server.stop()
-        raise RuntimeError(f"viser {viser.__version__} starts its server in a way this version does not know")
-    # Any client could ask viser to open a public tunnel; nobody can here.
-    for message in (_messages.ShareUrlRequest, _messages.ShareUrlDisconnect):
-        server._websock_server.unregister_handler(message)
-    return server
+def _client_file() -> Path:
+    import viser
+
+    return Path(viser.__file__).parent / "client" / "build" / "index.html"
+
+
+def _unknown_viser(what: str) -> InstallationError:
+    import viser
+
+    return InstallationError(
+        f"viser {viser.__version__} cannot be used: {what}; install cocalib again, with the viser that it asks for"
+    )

@@ -34,7 +34,7 @@ def schema_texts() -> dict[str, str]:
         for part, definition in schema["$defs"].items():
             if part.endswith(("Options", "Prior")):  # settings: the reader refuses what it does not know
                 definition["additionalProperties"] = False
-        texts[f"{name.removeprefix('cocalib/')}.schema.json"] = json_text(schema)
+        texts[f"{name.removeprefix('cocalib/')}.schema.json"] = json_text(_null_last(schema))
     return texts
 
 
@@ -43,6 +43,16 @@ def write_schemas(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in schema_texts().items():
         (folder / name).write_text(text, encoding="utf-8")
+
+
+def _null_last(schema: Any) -> Any:
+    """Put null behind the other types of a choice: msgspec's order of them differs from version to version."""
+    if isinstance(schema, dict):
+        ordered = {key: _null_last(value) for key, value in schema.items()}
+        if "anyOf" in ordered:
+            ordered["anyOf"].sort(key=lambda choice: choice == {"type": "null"})
+        return ordered
+    return [_null_last(item) for item in schema] if isinstance(schema, list) else schema
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ def camera_from_info(message: Message, *, topic: str, rectified: bool = False) -
 
 
 def _none(topic: str, code: str, what: str) -> CameraReading:
-    hint = "give the intrinsics with --camera FILE, or find them with cocalib intrinsics"
+    hint = "give the intrinsics with --camera FILE: camera_info YAML, OpenCV YAML or XML, Kalibr camchain, JSON"
     return CameraReading(None, (DataWarning(code, f"{topic} {what}", hint),))
 
 

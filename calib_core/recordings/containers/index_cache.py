@@ -8,12 +8,14 @@ switches it off, COCALIB_CACHE=FOLDER puts it elsewhere.
 import hashlib
 import os
 import sys
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import NamedTemporaryFile
+from typing import IO
 
 import numpy as np
 
@@ -26,6 +28,11 @@ _ENDS_BYTES = 1 << 16
 _MAX_ENTRY_BYTES = 128_000_000
 _MAX_TOTAL_BYTES = 512_000_000
 _SUFFIX = ".index.npz"
+
+_DAMAGED = (
+    *(OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile, zlib.error),
+    *(SyntaxError, tokenize.TokenError),  # some versions of NumPy let these pass from a damaged header
+)
 
 SMALLEST_FILE_BYTES = 16_000_000
 """Smaller files open fast anyway."""
@@ -88,7 +95,7 @@ class FileCache:
             with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
                 arrays = {key: kept[key] for key in kept.files}
             os.utime(path)
-        except (OSError, ValueError, KeyError, EOFError, AttributeError, TypeError, zipfile.BadZipFile, zlib.error):
+        except _DAMAGED:
             return None
         return arrays
 
@@ -99,7 +106,7 @@ class FileCache:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             with NamedTemporaryFile(dir=self.folder, suffix=".part", delete=False) as file:
-                np.savez(file, allow_pickle=False, **arrays)
+                _write_arrays(file, arrays)
             Path(file.name).replace(self._path(name))
             self._make_room()
         except OSError:
@@ -117,3 +124,11 @@ class FileCache:
                 return
             path.unlink(missing_ok=True)
             total -= size
+
+
+def _write_arrays(file: IO[bytes], arrays: Mapping[str, np.ndarray]) -> None:
+    """Write what np.savez writes, and never an object: NumPy before 2.1 cannot be asked for that."""
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                np.lib.format.write_array(entry, array, allow_pickle=False)

@@ -120,7 +120,7 @@ def test_the_optical_pose_on_the_body_frame_is_found(file):
     kit = text_of(file, "autoware")
     from scipy.spatial.transform import Rotation
 
-    angles = Rotation.from_matrix(radar_from_camera.rotation).as_euler("xyz")
+    angles = Rotation.from_matrix(np.array(radar_from_camera.rotation)).as_euler("xyz")
     head, _, entry = kit.partition('"camera_link"')
     for key, angle in zip(("roll", "pitch", "yaw"), angles, strict=True):
         entry = re.sub(rf"{key}: \S+", f"{key}: {float(angle)!r}", entry)

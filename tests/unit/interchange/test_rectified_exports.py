@@ -119,7 +119,10 @@ def test_its_numbers_bring_the_check_point_to_the_pixel_that_rectifying_the_pict
         rectified = cv2.fisheye.undistortPoints(*given, P=camera.matrix_px)
     else:
         often = (cv2.TERM_CRITERIA_COUNT, 100, 0.0)
-        rectified = cv2.undistortPoints(*given, P=camera.matrix_px, criteria=often)
+        if hasattr(cv2, "undistortPointsIter"):  # until OpenCV 5
+            rectified = cv2.undistortPointsIter(*given, None, camera.matrix_px, often)
+        else:
+            rectified = cv2.undistortPoints(*given, P=camera.matrix_px, criteria=often)
     np.testing.assert_allclose(seen[:2] / seen[2], np.ravel(rectified), rtol=0, atol=1e-4)
     assert np.linalg.norm(seen[:2] / seen[2] - check_point.pixel_px) > 0.5
 

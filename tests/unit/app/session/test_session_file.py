@@ -173,7 +173,7 @@ def damaged(line: int, text: bytes, whole: bytes) -> bytes:
         (2, b"", "line 3 is damaged"),
         (2, b'{"n":7,"step":{"type":"cleared"}}', "step 7 stands where step 2 belongs"),
         (2, b'{"n":2,"step":{"type":"click_removed","id":"c9"}}', "there is no click 'c9'"),
-        (2, b'{"n":2,"step":{"type":"options_changed","options":{"nois":{}}}}', "there is no option 'nois'"),
+        (2, b'{"n":2,"step":{"type":"options_changed","options":{"nois":{}}}}', "unknown option 'nois'"),
         (2, b'{"n":2,"step":{"type":"juggled"}}', "Invalid value 'juggled'"),
         (0, b"{}", "line 1 is damaged"),
         (0, b'{"schema":"cocalib/session-1"', "line 1 is damaged"),

@@ -1,0 +1,54 @@
+"""Flags of the commands that read a recording: which files and topics, and the options of a calibration."""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import tyro
+
+from app.cli.flags import called, same
+from calib_core.options import CalibrationOptions, CameraPositionPrior
+from calib_core.recordings import RecordingOptions
+
+__all__ = ["CameraPosition", "MeasuredCamera", "Options", "Recordings", "TopicFlags", "Topics"]
+
+Recordings: TypeAlias = Annotated[tuple[Path, ...], tyro.conf.Positional, called("RECORDING...")]
+
+
+@dataclass(frozen=True, slots=True)
+class TopicFlags(RecordingOptions):
+    """RecordingOptions with their values named; what each means is told there."""
+
+    radar_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "radar_topic")
+    image_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "image_topic")
+    camera_info_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "camera_info_topic")
+    radar_axes: Annotated[str | None, called("AXES")] = same(RecordingOptions, "radar_axes")
+    video_start: Annotated[str | None, called("TIME")] = same(RecordingOptions, "video_start")
+
+
+Topics: TypeAlias = Annotated[TopicFlags, tyro.conf.arg(name="")]
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredCamera:
+    """A tape-measured camera position: the most valuable extra fact there is."""
+
+    camera_position_m: Annotated[tuple[float, float, float] | None, called("X Y Z")] = None
+    """Where the camera's lens sits in the radar frame: forward, left, up [m]."""
+    camera_position_sigma_m: float = 0.01
+    """How well that is known, per axis [m]."""
+
+    def over(self, options: CalibrationOptions) -> CalibrationOptions:
+        """Lay the measured position over the options."""
+        if self.camera_position_m is None:
+            return options
+        prior = CameraPositionPrior(self.camera_position_m, self.camera_position_sigma_m)
+        return dataclasses.replace(options, solving=dataclasses.replace(options.solving, camera_position=prior))
+
+
+CameraPosition: TypeAlias = Annotated[MeasuredCamera, tyro.conf.arg(name="")]
+# The camera position has flags of its own; here it would become a sub-command.
+Options: TypeAlias = Annotated[
+    CalibrationOptions, tyro.conf.arg(name=""), tyro.conf.AvoidSubcommands, tyro.conf.FlagConversionOff
+]

@@ -1,0 +1,68 @@
+"""What is imported is declared, and what is declared is imported."""
+
+import ast
+import importlib.metadata
+import re
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+AWAITED = {"rerun-sdk": "`record-rrd`, which writes recordings of rerun, is to come"}
+"""Dependencies that are declared and not imported yet, and why."""
+
+OWN = {"app", "calib_core"}
+
+
+def imported_modules(root: Path) -> dict[str, set[str]]:
+    """Return every third-party module that our packages import, and the files that do."""
+    found: dict[str, set[str]] = {}
+    for path in sorted(file for package in OWN for file in (root / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names: list[str] = []
+            if isinstance(node, ast.Import):
+                names = [name.name for name in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+                names = [node.module]
+            for name in names:
+                top = name.split(".")[0]
+                # compression came with Python 3.14; before, backports-zstd stands in for it
+                if top not in OWN | {"compression"} | sys.stdlib_module_names:
+                    found.setdefault(top, set()).add(str(path.relative_to(root)))
+    return found
+
+
+def distributions_of(module: str) -> set[str]:
+    """Return the installed distributions that bring a top-level module, by their normalised names."""
+    names = importlib.metadata.packages_distributions().get(module, [])
+    return {re.sub(r"[-_.]+", "-", name).lower() for name in names}
+
+
+@pytest.fixture(scope="module")
+def declared(project_root: Path) -> set[str]:
+    """Return the names of the dependencies that the program declares, extras included."""
+    project = tomllib.loads((project_root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lines = [*project["dependencies"], *(line for extra in project["optional-dependencies"].values() for line in extra)]
+    return {re.split(r"[^\w-]", line)[0].lower() for line in lines}
+
+
+def test_every_module_that_is_imported_comes_with_a_declared_dependency(project_root: Path, declared: set[str]) -> None:
+    modules = imported_modules(project_root)
+    assert {"numpy", "cv2", "lz4", "backports"} <= set(modules)
+    undeclared = {
+        module: sorted(files) for module, files in modules.items() if distributions_of(module).isdisjoint(declared)
+    }
+    assert undeclared == {}, "declare what brings these modules in pyproject.toml, or do not import them"
+
+
+def test_every_declared_dependency_is_imported(project_root: Path, declared: set[str]) -> None:
+    modules = imported_modules(project_root)
+    imported = {name for module in modules for name in distributions_of(module)}
+    assert declared - imported == set(AWAITED), "remove what nobody imports from pyproject.toml"
+
+
+def test_every_dependency_has_a_lowest_and_an_upper_bound(project_root: Path) -> None:
+    project = tomllib.loads((project_root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    pattern = re.compile(r"[a-z][a-z0-9-]*>=\d[\d.]*,<\d[\d.]*(; .+)?")
+    assert [line for line in project["dependencies"] if not pattern.fullmatch(line)] == []

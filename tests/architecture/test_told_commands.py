@@ -1,0 +1,103 @@
+"""What errors, hints and pages tell people to type exists: every command, and every option."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.cli.commands import COMMANDS
+from app.cli.tyro_hook import flags_of
+
+PROSE = {"again", "cookie", "therefore", "wrote"}
+"""Words that follow the program's name in sentences that tell nobody to type anything."""
+
+OTHER_PROGRAMS = {f"--{name}" for name in ("frame-id", "child-frame-id", "qx", "qy", "qz", "qw")}
+"""Options of programs that are not ours: of ROS's static_transform_publisher."""
+
+_COMMAND = re.compile(r"(?<![\w/.-])cocalib[ \t]+(?P<command>[a-z][\w-]*)(?P<rest>[^\n`;()]*)")
+_FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9.-]*[a-z0-9]")
+
+FLAGS = {name: {*flags_of(command.load()), "--help"} for name, command in COMMANDS.items()}
+ANY_FLAG = set().union(*FLAGS.values(), {"--version"})
+
+
+def literals(path: Path) -> Iterator[str]:
+    """Yield every string of a module; what an f-string fills in becomes `{}`."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    parts = {part for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            yield "".join(str(part.value) if isinstance(part, ast.Constant) else "{}" for part in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in parts:
+            yield node.value
+
+
+def code_of(page: str) -> Iterator[str]:
+    """Yield what a page shows as code: fenced blocks line by line, and spans."""
+    for block in re.findall(r"^```[^\n]*\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
+        yield from (line.partition("#")[0] for line in block.splitlines())
+    yield from re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```", "", page, flags=re.MULTILINE | re.DOTALL))
+
+
+def mistakes(text: str, *, prose: set[str]) -> list[str]:
+    """Name the commands that do not exist, and the options that their command does not have."""
+    found: list[str] = []
+    for match in _COMMAND.finditer(text):
+        name = match["command"]
+        if name in COMMANDS:
+            unknown = sorted(set(_FLAG.findall(match["rest"].partition(". ")[0])) - FLAGS[name])
+            found += [f"cocalib {name} {flag}" for flag in unknown]
+        elif name not in prose:
+            found.append(f"cocalib {name}")
+    return found
+
+
+def modules(root: Path) -> list[Path]:
+    return sorted(path for package in ("app", "calib_core") for path in (root / package).rglob("*.py"))
+
+
+def test_every_command_that_the_program_names_exists(project_root: Path) -> None:
+    told = {
+        str(path.relative_to(project_root)): wrong
+        for path in modules(project_root)
+        if (wrong := [each for text in literals(path) for each in mistakes(text, prose=PROSE)])
+    }
+    assert told == {}
+
+
+def test_every_option_that_the_program_names_exists(project_root: Path) -> None:
+    told = {
+        str(path.relative_to(project_root)): wrong
+        for path in modules(project_root)
+        if (wrong := {flag for text in literals(path) for flag in _FLAG.findall(text)} - ANY_FLAG - OTHER_PROGRAMS)
+    }
+    assert told == {}
+
+
+def test_the_page_names_commands_that_exist(project_root: Path) -> None:
+    for path in sorted((project_root / "static").glob("*.js")):
+        assert mistakes(path.read_text(encoding="utf-8"), prose=PROSE) == [], path.name
+
+
+@pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs"])
+def test_the_pages_promise_what_can_be_typed(page: str, project_root: Path) -> None:
+    path = project_root / page
+    for file in sorted(path.glob("*.md")) if path.is_dir() else [path]:
+        text = file.read_text(encoding="utf-8").replace(".venv/bin/cocalib", "cocalib")
+        assert [each for code in code_of(text) for each in mistakes(code, prose=set())] == [], file.name
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("or find them with cocalib intrinsics", ["cocalib intrinsics"]),
+        ("check it: cocalib open RECORDING --calibration FILE, and click", []),
+        ("cocalib open RECORDING --calibrations FILE", ["cocalib open --calibrations"]),
+        ("a calibration that cocalib wrote", []),
+        ("cocalib export {} --to FORMAT [--out FILE]", []),
+    ],
+)
+def test_a_command_that_does_not_exist_would_be_seen(text: str, expected: list[str]) -> None:
+    assert mistakes(text, prose=PROSE) == expected

@@ -1,0 +1,103 @@
+"""The table of commands says what the commands are, and the command line says no more than the table."""
+
+import dataclasses
+import inspect
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from app.cli import tyro_hook
+from app.cli.commands import COMMANDS, Command
+from app.option_changes import option_groups
+from calib_core.recordings import RecordingOptions
+
+Cocalib = Callable[..., Any]
+
+
+@pytest.mark.parametrize("command", COMMANDS.values(), ids=lambda command: command.name)
+def test_the_summary_of_a_command_is_the_beginning_of_its_docstring(command: Command) -> None:
+    first_paragraph = (inspect.getdoc(command.load()) or "").split("\n\n")[0]
+    assert command.summary == " ".join(first_paragraph.split())
+
+
+def test_the_overview_names_every_command_with_its_summary_within_a_terminal(cocalib: Cocalib) -> None:
+    answer = cocalib("--help")
+    assert answer.code == 0
+    assert answer.err == ""
+    words = " ".join(answer.out.split())
+    for command in COMMANDS.values():
+        assert f" {command.name} {command.summary}" in words
+    assert max(map(len, answer.out.splitlines())) <= 80
+    assert cocalib("-h") == cocalib() == answer
+
+
+def test_the_version_is_one_line(cocalib: Cocalib) -> None:
+    answer = cocalib("--version")
+    assert answer.code == 0
+    assert re.fullmatch(r"cocalib \d+\.\d+\.\d+\S*\n", answer.out)
+
+
+@pytest.mark.parametrize("command", COMMANDS.values(), ids=lambda command: command.name)
+def test_the_options_of_a_command_are_those_its_help_shows(cocalib: Cocalib, command: Command) -> None:
+    shown = cocalib(command.name, "--help")
+    assert shown.code == 0
+    assert shown.out.startswith(f"usage: cocalib {command.name} ")
+    assert {*tyro_hook.flags_of(command.load()), "--help"} == set(re.findall(r"(?<!\S)--[a-z][a-z.-]*", shown.out))
+
+
+@pytest.mark.parametrize("command", ["open", "solve"])
+def test_the_help_has_the_text_of_every_option(cocalib: Cocalib, command: str) -> None:
+    words = " ".join(re.sub("[│╭╮╰╯─]", " ", cocalib(command, "--help").out).split())
+    told = [description.hint for group in option_groups() for description in group.options]
+    told += [field.metadata["help"] for field in dataclasses.fields(RecordingOptions)]
+    assert len(told) > 25
+    assert [text for text in told if text not in words] == ["Tape-measured camera position, if there is one."]
+
+
+def test_tyro_still_has_the_private_events_that_wrong_usage_is_worded_from() -> None:
+    assert tyro_hook.missing_parts() == (), (
+        "this version of tyro has changed its private events; adapt app/cli/tyro_hook.py, or lower the upper bound of "
+        "tyro in pyproject.toml. Until then tyro words wrong usage itself."
+    )
+
+
+def test_a_tyro_without_those_events_still_runs_commands_and_refuses_in_its_own_words(
+    cocalib: Cocalib, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "tyro._errors_of_tomorrow", None)
+    monkeypatch.setattr(tyro_hook, "_PRIVATE", "tyro._errors_of_tomorrow")
+    assert tyro_hook.missing_parts() == ("tyro._errors_of_tomorrow",)
+    assert cocalib("export").code == 0
+    answer = cocalib("export", "--bogus", "tf2")
+    assert answer.code == 2
+    assert "--bogus" in answer.err
+
+
+def imported_after(*arguments: str) -> set[str]:
+    """Run the command in a fresh interpreter and name what it has imported."""
+    code = (
+        "import sys\nfrom app.cli import run\n"
+        f"try:\n    run({list(arguments)!r})\nexcept SystemExit:\n    pass\n"
+        "print('imported', *sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.rpartition("imported ")[2].split())
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["--version"], ["bogus"]], ids=str)
+def test_what_needs_no_command_imports_none(arguments: list[str]) -> None:
+    imported = imported_after(*arguments)
+    assert imported & {"numpy", "tyro", "rich", "msgspec", "calib_core.recordings", "calib_core.synthetic"} == set()
+    assert imported & {command.where.partition(":")[0] for command in COMMANDS.values()} == set()
+
+
+@pytest.mark.parametrize("command", COMMANDS.values(), ids=lambda command: command.name)
+def test_a_command_imports_no_other_command(command: Command) -> None:
+    mine = command.where.partition(":")[0]
+    others = {other.where.partition(":")[0] for other in COMMANDS.values()} - {mine}
+    allowed = {"app.cli.import_file"} if mine == "app.cli.open" else set()  # it shows calibrations that were imported
+    assert imported_after(command.name, "--help") & others == allowed

@@ -1,0 +1,93 @@
+"""What is private to viser is still there, and a viser that has changed it is refused before anything is served."""
+
+import re
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+import viser
+
+from app.resources import InstallationError
+from app.web.port import viser_hook
+from app.web.port.websockets_hook import ProcessRequest, SocketHandler
+
+CHANGED = (
+    "this version of viser has changed what is private to it; adapt app/web/port/viser_hook.py, or lower the upper bound "
+    "of viser in pyproject.toml"
+)
+
+
+def unwrapped(handler: SocketHandler) -> SocketHandler:
+    return handler
+
+
+def nobody(_files: object) -> ProcessRequest:
+    async def refuse(_connection: object, _request: object) -> None:
+        return None
+
+    return refuse
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[viser.ViserServer]:
+    started = viser_hook.start_viser("127.0.0.1", 0, wrap_request=nobody, wrap_handler=unwrapped)
+    yield started
+    viser_hook.stop_viser(started)
+
+
+def test_viser_still_has_the_private_parts_that_are_used(server: viser.ViserServer) -> None:
+    assert viser_hook.missing_parts(server) == (), CHANGED
+
+
+def test_nobody_can_ask_viser_for_a_public_tunnel(server: viser.ViserServer) -> None:
+    handled = {kind.__name__ for kind in server._websock_server._incoming_handlers}
+    assert handled.isdisjoint({"ShareUrlRequest", "ShareUrlDisconnect"})
+    assert handled != set(), CHANGED
+
+
+def test_a_client_that_has_left_has_no_address(server: viser.ViserServer) -> None:
+    assert viser_hook.path_of_client(server, 7) == ""
+
+
+def test_the_page_of_viser_takes_our_script_first_and_hides_its_panels() -> None:
+    page = viser_hook.client_page("../../pace.js").decode()
+    head, _, rest = page.partition("</head>")
+    scripts = re.findall(r"<script[^>]*>", page)
+    assert scripts[0] == '<script src="../../pace.js">'
+    assert len(scripts) > 1, CHANGED
+    assert "mantine-Paper-root" in head, CHANGED
+    assert "<body" in rest, CHANGED
+
+
+class StartedElsewhere:
+    """A viser that starts its server without websockets' `serve`."""
+
+    def __init__(self, **_options: Any) -> None:
+        self.stopped = False
+        made.append(self)
+
+    def stop(self) -> None:
+        self.stopped = True
+
+
+made: list[StartedElsewhere] = []
+
+
+def test_a_viser_that_starts_its_server_in_another_way_is_stopped_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(viser, "ViserServer", StartedElsewhere)
+    with pytest.raises(InstallationError, match=rf"viser {viser.__version__} cannot be used: it does not start"):
+        viser_hook.start_viser("127.0.0.1", 0, wrap_request=nobody, wrap_handler=unwrapped)
+    assert made[-1].stopped
+
+
+def test_a_viser_without_a_part_is_stopped_and_the_part_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    started: list[viser.ViserServer] = []
+    stop: Callable[[viser.ViserServer], None] = viser_hook.stop_viser
+    monkeypatch.setattr(viser_hook, "stop_viser", lambda server: (started.append(server), stop(server)))
+    monkeypatch.setattr(viser_hook, "_TUNNEL_MESSAGES", ("ShareUrlRequest", "ShareEverything"))
+    with pytest.raises(InstallationError, match=r"it has no viser\._messages\.ShareEverything; install cocalib again"):
+        viser_hook.start_viser("127.0.0.1", 0, wrap_request=nobody, wrap_handler=unwrapped)
+    assert len(started) == 1
+    assert capsys.readouterr().out == ""
