@@ -1,9 +1,11 @@
 """The command line: reads what was typed, runs it, and turns every refusal into one line and an exit code.
 
-Exit codes: 0 done; 1 the data cannot give a calibration; 2 wrong usage or unreadable input.
+Exit codes: 0 done; 1 the data cannot give a calibration; 2 wrong usage or unreadable input; 130 stopped by
+Ctrl+C, 143 by SIGTERM.
 """
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -55,7 +57,7 @@ def run(arguments: Sequence[str]) -> int:
         arguments: what was typed after `cocalib`.
 
     Returns:
-        The exit code: 0, 1 or 2.
+        The exit code.
     """
     if list(arguments) == ["--version"]:
         from app.resources import version
@@ -72,6 +74,6 @@ def run(arguments: Sequence[str]) -> int:
         return 0
     except OSError as error:
         return refuse(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:  # with the number of the signal, where it was not Ctrl+C
         print(file=sys.stderr)
-        return 130
+        return 128 + int(stop.args[0] if stop.args else signal.SIGINT)
