@@ -2,8 +2,11 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+PARALLEL := -n logical --maxprocesses 4 --dist loadfile
+FAST := tests/architecture tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
+  $(addprefix tests/unit/,advice association diagnostics estimation interchange)
 
-.PHONY: help env dev demo test check lock bench bench-accuracy sample picture clean
+.PHONY: help env dev demo test test-fast check lock bench bench-accuracy sample picture clean
 
 help:  ## Say what can be typed.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -41,7 +44,10 @@ check: dev  ## Style, types, layers, frame names, spelling.
 
 test: dev  ## Every test, the browser ones included.
 	@$(BIN)/python tests/find_browser.py --install
-	$(BIN)/pytest
+	$(BIN)/pytest $(PARALLEL)
+
+test-fast: dev  ## The core's laws, in under a minute of processor time.
+	$(BIN)/pytest -q -m "not slow and not real" $(FAST)
 
 bench: dev  ## Speed, as ratios within one run; writes docs/speed.md. BENCH=--large opens 5 GB and 100 GB as well.
 	@$(BIN)/python tests/find_browser.py --install
