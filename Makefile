@@ -3,8 +3,11 @@ PYTHON ?= python3
 LOWEST_PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
+PARALLEL := -n logical --maxprocesses 4 --dist loadfile
+FAST := tests/architecture tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
+  $(addprefix tests/unit/,advice association diagnostics estimation interchange)
 
-.PHONY: help env dev demo test test-lowest test-newest check lock bench bench-accuracy sample picture clean
+.PHONY: help env dev demo test test-fast test-lowest test-newest check lock bench bench-accuracy sample picture clean
 
 help:  ## Say what can be typed.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -43,7 +46,10 @@ check: dev  ## Style, types, layers, frame names, spelling.
 
 test: dev  ## Every test, the browser ones included.
 	@$(BIN)/python tests/find_browser.py --install
-	$(BIN)/pytest
+	$(BIN)/pytest $(PARALLEL)
+
+test-fast: dev  ## The core's laws, in under a minute of processor time.
+	$(BIN)/pytest -q -m "not slow and not real" $(FAST)
 
 test-lowest:  ## A part of the tests with the lowest versions that pyproject.toml allows (needs python3.11 and the package index).
 	@$(LOWEST_PYTHON) .ci/test_bounds lowest

@@ -15,6 +15,10 @@ ROOT = Path(__file__).resolve().parent.parent
 
 os.environ["COCALIB_CACHE"] = "off"  # tests leave nothing in the user's cache folder
 
+# As in the program itself: our matrices are small, and threads inside one product only cost time. Nothing has loaded NumPy
+# yet; jaxtyping's plugin, which would, is switched off in pyproject.toml.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 
 @pytest.fixture(scope="session")
 def project_root() -> Path:

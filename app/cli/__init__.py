@@ -1,10 +1,12 @@
 """The command line: reads what was typed, runs it, and turns every refusal into one line and an exit code.
 
-Exit codes: 0 done; 1 the data cannot give a calibration; 2 wrong usage or unreadable input.
+Exit codes: 0 done; 1 the data cannot give a calibration; 2 wrong usage or unreadable input; 130 stopped by
+Ctrl+C, 143 by SIGTERM.
 Only what the typed command needs is imported: the version and the overview come without NumPy and tyro.
 """
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -22,7 +24,7 @@ def run(arguments: Sequence[str]) -> int:
         arguments: what was typed after `cocalib`.
 
     Returns:
-        The exit code: 0, 1 or 2.
+        The exit code.
     """
     try:
         return _run(*arguments)
@@ -33,9 +35,9 @@ def run(arguments: Sequence[str]) -> int:
         return 0
     except OSError as error:
         return refuse(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:  # with the number of the signal, where it was not Ctrl+C
         print(file=sys.stderr)
-        return 130
+        return 128 + int(stop.args[0] if stop.args else signal.SIGINT)
 
 
 def refuse(reason: str) -> int:

@@ -57,7 +57,7 @@ class Demo:
     serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
 
     def run(self) -> int:
-        """Serve until Ctrl+C; return the exit code."""
+        """Serve until Ctrl+C or SIGTERM; return the exit code."""
         from app.resources import sample_folder
         from app.session.file import user_session_folder
 
@@ -102,7 +102,7 @@ class Open:
     serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
 
     def run(self) -> int:
-        """Serve until Ctrl+C; return the exit code."""
+        """Serve until Ctrl+C or SIGTERM; return the exit code."""
         from app.session.file import recording_session_folder
         from calib_core.recordings import require_files
 
@@ -134,7 +134,7 @@ def _serve(
     topics: RecordingOptions | None = None,
     options: CalibrationOptions | None = None,
 ) -> int:
-    """Open everything, serve until Ctrl+C, close everything.
+    """Open everything, serve until Ctrl+C or SIGTERM, close everything.
 
     Raises:
         CalibrationError: the recording, the intrinsics, the clicks or the session cannot be used.

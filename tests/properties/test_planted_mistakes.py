@@ -18,6 +18,7 @@ from calib_core.interchange import (
     FORMATS,
     CalibrationFile,
     FrameNames,
+    ImportedCalibration,
     WrittenPose,
     check,
     export,
@@ -121,20 +122,24 @@ def planted(file: CalibrationFile, name: str, slip: Callable[[np.ndarray, Writte
     return with_words_of(right, wrong.data)
 
 
-def found(data: bytes, file: CalibrationFile, name: str, *, by_other: bool) -> tuple[list[str], set[str]]:
-    """Return the errors that a check names, and every single slip that would explain the numbers exactly."""
-    wrong = read_any(data)
+def named_errors(wrong: ImportedCalibration, file: CalibrationFile, *, by_other: bool) -> list[str]:
+    """Return the errors that a check names."""
     report = check(wrong, against=imported(file) if by_other else None)
+    return [result.code for result in report.results if result.level == "error"]
+
+
+def explaining(wrong: ImportedCalibration, file: CalibrationFile) -> set[str]:
+    """Return every single slip that would explain the numbers exactly."""
     right = file.calibration.camera_from_radar.as_matrix()
-    explaining = set()
+    slips = set()
     for suspected in takewhile(lambda one: len(one.slips) == 1, suspected_slips(wrong.pose)):
         try:
             undone = suspected.pose.camera_from_radar().as_matrix()
         except ValueError:
             continue
         if np.abs(undone - right).max() < 1e-6:
-            explaining.add(suspected.slips[0].code)
-    return [result.code for result in report.results if result.level == "error"], explaining
+            slips.add(suspected.slips[0].code)
+    return slips
 
 
 @pytest.mark.parametrize("slip", SLIPS)
@@ -143,16 +148,16 @@ def found(data: bytes, file: CalibrationFile, name: str, *, by_other: bool) -> t
 @given(pose=poses())
 def test_a_planted_mistake_is_called_by_its_name_in_every_format(name, slip, pose):
     file = file_of(pose)
-    data = planted(file, name, SLIPS[slip])
-    apart = read_any(data).camera_from_radar.as_matrix() - pose.as_matrix()
-    assume(np.abs(apart).max() > 0.01)
+    wrong = read_any(planted(file, name, SLIPS[slip]))
+    assume(np.abs(wrong.camera_from_radar.as_matrix() - pose.as_matrix()).max() > 0.01)
 
+    slips = explaining(wrong, file)
+
+    assert slip in slips
     for by_other in {name in NO_COMMENT, True}:
-        named, explaining = found(data, file, name, by_other=by_other)
-
-        assert slip in explaining
-        assert named
-        assert set(named) <= explaining
+        errors = named_errors(wrong, file, by_other=by_other)
+        assert errors
+        assert set(errors) <= slips
 
 
 @pytest.mark.parametrize("name", ["urdf", "autoware", "tf2"])
@@ -171,20 +176,20 @@ def test_wrong_angles_are_called_by_their_name(name, slip, pose):
         return angles[::-1] if slip == "angle-order" else [repr(float(np.degrees(float(angle)))) for angle in angles]
 
     if name == "urdf":
-        wrong = re.sub(r'rpy="([^"]+)"', lambda m: f'rpy="{" ".join(slipped(m[1].split()))}"', text, count=1)
+        text = re.sub(r'rpy="([^"]+)"', lambda m: f'rpy="{" ".join(slipped(m[1].split()))}"', text, count=1)
     else:
         head, tail = text[: text.rindex("roll")], text[text.rindex("roll") :]
         head, tail = head[:-2] if name == "tf2" else head, ("--" if name == "tf2" else "") + tail
         replaced = iter(slipped([number for _, number in ANGLE.findall(tail)]))
-        wrong = head + ANGLE.sub(lambda m: m[1] + next(replaced), tail)
-    apart = read_any(wrong).camera_from_radar.as_matrix() - pose.as_matrix()
-    assume(np.abs(apart).max() > 0.01)
+        text = head + ANGLE.sub(lambda m: m[1] + next(replaced), tail)
+    wrong = read_any(text.encode())
+    assume(np.abs(wrong.camera_from_radar.as_matrix() - pose.as_matrix()).max() > 0.01)
 
-    errors, explaining = found(wrong.encode(), file, name, by_other=False)
+    errors, slips = named_errors(wrong, file, by_other=False), explaining(wrong, file)
 
-    assert slip in explaining
+    assert slip in slips
     assert errors
-    assert set(errors) <= explaining
+    assert set(errors) <= slips
 
 
 @settings(max_examples=20, deadline=None)
@@ -194,11 +199,11 @@ def test_radians_in_a_rig_that_wants_degrees_are_called_so(pose):
     rig = json.loads(export(file, "driveworks").data)
     written = rig["rig"]["sensors"][1]["nominalSensor2Rig_FLU"]
     written["roll-pitch-yaw"] = np.radians(written["roll-pitch-yaw"]).tolist()
-    wrong = json.dumps(rig).encode()
-    assume(np.abs(read_any(wrong).camera_from_radar.as_matrix() - pose.as_matrix()).max() > 0.01)
+    wrong = read_any(json.dumps(rig).encode())
+    assume(np.abs(wrong.camera_from_radar.as_matrix() - pose.as_matrix()).max() > 0.01)
 
-    errors, explaining = found(wrong, file, "driveworks", by_other=True)
+    errors, slips = named_errors(wrong, file, by_other=True), explaining(wrong, file)
 
-    assert "radians-for-degrees" in explaining
+    assert "radians-for-degrees" in slips
     assert errors
-    assert set(errors) <= explaining
+    assert set(errors) <= slips

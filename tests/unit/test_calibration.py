@@ -135,6 +135,7 @@ def test_clicks_that_have_nothing_to_do_with_the_radar_are_unsolvable() -> None:
     assert outcome.hint
 
 
+@pytest.mark.slow
 def test_a_whole_simulated_session_comes_out_within_its_uncertainty() -> None:
     session = simulate_scans(SimulationOptions(placements=12, seed=4))
     options = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.015)))

@@ -1,4 +1,7 @@
-"""From a command to a page that works, until Ctrl+C. Where opening takes long, the page is there before the recording is."""
+"""From a command to a page that works, until Ctrl+C or SIGTERM.
+
+Where opening takes long, the page is there before the recording is.
+"""
 
 import contextlib
 import logging
@@ -69,7 +72,7 @@ class Service:
         self._end(error)
 
     def serve(self, workspace: Workspace, recording: Recording) -> None:
-        """Serve what has been opened until Ctrl+C.
+        """Serve what has been opened until Ctrl+C or SIGTERM.
 
         Raises:
             OSError: the port cannot be had.

@@ -1,6 +1,7 @@
 """Advice that pays: following it beats walking about."""
 
 import numpy as np
+import pytest
 
 from calib_core.advice.next_placement import PlacementLimits, next_placement
 from calib_core.calibration import calibrate_pairs
@@ -33,6 +34,7 @@ def measured_at(position: np.ndarray, name: str, simulated: SimulatedPairs, rng:
     return Pair(name, pixel, (type(example)(point, sigma, covariance),), sigma_px=2.0)
 
 
+@pytest.mark.slow
 def test_following_the_advice_beats_random_placements() -> None:
     ratios = []
     for seed in range(4):

@@ -52,6 +52,7 @@ def rests_at(placement: Placement, start: TimeNs, end: TimeNs, position_radar_m:
     return overlap > 0.5 * (end - start) and apart_m < 0.06 + 0.06 * float(np.linalg.norm(position_radar_m))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
@@ -42,6 +43,7 @@ def solved(simulated: SimulatedPairs) -> Calibration:
     return outcome
 
 
+@pytest.mark.slow
 def test_the_ellipsoid_holds_the_truth_despite_smooth_errors() -> None:
     """With errors taken for independent it would hold it in fewer than 3 of 24."""
     inside = 0

@@ -19,6 +19,7 @@ def solved(simulated: SimulatedPairs, options: CalibrationOptions = MEASURED) ->
     return outcome
 
 
+@pytest.mark.slow
 def test_the_ellipsoid_holds_the_truth_about_as_often_as_it_says() -> None:
     inside, squared = 0, []
     for seed in range(60):

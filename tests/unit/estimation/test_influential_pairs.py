@@ -11,7 +11,7 @@ from calib_core.calibration import calibrate, calibrate_pairs
 from calib_core.geometry import RigidTransform
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import Calibration
-from calib_core.synthetic import simulate_pairs
+from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from tests.rooftop import ClickedSample, read_rooftop
 
 FREE = CalibrationOptions()
@@ -91,11 +91,16 @@ def test_a_doubtful_pair_that_is_let_go_moves_the_camera_as_announced(rooftop: C
     assert f"the camera moves {moved_cm:.0f} cm" in warning.message
 
 
+@pytest.fixture(scope="module")
+def good_sets() -> list[SimulatedPairs]:
+    return [simulate_pairs(20, rng=np.random.default_rng(7000 + seed), noise="ti_fine") for seed in range(100)]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [FREE, MEASURED], ids=["free", "measured"])
-def test_a_hundred_good_sets_raise_hardly_a_doubt(options: CalibrationOptions) -> None:
+def test_a_hundred_good_sets_raise_hardly_a_doubt(options: CalibrationOptions, good_sets: list[SimulatedPairs]) -> None:
     doubted = wrongly_out = 0
-    for seed in range(100):
-        simulated = simulate_pairs(20, rng=np.random.default_rng(7000 + seed), noise="ti_fine")
+    for simulated in good_sets:
         outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
         assert isinstance(outcome, Calibration)
         doubted += any(warning.code == "doubtful-pair" for warning in outcome.warnings)

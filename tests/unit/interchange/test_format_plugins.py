@@ -245,7 +245,7 @@ def test_a_module_in_the_current_folder_does_not_take_the_place_of_the_package_s
 
     assert written_formats() == FORMATS
     assert (
-        "acme_params lies in the current folder, from which nothing is loaded; start cocalib in another"
+        "acme_params lies in the current folder, from which nothing is loaded; start the program in another"
         in only_line(caplog)
     )
 

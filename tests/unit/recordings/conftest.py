@@ -1,6 +1,7 @@
 """Recordings written with rosbags, message by message: the other side of the reader under test."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +20,27 @@ CONTAINERS = ("bag", "bag-lz4", "bag-bz2", "mcap", "mcap-zstd", "db3", "db3-zstd
 POINT_CODES = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
 
 
+def standard_types(generation: int) -> Any:
+    """Return a new store of a generation's standard types."""
+    return get_typestore(Stores.ROS1_NOETIC if generation == 1 else Stores.ROS2_JAZZY)
+
+
+shared_types = cache(
+    standard_types
+)  # rosbags compiles a serialiser per type and store: all tests use those of one store
+
+
 class Ros:
     """Messages of one ROS generation, and files of them."""
 
     def __init__(self, generation: int) -> None:
         self.generation = generation
-        self.store = get_typestore(Stores.ROS1_NOETIC if generation == 1 else Stores.ROS2_JAZZY)
+        self.store = shared_types(generation)
 
     def define(self, name: str, text: str) -> str:
-        """Register a type from its definition; return its name."""
+        """Register a type from its definition, in a store of our own; return its name."""
+        if self.store is shared_types(self.generation):
+            self.store = standard_types(self.generation)
         if self.generation == 2:
             text = text.replace("\nHeader ", "\nstd_msgs/Header ").removeprefix("\n")
             text = "std_msgs/" + text if text.startswith("Header ") else text
@@ -66,7 +79,8 @@ class Ros:
         ]
         width = len(points) // height
         raw = np.frombuffer(points.tobytes(), dtype=np.uint8).reshape(height, width * dtype.itemsize)
-        raw = np.pad(raw, ((0, 0), (0, padding)), constant_values=255)
+        if padding:
+            raw = np.pad(raw, ((0, 0), (0, padding)), constant_values=255)
         big = any(place[0].str.startswith(">") for place in dtype.fields.values())
         return self.new(
             "sensor_msgs/msg/PointCloud2",

@@ -13,9 +13,9 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from calib_core.errors import RecordingError
-from calib_core.measurements import TimeNs
+from calib_core.measurements import RadarScan, TimeNs
 from calib_core.recordings.containers.writing import RadarReturnMessage, RecordedMessage, write_ros1_bag
-from calib_core.synthetic import SimulatedRecording, SimulationOptions, simulate, write_recording
+from calib_core.synthetic import SimulatedFrame, SimulatedRecording, SimulationOptions, simulate, write_recording
 
 OPTIONS = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0, seed=5)
 
@@ -30,6 +30,16 @@ def folder(recording: SimulatedRecording, tmp_path_factory: pytest.TempPathFacto
     target = tmp_path_factory.mktemp("recording")
     write_recording(recording, target, ("ros1", "mcap", "db3"))
     return target
+
+
+@pytest.fixture(scope="module")
+def scans(recording: SimulatedRecording) -> tuple[RadarScan, ...]:
+    return tuple(recording.scans())
+
+
+@pytest.fixture(scope="module")
+def frames(recording: SimulatedRecording) -> tuple[SimulatedFrame, ...]:
+    return tuple(recording.frames())
 
 
 def _messages(paths: list[Path], topic: str) -> Iterator[tuple[int, Any]]:
@@ -47,12 +57,11 @@ def _cloud(message: Any) -> np.ndarray:
 
 
 def test_a_ros_1_radar_bag_has_one_message_per_return_and_point_ids_that_begin_anew_in_each_scan(
-    recording: SimulatedRecording, folder: Path
+    scans: tuple[RadarScan, ...], folder: Path
 ) -> None:
     messages = [message for _, message in _messages([folder / "radar.bag"], "/ti_mmwave/radar_scan")]
-    scans = [scan for scan in recording.scans() if len(scan)]
     assert [m.point_id for m in messages] == [i for scan in scans for i in range(len(scan))]
-    assert [_stamp(m) for m in messages if m.point_id == 0] == [int(scan.time) for scan in scans]
+    assert [_stamp(m) for m in messages if m.point_id == 0] == [int(scan.time) for scan in scans if len(scan)]
     points = np.array([[m.x, m.y, m.z] for m in messages])
     assert np.array_equal(points, np.concatenate([scan.points_radar_m for scan in scans]))
     assert np.array_equal([m.velocity for m in messages], np.concatenate([scan.doppler_mps for scan in scans]))
@@ -64,10 +73,9 @@ def test_a_ros_1_radar_bag_has_one_message_per_return_and_point_ids_that_begin_a
 
 @pytest.mark.parametrize("container", ["mcap", "db3"])
 def test_ros_2_bags_hold_the_same_scans_as_clouds_and_open_as_folder_and_as_file(
-    recording: SimulatedRecording, folder: Path, container: str
+    scans: tuple[RadarScan, ...], folder: Path, container: str
 ) -> None:
     inside = folder / f"recording_{container}"
-    scans = list(recording.scans())
     for path in (inside, inside / f"recording_{container}.{container}"):
         clouds = [message for _, message in _messages([path], "/ti_mmwave/radar_scan_pcl")]
         assert [_stamp(cloud) for cloud in clouds] == [int(scan.time) for scan in scans]
@@ -81,9 +89,8 @@ def test_ros_2_bags_hold_the_same_scans_as_clouds_and_open_as_folder_and_as_file
 
 @pytest.mark.parametrize("name", ["camera.bag", "recording_mcap", "recording_db3"])
 def test_every_container_holds_the_rendered_frames_with_both_stamps(
-    recording: SimulatedRecording, folder: Path, name: str
+    frames: tuple[SimulatedFrame, ...], folder: Path, name: str
 ) -> None:
-    frames = list(recording.frames())
     images = list(_messages([folder / name], "/camera/image_raw/compressed"))
     assert [time for time, _ in images] == [int(frame.receive_time) for frame in frames]
     for (_, message), frame in zip(images, frames, strict=True):

@@ -13,6 +13,7 @@ import struct
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,19 @@ from tests.unit.recordings.containers.mcap_writing import mcap, record
 
 FRAMES = 60
 CHUNK_BYTES = 16_000
+BOMB_BYTES = 200_000_000
 CASES: dict[str, Callable[["Kit"], Path]] = {}
+
+
+@cache
+def _rows(generation: int, jpeg: bytes) -> list[Any]:
+    return plain_rows(Ros(generation), jpeg, n=FRAMES)
+
+
+@cache
+def _bomb(compress: Callable[[bytes], bytes]) -> bytes:
+    """Return 200 MB of nothing, compressed."""
+    return compress(bytes(BOMB_BYTES))
 
 
 @dataclass(frozen=True)
@@ -37,8 +50,7 @@ class Kit:
     jpeg: bytes
 
     def rows(self, generation: int) -> tuple[Ros, list[Any]]:
-        ros = Ros(generation)
-        return ros, plain_rows(ros, self.jpeg, n=FRAMES)
+        return Ros(generation), _rows(generation, self.jpeg)
 
     def bag(self, compression: str = "", name: str = "r.bag", extra: tuple[Any, ...] = ()) -> Path:
         """Write a bag of several chunks."""
@@ -240,8 +252,8 @@ def bag_bomb(kit: Kit) -> Path:
 
     def change(raw: bytearray) -> bytes:
         start = chunk_places(raw)[-1]
-        bomb = bz2.compress(bytes(200_000_000))
-        poke(raw, raw.rindex(b"size=", 0, start) + 5, struct.pack("<I", 200_000_000))
+        bomb = _bomb(bz2.compress)
+        poke(raw, raw.rindex(b"size=", 0, start) + 5, struct.pack("<I", BOMB_BYTES))
         poke(raw, raw.index(b"index_pos=") + 10, bytes(8))
         return bytes(raw[: start - 4]) + struct.pack("<I", len(bomb)) + bomb
 
@@ -418,8 +430,8 @@ def mcap_with_a_summary_past_its_end(kit: Kit) -> Path:
 @case
 def mcap_bomb(kit: Kit) -> Path:
     """A chunk of 20 kB that unpacks to 200 MB."""
-    bomb = zstd.compress(bytes(200_000_000))
-    head = struct.pack("<QQQI", START_NS, START_NS, 200_000_000, 0) + struct.pack("<I", 4) + b"zstd"
+    bomb = _bomb(zstd.compress)
+    head = struct.pack("<QQQI", START_NS, START_NS, BOMB_BYTES, 0) + struct.pack("<I", 4) + b"zstd"
     chunk = record(6, head + struct.pack("<Q", len(bomb)) + bomb)
     return edit(kit.mcap(summary=False), lambda raw: raw.replace(record(15, bytes(4)), chunk + record(15, bytes(4))))
 

@@ -1,7 +1,9 @@
 """Opening a file again uses what was found out the first time, and never what belongs to another file."""
 
 import os
+import shutil
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ from calib_core.recordings import open_recording
 from calib_core.recordings.containers import chunks, index_cache
 from calib_core.recordings.containers.index_cache import FileCache, cache_folder
 from calib_core.recordings.containers.sqlite.reader import SqliteSource
-from tests.unit.recordings.conftest import plain_rows
+from tests.unit.recordings.conftest import Ros, plain_rows, write_rows
 from tests.unit.recordings.containers.malformed import Kit, without_index
 
 START_NS = 1_700_000_000 * NS_PER_S
@@ -26,9 +28,24 @@ def folder(tmp_path, monkeypatch):
     return tmp_path / "cache"
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory, jpeg):
+    """Return a function that writes a container, once."""
+
+    @cache
+    def write_once(container):
+        ros, folder = Ros(1 if container.startswith("bag") else 2), tmp_path_factory.mktemp("written")
+        path = folder / ("recording.bag" if container.startswith("bag") else "recording")
+        return folder, write_rows(path, ros, plain_rows(ros, jpeg, n=600), container)
+
+    return write_once
+
+
 @pytest.fixture
-def path(container, container_ros, write, jpeg):
-    return write(container_ros, plain_rows(container_ros, jpeg, n=600), container)
+def path(container, written, tmp_path):
+    """Return a copy that a test may change."""
+    folder, path = written(container)
+    return shutil.copytree(folder, tmp_path / "copy") / path.relative_to(folder)
 
 
 def contents(path):

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from tests.port_client import channel, come_in, get, wanted
 OPENING = Opening("long.bag", "Opening long.bag")
 RECORDING = PictureRecording(grey_pictures(3))
 LONG_S = 60.0
+POSIX_SIGNALS = pytest.mark.skipif(sys.platform == "win32", reason="a signal to one process is a matter of POSIX")
 
 
 @pytest.fixture(autouse=True)
@@ -247,25 +248,70 @@ def test_a_named_file_that_is_missing_is_refused_before_anything_is_read(
     assert line.endswith("absent: no such file; check the path")
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="a signal to one process is a matter of POSIX")
-def test_ctrl_c_while_opening_ends_the_program_quietly(tmp_path: Path) -> None:
-    program = (
-        "import sys, threading, calib_core.recordings as recordings\n"
-        "recordings.open_recording = lambda *_: threading.Event().wait()\n"
-        "from app.cli import run\n"
-        "sys.exit(run(['open', sys.argv[1], '--no-browser', '--port', '0']))\n"
-    )
-    (tmp_path / "long.bag").write_bytes(b"")
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
-    running = subprocess.Popen(
-        [sys.executable, "-c", program, str(tmp_path / "long.bag")],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment,
+SLOW_TO_OPEN = """
+import calib_core.recordings as recordings
+recordings.open_recording = lambda *_: threading.Event().wait()
+"""
+TELLS_WHEN_IT_SERVES = """
+from app.web.port.server import RunningServer
+admit = RunningServer.admit
+RunningServer.admit = lambda *arguments: (admit(*arguments), print("serving"))
+"""
+
+
+def started(arguments: Sequence[object], *, patch: str, sigint: str) -> subprocess.Popen[str]:
+    """Start the program in a process of its own, after a patch.
+
+    Args:
+        arguments: what is typed after `cocalib`.
+        patch: statements that run first.
+        sigint: how the process takes SIGINT; it would inherit SIG_IGN where the tests run in the background of a script.
+    """
+    program = f"import signal, threading\nsignal.signal(signal.SIGINT, signal.{sigint})\n{patch}"
+    return subprocess.Popen(
+        [sys.executable, "-c", f"{program}\nfrom app.__main__ import main\nmain()", *map(str, arguments)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )  # fmt: skip
+
+
+def stopped(running: subprocess.Popen[str], *, once_it_says: str, by: signal.Signals) -> tuple[int, str, str]:
+    """Send a signal once the program has said something; return its exit code and what it said after that."""
     assert running.stdout is not None
-    assert any("http://" in line for line in running.stdout)
-    running.send_signal(signal.SIGINT)
-    _, complaints = running.communicate(timeout=30)
-    assert (running.returncode, complaints.strip()) == (130, "")
+    assert any(once_it_says in line for line in running.stdout)
+    running.send_signal(by)
+    out, err = running.communicate(timeout=30)
+    return running.returncode, out, err
+
+
+@POSIX_SIGNALS
+@pytest.mark.parametrize(
+    ("sigint", "sent", "code"),
+    [("default_int_handler", signal.SIGINT, 130), ("SIG_IGN", signal.SIGTERM, 143)],
+    ids=["SIGINT", "SIGTERM"],
+)
+def test_a_signal_while_opening_ends_the_program_quietly(
+    tmp_path: Path, sigint: str, sent: signal.Signals, code: int
+) -> None:
+    (tmp_path / "long.bag").write_bytes(b"")
+    arguments = ["open", tmp_path / "long.bag", "--no-browser", "--port", 0]
+    running = started(arguments, patch=SLOW_TO_OPEN, sigint=sigint)
+    returned, _, complaints = stopped(running, once_it_says="http://", by=sent)
+    assert (returned, complaints.strip()) == (code, "")
+
+
+@POSIX_SIGNALS
+@pytest.mark.parametrize(
+    ("sigint", "sent"),
+    [("default_int_handler", signal.SIGINT), ("SIG_IGN", signal.SIGTERM)],
+    ids=["SIGINT", "SIGTERM"],
+)
+def test_a_signal_while_serving_closes_the_session(tmp_path: Path, sigint: str, sent: signal.Signals) -> None:
+    arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
+    running = started(arguments, patch=TELLS_WHEN_IT_SERVES, sigint=sigint)
+    code, said, complaints = stopped(running, once_it_says="serving", by=sent)
+    assert (code, complaints) == (0, "")
+    assert "every click is kept" in said
+    assert (tmp_path / "session" / "session.json").is_file()
 
 
 def test_a_large_recording_has_its_link_before_it_is_opened(
