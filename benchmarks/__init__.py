@@ -1,1 +1,1 @@
-"""Measurements: accuracy against peers, speed as ratios within one run."""
+"""Benchmarks: accuracy compared with other methods, speed as ratios within one run."""

@@ -1,1 +1,1 @@
-"""How accurate is the estimator, against its peers and against the bound no estimator can beat? `make bench-accuracy`."""
+"""Accuracy of the estimator, compared with other methods and the Cramer-Rao bound: `make bench-accuracy`."""

@@ -1,4 +1,4 @@
-"""`python -m benchmarks.accuracy`: measure what is not kept yet, and write docs/accuracy.md."""
+"""`python -m benchmarks.accuracy`: measure the trials that are not kept yet, and write docs/accuracy.md."""
 
 import argparse
 import os
@@ -25,11 +25,11 @@ TABLES: dict[str, tuple[Row, ...]] = {
     "peers": efficiency.PEER_ROWS,
     "efficiency": efficiency.ROWS,
 }
-"""The rows by the name for --only, in the order they are measured: the longest table comes last."""
+"""The rows by their name for --only, in the order they are measured: the longest table is last."""
 
 
 def sections(kept: Kept) -> tuple[Section, ...]:
-    """Compose the answers, in the page's order."""
+    """Return the sections in the order of the page."""
     return (
         efficiency.section(kept),
         efficiency.peer_section(kept),
@@ -44,18 +44,18 @@ def sections(kept: Kept) -> tuple[Section, ...]:
 
 
 def main() -> int:
-    """Measure the accuracy and write it down. An interrupted run goes on where it stopped, if the code is the same."""
+    """Measure the accuracy and write the page. An interrupted run resumes if the code is unchanged."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=main.__doc__)
     parser.add_argument(
         "--only", action="append", choices=sorted(TABLES), help="measure this table only; may be repeated"
     )
-    parser.add_argument("--trials", type=int, default=None, help="at most so many trials per row")
+    parser.add_argument("--trials", type=int, default=None, help="largest number of trials per row")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: one per processor)")
     parser.add_argument("--scratch", type=Path, default=_ROOT / "build" / "accuracy", help="where raw figures are kept")
     parser.add_argument("--page", type=Path, default=_ROOT / "docs" / "accuracy.md", help="the page that is written")
-    parser.add_argument("--write-only", action="store_true", help="write the page from what is kept, measure nothing")
+    parser.add_argument("--write-only", action="store_true", help="write the page from kept figures, measure nothing")
     parser.add_argument(
-        "--kept", type=Path, help="a folder of raw figures to go on with, whatever version of the code made it"
+        "--kept", type=Path, help="continue with this folder of raw figures, whatever version of the code made it"
     )
     arguments = parser.parse_args()
     keeper = Keeper(arguments.kept or arguments.scratch / digest_of_sources())
@@ -72,6 +72,6 @@ if __name__ == "__main__":
     try:
         sys.exit(main())
     except KeyboardInterrupt:
-        sys.stderr.write("interrupted; what was measured is kept, the same command goes on from there\n")
+        sys.stderr.write("interrupted; measured trials are kept, run the same command to resume\n")
         sys.stderr.flush()
-        os._exit(130)  # without waiting for the trials under way; the children end with us
+        os._exit(130)  # without waiting for running trials; the child processes end with this one

@@ -1,4 +1,4 @@
-"""Placements where the program advises them, against placements anywhere: how much smaller does the uncertainty get?"""
+"""Placements where the program advises them, compared with placements anywhere: how much smaller is the uncertainty?"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ _CASES = tuple(Advised(noise, pairs, tape_m) for tape_m, noise, pairs in product
 
 
 def measure_advice(case: Advised, trial: int) -> Figures:
-    """Follow the advice from the first placements on, and compare with the placements as drawn."""
+    """Follow the advice after the first placements, and compare with the placements as drawn."""
     as_drawn = Case(case.noise, case.pairs, tape_m=case.tape_m)
     simulated = draw(as_drawn, trial)
     rng = np.random.default_rng([2026, trial])
@@ -82,7 +82,7 @@ def _advised(pairs: Sequence[Pair], simulated: SimulatedPairs, case: Case) -> np
 def _measured_at(
     place: np.ndarray, name: str, simulated: SimulatedPairs, noise: NoiseName, rng: np.random.Generator
 ) -> Pair:
-    """Put the reflector there and measure it as the simulation does."""
+    """Simulate a measurement of the reflector at a place."""
     profile = NOISE_PROFILES[noise]
     point = cartesian_from_polar(polar_from_cartesian(place) + profile.sigma_polar * rng.standard_normal(3))
     pixel = simulated.camera.project(simulated.camera_from_radar @ place[None])[0]
@@ -128,14 +128,14 @@ def section(kept: Kept) -> Section:
         "aim",
         "",
     )
-    told = fewest(kept, [row.key for row in ROWS])
-    claim = summed_up("next-placement advice cuts the rotation's sigma at least 1.35 times", verdicts, told)
-    return Section("Does the advice where to go next pay?", _TEXT, (Part("", head, tuple(cells)),), (claim,))
+    trial_counts = fewest(kept, [row.key for row in ROWS])
+    claim = summed_up("next-placement advice cuts the rotation's sigma at least 1.35 times", verdicts, trial_counts)
+    return Section("Does the next-placement advice help?", _TEXT, (Part("", head, tuple(cells)),), (claim,))
 
 
-_TEXT = """The first four placements are drawn anywhere in the field, 2 to 20 m away within 35 deg to either side; the others
-either as well, or in the same field where the program, knowing the pairs so far, advises. Sigma is the bound of the rotation
-at the true placements; the last ratio is of the errors really made."""
+_TEXT = """The first four placements are drawn anywhere in the field, 2 to 20 m away and within 35 deg to either side. The
+others are drawn the same way, or placed in the same field where the program advises, given the pairs so far. Sigma is the
+bound of the rotation at the true placements; the last ratio is that of the actual errors."""
 
 
 def _gain(before: np.ndarray, after: np.ndarray) -> Measured:

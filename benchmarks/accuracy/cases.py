@@ -1,4 +1,4 @@
-"""Pairs with known truth: noise, number of pairs, share of wrong pairs, what the estimator is told, and the bound."""
+"""Pairs with known truth: noise, number of pairs, share of wrong pairs, what the estimator is given, and the bound."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -17,14 +17,14 @@ __all__ = ["Bound", "Case", "SceneName", "bound_of", "draw", "options_of", "tape
 
 SceneName = Literal["field", "aisle"]
 
-_CROWD = 200  # pairs beyond which placements need not keep apart
+_CROWD = 200  # with more pairs than this, placements may be close together
 _BLOCK = 50
 _NOT_GIVEN = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What is drawn, and what an estimator is told of it."""
+    """What is drawn, and what the estimator is given."""
 
     noise: NoiseName
     pairs: int
@@ -33,7 +33,7 @@ class Case:
     """Sigma of the tape-measured camera position [m]; None: not measured."""
     scene: SceneName = "field"
     told: float = 1.0
-    """The radar sigmas the estimator is told, over the true ones; 0: it is told none, for radar and clicks."""
+    """The radar sigmas given to the estimator, over the true ones; 0: none are given, for radar and clicks."""
 
     @property
     def key(self) -> str:
@@ -45,19 +45,19 @@ class Case:
 
 
 def tape_measured(sigma_m: float | None) -> SolvingOptions:
-    """Return solving options with the rig's nominal camera position, measured this well."""
+    """Return solving options with the rig's nominal camera position and this standard deviation."""
     return SolvingOptions(
         camera_position=None if sigma_m is None else CameraPositionPrior(RigOptions().camera_offset_m, sigma_m)
     )
 
 
 def options_of(case: Case) -> CalibrationOptions:
-    """Return what our estimator is told beside the pairs."""
+    """Return the options given to our estimator along with the pairs."""
     return CalibrationOptions(noise=NoiseOptions(), solving=tape_measured(case.tape_m))
 
 
 def draw(case: Case, trial: int) -> SimulatedPairs:
-    """Draw one trial. Seeds depend on the trial only: every method sees the same pairs, with or without a tape measure."""
+    """Draw one trial. The seed depends on the trial only: every method gets the same pairs, with or without a tape prior."""
     rng = np.random.default_rng([2023, trial])
     layout = AISLE if case.scene == "aisle" else FIELD
     if case.pairs > _CROWD:
@@ -67,7 +67,9 @@ def draw(case: Case, trial: int) -> SimulatedPairs:
             case.pairs, rng=rng, noise=case.noise, outlier_share=case.outlier_share, layout=layout
         )
     return (
-        simulated if case.told == 1.0 else replace(simulated, pairs=tuple(_told(p, case.told) for p in simulated.pairs))
+        simulated
+        if case.told == 1.0
+        else replace(simulated, pairs=tuple(_with_given_noise(p, case.told) for p in simulated.pairs))
     )
 
 
@@ -89,7 +91,7 @@ def _crowd(case: Case, rng: np.random.Generator) -> SimulatedPairs:
     )
 
 
-def _told(pair: Pair, factor: float) -> Pair:
+def _with_given_noise(pair: Pair, factor: float) -> Pair:
     if factor == _NOT_GIVEN:
         candidates = tuple(candidate_at(one.position_radar_m, NoiseOptions()) for one in pair.candidates)
         return replace(pair, candidates=candidates, sigma_px=None)
@@ -109,7 +111,7 @@ class Bound:
 def bound_of(
     simulated: SimulatedPairs, noise: NoiseName, tape_m: float | None, *, points_radar_m: np.ndarray | None = None
 ) -> Bound:
-    """Return the bound of an estimator that is told which pairs are right.
+    """Return the bound of an estimator that knows which pairs are right.
 
     The information of a right pair is J^T S^-1 J at its true position, S = C + J V J^T.
 

@@ -1,4 +1,4 @@
-"""Other things than the reflector in the radar's view: which placements get a wrong position?"""
+"""Objects other than the reflector in the radar's view: which placements get a wrong position?"""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -26,7 +26,7 @@ _PLACEMENTS = 20
 _SCANS, _PERIOD_S = 30, 0.1
 _BETWEEN_S = 20.0
 _REFLECTOR_DBSM = 12.0
-_OBJECTS_M = 10.0  # so near that even the weakest is seen
+_OBJECTS_M = 10.0  # near enough that even the weakest is detected
 _FAR = 4.5  # standard deviations of a placement's own error
 _MASKED_BINS, _MASKED_COSINE = 2.5, 1.2
 _AIM, _PAPER = 0.5, 96.0  # percent
@@ -34,16 +34,16 @@ _AIM, _PAPER = 0.5, 96.0  # percent
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What the radar sees beside the reflector.
+    """What the radar sees in addition to the reflector.
 
     Attributes:
         name: for the table.
-        layout: where placements and objects stand.
+        layout: where placements and objects are.
         objects: how many static objects.
         rcs_dbsm: their least and largest radar cross-section; the reflector has 12 dBsm.
-        person: somebody stands beside the reflector and moves a little.
-        strays: static returns from nothing, per scan.
-        radar: which.
+        person: somebody stands next to the reflector and moves a little.
+        strays: false static returns per scan.
+        radar: the simulated radar.
     """
 
     name: str
@@ -71,7 +71,7 @@ _BARE = (
 
 
 def measure_clutter(scene: Scene, trial: int) -> Figures:
-    """Simulate the windows around the clicks of one session and solve it from the returns on."""
+    """Simulate the windows around the clicks of one session and solve it, starting from the returns."""
     rng = np.random.default_rng([2025, trial])
     profile = RADAR_PROFILES[scene.radar]
     rig = random_rig(rng, camera=study_camera())
@@ -117,7 +117,7 @@ def _things(rng: np.random.Generator, scene: Scene, rig: Rig) -> tuple[np.ndarra
 def _visible_places(
     rng: np.random.Generator, scene: Scene, rig: Rig, things: tuple[np.ndarray, np.ndarray], profile: RadarProfile
 ) -> np.ndarray:
-    """Draw placements whose echo is a return of its own: one merged with an object's in a radar cell nobody can find."""
+    """Draw placements whose echo is a separate return: one that merges with an object's in a radar cell cannot be found."""
     kept: list[np.ndarray] = []
     objects = direction_cosines(things[0]) if len(things[0]) else np.zeros((0, 3))
     while len(kept) < _PLACEMENTS:
@@ -150,9 +150,9 @@ def _scans(
     scans: list[RadarScan] = []
     for i, place in enumerate(places):
         own_bias = lasting * rng.standard_normal((1, 3))
-        stands = place + np.array([*rng.uniform(-1.2, 1.2, 2), 1.0])
+        person_m = place + np.array([*rng.uniform(-1.2, 1.2, 2), 1.0])
         for k in range(_SCANS):
-            bodies, body_rcs, body_speeds = _passing(rng, scene, stands)
+            bodies, body_rcs, body_speeds = _passing(rng, scene, person_m)
             speeds = np.concatenate([np.zeros(1 + len(things[1])), body_speeds])
             targets = Targets(
                 points_radar_m=np.concatenate([place[None], things[0], bodies]),
@@ -167,11 +167,11 @@ def _scans(
     return RadarScans.from_scans(scans)
 
 
-def _passing(rng: np.random.Generator, scene: Scene, stands: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Draw what differs from scan to scan: positions (k, 3), cross-sections (k,), speeds (k,) of limbs and strays."""
+def _passing(rng: np.random.Generator, scene: Scene, person_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Draw what changes from scan to scan: positions (k, 3), cross-sections (k,), speeds (k,) of limbs and strays."""
     limbs = 3 if scene.person else 0
     strays = int(rng.poisson(scene.strays))
-    body = stands + np.array([0.1, 0.2, 0.4]) * rng.standard_normal((limbs, 3))
+    body = person_m + np.array([0.1, 0.2, 0.4]) * rng.standard_normal((limbs, 3))
     nothing = np.stack(
         [rng.uniform(2.0, 20.0, strays), rng.uniform(-6.0, 6.0, strays), rng.uniform(-1.2, 1.0, strays)], axis=1
     ).reshape(-1, 3)
@@ -183,7 +183,7 @@ def _passing(rng: np.random.Generator, scene: Scene, stands: np.ndarray) -> tupl
 
 
 def _wrong(positions: list[np.ndarray | None], places: np.ndarray, profile: RadarProfile) -> np.ndarray:
-    """Tell which positions are missing, or farther off than the radar's own error of a placement explains."""
+    """Flag positions that are missing, or farther off than the radar's own error for a placement explains."""
     quantised = np.array([profile.range_bin_m, 2.0 / profile.angle_bins if profile.angle_bins else 0.0, 0.0]) / np.sqrt(
         12.0
     )
@@ -243,28 +243,29 @@ def section(kept: Kept) -> Section:
         "aim",
         "",
     )
-    told = fewest(kept, [row.key for row in ROWS])
+    trial_counts = fewest(kept, [row.key for row in ROWS])
     claims = (
-        summed_up("wrong placements at most 0.5 % in seven clutter scenes", verdicts, told),
-        summed_up("where the paper's mean is wrong in 96 % and more", papers, told),
+        summed_up("wrong placements at most 0.5 % in seven clutter scenes", verdicts, trial_counts),
+        summed_up("where the paper's mean is wrong in 96 % or more", papers, trial_counts),
     )
     return Section(
-        "With other things in the radar's view: which position is taken?",
+        "With other objects in the radar's view: which position is chosen?",
         _TEXT,
         (Part("", head, tuple(cells)),),
         claims,
     )
 
 
-_TEXT = """From returns on: 20 placements with 3 s of scans around each click, bins, lasting errors, side lobes, misses and
-false alarms included (the imaging radar in the row that says so, an AWR1843 elsewhere). A placement is wrong when the
-position taken lies more than 4.5 standard deviations of the radar's own error from the reflector, or none is taken. The
-reflector has 12 dBsm. Placements whose echo merges with an object's in one radar cell are not drawn: no radar reports them.
-"Wrong and used" are those that were not recognised as outliers; "right and set aside" those that were, wrongly."""
+_TEXT = """Starting from radar returns: 20 placements with 3 s of scans around each click, with range and angle bins,
+persistent errors, side lobes, misses and false alarms (the imaging radar in the row that says so, an AWR1843 elsewhere). A
+placement is wrong if the chosen position is more than 4.5 standard deviations of the radar's own error from the reflector,
+or if none is chosen. The reflector has 12 dBsm. Placements whose echo merges with an object's in one radar cell are not
+drawn, because no radar reports them separately. "Wrong and used" are those not recognised as outliers; "right and set
+aside" those wrongly marked as outliers."""
 
 
 def _percent(counts: np.ndarray) -> Measured:
-    """Return counts of 20 per trial in percent. Placements of one trial are not independent; none wrong is not certainty."""
+    """Return counts of 20 per trial in percent. Placements of one trial are not independent; 0 wrong has an error too."""
     shares = 100.0 * counts / _PLACEMENTS
     flags = np.repeat([1.0, 0.0], [int(counts.sum()), int(len(counts) * _PLACEMENTS - counts.sum())])
     between = float(2.0 * shares.std(ddof=1) / np.sqrt(len(shares))) if len(shares) > 1 else 100.0

@@ -1,4 +1,4 @@
-"""How near does the estimator come to the bound, how often does it fail, and how do others do on the same draws?"""
+"""How close is the estimator to the bound, how often does it fail, and how do other methods do on the same draws?"""
 
 from collections.abc import Sequence
 from functools import partial
@@ -51,7 +51,7 @@ _TAPE, _FREE = _cases(0.01), _cases(None)
 
 
 def _aim(case: Case) -> float | None:
-    """Return what the RMSE over the bound may be at most; None where nothing is promised."""
+    """Return the largest RMSE over the bound that meets the aim; None if there is no aim."""
     if case.outlier_share > 0.3:
         return None
     if case.tape_m is not None:
@@ -64,7 +64,7 @@ def _no_failure_promised(case: Case) -> bool:
 
 
 def errors_of(simulated: SimulatedPairs, pose: RigidTransform | None) -> Figures:
-    """Return the rotation's error [rad] and the camera position's [m]; None without a pose."""
+    """Return the errors of rotation [rad] and camera position [m]; None without a pose."""
     if pose is None:
         return {"rotation_rad": None, "position_m": None}
     error = simulated.camera_from_radar.error_from(pose)
@@ -76,7 +76,7 @@ def errors_of(simulated: SimulatedPairs, pose: RigidTransform | None) -> Figures
 
 
 def inside(simulated: SimulatedPairs, calibration: Calibration | None) -> float | None:
-    """Return 1 where the truth lies inside the stated 95 % ellipsoid, 0 outside, None without a pose."""
+    """Return 1 if the truth lies inside the stated 95 % ellipsoid, 0 if outside, None without a pose."""
     if calibration is None:
         return None
     error = simulated.camera_from_radar.error_from(calibration.camera_from_radar)
@@ -156,19 +156,19 @@ def section(kept: Kept) -> Section:
             fewest(kept, [f"ours-{case.key}" for case in (*_TAPE, *_FREE) if _no_failure_promised(case)]),
         )
     )
-    return Section("How near to the best possible?", _TEXT, tuple(parts), tuple(claims))
+    return Section("How close to the Cramer-Rao bound?", _TEXT, tuple(parts), tuple(claims))
 
 
-_TEXT = """The RMSE of rotation (all three axes) and camera position, each over the Cramer-Rao bound of an estimator that
-is told which pairs are right: 1.00 is as good as can be. Two verdicts in one cell are those on rotation and on position.
-`f` counts trials without a pose or with an error beyond six times the bound; `c` is the share whose truth lies inside the
-stated 95 % ellipsoid. Wrong pairs are half ghosts, a quarter misclicks, a quarter positions of another placement. Rows
-without an aim are shown because they were measured; six pairs of which three are wrong leave three right ones, which fix
-nothing, and their bound means little. Rows share their draws: their deviations are alike."""
+_TEXT = """RMSE of rotation (all three axes) and camera position, each divided by the Cramer-Rao bound of an estimator that
+knows which pairs are right: 1.00 is the best possible. Two verdicts in one cell are for rotation and for position. `f`
+counts trials without a pose or with an error of more than six times the bound; `c` is the share whose truth lies inside the
+stated 95 % ellipsoid. Of the wrong pairs, half are ghosts, a quarter misclicks, a quarter positions of another placement.
+Rows without an aim are listed for completeness; with three wrong pairs of six, the three right ones do not determine the
+pose, and the bound means little. Rows share their draws, so their deviations are correlated."""
 
 
 def _cells(case: Case, trials: Sequence[Figures]) -> tuple[tuple[str, ...], tuple[str, str, str]]:
-    """Write one row and judge it: rotation, position, failures; "" where nothing is promised."""
+    """Write one row and its verdicts: rotation, position, failures; "" if there is no aim."""
     rotation, position, aim = *_ratios(trials), _aim(case)
     failures = int(failed(trials).sum())
     verdicts = ("", "") if aim is None else (at_most(rotation, aim), at_most(position, aim))
@@ -193,7 +193,7 @@ def _cells(case: Case, trials: Sequence[Figures]) -> tuple[tuple[str, ...], tupl
 
 
 def _judged(failures: int, trials: int) -> str:
-    """Judge failures; none in fewer trials than the aim speaks of decides nothing."""
+    """Return the verdict on failures; no failure in fewer trials than the aim requires is undecided."""
     if failures:
         return MISSED
     return MET if trials >= _CLAIMED else UNDECIDED
@@ -207,7 +207,7 @@ def _ratios(trials: Sequence[Figures], prefix: str = "") -> tuple[Measured, Meas
 
 
 def failed(trials: Sequence[Figures], prefix: str = "") -> np.ndarray:
-    """Tell which trials have no pose, or one beyond six times the bound in rotation or position."""
+    """Flag trials without a pose, or with an error of more than six times the bound in rotation or position."""
     far = column(trials, f"{prefix}rotation_rad") > _FAILED * column(trials, "bound_rad")
     far |= column(trials, f"{prefix}position_m") > _FAILED * column(trials, "bound_m")
     return np.asarray(far | np.isnan(column(trials, f"{prefix}rotation_rad")))
@@ -230,14 +230,14 @@ def peer_section(kept: Kept) -> Section:
         parts.append(
             Part(scene.capitalize(), ("noise", "pairs", "wrong", "trials", "ours, 1 cm", "ours", *names), tuple(cells))
         )
-    return Section("And others, on the same draws?", _PEER_TEXT, tuple(parts), ())
+    return Section("How do other methods do on the same draws?", _PEER_TEXT, tuple(parts), ())
 
 
-_PEER_TEXT = """Rotation / camera position, RMSE over the bound as above, and the share of failures `f`. Nobody else can use
-a measured camera position, so all are held against the bound without one, and so is "ours"; "ours, 1 cm" is held against
-its own. Fewer trials than above: the first of the same draws. Pixel thresholds of the others are set to three sigmas of the
-true residual, which a user cannot know; ours has none. "8 px" is Algorithm 1 with OpenCV's default, which its authors use.
-An RMSE leaves out trials without a pose: read it with `f`."""
+_PEER_TEXT = """Rotation / camera position, RMSE over the bound as above, and the share of failures `f`. The other methods
+cannot use a measured camera position, so they and "ours" are compared with the bound without one; "ours, 1 cm" is compared
+with its own bound. Fewer trials than above: the first of the same draws. Pixel thresholds of the other methods are set to
+three sigmas of the true residual, which a user cannot know; ours needs none. "8 px" is Algorithm 1 with OpenCV's default,
+which its authors use. The RMSE leaves out trials without a pose: read it together with `f`."""
 
 
 def _peer_cell(trials: Sequence[Figures], prefix: str = "") -> str:

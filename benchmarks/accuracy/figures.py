@@ -1,4 +1,4 @@
-"""Raw figures of many trials become ratios and shares with their two standard errors, and verdicts."""
+"""Turn the raw figures of many trials into ratios and shares, each with two standard errors, and into verdicts."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ MET, UNDECIDED, MISSED = "met", "undecided", "**missed**"
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A figure and two standard errors of it."""
+    """A figure and its two standard errors."""
 
     value: float
     error: float
@@ -43,17 +43,17 @@ class Measured:
 
     @property
     def percent(self) -> str:
-        """The figure as a percentage that it is already."""
+        """The figure as text; it is already in percent."""
         return f"{self.value:.1f} ± {self.error:.1f} %" if np.isfinite(self.value) else "-"
 
 
 def column(trials: Sequence[Figures], name: str) -> np.ndarray:
-    """Return one figure of every trial; NaN where there is none."""
+    """Return one figure of every trial; NaN if a trial has none."""
     return np.array([np.nan if (value := trial.get(name)) is None else value for trial in trials], dtype=np.float64)
 
 
 def ratio(errors: np.ndarray, bounds: np.ndarray) -> Measured:
-    """Return the RMSE over the root mean square of the bound, of the trials with a pose.
+    """Return the RMSE divided by the root mean square of the bound, over the trials with a pose.
 
     The standard error is that of a ratio of means: e^2 - q^2 b^2 has mean 0 at the true ratio q.
     """
@@ -67,7 +67,7 @@ def ratio(errors: np.ndarray, bounds: np.ndarray) -> Measured:
 
 
 def share(flags: np.ndarray) -> Measured:
-    """Return a share in percent, of what is not NaN; its error by Wilson's middle, so that 0 of n has one too."""
+    """Return the share in percent of flags that are not NaN; the error uses Wilson's centre, so that 0 of n has one too."""
     used = flags[np.isfinite(flags)]
     if not len(used):
         return Measured(float("nan"), float("nan"))
@@ -76,19 +76,19 @@ def share(flags: np.ndarray) -> Measured:
 
 
 def at_most(measured: Measured, limit: float) -> str:
-    """Judge: above the limit by less than two standard errors is neither met nor missed."""
+    """Return the verdict; above the limit by less than two standard errors is undecided."""
     if measured.value <= limit:
         return MET
     return UNDECIDED if measured.value - measured.error <= limit else MISSED
 
 
 def at_least(measured: Measured, limit: float) -> str:
-    """Judge the other way round."""
+    """Return the verdict for a lower limit."""
     return at_most(Measured(-measured.value, measured.error), -limit)
 
 
 def within(measured: Measured, low: float, high: float) -> str:
-    """Judge a figure that must lie between two limits."""
+    """Return the verdict for a figure that must lie between two limits."""
     return worst([at_least(measured, low), at_most(measured, high)])
 
 
@@ -99,18 +99,18 @@ def worst(verdicts: Iterable[str]) -> str:
 
 
 def joined(verdicts: Sequence[str]) -> str:
-    """Write several verdicts into one cell, once where they agree."""
+    """Write several verdicts into one cell, or one if they agree."""
     return " / ".join(verdicts) if len(set(verdicts)) > 1 else next(iter(verdicts), "")
 
 
 def fewest(kept: Kept, keys: Iterable[str]) -> str:
-    """Say how many trials a row has at least, of those that were run."""
+    """Return text with the smallest number of trials of the rows that were run."""
     counts = [len(kept[key]) for key in keys if kept.get(key)]
     return f"{min(counts):,} trials or more a row" if counts else ""
 
 
 def summed_up(aim: str, verdicts: Sequence[str], trials: str) -> Claim:
-    """Turn the verdicts of rows into one claim."""
+    """Combine the verdicts of several rows into one claim."""
     if not verdicts:
         return Claim(aim, "not run", "not run")
     counts = [(name, verdicts.count(name)) for name in (MET, UNDECIDED, MISSED) if verdicts.count(name)]

@@ -1,4 +1,4 @@
-"""Where the raw figures of trials are kept, so that an interrupted run goes on where it stopped."""
+"""Keeping the raw figures of trials on disk, so that an interrupted run can resume."""
 
 import hashlib
 import json
@@ -15,7 +15,7 @@ _WRITING_ONLY = {"__main__.py", "figures.py", "keeping.py", "page.py", "running.
 
 
 def digest_of_sources() -> str:
-    """Return a short digest of everything that figures depend on: figures of another version are never mixed in."""
+    """Return a short digest of all code that the figures depend on, so that figures of different versions are not mixed."""
     content = hashlib.sha256()
     files = [*(_ROOT / "calib_core").glob("*.py"), *(_ROOT / "calib_core" / "synthetic").glob("*.py")]
     files += [path for path in Path(__file__).parent.glob("*.py") if path.name not in _WRITING_ONLY]
@@ -31,7 +31,7 @@ class Keeper:
     folder: Path
 
     def read(self, key: str) -> dict[int, Figures]:
-        """Return the kept figures by the trial's number; a last line cut short by an interruption does not count."""
+        """Return the kept figures by trial number; an incomplete last line is ignored."""
         path = self._path(key)
         kept: dict[int, Figures] = {}
         for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else ():

@@ -1,4 +1,4 @@
-"""The estimators that are compared. Every one gets the same pairs; pixel thresholds are given their best value as a gift."""
+"""The estimators that are compared. All get the same pairs; pixel thresholds are set to their best value."""
 
 import importlib.util
 from collections.abc import Callable
@@ -24,7 +24,7 @@ _DEFAULT_PX = 8.0  # OpenCV's
 
 
 def best_threshold_px(case: Case, camera_focal_px: float) -> float:
-    """Return three sigmas of the residual, known to the simulation only."""
+    """Return three sigmas of the residual, which only the simulation knows."""
     profile = NOISE_PROFILES[case.noise]
     angles_px = camera_focal_px * profile.sigma_polar[1:]
     return float(3.0 * np.sqrt((angles_px**2).mean() + profile.sigma_px**2))
@@ -37,7 +37,7 @@ def solve_ours(simulated: SimulatedPairs, case: Case) -> Calibration | None:
 
 
 def as_printed(simulated: SimulatedPairs, threshold_px: float) -> RigidTransform | None:
-    """Run Algorithm 1 from its RANSAC on."""
+    """Run Algorithm 1, starting with RANSAC."""
     options = CalibrationOptions(method="paper")
     paper = replace(options.paper, ransac_threshold_px=threshold_px, ransac_iterations=_ITERATIONS)
     outcome = calibrate_pairs(simulated.pairs, simulated.camera, replace(options, paper=paper))
@@ -49,7 +49,7 @@ def _algorithm_1(simulated: SimulatedPairs, case: Case) -> RigidTransform | None
 
 
 def _algorithm_1_tuned(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
-    return as_printed(simulated, _gift_px(simulated, case))
+    return as_printed(simulated, _best_px(simulated, case))
 
 
 def sqpnp_lm(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
@@ -66,7 +66,7 @@ def _magsac_lm(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
     points, pixels = _arrays(simulated)
     camera = simulated.camera
     parameters = cv2.UsacParams()
-    parameters.threshold = _gift_px(simulated, case)
+    parameters.threshold = _best_px(simulated, case)
     parameters.maxIterations = _ITERATIONS
     parameters.sampler = cv2.SAMPLING_UNIFORM
     parameters.score = cv2.SCORE_METHOD_MAGSAC
@@ -90,7 +90,7 @@ def _poselib(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
 
     points, pixels = _arrays(simulated)
     pose, _ = library.estimate_absolute_pose(
-        pixels, points, _colmap_camera(simulated), {"max_reproj_error": _gift_px(simulated, case)}, {}
+        pixels, points, _colmap_camera(simulated), {"max_reproj_error": _best_px(simulated, case)}, {}
     )
     return _finite(np.asarray(pose.R), np.asarray(pose.t))
 
@@ -101,7 +101,7 @@ def _pycolmap(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
 
     points, pixels = _arrays(simulated)
     options = library.AbsolutePoseEstimationOptions()
-    options.ransac.max_error = _gift_px(simulated, case)
+    options.ransac.max_error = _best_px(simulated, case)
     options.ransac.max_num_trials = _ITERATIONS
     options.ransac.random_seed = 0
     found = library.estimate_and_refine_absolute_pose(
@@ -121,7 +121,7 @@ def _finite(rotation: np.ndarray, translation_m: np.ndarray) -> RigidTransform |
 
 
 def _colmap_camera(simulated: SimulatedPairs, *, half_px: float = 0.0) -> dict[str, Any]:
-    """Describe the camera as COLMAP does, whose pixel centres lie at half pixels."""
+    """Describe the camera as COLMAP does; its pixel centres are at half pixels."""
     matrix, distortion = simulated.camera.matrix_px, np.zeros(4)
     distortion[: min(4, len(simulated.camera.distortion))] = simulated.camera.distortion[:4]
     parameters = [matrix[0, 0], matrix[1, 1], matrix[0, 2] + half_px, matrix[1, 2] + half_px, *distortion]
@@ -134,7 +134,7 @@ def _arrays(simulated: SimulatedPairs) -> tuple[np.ndarray, np.ndarray]:
     return points, np.array([pair.pixel_px for pair in simulated.pairs])
 
 
-def _gift_px(simulated: SimulatedPairs, case: Case) -> float:
+def _best_px(simulated: SimulatedPairs, case: Case) -> float:
     return best_threshold_px(case, float(simulated.camera.matrix_px[0, 0]))
 
 
@@ -150,5 +150,5 @@ _MODULES = {"PoseLib": "poselib", "pycolmap": "pycolmap"}
 
 
 def available(name: str) -> bool:
-    """Tell whether a peer's library is installed."""
+    """Return whether the library of a method is installed."""
     return name not in _MODULES or importlib.util.find_spec(_MODULES[name]) is not None

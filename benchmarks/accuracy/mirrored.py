@@ -1,4 +1,4 @@
-"""A radar with a mirrored axis: is it noticed?"""
+"""Is a radar with a mirrored axis detected?"""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -48,7 +48,7 @@ _CASES = (
 
 
 def measure_mirrored(case: Mirrored, trial: int) -> Figures:
-    """Solve one trial as it is and with mirrored input."""
+    """Solve one trial with the input as drawn and mirrored."""
     simulated = draw(Case(case.noise, case.pairs, 0.1), trial)
     solving = tape_measured(0.01) if case.measured else SolvingOptions(nominal_camera_distance_m=_NEAR_M)
     options = CalibrationOptions(solving=solving)
@@ -68,7 +68,7 @@ def _turned(pair: Pair, signs: np.ndarray) -> Pair:
 
 
 def _caught(simulated: SimulatedPairs, options: CalibrationOptions) -> float:
-    """Return 1 where the outcome names mirrored axes."""
+    """Return 1 if the outcome reports mirrored axes."""
     outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
     named = [one.code for one in outcome.warnings] if isinstance(outcome, Calibration) else [outcome.code]
     return float(_CODE in named)
@@ -91,10 +91,12 @@ def section(kept: Kept) -> Section:
         cells.append((case.noise, str(case.pairs), case.axis, known, str(len(trials)), *counts, "all", verdicts[-1]))
         cells[-1] = (*cells[-1][:5], f"{counts[0]} ({share(caught).value:.1f} %)", *cells[-1][6:])
     head = ("noise", "pairs", "axis", "camera position", "trials", "caught", "false alarms", "aim", "")
-    told = fewest(kept, [row.key for row in ROWS])
-    claim = summed_up("mirrored input caught in every trial, nominal camera position within 0.3 m", verdicts, told)
-    return Section("Is a mirrored radar axis noticed?", _TEXT, (Part("", head, tuple(cells)),), (claim,))
+    trial_counts = fewest(kept, [row.key for row in ROWS])
+    claim = summed_up(
+        "mirrored input caught in every trial, nominal camera position within 0.3 m", verdicts, trial_counts
+    )
+    return Section("Is a mirrored radar axis detected?", _TEXT, (Part("", head, tuple(cells)),), (claim,))
 
 
-_TEXT = """Placements on the ground, one pair in ten wrong; y or z of every radar position with the wrong sign. Caught means
-the outcome names mirrored axes; a false alarm that it does so on the same pairs with their right signs."""
+_TEXT = """Placements on the ground, one pair in ten wrong; y or z of every radar position has the wrong sign. "Caught"
+means that the outcome reports mirrored axes; "false alarms" that it does so for the same pairs with the right signs."""

@@ -1,4 +1,4 @@
-"""Real pairs that others measured, with the poses they published."""
+"""Real pairs measured by others, with the poses they published."""
 
 import json
 import os
@@ -26,30 +26,33 @@ _OUTLIER_PX = 53.0
 
 
 @dataclass(frozen=True, slots=True)
-class _Told:
-    """How the noise is told."""
+class _AssumedNoise:
+    """Noise options with a name for the table."""
 
     name: str
     noise: NoiseOptions
 
 
-_TOLD = {
-    _BOARDS: (_Told("defaults", NoiseOptions()), _Told("of a lidar", NoiseOptions(1.0, 0.015, 0.3, 0.3))),
+_NOISES = {
+    _BOARDS: (
+        _AssumedNoise("defaults", NoiseOptions()),
+        _AssumedNoise("of a lidar", NoiseOptions(1.0, 0.015, 0.3, 0.3)),
+    ),
     _CLICKS: (
-        _Told("defaults", NoiseOptions()),
-        _Told("of hasty clicks, fixed", NoiseOptions(6.0, 0.03, 1.15, 1.15, estimate_scale=False)),
+        _AssumedNoise("defaults", NoiseOptions()),
+        _AssumedNoise("of hasty clicks, fixed", NoiseOptions(6.0, 0.03, 1.15, 1.15, estimate_scale=False)),
     ),
 }
 
 
 def real_pairs_folder() -> Path | None:
-    """Return the folder of real pairs beside the checkout; None where it is absent."""
-    beside = Path(__file__).resolve().parents[3] / "shared" / "data"
-    folder = Path(os.environ.get("COCALIB_SHARED_DATA", beside)) / "real_pairs"
+    """Return the folder of real pairs next to the checkout; None if there is none."""
+    next_to_checkout = Path(__file__).resolve().parents[3] / "shared" / "data"
+    folder = Path(os.environ.get("COCALIB_SHARED_DATA", next_to_checkout)) / "real_pairs"
     return folder if folder.is_dir() else None
 
 
-def measure_real(name: str, told: _Told, trial: int) -> Figures:
+def measure_real(name: str, assumed: _AssumedNoise, trial: int) -> Figures:
     """Solve the pairs and compare with the published pose."""
     folder = real_pairs_folder()
     if folder is None:
@@ -59,10 +62,10 @@ def measure_real(name: str, told: _Told, trial: int) -> Figures:
     u, _, vt = np.linalg.svd(np.array(document["published_T_camera_from_sensor"]["R"]))
     published = RigidTransform(u @ vt, np.array(document["published_T_camera_from_sensor"]["t"]))
     pairs = [
-        Pair(row["id"], np.array(row["uv"]), (candidate_at(np.array(row["xyz"]), told.noise),))
+        Pair(row["id"], np.array(row["uv"]), (candidate_at(np.array(row["xyz"]), assumed.noise),))
         for row in document["pairs"]
     ]
-    outcome = calibrate_pairs(pairs, camera, CalibrationOptions(noise=told.noise))
+    outcome = calibrate_pairs(pairs, camera, CalibrationOptions(noise=assumed.noise))
     if not isinstance(outcome, Calibration):
         return {"rotation_rad": None}
     error = published.error_from(outcome.camera_from_radar)
@@ -80,29 +83,31 @@ def measure_real(name: str, told: _Told, trial: int) -> Figures:
     }
 
 
-def _key(name: str, told: _Told) -> str:
-    return f"real-{name}-{told.name.replace(', ', '-').replace(' ', '-')}"
+def _key(name: str, assumed: _AssumedNoise) -> str:
+    return f"real-{name}-{assumed.name.replace(', ', '-').replace(' ', '-')}"
 
 
 ROWS = tuple(
-    Row(_key(name, told), 1, partial(measure_real, name, told)) for name, several in _TOLD.items() for told in several
+    Row(_key(name, assumed), 1, partial(measure_real, name, assumed))
+    for name, several in _NOISES.items()
+    for assumed in several
 )
 
 
 def section(kept: Kept) -> Section:
     """Write the table."""
     cells, claims = [], []
-    for name, several in _TOLD.items():
-        for told in several:
-            figures = next(iter(kept.get(_key(name, told), ())), {})
+    for name, several in _NOISES.items():
+        for assumed in several:
+            figures = next(iter(kept.get(_key(name, assumed), ())), {})
             if figures.get("rotation_rad") is None:
                 continue
-            cells.append(_cells(name, told, figures))
-            if told is several[0]:
+            cells.append(_cells(name, assumed, figures))
+            if assumed is several[0]:
                 claims.append(_board_claim(figures) if name == _BOARDS else _clicks_claim(figures))
     head = (
         "pairs",
-        "noise told",
+        "noise given",
         "from the published pose",
         "stated sigma",
         "distance in the ellipsoid",
@@ -112,24 +117,24 @@ def section(kept: Kept) -> Section:
     return Section("Real pairs", _TEXT, (Part("", head, tuple(cells)),), tuple(claims))
 
 
-_TEXT = """Lidar instead of radar, with the poses their authors published: 40 board centres (one of them 53 px off), and 16
-hastily clicked points. The distance is that of the published pose in the stated covariance over the 95 % ellipsoid's radius:
-up to 1 it lies inside. The claims are about the default noise options. The published pose of the 16 clicks is no truth:
-it is, to 0.0004 deg, OpenCV's RANSAC fit to nine of these same clicks (`tests/real/test_pairs.py`), so the distance says
-how far two fits are apart."""
+_TEXT = """Lidar instead of radar, with the poses published by the data's authors: 40 board centres (one of them 53 px off),
+and 16 hastily clicked points. The distance is that of the published pose in the stated covariance, divided by the 95 %
+ellipsoid's radius: up to 1 it lies inside. The claims are for the default noise options. The published pose of the 16
+clicks is not ground truth: to within 0.0004 deg it is OpenCV's RANSAC fit to nine of these same clicks
+(`tests/real/test_pairs.py`), so the distance measures the difference between two fits."""
 
 
 def _reach(figures: Figures) -> float:
     return float(np.sqrt(float(figures["squared"] or 0.0) / float(figures["quantile"] or 1.0)))
 
 
-def _cells(name: str, told: _Told, figures: Figures) -> tuple[str, ...]:
+def _cells(name: str, assumed: _AssumedNoise, figures: Figures) -> tuple[str, ...]:
     value = {key: np.nan if one is None else one for key, one in figures.items()}
     verdict = MET if (_near(value) if name == _BOARDS else _reach(figures) <= 1.0) else MISSED
     outliers = f"{value['outliers']:.0f}" + (f", at most {value['outlier_px']:.0f} px off" if value["outliers"] else "")
     return (
         f"{value['pairs']:.0f} {'board centres' if name == _BOARDS else 'clicks'}",
-        told.name,
+        assumed.name,
         f"{np.rad2deg(value['rotation_rad']):.2f} deg, {100 * value['position_m']:.1f} cm",
         f"{np.rad2deg(value['sigma_rad']):.2f} deg, {100 * value['sigma_m']:.1f} cm",
         f"{_reach(figures):.2f}",

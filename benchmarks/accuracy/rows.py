@@ -1,4 +1,4 @@
-"""What a table is made of: rows that are measured trial by trial, and what is written about them."""
+"""The parts of a table: rows that are measured trial by trial, and the text about them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 __all__ = ["Claim", "Figures", "Kept", "Part", "Row", "Section"]
 
 Figures = dict[str, float | None]
-"""The raw figures of one trial by name, as they are kept on disk; None where there is none (no pose)."""
+"""The raw figures of one trial by name, as kept on disk; None if there is no figure (no pose)."""
 
 Kept = Mapping[str, Sequence[Figures]]
 """The figures of each row's trials, in order of the trial's number, by the row's key."""
@@ -17,9 +17,9 @@ class Row:
     """One row.
 
     Attributes:
-        key: unique; a file name.
-        trials: how many are wanted.
-        measure: from the trial's number to its figures; a module's function or a partial of one, so that processes can share it.
+        key: unique, and usable as a file name.
+        trials: the number of trials wanted.
+        measure: returns the figures of a trial given its number; a module's function or a partial, so that it can be pickled.
     """
 
     key: str
@@ -41,8 +41,8 @@ class Part:
     """A table.
 
     Attributes:
-        title: above it; may be empty.
-        head: of the columns.
+        title: heading; may be empty.
+        head: column headings.
         cells: row by row.
     """
 

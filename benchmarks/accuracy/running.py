@@ -1,4 +1,4 @@
-"""Measure rows trial by trial over several processes. Neither their number nor an interruption changes a figure."""
+"""Measure rows trial by trial in several processes. Neither their number nor an interruption changes a figure."""
 
 import os
 import signal
@@ -21,20 +21,20 @@ _Measured = list[tuple[int, Figures]]
 
 
 def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = None) -> None:
-    """Measure what is not kept yet.
+    """Measure the trials that are not kept yet.
 
     Args:
-        rows: in the order they are to be measured.
-        keeper: of the figures.
-        jobs: processes, one BLAS thread each; 1 measures in this process.
-        most: trials per row at most.
+        rows: in the order in which they are measured.
+        keeper: stores the figures.
+        jobs: number of processes, one BLAS thread each; 1 measures in this process.
+        most: largest number of trials per row.
     """
     chunks = [(row, chunk) for row in rows for chunk in _missing(row, keeper, most)]
     progress = _Progress(sum(len(chunk) for _, chunk in chunks))
     if jobs == 1:
         for row, chunk in chunks:
             keeper.add(row.key, _measure(row, chunk))
-            progress.tell(row.key, len(chunk))
+            progress.report(row.key, len(chunk))
         return
     os.environ.update(dict.fromkeys(_THREADS, "1"))  # before the children load NumPy
     pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_begin)
@@ -43,13 +43,13 @@ def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = No
         for done in as_completed(running):
             row, measured = running[done], done.result()
             keeper.add(row.key, measured)
-            progress.tell(row.key, len(measured))
+            progress.report(row.key, len(measured))
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
 def kept_figures(rows: Sequence[Row], keeper: Keeper, *, most: int | None = None) -> Kept:
-    """Read the kept figures, in order of the trial's number and none beyond the wanted ones."""
+    """Read the kept figures in order of the trial number, up to the wanted number of trials."""
     kept = {}
     for row in rows:
         trials = keeper.read(row.key)
@@ -72,11 +72,11 @@ def _measure(row: Row, trials: list[int]) -> _Measured:
 
 
 def _begin() -> None:
-    """Prepare a child: one thread, and no life beyond its parent's, however that ends."""
+    """Prepare a child process: one thread, and exit when the parent ends, for whatever reason."""
     import cv2
 
     cv2.setNumThreads(1)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
@@ -88,18 +88,18 @@ def _end_with_parent() -> None:
 
 
 class _Progress:
-    """Tells on the error stream how far it is, twice a minute."""
+    """Reports progress on stderr, twice a minute."""
 
     def __init__(self, total: int) -> None:
         self._total, self._done, self._start_s = total, 0, time.monotonic()
-        self._told_s = 0.0
+        self._reported_s = 0.0
 
-    def tell(self, key: str, count: int) -> None:
+    def report(self, key: str, count: int) -> None:
         self._done += count
         now_s = time.monotonic()
-        if now_s - self._told_s < 30.0 and self._done < self._total:
+        if now_s - self._reported_s < 30.0 and self._done < self._total:
             return
-        self._told_s = now_s
+        self._reported_s = now_s
         left_min = (now_s - self._start_s) * (self._total - self._done) / self._done / 60.0
         sys.stderr.write(f"{self._done}/{self._total} trials, about {left_min:.0f} min left ({key})\n")
         sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""A smooth angle error of the radar: do new placements come out where they are clicked?"""
+"""A smooth angle error of the radar: do new placements project to where they are clicked?"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -26,24 +26,24 @@ _TRIALS = {20: 1000, 40: 500, 100: 500}
 _WITHOUT, _WITHOUT_TRIALS = 20, 200
 _HELD_OUT = 100
 _SMOOTH_DEG = (0.3, 0.8)  # rms of azimuth and elevation
-_OWN = (0.005, np.deg2rad(0.08), np.deg2rad(0.22))  # range [m], azimuth, elevation of one placement by itself
+_OWN = (0.005, np.deg2rad(0.08), np.deg2rad(0.22))  # range [m], azimuth, elevation: independent error of each placement
 _VALLEY_RAD = 0.25
 _WAVES = 200
 _LAYOUT = replace(FIELD, separation_m=0.05)
 
 
 def smooth_key(count: int) -> str:
-    """Name the row."""
+    """Return the row's key."""
     return f"smooth-{count}"
 
 
 def measure_smooth(count: int, trial: int, *, smooth: bool = True) -> Figures:
-    """Solve one trial by both methods and look at placements that neither has seen.
+    """Solve one trial by both methods and evaluate placements that neither has used.
 
     Args:
         count: pairs to solve with.
         trial: its number.
-        smooth: with the smooth error; without, the radar's errors are independent and as large as those of "ti".
+        smooth: with the smooth error; if false, the radar's errors are independent and as large as those of "ti".
     """
     rng = np.random.default_rng([2024, trial])
     everything = true = simulate_pairs(count + _HELD_OUT, rng=rng, layout=_LAYOUT)
@@ -66,7 +66,7 @@ def measure_smooth(count: int, trial: int, *, smooth: bool = True) -> Figures:
 
 
 def _with_map(calibration: Calibration) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the projection with the learnt angle errors taken out, where the map says that this pays."""
+    """Return the projection with the learnt angle errors removed, if the map says that this helps."""
     learnt = learn_angle_map(calibration)
     if learnt is None or not learnt.pays:
         return calibration.reproject
@@ -74,7 +74,7 @@ def _with_map(calibration: Calibration) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _angle_errors(rng: np.random.Generator, simulated: SimulatedPairs) -> tuple[np.ndarray, np.ndarray]:
-    """Draw each placement's own error and the one that neighbours share: (n, 3) range [m], azimuth, elevation [rad]."""
+    """Draw each placement's own error and the error shared by neighbours: (n, 3) range [m], azimuth, elevation [rad]."""
     directions = polar_from_cartesian(simulated.points_radar_m)[:, 1:]
     own = np.array(_OWN) * rng.standard_normal((len(directions), 3))
     smooth = np.zeros_like(own)
@@ -84,7 +84,7 @@ def _angle_errors(rng: np.random.Generator, simulated: SimulatedPairs) -> tuple[
 
 
 def _measured_off_by(simulated: SimulatedPairs, off: np.ndarray) -> SimulatedPairs:
-    """Put every radar position off its true one by (n, 3) range [m], azimuth and elevation [rad]."""
+    """Shift every radar position from its true one by (n, 3) range [m], azimuth and elevation [rad]."""
     measured = cartesian_from_polar(polar_from_cartesian(simulated.points_radar_m) + off)
     pairs = tuple(
         replace(pair, candidates=(replace(pair.candidates[0], position_radar_m=point),))
@@ -94,7 +94,7 @@ def _measured_off_by(simulated: SimulatedPairs, off: np.ndarray) -> SimulatedPai
 
 
 def _smooth(rng: np.random.Generator, directions: np.ndarray, rms_rad: float) -> np.ndarray:
-    """Draw a smooth function of azimuth and elevation (n, 2): a Gaussian process by random waves."""
+    """Draw a smooth function of azimuth and elevation (n, 2): a Gaussian process as a sum of random waves."""
     waves, phases = rng.standard_normal((_WAVES, 2)) / _VALLEY_RAD, rng.uniform(0.0, 2.0 * np.pi, _WAVES)
     return np.asarray(
         rms_rad * np.sqrt(2.0 / _WAVES) * np.cos(directions @ waves.T + phases) @ rng.standard_normal(_WAVES)
@@ -113,7 +113,7 @@ def _first(simulated: SimulatedPairs, count: int) -> SimulatedPairs:
 
 
 def _held_out_px(everything: SimulatedPairs, count: int, pose: RigidTransform | None) -> float | None:
-    """Return the AED under a pose of the placements after the first ones."""
+    """Return the AED under a pose, over the placements after the first ones."""
     if pose is None:
         return None
     return _aed_px(everything, count, lambda points: everything.camera.project(pose @ points))
@@ -153,19 +153,22 @@ def section(kept: Kept) -> Section:
     promise = "held-out AED at most 0.65 times Algorithm 1's at 20 pairs, 0.45 times at 100"
     claim = summed_up(promise, verdicts, fewest(kept, [smooth_key(count) for count in _AIMS]))
     return Section(
-        "With a smooth angle error: what do new placements say?", _TEXT, (Part("", head, tuple(cells)),), (claim,)
+        "With a smooth angle error: how well are new placements predicted?",
+        _TEXT,
+        (Part("", head, tuple(cells)),),
+        (claim,),
     )
 
 
-_TEXT = """The AED over 100 placements that took no part in the calibration, and the RMSE of the rotation, under the smooth
-angle error of the table above; camera position measured to 1 cm (Algorithm 1 cannot use it), no wrong pair. "With map": the
-smooth error learnt from the pairs is taken out of the new radar positions, where the program says that this pays. "Best" is
-who knows the true pose and the smooth error at every direction: what is left are clicks and each placement's own noise.
-Last row: the radar's errors are independent, there is nothing to learn, and the map must do no harm."""
+_TEXT = """The AED over 100 placements that were not used in the calibration, and the RMSE of the rotation, with the smooth
+angle error of the table above; camera position measured to 1 cm (Algorithm 1 cannot use it), no wrong pairs. "With map":
+the smooth error learnt from the pairs is removed from the new radar positions if the program says that this helps. "Best"
+uses the true pose and the true smooth error in every direction: only the noise of the clicks and of each placement remains.
+Last row: the radar's errors are independent, so there is nothing to learn, and the map must do no harm."""
 
 
 def _cells(trials: Sequence[Figures]) -> tuple[tuple[str, ...], Measured]:
-    """Write the figures of one row; return the ratio that is judged as well."""
+    """Write the figures of one row, and return the ratio that the verdict is about."""
     ours, mapped, paper, best = (column(trials, f"{name}_px") for name in ("held_out", "mapped", "paper", "best"))
     ours_deg, paper_deg = (
         np.rad2deg(np.sqrt(np.nanmean(column(trials, name) ** 2))) for name in ("rotation_rad", "paper_rad")

@@ -2,5 +2,5 @@
 
 import os
 
-# before NumPy is loaded, as the application does: on matrices this small, threads of linear algebra only get in the way
+# Before NumPy is loaded, as in the application: on matrices this small, BLAS threads only slow things down.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

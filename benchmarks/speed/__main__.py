@@ -15,7 +15,7 @@ _PAGE = Path(__file__).resolve().parents[2] / "docs" / "speed.md"
 
 
 def main() -> int:
-    """Run every measurement; the exit code is 0 whatever the figures are."""
+    """Run every measurement; the exit code is 0 whatever the figures."""
     large = "--large" in sys.argv
     with tempfile.TemporaryDirectory() as scratch:
         tables = [

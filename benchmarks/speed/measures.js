@@ -5,7 +5,7 @@
   const until = async (condition, limitMs = 20000) => {
     const start = performance.now();
     while (!condition()) {
-      if (performance.now() - start > limitMs) throw new Error("waited in vain for " + condition);
+      if (performance.now() - start > limitMs) throw new Error("timed out waiting for " + condition);
       await new Promise((done) => requestAnimationFrame(done));
     }
   };
@@ -22,7 +22,7 @@
   };
   window.__measures = {
     settled,
-    /** Drag the mark of one click by a few pixels, as a person does who corrects it. */
+    /** Drag the mark of one click by a few pixels, as a user would to correct it. */
     async click(number) {
       const click = state.view.clicks[number % state.view.clicks.length];
       goTo(click.frame);
@@ -54,7 +54,7 @@
       await new Promise((done) => setTimeout(done, 50));
       return taken;
     },
-    /** Play for some seconds, from the start again at the end. */
+    /** Play for some seconds; at the end, continue from the start. */
     async play(seconds) {
       goTo(0);
       await until(() => state.shown.index === 0);
@@ -73,7 +73,7 @@
       if (state.playing) document.getElementById("play").click();
       return { shown, seconds: taken, longest_gap_ms: longest };
     },
-    /** Ask for many frames at once, as a held key does, and see whether the last one comes. */
+    /** Request many frames at once, as a held key does, and check whether the last one is shown. */
     async push(count) {
       const first = Math.max(0, Math.min(state.cursor, state.seconds.length - count - 1));
       const seen = new Set();

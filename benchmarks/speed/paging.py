@@ -44,9 +44,9 @@ class _Opened:
     """A page on a server.
 
     Attributes:
-        page: in Chromium, loaded, its first frame shown and its 3D view drawn.
-        server: the process of `cocalib`.
-        ready_s: from starting the process to the first frame on the screen.
+        page: loaded in Chromium, with its first frame shown and its 3D view drawn.
+        server: the `cocalib` process.
+        ready_s: time from starting the process to the first frame on the screen.
     """
 
     page: Page
@@ -58,7 +58,7 @@ def measure_page(scratch: Path) -> tuple[Table, ...]:
     """Measure on the sample and on a simulated 1080p recording.
 
     Args:
-        scratch: a folder for recordings and sessions.
+        scratch: folder for recordings and sessions.
     """
     sample = sample_folder() / "rooftop"
     bags = [str(sample / "radar.bag"), str(sample / "camera.bag")]
@@ -80,8 +80,8 @@ def _clicking(opened: _Opened) -> Table:
         solved_ms.append(times["solved"])
     return Table(
         "Clicking",
-        f"The sample with its 20 pairs and the 3D view beside the picture; {_CLICKS} marks dragged by 6 px one after another, "
-        "from the pointer's release to the painted picture.",
+        f"The sample with its 20 pairs and the 3D view next to the picture; {_CLICKS} marks dragged by 6 px, one after another. "
+        "Times are from the pointer's release to the painted picture.",
         (
             _timed("click to mark", marks_ms, 80),
             _timed("click to solved overlay", solved_ms, 200),
@@ -100,14 +100,14 @@ def _playing(opened: _Opened) -> Table:
     frames_per_s = played["shown"] / played["seconds"]
     return Table(
         "Stepping and playing 1080p",
-        "A simulated recording of 1920 x 1080 at 30 frames a second, 3D view beside it; "
-        f"{_STEPS} steps, {_PLAY_S:.0f} s of play.",
+        "A simulated recording of 1920 x 1080 at 30 frames a second, with the 3D view next to it; "
+        f"{_STEPS} steps, {_PLAY_S:.0f} s of playback.",
         (
             _timed("frame step to shown picture", steps_ms, 300),
             Row("frames shown while playing", f"{frames_per_s:.1f} a second", "", "10 or more", frames_per_s >= 10),
             Row("longest gap between two frames while playing", f"{played['longest_gap_ms']:.0f} ms"),
             Row(
-                "120 frames asked for at once (over-pushed)",
+                "120 frames requested at once",
                 f"settled on the last one in {pushed['settled_ms']:.0f} ms, {pushed['shown']} shown on the way",
                 "",
                 "never freezes",
@@ -156,7 +156,7 @@ def _megabytes(process: psutil.Process) -> float:
 
 
 def _tab_megabytes() -> float:
-    """Return the memory of the largest renderer process: the page with its 3D view."""
+    """Return the memory of the largest renderer process, the page with its 3D view [MB]."""
     renderers = [
         process.memory_info().rss
         for process in psutil.Process().children(recursive=True)

@@ -1,4 +1,4 @@
-"""Recordings beside rosbags: opening, decoding, seeking, memory. Files are made here and deleted afterwards."""
+"""Recordings, compared with rosbags: opening, decoding, seeking, memory. Files are generated here and deleted afterwards."""
 
 import os
 import struct
@@ -29,7 +29,7 @@ from calib_core.recordings import first_picture, open_recording
 from app.memory import keep_freed_memory
 import cv2
 keep_freed_memory()
-def peak():  # Linux hands ru_maxrss down from the process that started this one; VmHWM begins anew
+def peak():  # on Linux, ru_maxrss is inherited from the parent process; VmHWM is not
     status = pathlib.Path("/proc/self/status")
     lines = status.read_text().splitlines() if status.exists() else []
     marks = [int(line.split()[1]) for line in lines if line.startswith("VmHWM")]
@@ -56,11 +56,11 @@ def measure_recordings(scratch: Path, *, large: bool = False) -> Table:
     """Measure on generated bags.
 
     Args:
-        scratch: a folder with room for the files.
+        scratch: folder with enough space for the files.
         large: open a bag of 5 GB and a sparse one of 100 GB as well.
     """
     os.environ["COCALIB_CACHE"] = "off"
-    keep_freed_memory()  # as the command does
+    keep_freed_memory()  # as the cocalib command does
     plain = _write(scratch / "plain.bag", _FRAMES)
     packed = _write(scratch / "packed.bag", 1_000, compression="lz4")
     rows = [
@@ -78,11 +78,11 @@ def measure_recordings(scratch: Path, *, large: bool = False) -> Table:
         path.unlink()
     return Table(
         "Recordings",
-        "Bags made for this run and deleted again: pictures of 1920 x 1080 and ten radar clouds a second, 0.6 GB of them, or "
-        "5 GB; the one of 100 GB is mostly holes. Read by us and by rosbags in turn. Cold: the file's pages are dropped from the "
-        "system's cache first, once per opening; medians. The first picture comes from the beginning of the file; the timeline "
-        "has the stamps of all pictures and scans, each read from its message. Decoding and seeking are in time of the "
-        "processor. Seeks of ours and decodes of the same bytes alternate.",
+        "Bags generated for this run and then deleted: pictures of 1920 x 1080 and ten radar clouds a second, 0.6 GB or 5 GB; "
+        "the one of 100 GB is a mostly empty sparse file. Read by cocalib and by rosbags in turn. Cold: the file's pages are "
+        "dropped from the system's cache before each opening; medians. The first picture is at the beginning of the file; "
+        "the timeline has the stamps of all pictures and scans, each read from its message. Decoding and seeking are in "
+        "processor time. Our seeks and bare decodes of the same bytes alternate.",
         tuple(rows),
     )
 
@@ -93,7 +93,7 @@ def measure_recordings(scratch: Path, *, large: bool = False) -> Table:
 def _write(
     path: Path, frames: int, *, compression: str = "", returns: int = 0, clouds: int = 0, hole_bytes: int = 0
 ) -> Path:
-    """Write a bag with rosbags; with holes, its pictures lie far apart in a sparse file."""
+    """Write a bag with rosbags; with holes, its pictures are far apart in a sparse file."""
     from rosbags.rosbag1 import Writer
 
     writer = Writer(path)
@@ -105,13 +105,13 @@ def _write(
         for time_ns, topic, data in _messages(frames, returns, clouds, pictures):
             if hole_bytes and topic == "/camera/image/compressed":
                 _flush(writer)
-                writer.bio.seek(hole_bytes, os.SEEK_CUR)  # a reader goes by the index and never looks here
+                writer.bio.seek(hole_bytes, os.SEEK_CUR)  # readers use the index and never read this part
             writer.write(topics[topic], time_ns, data)
     return path
 
 
 def _flush(writer: Any) -> None:
-    """End the current chunk, so that what follows is a new one."""
+    """End the current chunk, so that a new one follows."""
     if writer.chunks[-1].data.tell():
         writer.write_chunk(writer.chunks[-1])
 
@@ -254,7 +254,7 @@ def _decoding(path: Path, what: str, aim: float) -> list[Row]:
 
 
 def _decode(path: Path) -> float:
-    """Return seconds per message, as the survey of a whole recording reads them."""
+    """Return seconds per message when reading all radar windows, as placement detection does."""
     with open_recording(path) as recording:
         start = time.process_time()
         scans = sum(len(window) for window in recording.radar_windows())
@@ -279,7 +279,7 @@ def _decode_rosbags(path: Path) -> float:
 def _seeking(path: Path, compression: str) -> Row:
     import cv2
 
-    with path.open("rb") as file:  # from here on the file is in the system's cache
+    with path.open("rb") as file:  # reads the file into the system's cache
         while file.read(1 << 24):
             pass
     bare_s, ours_s = [], []

@@ -1,4 +1,4 @@
-"""What a measurement says, and the page of tables that docs show."""
+"""The rows and tables of docs/speed.md."""
 
 import os
 import platform
@@ -19,9 +19,9 @@ class Row:
     Attributes:
         what: what was measured.
         figure: the measured value as text, with its unit.
-        ratio: against what was measured beside it in the same run; "" where there is nothing to compare with.
-        aim: what it should be; "" where there is none.
-        met: whether it is.
+        ratio: compared with another measurement in the same run; "" if there is none.
+        aim: the value to reach; "" if there is none.
+        met: whether the aim is met.
     """
 
     what: str
@@ -33,7 +33,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Some rows under one heading, and how they were measured."""
+    """Rows under one heading, and how they were measured."""
 
     title: str
     how: str
@@ -41,12 +41,12 @@ class Table:
 
 
 def spread(values_ms: Sequence[float]) -> str:
-    """Write a sample of times as its median and 95th percentile."""
+    """Format times as their median and 95th percentile."""
     return f"{np.median(values_ms):.0f} ms (p95 {np.percentile(values_ms, 95):.0f})"
 
 
 def page(tables: Sequence[Table], *, command: str) -> str:
-    """Write the page of tables in Markdown, and the command that measured them."""
+    """Return the page in Markdown, with the command that measured it."""
     lines = [
         "# Speed",
         "",

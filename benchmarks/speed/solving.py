@@ -1,4 +1,4 @@
-"""How long a full robust solve takes, beside Algorithm 1 and the robust solvers of OpenCV, PoseLib and COLMAP."""
+"""How long a full robust solve takes, compared with Algorithm 1 and the robust solvers of OpenCV, PoseLib and COLMAP."""
 
 import dataclasses
 import time
@@ -37,9 +37,9 @@ def measure_solving() -> Table:
     return Table(
         "Solving",
         "Simulated pairs of a TI-like radar in a field, 10 % of them wrong, one core; medians of processor "
-        "time, which other programs disturb least. "
+        "time, which depends least on other running programs. "
         "The default solve includes noise levels, covariance, leave-one-out, the test for mirrored axes and every warning; "
-        "the others return a pose, and are given the best pixel threshold."
+        "the others return only a pose, and are given the best pixel threshold."
         + (f" Not installed here: {', '.join(missing)}." if missing else ""),
         tuple(rows),
     )
@@ -50,7 +50,7 @@ def _ours(pairs: tuple[Pair, ...], simulated: SimulatedPairs, case: Case) -> Cal
 
 
 def _one_click_off() -> Callable[[], object]:
-    """Move one click of twenty right pairs: pairs under suspected are left out in earnest, which takes fits of their own."""
+    """Move one click of twenty right pairs: influential pairs are left out by full fits, which take extra time."""
     case = Case("ti", 20, tape_m=None)
     simulated = simulate_pairs(20, rng=np.random.default_rng(20), noise="ti")
     first, *others = simulated.pairs
@@ -70,7 +70,7 @@ def _rows(what: str, medians_ms: Mapping[str, float], aim_ms: float | None) -> l
 
 
 def _medians_ms(works: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
-    """Time the works in turns, so that a busy moment of the machine touches all of them; processor time."""
+    """Measure processor times in turn, so that a busy moment of the machine affects all methods alike."""
     for work in works.values():
         work()
     times_s: dict[str, list[float]] = {name: [] for name in works}

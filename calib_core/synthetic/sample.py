@@ -1,4 +1,4 @@
-"""Make the sample recording again, bit for bit: python -m calib_core.synthetic.sample sample_data."""
+"""Regenerate the sample recording, bit for bit: python -m calib_core.synthetic.sample sample_data."""
 
 import argparse
 import shutil
@@ -32,26 +32,26 @@ _README = """\
 # The rooftop sample
 
 A simulated recording: a TI AWR1843 radar and a camera on one mast, and a person who puts a trihedral corner reflector
-down {placements} times on a rooftop. Nothing in it was recorded by a real sensor.
+down at {placements} places on a rooftop. No real sensor was involved.
 
-| file | what |
+| file | content |
 |---|---|
-| `radar.bag` | ROS 1, `/ti_mmwave/radar_scan`: one `ti_mmwave_rospkg/RadarScan` per return, {radar_rate:g} scans a second |
-| `camera.bag` | ROS 1, `/camera/image_raw/compressed` ({width} x {height}, {camera_rate:g} a second), `/camera/camera_info` |
+| `radar.bag` | ROS 1, `/ti_mmwave/radar_scan`: one `ti_mmwave_rospkg/RadarScan` per return, {radar_rate:g} scans per second |
+| `camera.bag` | ROS 1, `/camera/image_raw/compressed` ({width} x {height}, {camera_rate:g} per second), `/camera/camera_info` |
 | `clicks.json` | example clicks: one per placement, {click_sigma:g} px of click noise |
-| `truth.json` | the true `camera_from_radar`, and where and when the reflector rested: for tests and benchmarks only |
+| `truth.json` | the true `camera_from_radar`, and where and when the reflector stood still; for tests and benchmarks only |
 
-The reflector's position is its apex, the inner corner where the three sheets meet: that is its phase centre, and what
-to click. Made by `make sample` (`python -m calib_core.synthetic.sample sample_data`), the same bytes every time with
-the pinned packages.
+The reflector's position is its apex, the inner corner where the three sheets meet. The apex is the phase centre and the
+point to click. `make sample` (`python -m calib_core.synthetic.sample sample_data`) regenerates these files, byte for byte
+with the pinned packages.
 """
 
 
 def write_sample(folder: Path) -> tuple[Path, ...]:
-    """Write the sample into a folder of its own below another, replacing what is there, and return its files.
+    """Write the sample into its own subfolder, replace what is there, and return its files.
 
     Args:
-        folder: the parent, such as sample_data.
+        folder: the parent folder, such as sample_data.
     """
     target = folder / SAMPLE_NAME
     if target.exists():
@@ -70,9 +70,9 @@ def write_sample(folder: Path) -> tuple[Path, ...]:
 
 
 def main(arguments: list[str]) -> int:
-    """Write the sample where the command line says."""
-    parser = argparse.ArgumentParser(prog="calib_core.synthetic.sample", description="Make the sample recording again.")
-    parser.add_argument("folder", type=Path, help="the folder to write it below, such as sample_data")
+    """Write the sample to the folder given on the command line."""
+    parser = argparse.ArgumentParser(prog="calib_core.synthetic.sample", description="Regenerate the sample recording.")
+    parser.add_argument("folder", type=Path, help="parent folder, such as sample_data")
     for path in write_sample(parser.parse_args(arguments).folder):
         print(f"{path}  {path.stat().st_size / 1e6:.2f} MB")
     return 0

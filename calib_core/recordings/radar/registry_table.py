@@ -1,4 +1,4 @@
-"""The table of radar layouts in docs/radar-formats.md, written from the registry itself.
+"""The page docs/radar-formats.md, generated from the registry of radar layouts.
 
 python -m calib_core.recordings.radar.registry_table docs/radar-formats.md
 """
@@ -22,22 +22,21 @@ _KINDS: dict[MessageKind, str] = {
 _INTRODUCTION = """\
 # Radar formats
 
-This page is generated from the registry that reads the messages:
-`python -m calib_core.recordings.radar.registry_table docs/radar-formats.md`. Each row is held by a test on bytes built from the
-definition its drivers publish (`tests/unit/recordings/radar/radar_samples.py`).
+This page is generated from the registry that the decoder uses:
+`python -m calib_core.recordings.radar.registry_table docs/radar-formats.md`. Each row is tested with messages built from the
+definition that the drivers publish (`tests/unit/recordings/radar/radar_samples.py`).
 
-A layout is recognised by its **field names**, as the recording itself declares them, in any order and at any offset,
-aligned or not, of any number type and byte order; never by the package's name. Of several that fit, the one with the
-most fields is taken. A message that fits none is read by its column names alone, if it has a position: `x y z`, or a
-range and an azimuth.
-`cocalib info` shows what was recognised and what is read from where.
+A layout is recognised by its **field names** as declared in the recording, never by the package name. The fields may have any
+order, offset, alignment, number type and byte order. If several layouts match, the one with the most fields is used. A message
+that matches none is read by its column names alone, if it has a position: `x y z`, or a range and an azimuth.
+`cocalib info` shows which layout was recognised and which field each value is read from.
 
-All positions become metres in the radar frame of [conventions](conventions.md): x forward, y left, z up. Speeds are in m/s,
-positive moving away. What a message says about its own noise travels with each return.
+All positions are converted to metres in the radar frame of [conventions](conventions.md): x forward, y left, z up. Speeds are
+in m/s, positive moving away. If a message states its own noise, that noise is kept with each return.
 
-## When axes, signs or units are others
+## Messages with other axes, signs or units
 
-One option says where the message's x, y and z point, in this order:
+Use `--radar-axes` to state where the message's x, y and z point, in this order:
 
 ```
 cocalib info  RECORDING --radar-axes forward,right,up            y to the right, or azimuth positive to the right
@@ -46,20 +45,20 @@ cocalib solve RECORDING --radar-axes degrees ...                 the angles are 
 cocalib solve RECORDING --radar-axes forward,left,down,radians ...
 ```
 
-Polar messages are first turned into x, y, z as the table says, then the option is applied. It is kept in the calibration
-(`provenance.radar_axes`); a session that is opened with other axes than before says so, and solves its clicks anew.
+Polar messages are first converted to x, y, z as the table says, then the option is applied. It is stored in the calibration
+(`provenance.radar_axes`). A session opened with different axes than before reports this and solves its clicks again.
 
-## What is compared
+## Consistency checks
 
-From a sample of the messages, and said as warnings by `cocalib info` and on the page:
+These checks run on a sample of the messages; `cocalib info` and the page show the results as warnings:
 
-| code | what was found |
+| code | meaning |
 |---|---|
-| `radar-range-contradicts` | the message's range is not the length of its x, y, z |
+| `radar-range-contradicts` | the message's range differs from the length of its x, y, z |
 | `radar-azimuth-mirrored` | the message's azimuth has the sign opposite to its y |
-| `radar-azimuth-contradicts` | azimuth and x, y agree in no unit and sign |
-| `radar-elevation-zero` | the elevation is always 0, yet there are heights |
-| `radar-angle-unit` | the angles can hardly be of the unit they are read in |
+| `radar-azimuth-contradicts` | azimuth and x, y disagree in every unit and sign |
+| `radar-elevation-zero` | the elevation is always 0, but the positions have heights |
+| `radar-angle-unit` | the angles are implausible in the unit they are read in |
 | `radar-convention-assumed` | no document states the layout's signs or units; the row below says what is assumed |
 | `flat-radar` | every return has the same height: the radar measures no elevation |
 
@@ -69,25 +68,25 @@ From a sample of the messages, and said as warnings by `cocalib info` and on the
 _FILES = """\
 ## Files without ROS
 
-Folders and files can be given beside recordings of ROS or without any: `cocalib open RADAR_FRONT/ CAM_FRONT/`, or the
-folder that holds them.
+Folders and files can be opened with or without ROS recordings: `cocalib open RADAR_FRONT/ CAM_FRONT/`, or the
+folder that contains them.
 
 | what | read as |
 |---|---|
-| folder of `.pcd` (version 0.7, binary or ascii) | radar, one scan per file; by its fields as a PointCloud2, nuScenes included |
+| folder of `.pcd` (version 0.7, binary or ascii), such as nuScenes | radar, one scan per file; recognised like a PointCloud2 |
 | folder of `.bin` | View-of-Delft radar, one scan per file |
 | `.csv` | radar; the first line names columns and units: `{example}` |
 | folder of pictures | camera |
-| video file, with `--video-start` | camera; most videos lose the frames' own times: give the recording where there is one |
+| video file, with `--video-start` | camera; most videos do not store the original frame times: use the recording if possible |
 
-The time of a file is in a CSV beside it (`file,time_ns`), or in its name: the last number of 19 digits (ns), 16 (us),
-13 (ms) or 10 (s, with a fraction or without) that is a date after 2001. Files that are only numbered count as 0.1 s
-apart, and that is said.
+The time of a file comes from a CSV in or next to its folder (`file,time_ns`), or from its name: the last number of 19
+digits (ns), 16 (us), 13 (ms) or 10 (s, with or without a fraction) that is a date after 2001. Files that are only numbered
+are assumed to be 0.1 s apart, and a warning says so.
 
 ### Columns of a radar CSV
 
-Columns are parted by commas, semicolons or tabs. A unit stands behind the name, as `x_m` or `x [m]`. Rows of one time
-are one scan. An unknown unit, or none, is an error; columns of other names are left out, and `cocalib info` says so.
+Columns are separated by commas, semicolons or tabs. The unit follows the name, as in `x_m` or `x [m]`. Rows with the same time
+form one scan. An unknown or missing unit is an error; columns with other names are ignored, and `cocalib info` lists them.
 Axes and signs are those of the radar frame.
 
 | column | units |
@@ -97,11 +96,11 @@ Axes and signs are those of the radar frame.
 
 
 def radar_formats() -> str:
-    """Write the page."""
+    """Return the page."""
     parts = [_INTRODUCTION.rstrip("\n"), ""]
     for kind, title in _KINDS.items():
         parts += [f"## {title}", "", *_table([decoder for decoder in DECODERS if decoder.kind == kind]), ""]
-    parts += [_FILES.format(example=CSV_EXAMPLE, columns="\n".join(csv_columns())).rstrip("\n"), "", "## Remarks", ""]
+    parts += [_FILES.format(example=CSV_EXAMPLE, columns="\n".join(csv_columns())).rstrip("\n"), "", "## Notes", ""]
     parts += [
         f"* **{d.name}**: {'; '.join(filter(None, (d.note, d.assumed)))}." for d in DECODERS if d.note or d.assumed
     ]
@@ -110,7 +109,7 @@ def radar_formats() -> str:
 
 def _table(decoders: list[Decoder]) -> list[str]:
     rows = [
-        "| layout | used by | position [m, angles as said] | axes | angles | speed [m/s] | amplitude | noise |",
+        "| layout | used by | position [m; angles as listed] | axes | angles | speed [m/s] | amplitude | noise |",
         "|" + "---|" * 8,
     ]
     rows += ["| " + " | ".join(_cells(decoder)) + " |" for decoder in decoders]
@@ -129,7 +128,7 @@ def _cells(decoder: Decoder) -> tuple[str, ...]:
 
 
 def main(path: str) -> None:
-    """Write the page into a file."""
+    """Write the page to a file."""
     Path(path).write_text(radar_formats(), encoding="utf-8")
 
 
