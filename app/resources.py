@@ -1,4 +1,4 @@
-"""Where the installed program finds its own files and keeps its state, and whether it is installed alone."""
+"""Where the installed program finds its files and keeps its state, and whether another package conflicts with it."""
 
 import importlib.metadata
 import os
@@ -22,11 +22,11 @@ _PACKAGE_FOLDER = Path(__file__).resolve().parent
 
 
 class InstallationError(CalibrationError):
-    """The program is not installed as it must be."""
+    """The program is not installed correctly."""
 
 
 def static_folder() -> Path:
-    """Return the folder of the page's files: inside the installed package, else beside it in the checkout.
+    """Return the folder of the page's files: inside the installed package, else next to it in the checkout.
 
     Raises:
         InstallationError: it is in neither place.
@@ -35,7 +35,7 @@ def static_folder() -> Path:
 
 
 def sample_folder() -> Path:
-    """Return the folder of the sample recordings: inside the installed package, else beside it in the checkout.
+    """Return the folder of the sample recordings: inside the installed package, else next to it in the checkout.
 
     Raises:
         InstallationError: it is in neither place.
@@ -62,7 +62,7 @@ def installed_app_owners() -> tuple[str, ...]:
 
 
 def check_installation() -> None:
-    """Refuse to start when another distribution has put its own `app` over ours.
+    """Refuse to start if another distribution has installed its own `app` over ours.
 
     Raises:
         InstallationError: more than one distribution owns `app`.
@@ -70,8 +70,8 @@ def check_installation() -> None:
     others = [owner for owner in installed_app_owners() if owner != _DISTRIBUTION]
     if others:
         raise InstallationError(
-            f"another package, {' and '.join(others)}, is installed here with the same import name, app: "
-            f"one of them has overwritten the other; install {_DISTRIBUTION} into an environment of its own, "
+            f"another package, {' and '.join(others)}, is installed here with the same import name, app, "
+            f"and one has overwritten the other; install {_DISTRIBUTION} in its own environment, "
             f"with `uv tool install {_DISTRIBUTION}` or `pipx install {_DISTRIBUTION}`"
         )
 
@@ -81,7 +81,7 @@ def _folder(name: str) -> Path:
         if folder.is_dir():
             return folder
     raise InstallationError(
-        f"the folder {name} is not in {_PACKAGE_FOLDER} nor beside it: install {_DISTRIBUTION} again"
+        f"the folder {name} is neither in {_PACKAGE_FOLDER} nor next to it; install {_DISTRIBUTION} again"
     )
 
 

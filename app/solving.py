@@ -1,4 +1,4 @@
-"""From clicks to an answer: the one function that page and command line share, and the worker that runs it for the page."""
+"""From clicks to a calibration: the function shared by page and command line, and the worker that runs it for the page."""
 
 import dataclasses
 import hashlib
@@ -65,19 +65,19 @@ def solve_clicks(
     Args:
         recording: where the radar scans come from.
         clicks: in any order; excluded ones are paired and shown, but not used.
-        camera: the intrinsics; without them there is an answer too: that they are missing.
-        options: what steers the solve.
+        camera: the intrinsics; without them, the outcome says that they are missing.
+        options: of the calibration.
 
     Raises:
         OptionError: an option is out of range.
-        CalibrationError: the recording cannot be read where the clicks lie.
+        CalibrationError: the recording cannot be read at the clicks.
     """
     checked_options(options)
     if camera is None:
         return Unsolvable(
             "no-camera",
-            "the camera's intrinsics are missing: the recording has none that can be used",
-            "calibrate the camera with OpenCV, Kalibr or ROS camera_calibration, and start again with --camera FILE",
+            "the camera intrinsics are missing: the recording contains none that can be used",
+            "calibrate the camera with OpenCV, Kalibr or ROS camera_calibration, then start again with --camera FILE",
         )
     times = sorted({click.image_time for click in clicks})
     scans = recording.radar_scans_around(times, half_window_s(options))
@@ -87,12 +87,12 @@ def solve_clicks(
 def check_clicks(
     recording: RadarSource, clicks: Sequence[ReflectorClick], reference: Calibration, options: CalibrationOptions
 ) -> tuple[PairResult, ...]:
-    """Look at clicks under a calibration that they had no part in: each is marked as excluded.
+    """Evaluate clicks under a calibration that was solved without them; each is marked as excluded.
 
-    Of a click's radar positions the one that comes out nearest to it is taken, which flatters the calibration a little.
+    Of a click's radar positions, the one reprojected nearest to it is used, which makes the residual slightly too small.
 
     Raises:
-        CalibrationError: the recording cannot be read where the clicks lie.
+        CalibrationError: the recording cannot be read at the clicks.
     """
     times = sorted({click.image_time for click in clicks})
     scans = recording.radar_scans_around(times, half_window_s(options))
@@ -110,7 +110,7 @@ def _under(pair: Pair, reference: Calibration) -> PairResult:
 
 
 def half_window_s(options: CalibrationOptions) -> float:
-    """Return how far around a click radar scans can matter [s].
+    """Return how far from a click radar scans can matter [s].
 
     A window is centred on a scan up to `max_time_gap_s` away; the paper's may begin at a whole second instead.
     """
@@ -121,13 +121,13 @@ def half_window_s(options: CalibrationOptions) -> float:
 def solve_pairs(text: str, source: str, options: CalibrationOptions) -> Outcome:
     """Solve for camera_from_radar from the text of a pairs-1 file, or again from that of a calibration-1 file.
 
-    What a pairs-1 file says about noise wins over the options. A calibration-1 file brings its own options; of the given
-    ones those count that differ from the defaults.
+    What a pairs-1 file says about noise overrides the options. A calibration-1 file has its own options; of the given ones,
+    those that differ from the defaults override them.
 
     Args:
         text: the file's content.
         source: its name, for error messages.
-        options: what steers the solve.
+        options: of the calibration.
 
     Raises:
         InputError: the text is neither, or a calibration without the candidates of its pairs.
@@ -146,7 +146,7 @@ def solve_pairs(text: str, source: str, options: CalibrationOptions) -> Outcome:
 
 
 def _over(base: CalibrationOptions, given: CalibrationOptions) -> CalibrationOptions:
-    """Lay those options over the base that differ from the defaults."""
+    """Override the base by those options that differ from the defaults."""
     usual = CalibrationOptions()
     changes: dict[str, Any] = {}
     for group in dataclasses.fields(usual):
@@ -161,10 +161,10 @@ def _over(base: CalibrationOptions, given: CalibrationOptions) -> CalibrationOpt
 
 
 def camera_for(recording: Recording, camera_file: Path | None) -> Camera | None:
-    """Return the intrinsics to solve with: the file's where one is given, else the recording's, else None.
+    """Return the intrinsics to solve with: the file's if one is given, else the recording's, else None.
 
     Raises:
-        InputError: the file holds no camera, or one of another image size than the recording's.
+        InputError: the file contains no camera, or one with an image size other than the recording's.
     """
     if camera_file is None:
         return recording.camera()
@@ -195,17 +195,19 @@ def calibration_text(calibration: Calibration, recording: Recording) -> str:
 
 
 def _frame_names(recording: Recording) -> FrameNames:
-    """Take the recording's names; a calibration must not be lost because a recorder named both frames alike."""
+    """Return the recording's frame names, or the defaults if these are unusable: that must not cost the calibration."""
     usual = FrameNames()
     try:
         return FrameNames(recording.radar_frame or usual.radar, recording.camera_frame or usual.camera)
     except InputError as error:
-        _log.warning("the recording's frame names cannot be used, so %s and %s: %s", usual.radar, usual.camera, error)
+        _log.warning(
+            "the recording's frame names cannot be used; using %s and %s: %s", usual.radar, usual.camera, error
+        )
         return usual
 
 
 def calibration_text_of_pairs(calibration: Calibration, text: str, name: str) -> str:
-    """Write a calibration-1 file of a calibration that came from a pairs-1 file, or again from a calibration-1 file.
+    """Write a calibration-1 file for a calibration solved from a pairs-1 file, or again from a calibration-1 file.
 
     Args:
         calibration: what was solved.
@@ -230,7 +232,7 @@ class _Request:
 
 
 class SolverWorker:
-    """Solves in one thread of its own; of several requests waiting, only the newest is worked on."""
+    """Solves in its own thread; of several waiting requests, only the newest is solved."""
 
     def __init__(self, recording: RadarSource, camera: Camera | None, reference: Calibration | None = None) -> None:
         self._recording = recording
@@ -248,12 +250,12 @@ class SolverWorker:
         options: CalibrationOptions,
         when_done: Callable[[Solved], None],
     ) -> None:
-        """Answer this revision soon, and forget the older ones; returns at once, and does nothing after `close`.
+        """Solve this revision and drop older requests; returns immediately, and does nothing after `close`.
 
         Args:
-            revision: echoed in the answer; a larger one is a newer one.
-            clicks: as they are in this revision.
-            options: as they are in this revision.
+            revision: echoed in the answer; larger means newer.
+            clicks: of this revision.
+            options: of this revision.
             when_done: called with the answer, without any lock held; not called when a newer request came in time.
         """
         request = _Request(revision, tuple(clicks), options, when_done)
@@ -265,7 +267,7 @@ class SolverWorker:
         future.add_done_callback(partial(_deliver, request))
 
     def close(self) -> None:
-        """Stop; the solve under way is finished, and no answer comes after this returns."""
+        """Stop: the current solve is finished, and no answer comes after this returns."""
         with self._lock:
             self._closed = True
             self._newest_revision += 1
@@ -282,7 +284,7 @@ class SolverWorker:
 
 
 def _deliver(request: _Request, future: "Future[Solved | None]") -> None:
-    """Hand the answer over. A failure is an answer too: it is shown where the person looks, and logged if it is ours."""
+    """Deliver the answer. A failure is an answer too: it is shown to the user, and logged if it is a bug."""
     if future.cancelled():
         return
     error = future.exception()
@@ -294,11 +296,11 @@ def _deliver(request: _Request, future: "Future[Solved | None]") -> None:
 def _failure(error: BaseException) -> Unsolvable:
     if isinstance(error, CalibrationError):
         return Unsolvable(
-            "unreadable", str(error), "the clicks are kept; put that right, then change any of them to try again"
+            "unreadable", str(error), "the clicks are kept; fix the problem, then change any click to try again"
         )
     _log.error("the solver failed", exc_info=error)
     return Unsolvable(
         "internal-error",
         f"the solver failed: {type(error).__name__}: {error}",
-        "this is a fault of the program, not of your data; the clicks are kept, and the log has the details for a report",
+        "this is a bug in cocalib, not a problem with your data; the clicks are kept, and the log has details for a bug report",
     )

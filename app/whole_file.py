@@ -1,4 +1,4 @@
-"""Writing a file so that a reader finds the old one or the new one, never a part."""
+"""Atomic writes: a reader finds the old file or the new one, never a part."""
 
 import os
 import secrets
@@ -8,10 +8,10 @@ __all__ = ["write_whole"]
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Replace a file, or make it, in one step that outlasts a crash.
+    """Replace or create a file in one step, durable across a crash.
 
     Raises:
-        OSError: it cannot be written; what was there stays.
+        OSError: it cannot be written; the old file stays.
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(6)}")
     try:
@@ -26,7 +26,7 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the file's name as lasting as its content; Windows does so by itself."""
+    """Flush the folder, so that the file's name is as durable as its content; Windows needs no such step."""
     if os.name == "nt":
         return
     descriptor = os.open(folder, os.O_RDONLY)

@@ -1,4 +1,4 @@
-"""The one mutable cell of the program: the history of the session, and the way every change takes through it."""
+"""The only mutable state of the program: the history of the session, and how every change is made."""
 
 import threading
 from collections import deque
@@ -23,17 +23,17 @@ Subscriber: TypeAlias = Callable[[View], None]
 
 
 class Journal(Protocol):
-    """What keeps the steps: app.session.file.SessionFile, or a list in a test."""
+    """Stores the steps: app.session.file.SessionFile, or a list in a test."""
 
     def append(self, step: Step, history: History) -> None:
-        """Keep a step for good before returning; `history` is what it leads to."""
+        """Store a step permanently before returning; `history` is the state after it."""
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
 
 
 class Solver(Protocol):
-    """What answers a revision: app.solving.SolverWorker, or a fake in a test."""
+    """Solves revisions: app.solving.SolverWorker, or a fake in a test."""
 
     def request(
         self,
@@ -42,22 +42,22 @@ class Solver(Protocol):
         options: CalibrationOptions,
         when_done: Callable[[Solved], None],
     ) -> None:
-        """Answer this revision soon, and forget the older ones; must not wait. A larger revision is a newer one."""
+        """Solve this revision and drop older requests; must not block. A larger revision is a newer one."""
 
     def close(self) -> None:
-        """Stop; no answer comes after this returns."""
+        """Stop: no answer comes after this returns."""
 
 
 class Workspace:
-    """Holds the session; whoever wants to change it dispatches a step.
+    """Holds the session; every change is made by dispatching a step.
 
-    A step is journalled before anybody is told of it. Views reach the subscribers in the order of the changes and outside
-    the lock, so a subscriber may dispatch; it must return quickly and must not raise.
+    A step is journalled before the subscribers are notified. Views reach them in the order of the changes and outside the
+    lock, so a subscriber may dispatch; it must return quickly and must not raise.
 
     Attributes:
         facts: the recording's frames.
         restored: what was found in the session's folder at the start.
-        reference: a calibration to look at until the clicks give one of their own; None without one.
+        reference: a calibration to show until the clicks give a new one; None if there is none.
     """
 
     def __init__(
@@ -76,32 +76,32 @@ class Workspace:
         self._solver = solver
         self._lock = threading.Lock()
         self._subscribers: tuple[Subscriber, ...] = ()
-        self._untold: deque[tuple[View, tuple[Subscriber, ...]]] = deque()
-        self._telling = False
+        self._pending: deque[tuple[View, tuple[Subscriber, ...]]] = deque()
+        self._notifying = False
         self._ask_for_answer(restored.history.present)
 
     @property
     def history(self) -> History:
-        """The session with what can be undone and redone."""
+        """The session, with what can be undone and redone."""
         return self._history
 
     @property
     def session(self) -> Session:
-        """The session of now."""
+        """The current session."""
         return self._history.present
 
     @property
     def view(self) -> View:
-        """What there is to draw now."""
+        """The current View."""
         return view(self._history, self.facts, self.reference)
 
     def dispatch(self, step: Step) -> None:
-        """Take one step: apply it, journal it, then tell the subscribers.
+        """Apply one step, journal it, then notify the subscribers.
 
         Raises:
             EventError: the event does not fit; nothing changed.
             OptionError: an option is unknown or out of range; nothing changed.
-            SessionFileError: the step could not be kept; nothing changed.
+            SessionFileError: the step could not be stored; nothing changed.
         """
         with self._lock:
             step = settled(step, self._history.present)
@@ -111,28 +111,28 @@ class Workspace:
             if not isinstance(step, Solved):
                 self._journal.append(step, after)
             self._history = after
-            self._untold.append((view(after, self.facts, self.reference), self._subscribers))
+            self._pending.append((view(after, self.facts, self.reference), self._subscribers))
         self._ask_for_answer(after.present)
-        self._tell()
+        self._notify()
 
     def undo(self) -> None:
-        """Take the last change back; nothing happens when there is none."""
+        """Undo the last change, if there is one."""
         self.dispatch(Undo())
 
     def redo(self) -> None:
-        """Make the change again that was taken back last; nothing happens when there is none."""
+        """Redo the change that was undone last, if there is one."""
         self.dispatch(Redo())
 
     def subscribe(self, subscriber: Subscriber) -> Callable[[], None]:
-        """Call the subscriber with the View of now and of every change from now on.
+        """Call the subscriber with the current View, and again after every change.
 
         Returns:
             a function that ends the subscription.
         """
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
-            self._untold.append((view(self._history, self.facts, self.reference), (subscriber,)))
-        self._tell()
+            self._pending.append((view(self._history, self.facts, self.reference), (subscriber,)))
+        self._notify()
 
         def end() -> None:
             with self._lock:
@@ -145,7 +145,7 @@ class Workspace:
         return write_clicks(self.session.clicks)
 
     def import_clicks(self, text: str, source: str) -> None:
-        """Let the clicks of a clicks-1 file join the session.
+        """Add the clicks of a clicks-1 file to the session.
 
         Args:
             text: the content of the file.
@@ -158,34 +158,34 @@ class Workspace:
         self.dispatch(ClicksImported(read_clicks(text, source)))
 
     def close(self) -> None:
-        """Stop the solver and let go of the session file."""
+        """Stop the solver and close the session file."""
         self._solver.close()
         with self._lock:
             self._journal.close()
 
     def _ask_for_answer(self, session: Session) -> None:
-        """Ask without the lock: the answer may come in this very call, and older requests never replace newer ones."""
+        """Request a solve without holding the lock: the answer may come at once; older requests never replace newer ones."""
         if session.needs_solving:
             self._solver.request(session.revision, session.clicks, session.options, self.dispatch)
 
-    def _tell(self) -> None:
-        """Tell the subscribers what they have not heard, one thread at a time and in order."""
+    def _notify(self) -> None:
+        """Send pending Views to their subscribers, one thread at a time and in order."""
         while True:
             with self._lock:
-                if self._telling or not self._untold:
+                if self._notifying or not self._pending:
                     return
-                shown, subscribers = self._untold.popleft()
-                self._telling = True
+                shown, subscribers = self._pending.popleft()
+                self._notifying = True
             try:
                 for subscriber in subscribers:
                     subscriber(shown)
             finally:
                 with self._lock:
-                    self._telling = False
+                    self._notifying = False
 
 
 def recording_facts(recording: Recording, name: str) -> RecordingFacts:
-    """Return the little that clicks must fit.
+    """Return what clicks are checked against.
 
     Args:
         recording: the open recording.
@@ -196,7 +196,7 @@ def recording_facts(recording: Recording, name: str) -> RecordingFacts:
     """
     if not len(recording.image_times):
         raise InputError(
-            f"{name}: has no frames to click in; give the recording of the camera too, or another --image-topic"
+            f"{name}: has no frames to click in; give the camera's recording as well, or another --image-topic"
         )
     picture = recording.image_bytes(0)
     return RecordingFacts(name, recording.image_times, picture.width_px, picture.height_px, recording.radar_axes)
@@ -210,14 +210,14 @@ def open_workspace(
     name: str,
     reference: Reference | None = None,
 ) -> Workspace:
-    """Open or begin the session of a recording, with a solver beside it.
+    """Open or start the session of a recording, with its solver.
 
     Args:
         recording: the open recording.
-        camera: the intrinsics to solve with; None where there are none.
-        session_folder: where the session is kept.
+        camera: the intrinsics to solve with; None if there are none.
+        session_folder: where the session is stored.
         name: what to call the recording.
-        reference: a calibration to look at and to compare with; None without one.
+        reference: a calibration to review and to compare with; None if there is none.
 
     Raises:
         InputError: the recording has no frames.

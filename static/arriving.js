@@ -1,12 +1,12 @@
 // @ts-check
-/** Coming to another placement or pair: what is looked for is in sight, at the zoom one has. */
+/** Going to another placement or pair: keep the zoom and bring the reflector into view. */
 
 import { lookAt, viewport } from "./geometry.js";
 import { fit, redraw } from "./picture.js";
 import { goTo, pause } from "./player.js";
 import { clickIn, emit, on, state } from "./state.js";
 
-/** The frame that has been gone to and is not centred yet. @type {number|null} */
+/** The frame to centre once it is shown. @type {number|null} */
 let awaited = null;
 
 export function startArriving() {
@@ -14,7 +14,7 @@ export function startArriving() {
   on(["playing"], () => (awaited = null));
 }
 
-/** Go to a frame: fitted, or with its reflector in the middle where a mark or the calibration tells the place. @param {number} frame */
+/** Go to a frame. When zoomed in, centre the reflector if a mark or the calibration gives its position. @param {number} frame */
 export function comeTo(frame) {
   pause();
   awaited = viewport.fitted ? null : frame;

@@ -1,5 +1,5 @@
 // @ts-check
-/** The hand on the frame: click places, drag on a mark adjusts, drag elsewhere pans, wheel zooms at the cursor, arrows nudge. */
+/** Pointer input on the frame: click to place, drag a mark to move it, drag elsewhere to pan, wheel to zoom at the cursor, arrow keys to nudge. */
 
 import { onImage, pan, toCss, toImage, viewport } from "./geometry.js";
 import { hold } from "./loupe.js";
@@ -11,9 +11,9 @@ import { toast } from "./notices.js";
 
 /** A press that moves farther than this is a drag [CSS px]. */
 const THRESHOLD = 4;
-/** A press this near to a mark takes hold of it [CSS px]. */
+/** A press this close to a mark grabs it [CSS px]. */
 const REACH = 9;
-/** Nudges are sent when the key rests this long [ms]: one change, one step back. */
+/** Nudges are sent once no key was pressed for this long [ms], so that they make one change and one undo step. */
 const REST = 250;
 
 /** @type {{x: number, y: number, lastX: number, lastY: number, u: number, v: number, moved: boolean, mark: import("./messages.js").ClickRow|null, pointer: number}|null} */
@@ -33,7 +33,7 @@ export function startClicking() {
   on(["cursor", "playing"], flushNudge);
 }
 
-/** Place of an event in the canvas box. @param {MouseEvent} event @returns {[number, number]} CSS px */
+/** Position of an event in the canvas box. @param {MouseEvent} event @returns {[number, number]} CSS px */
 function inBox(event) {
   const box = marks.getBoundingClientRect();
   return [event.clientX - box.left, event.clientY - box.top];
@@ -51,7 +51,7 @@ function pressed(event) {
   /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
 }
 
-/** The mark of this frame under the hand. @param {number} x @param {number} y */
+/** The mark of this frame under the pointer. @param {number} x @param {number} y */
 function markNear(x, y) {
   const click = clickIn(state.shown?.index ?? -1);
   if (!click || state.playing) return null;
@@ -101,7 +101,7 @@ function hover(point) {
   emit("hover");
 }
 
-/** Put a click into the frame on screen. @param {number} u @param {number} v */
+/** Place a click in the frame on screen. @param {number} u @param {number} v */
 export async function place(u, v) {
   if (!state.shown) return;
   if (state.playing) return pause();
@@ -114,7 +114,7 @@ export async function place(u, v) {
   if (here?.id) select(here.id);
 }
 
-/** Put a click where the reflector is expected; else in the middle of what is seen, for the arrows to move. */
+/** Place a click where the reflector is expected, or else in the middle of the view, to be moved with the arrow keys. */
 export function placeByKey() {
   if (!state.shown || state.shown.index !== state.cursor || state.playing || clickIn(state.cursor)) return;
   const guess = state.overlay?.index === state.shown.index ? state.overlay.guesses[0] : undefined;
@@ -137,24 +137,24 @@ async function moveTo(click, u, v) {
   await settle(key, { type: "click_moved", id: click.id, pixel_px: [inU, inV] });
 }
 
-/** Keep a point on the picture. @param {number} u @param {number} v @returns {[number, number]} */
+/** Clamp a point to the picture. @param {number} u @param {number} v @returns {[number, number]} */
 function clamped(u, v) {
   const most = [viewport.imageWidth - 0.5, viewport.imageHeight - 0.5];
   return [Math.min(most[0], Math.max(-0.5, u)), Math.min(most[1], Math.max(-0.5, v))];
 }
 
-/** Show a mark where the hand left it, before the server has said so. @param {string} key @param {number} u @param {number} v */
+/** Show a mark where the user left it, before the server confirms it. @param {string} key @param {number} u @param {number} v */
 function draft(key, u, v) {
   state.local.set(key, { u, v });
   emit("view");
 }
 
-/** Send and then believe the server. @param {string} key @param {Record<string, any>} message */
+/** Send the change, then show what the server has. @param {string} key @param {Record<string, any>} message */
 async function settle(key, message) {
   const mine = state.local.get(key);
   const refusal = await send(message);
   if (state.local.get(key) === mine) state.local.delete(key);
-  if (refusal) toast(refusal, "The mark is back where it was.");
+  if (refusal) toast(refusal, "The mark was moved back.");
   emit("view");
 }
 
@@ -191,7 +191,7 @@ function wheeled(event) {
   hover(onImage(u, v) ? { u, v } : null);
 }
 
-/** Leave the selected click out of the solve, or take it in again. */
+/** Exclude the selected click, or include it again. */
 export async function toggleExcluded() {
   const click = selectedClick();
   if (!click) return;

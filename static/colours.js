@@ -1,5 +1,5 @@
 // @ts-check
-/** Colours of the marks. Blue to sand to red-orange tells small from large residuals to every kind of eye; shapes say it again. */
+/** Colours of the marks. The residual ramp from blue through sand to red-orange also works for colour-blind users; shapes carry the same information. */
 
 /** @type {[number, [number, number, number]][]} */
 const RAMP = [
@@ -27,7 +27,7 @@ export function residualColour(residual, limit) {
   return rampColour(residual / Math.max(limit ?? 20, 1e-9));
 }
 
-/** @param {number} share of the ramp, 0 to 1 */
+/** @param {number} position on the ramp, 0 to 1 */
 export function rampColour(share) {
   const at = Math.min(1, Math.max(0, share));
   const upper = RAMP.findIndex(([stop]) => stop >= at);

@@ -1,16 +1,16 @@
 // @ts-check
-/** Parts of the export panel: the text with its comments set apart, the pose in numbers, the warnings. */
+/** Parts of the export panel: the text with its comments dimmed, the pose in numbers, the warnings. */
 
 import { icon, make } from "./notices.js";
 
-/** The text with its comments set apart. @param {string} content */
+/** The text with its comments dimmed. @param {string} content */
 export function lines(content) {
   let inside = false;
   return content.split(/(?<=\n)/).map((line) => {
     const opens = line.includes("<!--");
-    const said = inside || opens || /^\s*(#|%)/.test(line);
+    const isComment = inside || opens || /^\s*(#|%)/.test(line);
     inside = (inside || opens) && !line.includes("-->");
-    return said ? make("i", "", line) : line;
+    return isComment ? make("i", "", line) : line;
   });
 }
 
@@ -24,14 +24,14 @@ export function numbers(preview) {
     row("translation_m", [x, y, z, ""]),
     row("quaternion_xyzw", preview.quaternion_xyzw.map((/** @type {number} */ value) => value.toFixed(4))),
   ]);
-  table.dataset.hint = "Rounded here; the file has every digit.";
+  table.dataset.hint = "Rounded here; the file has full precision.";
   return table;
 }
 
-/** What the solve warns of. @param {import("./messages.js").WarningRow[]} rows */
+/** The warnings of the calibration. @param {import("./messages.js").WarningRow[]} rows */
 export function warningBox(rows) {
   if (!rows.length) return [];
-  const title = rows.length === 1 ? "One warning comes with this calibration" : `${rows.length} warnings come with this calibration`;
+  const title = rows.length === 1 ? "This calibration has one warning" : `This calibration has ${rows.length} warnings`;
   const items = rows.map((row) => {
     const item = make("li", "", row.message);
     item.dataset.hint = row.hint;
@@ -42,15 +42,15 @@ export function warningBox(rows) {
 
 const RECTIFIED = "cocalib-rectified";
 
-/** The word about the pictures that a format without a place for distortion asks for. It is kept for this visit only: the next
- * recording's pictures may be others. @param {() => void} changed */
+/** The user's statement that the pictures are rectified, required by formats that cannot hold distortion. It is kept for this
+ * browser session only: the pictures of the next recording may differ. @param {() => void} changed */
 export function rectifiedBox(changed) {
   const box = make("input", "", []);
   box.type = "checkbox";
   try {
     box.checked = sessionStorage.getItem(RECTIFIED) === "1";
   } catch {
-    // A browser that keeps nothing forgets the word, no more.
+    // Without storage, the choice is just not remembered.
   }
   box.addEventListener("change", () => {
     try {
@@ -61,6 +61,6 @@ export function rectifiedBox(changed) {
     changed();
   });
   const label = make("label", "", [box, "My pictures are rectified (undistorted with this K)"]);
-  label.dataset.hint = "They are undistorted with this same camera matrix, and no distortion is left in them: this format has no place for any.";
+  label.dataset.hint = "The pictures were undistorted with this camera matrix and have no distortion left. This format cannot hold distortion coefficients.";
   return { box, row: make("div", "rectified", [label]) };
 }

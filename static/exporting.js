@@ -1,5 +1,5 @@
 // @ts-check
-/** The export panel: every format with its text before it is saved, which way it carries points, and the clicks. */
+/** The export panel: a preview of every format, the direction of its transform, and the clicks. */
 
 import { warningBox, lines, numbers, rectifiedBox } from "./export_parts.js";
 import { frameDrawing } from "./frames.js";
@@ -8,18 +8,18 @@ import { send } from "./socket.js";
 import { on, state } from "./state.js";
 
 /** @typedef {{key: string, label: string, takes_parent: boolean, takes_rectified: boolean}} Format */
-/** What the server says about a format: ExportPreview in app/web/channel/export_preview.py. @typedef {Record<string, any>} Preview */
+/** The server's preview of a format: ExportPreview in app/web/channel/export_preview.py. @typedef {Record<string, any>} Preview */
 const KEPT = "cocalib-export";
 const CLICKS = "clicks";
 const PARENT = ["x", "y", "z", "qx", "qy", "qz", "qw"];
-const NOWHERE = ["0", "0", "0", "0", "0", "0", "1"];
+const IDENTITY = ["0", "0", "0", "0", "0", "0", "1"];
 const TYPING_MS = 250;
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("export-dialog"));
 const button = /** @type {HTMLButtonElement} */ (document.getElementById("export"));
 /** @type {Format[]} */
 let formats = [];
 /** @type {{format: string, parent: string[]}} */
-let kept = { format: "json", parent: [...NOWHERE] };
+let kept = { format: "json", parent: [...IDENTITY] };
 let asked = 0;
 let parentTimer = 0;
 
@@ -38,7 +38,7 @@ export function startExporting() {
   try {
     kept = { ...kept, ...JSON.parse(localStorage.getItem(KEPT) ?? "{}") };
   } catch {
-    // A browser that keeps nothing forgets the choice, no more.
+    // Without storage, the choice is just not remembered.
   }
   build();
   button.onclick = openExport;
@@ -78,7 +78,7 @@ function build() {
   list.setAttribute("aria-label", "Format");
   list.addEventListener("keydown", walk);
   text.tabIndex = 0;
-  text.setAttribute("aria-label", "The file's text");
+  text.setAttribute("aria-label", "File content");
   fileName.type = "text";
   fileName.spellcheck = false;
   fileName.setAttribute("aria-label", "File name");
@@ -96,7 +96,7 @@ function drawList() {
   list.replaceChildren(
     ...formats.map((format) => option(format.key, format.label)),
     make("hr", "", []),
-    option(CLICKS, "Clicks, to go on with elsewhere"),
+    option(CLICKS, "Clicks, to continue elsewhere"),
   );
 }
 
@@ -124,7 +124,7 @@ function choose(key) {
   load();
 }
 
-/** Up and down walk the list and choose. @param {KeyboardEvent} event */
+/** The up and down keys move through the list and select. @param {KeyboardEvent} event */
 function walk(event) {
   const items = /** @type {HTMLElement[]} */ ([...list.querySelectorAll("[data-export]")]);
   const at = items.findIndex((item) => item.dataset.export === kept.format);
@@ -136,7 +136,7 @@ function walk(event) {
   next.scrollIntoView({ block: "nearest" });
 }
 
-/** Tab stays in the panel. @param {KeyboardEvent} event */
+/** Keep Tab inside the panel. @param {KeyboardEvent} event */
 function trap(event) {
   if (event.key !== "Tab") return;
   const stops = /** @type {HTMLElement[]} */ ([...dialog.querySelectorAll("button, input:not([type=file]), label[tabindex], pre")]).filter(
@@ -164,7 +164,7 @@ async function load() {
 /** @param {"preview"|"export"} kind */
 function address(kind) {
   const query = new URLSearchParams();
-  if (takesParent() && kept.parent.join() !== NOWHERE.join()) query.set("parent_from_radar", kept.parent.join());
+  if (takesParent() && kept.parent.join() !== IDENTITY.join()) query.set("parent_from_radar", kept.parent.join());
   if (takesRectified() && rectified.box.checked) query.set("rectified", "1");
   return `api/${kind}/${encodeURIComponent(kept.format)}${query.size ? `?${query}` : ""}`;
 }
@@ -175,7 +175,7 @@ const takesRectified = () => form()?.takes_rectified ?? false;
 
 /** @param {Preview} preview */
 function drawPreview(preview) {
-  const kind = preview.is_binary ? `binary, ${preview.size_bytes} bytes: this is what is in it` : "";
+  const kind = preview.is_binary ? `binary, ${preview.size_bytes} bytes; contents shown below` : "";
   head.replaceChildren(make("span", "", preview.numbers), make("span", "kind", kind));
   parent.hidden = !takesParent();
   rectified.row.hidden = !preview.is_for_rectified;
@@ -192,7 +192,7 @@ function drawPreview(preview) {
 /** @param {string} content */
 function drawClicks(content) {
   const count = state.view?.clicks.length ?? 0;
-  head.replaceChildren(make("span", "", `${count} click${count === 1 ? "" : "s"} with the stamps of their frames: for cocalib solve, or to load on another machine`));
+  head.replaceChildren(make("span", "", `${count} click${count === 1 ? "" : "s"} with the stamps of their frames, for cocalib solve or to load on another machine`));
   parent.hidden = true;
   rectified.row.hidden = true;
   show(content, "clicks.json", false);
@@ -200,7 +200,7 @@ function drawClicks(content) {
   side.replaceChildren();
 }
 
-/** Why there is nothing to save yet. @param {string} reason */
+/** Show why there is nothing to save yet. @param {string} reason */
 function drawReason(reason) {
   head.replaceChildren();
   const inParent = takesParent() && reason.includes("parent");
@@ -224,17 +224,17 @@ function show(content, name, isBinary) {
 }
 
 function parentFields() {
-  const label = make("span", "", "Pose of the radar in the kit, rig or ego frame");
-  label.dataset.hint = "parent_from_radar: position in metres, rotation as a quaternion in the order x y z w. As it stands, the radar is the origin.";
+  const label = make("span", "", "Radar pose in the kit, rig or ego frame");
+  label.dataset.hint = "parent_from_radar: position in metres, rotation as a quaternion in the order x y z w. By default the radar is the origin.";
   const fields = PARENT.map((name, index) => {
     const field = make("input", "", []);
     field.type = "text";
     field.inputMode = "decimal";
-    field.value = kept.parent[index] ?? NOWHERE[index];
-    field.setAttribute("aria-label", `${name} of the radar in its parent`);
+    field.value = kept.parent[index] ?? IDENTITY[index];
+    field.setAttribute("aria-label", `${name} of the radar in the parent frame`);
     field.addEventListener("input", () => {
       const values = /** @type {HTMLInputElement[]} */ ([...parent.querySelectorAll("input")]).map((input) => input.value.trim());
-      keep({ parent: values.map((value, at) => value || NOWHERE[at]) });
+      keep({ parent: values.map((value, at) => value || IDENTITY[at]) });
       clearTimeout(parentTimer);
       parentTimer = window.setTimeout(load, TYPING_MS);
     });
@@ -248,14 +248,14 @@ async function copyText() {
   try {
     await navigator.clipboard.writeText(content);
   } catch {
-    getSelection()?.selectAllChildren(text); // without HTTPS, a page on another machine has no clipboard but this
+    getSelection()?.selectAllChildren(text); // without HTTPS, a page on another machine has only this clipboard
     document.execCommand("copy");
   }
   copy.classList.add("done");
   setTimeout(() => copy.classList.remove("done"), 1600);
 }
 
-/** Fetch the file and hand it to the browser under the name in the field; a refusal is shown in words. */
+/** Download the file under the name in the field; if the server refuses, show why. */
 async function download() {
   if (save.disabled) return;
   const answer = await fetch(kept.format === CLICKS ? "api/clicks.json" : address("export"));
@@ -280,7 +280,7 @@ function importer() {
     input.value = "";
   };
   const open = make("button", "second", "Load clicks…");
-  open.dataset.hint = "Clicks from a clicks.json join what is here.";
+  open.dataset.hint = "Add the clicks from a clicks.json. In frames that already have a click, they replace it.";
   open.onclick = () => input.click();
   return make("span", "", [open, input]);
 }
@@ -291,6 +291,6 @@ function keep(change) {
   try {
     localStorage.setItem(KEPT, JSON.stringify(kept));
   } catch {
-    // A browser that keeps nothing forgets the choice, no more.
+    // Without storage, the choice is just not remembered.
   }
 }

@@ -1,5 +1,5 @@
 // @ts-check
-/** Metrics, pose and warnings, as the server worded them. */
+/** Metrics, pose and warnings, with the server's text. */
 
 import { icon, make } from "./notices.js";
 import { on, state } from "./state.js";
@@ -8,7 +8,7 @@ import { on, state } from "./state.js";
 const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));
 const warnings = /** @type {HTMLElement} */ (document.getElementById("warnings"));
 const posePage = /** @type {HTMLElement} */ (document.getElementById("page-pose"));
-/** What stands in the strip before there is anything to say: nothing jumps when it arrives. @type {[string, string][]} */
+/** Placeholders before the first calibration, so that the layout does not jump. @type {[string, string][]} */
 const EMPTY = [
   ["aed", "AED"],
   ["held_out_aed", "held-out AED"],
@@ -16,14 +16,14 @@ const EMPTY = [
   ["rms", "RMS"],
   ["inliers", "pairs that agree"],
 ];
-/** Warnings that the person has opened stay open. @type {Set<string>} */
+/** Warnings that the user has opened stay open. @type {Set<string>} */
 const openCodes = new Set(["unsolvable"]);
 export const poseTable = make("table", "", []);
 const poseHead = make("div", "pose-head", "");
 const apartTable = make("table", "", []);
 const apart = make("div", "apart", []);
 const adviceLine = make("p", "advice", "");
-const axesLine = make("p", "advice axes", "Along and about the radar's axes: x forward, y left, z up. All angles 0: the camera looks along x.");
+const axesLine = make("p", "advice axes", "Relative to the radar's axes: x forward, y left, z up. With all angles at 0, the camera looks along x.");
 let warningText = "";
 
 export function startFigures() {
@@ -36,21 +36,21 @@ function draw() {
   const view = state.view;
   if (!view) return;
   figures.classList.toggle("stale", view.solving && view.has_calibration);
-  const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Appears with the first calibration.", level: "none" }));
+  const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Available after the first calibration.", level: "none" }));
   figures.replaceChildren(...shown.map(cell));
-  poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Appears with the first calibration.")])]));
+  poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Available after the first calibration.")])]));
   adviceLine.textContent = view.advice?.words ?? "";
   drawReference(view);
   const failure = view.stage === "unsolvable" ? [{ code: "unsolvable", message: view.status, hint: view.hint }] : [];
   drawWarnings([...failure, ...(state.recording?.warnings ?? []), ...view.warnings]);
 }
 
-/** Where the pose comes from while it is a file's, and how far the solved one lies from it. @param {import("./messages.js").View} view */
+/** Name the file that the pose comes from, or show how far the solved pose is from the one in it. @param {import("./messages.js").View} view */
 function drawReference(view) {
   poseHead.hidden = !view.reference || view.has_calibration;
   poseHead.textContent = `From ${view.reference}, not from the clicks`;
   apart.hidden = view.comparison.length === 0;
-  apart.replaceChildren(make("div", "pose-head", `Solved, against ${view.reference}`), apartTable);
+  apart.replaceChildren(make("div", "pose-head", `Difference from ${view.reference}`), apartTable);
   apartTable.replaceChildren(...view.comparison.map(row));
 }
 

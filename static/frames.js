@@ -1,5 +1,5 @@
 // @ts-check
-/** A small drawing of the radar's and the camera's axes, with the arrow that says which way points are carried. */
+/** A small drawing of the radar's and the camera's axes, with an arrow for the direction of the transform. */
 
 const NS = "http://www.w3.org/2000/svg";
 const WIDTH = 280;
@@ -7,7 +7,7 @@ const HEIGHT = 212;
 const RADAR = [72, 78];
 const CAMERA = [206, 78];
 const LENGTH = 44;
-/** Where the radar's x (forward), y (left) and z (up) point on the paper: seen from behind, to the left and above. */
+/** Directions of the radar's x (forward), y (left) and z (up) in the drawing: seen from behind, from the left and from above. */
 const PAPER = [
   [0.64, -0.4],
   [-0.82, -0.26],
@@ -16,14 +16,14 @@ const PAPER = [
 const COLOURS = ["var(--axis-x)", "var(--axis-y)", "var(--axis-z)"];
 
 /**
- * Draw both frames. The directions of the axes are the solved ones; the places are not to scale.
+ * Draw both frames. The directions of the axes are the solved ones; the positions are not to scale.
  * @param {Record<string, any>} preview ExportPreview of app/web/channel/export_preview.py
  */
 export function frameDrawing(preview) {
   const svg = shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "frames", role: "img" });
   const body = preview.axes === "link";
-  const inFile = preview.carries === "radar_from_camera" ? `The file states the pose of the camera${body ? "'s body frame" : ""} in the radar.` : "";
-  svg.append(said(`Points are carried from ${preview.radar_frame} to ${preview.camera_frame}: p_camera = R p_radar + t. ${inFile}`));
+  const inFile = preview.carries === "radar_from_camera" ? `The file gives the pose of the camera${body ? "'s body frame" : ""} in the radar frame.` : "";
+  svg.append(titled(`Transforms points from ${preview.radar_frame} to ${preview.camera_frame}: p_camera = R p_radar + t. ${inFile}`));
   svg.append(arrow(RADAR, CAMERA, 0, "carry"), label(136, 70, "R, t", "equation"), label(WIDTH / 2, 176, "p_camera = R p_radar + t", "equation"));
   if (preview.carries === "radar_from_camera") {
     svg.append(arrow(CAMERA, RADAR, 13, "stated"), label(WIDTH / 2, 196, `⇠ in this file: the pose of ${body ? "its body frame (x forward)" : "the camera"}`, "stated"));
@@ -35,7 +35,7 @@ export function frameDrawing(preview) {
   return svg;
 }
 
-/** Three arrows with their letters; `directions` are the axes in the radar frame, those farther away drawn first. @param {Element} svg @param {number[]} at @param {number[][]} directions */
+/** Three arrows with their letters; `directions` are the axes in the radar frame. @param {Element} svg @param {number[]} at @param {number[][]} directions */
 function axes(svg, at, directions) {
   for (const [index, [x, y, z]] of directions.entries()) {
     const dx = LENGTH * (x * PAPER[0][0] + y * PAPER[1][0] + z * PAPER[2][0]);
@@ -73,7 +73,7 @@ function label(x, y, words, name) {
 }
 
 /** @param {string} words */
-function said(words) {
+function titled(words) {
   const title = shape("title", {});
   title.textContent = words;
   return title;

@@ -1,10 +1,10 @@
 // @ts-check
 /**
- * Where image pixels lie on the screen. Image pixels follow OpenCV: (0, 0) is the centre of the top-left pixel, the picture's
- * edge is at -0.5. The half pixel lives in `toDevice` and its inverse, and nowhere else.
+ * Maps image pixels to the screen and back. Image pixels follow OpenCV: (0, 0) is the centre of the top-left pixel, the picture's
+ * edge is at -0.5. The half pixel appears only in `toDevice` and its inverse.
  */
 
-/** Canvas boxes are multiples of this many CSS px: then they end on device pixels at 100, 125, 150 and 200 %. */
+/** Canvas boxes are multiples of this many CSS px, so that they end on device pixels at 100, 125, 150 and 200 %. */
 const GRID = 4;
 const MAX_SCALE = 64;
 
@@ -39,12 +39,12 @@ export function toCss(u, v) {
   return [x / viewport.ratio, y / viewport.ratio];
 }
 
-/** Whether an image point lies on the picture. @param {number} u @param {number} v */
+/** Whether an image point is on the picture. @param {number} u @param {number} v */
 export function onImage(u, v) {
   return u >= -0.5 && v >= -0.5 && u <= viewport.imageWidth - 0.5 && v <= viewport.imageHeight - 0.5;
 }
 
-/** Take the size of the pane. @param {number} width @param {number} height CSS px @returns {boolean} whether anything changed */
+/** Adopt the size of the pane. @param {number} width @param {number} height CSS px @returns {boolean} whether anything changed */
 export function resize(width, height) {
   const box = [Math.max(GRID, Math.floor(width / GRID) * GRID), Math.max(GRID, Math.floor(height / GRID) * GRID)];
   const ratio = window.devicePixelRatio || 1;
@@ -78,7 +78,7 @@ export function lookAt(u, v) {
   keepInside();
 }
 
-/** Zoom and leave the image point under (x, y) where it is. @param {number} factor @param {number} x @param {number} y CSS px */
+/** Zoom, keeping the image point under (x, y) in place. @param {number} factor @param {number} x @param {number} y CSS px */
 export function zoomAt(factor, x, y) {
   const [u, v] = toImage(x, y);
   const smallest = fitScale();
@@ -109,7 +109,7 @@ function fitScale() {
   );
 }
 
-/** Do not let the picture leave the box: its edge may come to the middle, no farther. */
+/** Keep the picture in the box: its edge may reach the middle, no farther. */
 function keepInside() {
   const [halfWidth, halfHeight] = [(viewport.width * viewport.ratio) / 2, (viewport.height * viewport.ratio) / 2];
   viewport.left = Math.min(halfWidth, Math.max(halfWidth - viewport.imageWidth * viewport.scale, viewport.left));

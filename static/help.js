@@ -1,5 +1,5 @@
 // @ts-check
-/** Keys, mouse and marks on one sheet. */
+/** The help dialog: keys, mouse and marks. */
 
 import { ink } from "./colours.js";
 import { KEYS } from "./keys.js";
@@ -9,21 +9,21 @@ const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("help-d
 /** @type {[string, string][]} */
 const MOUSE = [
   ["wheel", "zoom at the cursor"],
-  ["drag", "move the picture"],
-  ["click", "place the mark of this frame"],
-  ["drag a mark", "adjust it"],
+  ["drag", "pan the picture"],
+  ["click", "place the mark for this frame"],
+  ["drag a mark", "move it"],
 ];
 /** @type {[string, string][]} */
 const MARKS = [
-  ["M8 1v5M8 10v5M1 8h5M10 8h5", "cross: your click; small and coloured, the click of another frame"],
-  ["M6.5 1h3v5.5H15v3H9.5V15h-3V9.5H1v-3h5.5z", "hollow cross: a click that is left out"],
-  ["M8 3a5 5 0 1 0 .01 0z", "ring: where the calibration puts its radar position"],
-  ["M2 13 13 3", "line between them: the residual"],
-  ["M1 8a7 4 0 1 0 14 0a7 4 0 1 0-14 0z||ring", "ellipse: 95 % of the clicks of good pairs lie in it"],
-  ["M8 3a5 5 0 1 0 .01 0z|2.5 2.5|guess", "dashed circle: the reflector is expected here"],
-  ["M1 8 8 4.5 15 8 8 11.5z|2.5 2.5|guess", "dashed diamond (ring in 3D): best place for another placement"],
-  ["M8 5.5a2.5 2.5 0 1 0 .01 0z|fill|still", "dot: radar return that stands still"],
-  ["M8 4.5 12 11.5H4z|fill|moving", "triangle: radar return that moves"],
+  ["M8 1v5M8 10v5M1 8h5M10 8h5", "cross: your click; small and coloured: a click in another frame"],
+  ["M6.5 1h3v5.5H15v3H9.5V15h-3V9.5H1v-3h5.5z", "hollow cross: excluded click"],
+  ["M8 3a5 5 0 1 0 .01 0z", "ring: reprojection of its radar position"],
+  ["M2 13 13 3", "line between them: residual"],
+  ["M1 8a7 4 0 1 0 14 0a7 4 0 1 0-14 0z||ring", "ellipse: contains 95 % of the clicks of good pairs"],
+  ["M8 3a5 5 0 1 0 .01 0z|2.5 2.5|guess", "dashed circle: expected position of the reflector"],
+  ["M1 8 8 4.5 15 8 8 11.5z|2.5 2.5|guess", "dashed diamond (ring in 3D): best next placement"],
+  ["M8 5.5a2.5 2.5 0 1 0 .01 0z|fill|still", "dot: static radar return"],
+  ["M8 4.5 12 11.5H4z|fill|moving", "triangle: moving radar return"],
 ];
 
 export function toggleHelp() {
@@ -39,7 +39,7 @@ function build() {
   const keys = make("dl", "", KEYS.flatMap(({ keys: names, does }) => [make("dt", "", names.map(key)), make("dd", "", does)]));
   const mouse = make("dl", "", MOUSE.flatMap(([hand, does]) => [make("dt", "", [key(hand)]), make("dd", "", does)]));
   const legend = make("div", "legend", MARKS.map(([path, words]) => make("div", "", [drawing(path), words])));
-  const title = make("h2", "", "Keys, mouse and marks");
+  const title = make("h2", "", "Shortcuts, mouse and marks");
   title.tabIndex = -1;
   title.autofocus = true;
   dialog.replaceChildren(
@@ -54,7 +54,7 @@ function build() {
 }
 
 function note() {
-  const text = make("p", "", "Every click is kept on disk at once: there is nothing to save. Colours run from blue (small residual) to red (large), and every number explains itself when the pointer rests on it.");
+  const text = make("p", "", "Every click is saved to disk immediately; there is no save button. Colours run from blue (small residual) to red (large). Hover over any number for an explanation.");
   text.style.maxWidth = "260px";
   text.style.color = "var(--muted)";
   return text;

@@ -1,5 +1,5 @@
 // @ts-check
-/** One key, one deed; the same when the hand is in the 3D view. */
+/** Keyboard shortcuts; they also work while the 3D view has the focus. */
 
 import { comeTo } from "./arriving.js";
 import { flushNudge, nudgeBy, placeByKey, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
@@ -11,23 +11,23 @@ import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
 import { isClicked, placementAt, state } from "./state.js";
 
-/** Keys with what they do, in the order of the help. @type {{keys: string[], does: string}[]} */
+/** Keys and what they do, in the order of the help dialog. @type {{keys: string[], does: string}[]} */
 export const KEYS = [
   { keys: ["Space"], does: "play or pause" },
-  { keys: ["←", "→"], does: "one frame" },
-  { keys: ["Shift", "←", "→"], does: "ten frames" },
-  { keys: ["N", "P"], does: "next, previous placement" },
-  { keys: ["J"], does: "next worst residual" },
-  { keys: ["Enter"], does: "place a mark where the reflector is expected, else in the middle" },
+  { keys: ["←", "→"], does: "step one frame" },
+  { keys: ["Shift", "←", "→"], does: "step ten frames" },
+  { keys: ["N", "P"], does: "next or previous placement" },
+  { keys: ["J"], does: "next worst pair" },
+  { keys: ["Enter"], does: "place a mark where the reflector is expected, or in the middle" },
   { keys: ["Alt", "arrows"], does: "move the mark by 0.1 px" },
   { keys: ["Alt", "Shift", "arrows"], does: "move the mark by 1 px" },
-  { keys: ["X"], does: "leave the pair out, or take it in again" },
-  { keys: ["Del"], does: "remove the click" },
+  { keys: ["X"], does: "exclude the pair, or include it again" },
+  { keys: ["Del"], does: "delete the click" },
   { keys: ["Ctrl", "Z"], does: "undo" },
   { keys: ["Ctrl", "Shift", "Z"], does: "redo" },
   { keys: ["F"], does: "fit the picture" },
   { keys: ["+", "−"], does: "zoom" },
-  { keys: ["1", "–", "4"], does: "overlays on and off" },
+  { keys: ["1", "–", "4"], does: "toggle overlays" },
   { keys: ["E"], does: "export" },
   { keys: ["?"], does: "this help" },
 ];
@@ -58,7 +58,7 @@ const PLAIN = {
 /** @type {Record<string, [number, number]>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
-/** Listen in a window; in the capture phase, before viser's own keys. @param {Window} owner */
+/** Listen in a window, in the capture phase so as to run before viser's own handlers. @param {Window} owner */
 export function listen(owner) {
   owner.addEventListener("keydown", pressed, { capture: true });
 }
@@ -66,11 +66,11 @@ export function listen(owner) {
 /** @param {KeyboardEvent} event */
 function pressed(event) {
   const inside = event.view !== null && event.view !== window;
-  const deed = typing(event) && !inside ? undefined : deedOf(event);
-  if (!deed && !(inside && event.key in ARROWS)) return;
+  const action = typing(event) && !inside ? undefined : actionOf(event);
+  if (!action && !(inside && event.key in ARROWS)) return;
   event.preventDefault();
   event.stopImmediatePropagation();
-  deed?.();
+  action?.();
 }
 
 /** Whether the key belongs to a field, a button or a dialog. @param {KeyboardEvent} event */
@@ -85,7 +85,7 @@ function typing(event) {
 }
 
 /** @param {KeyboardEvent} event @returns {(() => unknown)|undefined} */
-function deedOf(event) {
+function actionOf(event) {
   const command = event.ctrlKey || event.metaKey;
   if (command) return commandOf(event);
   if (event.key in ARROWS) return arrow(event);

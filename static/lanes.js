@@ -1,5 +1,5 @@
 // @ts-check
-/** What the timeline shows, lane by lane: ruler, placements with residual stems, radar activity, and the frame of now. */
+/** Draws the timeline, lane by lane: ruler, placements with residual stems, radar activity, and the current frame. */
 
 import { ink, residualColour, themeColour } from "./colours.js";
 import { clicks, isClicked, state } from "./state.js";
@@ -29,7 +29,7 @@ export function drawLanes(pen, width, height, toX, span, pointer) {
     pen.fillStyle = themeColour("line-strong");
     pen.fillRect(Math.round(pointer), lanes.ruler, 1, height - lanes.ruler);
   }
-  drawNow(pen, height, toX(state.seconds[state.cursor] ?? 0));
+  drawCursor(pen, height, toX(state.seconds[state.cursor] ?? 0));
 }
 
 /** @param {Ink} pen @param {number} width @param {number} height @param {(s: number) => number} toX @param {{from: number, to: number}} span */
@@ -123,7 +123,7 @@ function head(pen, clickState, x, y, size) {
 }
 
 /** @param {Ink} pen @param {number} height @param {number} x */
-function drawNow(pen, height, x) {
+function drawCursor(pen, height, x) {
   pen.fillStyle = themeColour("ink");
   pen.fillRect(Math.round(x), lanes.ruler, 1, height);
   pen.beginPath();

@@ -7,10 +7,10 @@ import { emit, on, state } from "./state.js";
 /** @typedef {keyof typeof state.layers} Layer */
 /** @type {[Layer, string, string][]} */
 const LAYERS = [
-  ["returns", "Returns", "Radar returns of the nearest scan, carried into the picture: dots stand still, triangles move. (1)"],
-  ["others", "All clicks", "The clicks of all other frames, coloured by residual. (2)"],
-  ["ellipses", "95 %", "Where 95 % of the clicks of good pairs lie around their reprojection. (3)"],
-  ["predictions", "Predicted", "Where radar and calibration expect the reflector of this placement (circle), and where the next placement pays most (diamond). (4)"],
+  ["returns", "Returns", "Radar returns of the nearest scan, projected into the picture: dots are static, triangles are moving. (1)"],
+  ["others", "All clicks", "Clicks in all other frames, coloured by residual. (2)"],
+  ["ellipses", "95 %", "Ellipses around the reprojections that contain 95 % of the clicks of good pairs. (3)"],
+  ["predictions", "Predicted", "Expected position of the reflector in this placement (circle) and best next placement (diamond). (4)"],
 ];
 const group = /** @type {HTMLElement} */ (document.getElementById("layers"));
 

@@ -1,5 +1,5 @@
 // @ts-check
-/** Dividers, tabs and the theme; what the person chose is kept for the next time. */
+/** Dividers, tabs and the theme; the user's choices are remembered. */
 
 import { emit, on, state } from "./state.js";
 
@@ -71,7 +71,7 @@ function keep(change) {
   try {
     localStorage.setItem(KEPT, JSON.stringify(kept));
   } catch {
-    // A browser that keeps nothing forgets the layout, no more.
+    // Without storage, the layout is just not remembered.
   }
 }
 
@@ -101,7 +101,7 @@ function divider(id, follow) {
   });
 }
 
-/** The first calibration is worth a look at the pose's tab label. */
+/** Highlight the Pose tab once there is a calibration. */
 export function startBadges() {
   on(["view"], () => document.getElementById("tab-pose")?.classList.toggle("ready", state.view?.has_calibration ?? false));
 }

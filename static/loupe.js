@@ -1,5 +1,5 @@
 // @ts-check
-/** The loupe: eight times the picture around a point, with a cross whose centre is that point to a fraction of a pixel. */
+/** The loupe: the picture around a point, magnified eight times, with a cross centred on the point to a fraction of a pixel. */
 
 import { ink } from "./colours.js";
 import { viewport } from "./geometry.js";
@@ -8,7 +8,7 @@ import { clickIn, on, state } from "./state.js";
 const SIDE = 156;
 const MAGNIFIES = 8;
 const MARGIN = 8;
-/** Above this zoom the picture itself is a loupe. */
+/** Above this zoom the loupe is not needed. */
 const NEEDLESS_ABOVE = 6;
 const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById("loupe"));
 const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
@@ -48,7 +48,7 @@ function draw() {
   }
 }
 
-/** A fixed corner, so that nothing moves with the hand; the other one when the hand comes near. @param {{u: number, v: number}} point */
+/** Put the loupe in a fixed corner, so that it does not follow the pointer; in the other one when the pointer comes near. @param {{u: number, v: number}} point */
 function place(point) {
   const x = (viewport.left + (point.u + 0.5) * viewport.scale) / viewport.ratio;
   const y = (viewport.top + (point.v + 0.5) * viewport.scale) / viewport.ratio;

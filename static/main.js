@@ -1,5 +1,5 @@
 // @ts-check
-/** The page: wires the parts together and gives the server's messages to those who draw them. */
+/** The page: wires the modules together and passes the server's messages to those that draw them. */
 
 import { startArriving } from "./arriving.js";
 import { startClicking, turnBack } from "./clicking.js";
@@ -79,7 +79,7 @@ function takeRecording(message) {
   else goTo(firstFrame());
 }
 
-/** A page that is loaded again stays where it was. */
+/** The frame to start with: after a reload, the one shown before. */
 function firstFrame() {
   const kept = Number(sessionStorage.getItem("cocalib-frame") ?? 0);
   return Number.isInteger(kept) && kept < state.seconds.length ? kept : 0;
@@ -97,9 +97,9 @@ async function loadActivity() {
   emit("cursor");
 }
 
-/** @param {string} id @param {() => unknown} deed */
-function press(id, deed) {
-  /** @type {HTMLElement} */ (document.getElementById(id)).addEventListener("click", deed);
+/** @param {string} id @param {() => unknown} action */
+function press(id, action) {
+  /** @type {HTMLElement} */ (document.getElementById(id)).addEventListener("click", action);
 }
 
 startLayout();
@@ -133,14 +133,14 @@ connect({
   frame: receiveFrame,
   connection(connected) {
     state.connected = connected;
-    const why = state.opening?.problem || "The server does not answer. Clicks are kept here and sent when it is back.";
+    const why = state.opening?.problem || "The server is not responding. Clicks are kept here and sent when it is back.";
     setBanner(connected ? "" : why);
     emit("connection");
   },
 });
 startSpace();
 
-/** What the browser tests hold on to. */
+/** Exposed for the browser tests. */
 Object.assign(window, {
   __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, goTo, unconfirmed },
 });

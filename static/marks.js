@@ -1,7 +1,7 @@
 // @ts-check
 /**
  * Marks on the frame: click = cross, reprojection = ring, their residual = line, excluded = hollow, predicted = dashed,
- * 95 % of good residuals = ellipse, radar returns = dots (still) and triangles (moving).
+ * 95 % of good residuals = ellipse, radar returns = dots (static) and triangles (moving).
  */
 
 import { ink, residualColour } from "./colours.js";
@@ -11,9 +11,9 @@ import { clicks, state } from "./state.js";
 /** @typedef {CanvasRenderingContext2D} Ink */
 /** @typedef {import("./messages.js").ClickRow} Click */
 
-/** Nearer than this to a mark, the hand is at the reflector [CSS px]. */
+/** Within this distance of a mark, the pointer counts as being at the reflector [CSS px]. */
 const CLOSE = 36;
-/** From this many screen px per image px on, one looks at the reflector. */
+/** From this many screen px per image px on, the view counts as being close to the reflector. */
 const CLOSE_ZOOM = 2;
 
 /** Draw all marks of the frame on screen. @param {Ink} pen */
@@ -55,14 +55,14 @@ function triangle(pen, x, y, size) {
   pen.closePath();
 }
 
-/** Where the reflector should be by the radar and the pose. @param {Ink} pen @param {number} u @param {number} v */
+/** Where the radar and the pose expect the reflector. @param {Ink} pen @param {number} u @param {number} v */
 function drawGuess(pen, u, v) {
   const [x, y] = toDevice(u, v);
   const dashes = [4 * viewport.ratio, 3.5 * viewport.ratio];
   outlined(pen, ink.guess, 1.4, () => pen.arc(x, y, 15 * viewport.ratio, 0, 2 * Math.PI), dashes);
 }
 
-/** Where the next placement pays most: a dashed diamond, for it lies on the ground. @param {Ink} pen @param {import("./messages.js").Advice} advice */
+/** The best next placement: a dashed diamond, since it lies on the ground. @param {Ink} pen @param {import("./messages.js").Advice} advice */
 function drawAdvice(pen, advice) {
   if (advice.may_stop) return;
   const [x, y] = toDevice(advice.u_px, advice.v_px);
@@ -85,7 +85,7 @@ function drawAdvice(pen, advice) {
   pen.fillText(words, x, below);
 }
 
-/** A click of another frame: where it was, small and quiet. @param {Ink} pen @param {Click} click */
+/** A click of another frame, small and dimmed. @param {Ink} pen @param {Click} click */
 function drawOther(pen, click) {
   const [x, y] = toDevice(click.u_px, click.v_px);
   const arm = 4 * viewport.ratio;
@@ -95,21 +95,21 @@ function drawOther(pen, click) {
   pen.globalAlpha = 1;
 }
 
-/** The click of this frame with all that belongs to it. @param {Ink} pen @param {Click} click */
+/** The click of this frame with its reprojection, residual and ellipse. @param {Ink} pen @param {Click} click */
 function drawClick(pen, click) {
   const [x, y] = toDevice(click.u_px, click.v_px);
-  const calm = looksClosely(click);
-  if (click.projected_px) drawReprojection(pen, click, x, y, calm);
+  const closeUp = looksClosely(click);
+  if (click.projected_px) drawReprojection(pen, click, x, y, closeUp);
   const hollow = click.state === "excluded";
-  const arm = (calm ? 22 : 13) * viewport.ratio;
-  const gap = (calm ? 10 : 3) * viewport.ratio;
-  if (calm) pen.globalAlpha = 0.9;
+  const arm = (closeUp ? 22 : 13) * viewport.ratio;
+  const gap = (closeUp ? 10 : 3) * viewport.ratio;
+  if (closeUp) pen.globalAlpha = 0.9;
   if (hollow) outlined(pen, ink.click, 1.2, () => hollowCross(pen, x, y, arm, gap));
-  else outlined(pen, ink.click, calm ? 1.2 : 1.6, () => cross(pen, x, y, arm, gap), [], calm ? 1.4 : 2);
+  else outlined(pen, ink.click, closeUp ? 1.2 : 1.6, () => cross(pen, x, y, arm, gap), [], closeUp ? 1.4 : 2);
   pen.globalAlpha = 1;
 }
 
-/** Whether the eye is on the reflector itself: then the marks leave it free. @param {Click} click */
+/** Whether the user is looking at the reflector itself; the marks then do not cover it. @param {Click} click */
 function looksClosely(click) {
   if (!viewport.fitted && zoom() >= CLOSE_ZOOM) return true;
   if (!state.hover) return false;
@@ -118,8 +118,8 @@ function looksClosely(click) {
   return Math.hypot(x - cx, y - cy) < CLOSE;
 }
 
-/** @param {Ink} pen @param {Click} click @param {number} x @param {number} y @param {boolean} calm */
-function drawReprojection(pen, click, x, y, calm) {
+/** @param {Ink} pen @param {Click} click @param {number} x @param {number} y @param {boolean} closeUp */
+function drawReprojection(pen, click, x, y, closeUp) {
   const [ring, limit] = [/** @type {[number, number]} */ (click.projected_px), state.view?.residual_limit_px ?? null];
   const [px, py] = toDevice(ring[0], ring[1]);
   const colour = residualColour(click.residual_px, limit);
@@ -129,26 +129,26 @@ function drawReprojection(pen, click, x, y, calm) {
     pen.beginPath();
     ellipse();
     pen.fillStyle = "rgb(255 255 255 / 7%)";
-    if (!calm) pen.fill();
-    pen.globalAlpha = calm ? 0.6 : 1;
-    outlined(pen, ink.ring, 1, ellipse, [], calm ? 1 : 2);
+    if (!closeUp) pen.fill();
+    pen.globalAlpha = closeUp ? 0.6 : 1;
+    outlined(pen, ink.ring, 1, ellipse, [], closeUp ? 1 : 2);
     pen.globalAlpha = 1;
   }
   const length = Math.hypot(px - x, py - y);
-  const radius = (calm ? 12 : 7) * viewport.ratio;
+  const radius = (closeUp ? 12 : 7) * viewport.ratio;
   if (length > radius) {
     const end = (length - radius) / length;
-    const start = Math.min(end, calm ? (10 * viewport.ratio) / length : 0);
+    const start = Math.min(end, closeUp ? (10 * viewport.ratio) / length : 0);
     outlined(pen, colour, 2, () => {
       pen.moveTo(x + (px - x) * start, y + (py - y) * start);
       pen.lineTo(x + (px - x) * end, y + (py - y) * end);
     });
   }
-  outlined(pen, colour, calm ? 1.2 : 2, () => pen.arc(px, py, radius, 0, 2 * Math.PI), [], calm ? 1 : 2);
+  outlined(pen, colour, closeUp ? 1.2 : 2, () => pen.arc(px, py, radius, 0, 2 * Math.PI), [], closeUp ? 1 : 2);
 }
 
 /**
- * Stroke a path with a dark edge below it, so that it shows on any picture.
+ * Stroke a path with a dark edge below it, so that it is visible on any picture.
  * @param {Ink} pen @param {string} colour @param {number} width CSS px @param {() => void} path @param {number[]} [dashes] @param {number} [edge] CSS px
  */
 function outlined(pen, colour, width, path, dashes = [], edge = 2) {

@@ -1,5 +1,5 @@
 // @ts-check
-/** What the page says in passing: toasts for what went wrong, the banner when the line is cut, the tip that explains a number. */
+/** Notices: toasts for errors, the banner for a lost connection, and tooltips. */
 
 const toasts = /** @type {HTMLElement} */ (document.getElementById("toasts"));
 const banner = /** @type {HTMLElement} */ (document.getElementById("banner"));
@@ -8,7 +8,7 @@ const TOAST_MS = 9000;
 const TIP_MS = 280;
 let tipTimer = 0;
 
-/** Say in words what went wrong and what to do. @param {string} message @param {string} [hint] @param {string} [about] what `settled` takes it away by */
+/** Say what went wrong and what to do. @param {string} message @param {string} [hint] @param {string} [about] key by which `settled` removes it */
 export function toast(message, hint = "", about = "") {
   const text = toasts.querySelector(".toast span")?.textContent;
   if (text === message) return;
@@ -23,18 +23,18 @@ export function toast(message, hint = "", about = "") {
   setTimeout(() => box.remove(), TOAST_MS);
 }
 
-/** What went wrong is right again: take away the words about it. @param {string} about */
+/** Remove the toasts about something that has been corrected. @param {string} about */
 export function settled(about) {
   for (const box of /** @type {NodeListOf<HTMLElement>} */ (toasts.querySelectorAll(".toast"))) if (box.dataset.about === about) box.remove();
 }
 
-/** @param {string} text "" takes it away */
+/** @param {string} text "" hides it */
 export function setBanner(text) {
   banner.hidden = text === "";
   banner.textContent = text;
 }
 
-/** Explain on hover and on focus whatever carries a data-hint. */
+/** Show a tooltip on hover and on focus for every element with a data-hint. */
 export function startTips() {
   document.addEventListener("pointerover", (event) => offer(event.target, event.clientX, event.clientY));
   document.addEventListener("focusin", (event) => {
@@ -59,7 +59,7 @@ function offer(target, x, y) {
   tipTimer = window.setTimeout(() => showTip(hint, x, y + 14), TIP_MS);
 }
 
-/** Show a tip at once. @param {string} text @param {number} x @param {number} y CSS px of the page; the tip lies below, or above near the bottom */
+/** Show a tooltip immediately. @param {string} text @param {number} x @param {number} y CSS px of the page; the tooltip appears below, or above near the bottom */
 export function showTip(text, x, y) {
   tip.textContent = text;
   tip.hidden = false;
@@ -74,7 +74,7 @@ export function hideTip() {
 }
 
 /**
- * Make an element. Text goes in as text: whatever a recording holds, it is never read as HTML.
+ * Create an element. Text is inserted as text: whatever a recording contains, it is never parsed as HTML.
  * @template {keyof HTMLElementTagNameMap} T
  * @param {T} name @param {string} className @param {string|(Node|string)[]} content @returns {HTMLElementTagNameMap[T]}
  */
@@ -85,7 +85,7 @@ export function make(name, className, content) {
   return element;
 }
 
-/** An icon of the sprite in index.html. @param {string} name */
+/** An icon from the sprite in index.html. @param {string} name */
 export function icon(name) {
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   const use = document.createElementNS("http://www.w3.org/2000/svg", "use");

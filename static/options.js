@@ -1,5 +1,5 @@
 // @ts-check
-/** The options, drawn from the server's own description of them: the few that matter first, all others below. */
+/** The options, built from the server's descriptions: the most used first, all others below. */
 
 import { make, settled, toast } from "./notices.js";
 import { send } from "./socket.js";
@@ -7,32 +7,32 @@ import { on, state } from "./state.js";
 
 /** @typedef {import("./messages.js").OptionDescription} Field */
 const page = /** @type {HTMLElement} */ (document.getElementById("page-options"));
-/** The options that most people come for. */
+/** The most used options. */
 const FIRST = [
   "locating.window_s", "noise.sigma_px", "gating.max_range_m", "solving.camera_position",
   "paper.ransac_threshold_px", "paper.window_s", "paper.max_range_m",
 ];
-/** What a method does not look at. @type {Record<string, (path: string) => boolean>} */
+/** Options that a method ignores. @type {Record<string, (path: string) => boolean>} */
 const IDLE = {
   default: (path) => path.startsWith("paper."),
   paper: (path) => /^(noise|solving|gating)\./.test(path) || (path.startsWith("locating.") && path !== "locating.max_time_gap_s"),
 };
-/** Names that say more than the option's own. @type {Record<string, string>} */
+/** Labels that are clearer than the option's own name. @type {Record<string, string>} */
 const LABELS = {
   "locating.window_s": "Radar window around a click",
-  "noise.sigma_px": "Uncertainty of a click",
-  "gating.max_range_m": "Farthest return",
-  "solving.camera_position": "Camera position by tape",
+  "noise.sigma_px": "Click uncertainty",
+  "gating.max_range_m": "Maximum range",
+  "solving.camera_position": "Measured camera position",
   "paper.ransac_threshold_px": "RANSAC threshold",
   "paper.window_s": "Radar window around a click",
-  "paper.max_range_m": "Farthest return",
+  "paper.max_range_m": "Maximum range",
   method: "Method",
 };
 /** @type {Record<string, string>} */
 const METHODS = { default: "Default", paper: "Paper" };
 /** @type {Record<string, string>} */
 const METHOD_HINTS = {
-  default: "The default method: robust, finds wrong pairs, weighs radar and click noise, says how sure it is.",
+  default: "The default method: detects wrong pairs, models the noise of radar and clicks, reports the uncertainty of the pose.",
   paper: "Algorithm 1 of the paper, line by line: average, RANSAC, Levenberg-Marquardt.",
 };
 /** @type {Map<string, (value: any) => void>} */
@@ -118,44 +118,44 @@ function yesNo(field) {
   return row(field, make("span", "control", [input]));
 }
 
-/** Camera position by tape measure: off, or three numbers and how sure they are. @param {Field} field */
+/** Measured camera position: off, or three distances and their standard deviation. @param {Field} field */
 function cameraPosition(field) {
-  const wanted = make("input", "", []);
-  wanted.type = "checkbox";
-  wanted.id = idOf(field);
+  const enabled = make("input", "", []);
+  enabled.type = "checkbox";
+  enabled.id = idOf(field);
   const names = ["forward", "left", "up"];
   const inputs = names.map(() => number(-100, 100));
   inputs.forEach((input, index) => {
-    input.dataset.hint = `Camera's distance ${names[index]} of the radar [m]`;
+    input.dataset.hint = `Distance ${names[index]} from the radar to the camera [m]`;
   });
-  const sure = number(0.0001, 10);
-  sure.dataset.hint = "Standard deviation of each of the three distances [m]";
-  const named = [...inputs, sure].map((input, index) => make("label", "", [make("span", "", names[index] ?? "± sigma"), input]));
+  const sigma = number(0.0001, 10);
+  sigma.dataset.hint = "Standard deviation of each of the three distances [m]";
+  const named = [...inputs, sigma].map((input, index) => make("label", "", [make("span", "", names[index] ?? "± sigma"), input]));
   const numbers = make("span", "control triple", [...named, make("span", "unit", "m")]);
   numbers.setAttribute("role", "group");
-  numbers.setAttribute("aria-label", "Camera seen from the radar");
-  const told = () => {
-    const entered = [...inputs, sure].every((input) => input.value !== "");
-    if (entered) change(field.path, { position_m: inputs.map((input) => Number(input.value)), sigma_m: Number(sure.value) });
+  numbers.setAttribute("aria-label", "Camera position relative to the radar");
+  const submit = () => {
+    const entered = [...inputs, sigma].every((input) => input.value !== "");
+    if (entered) change(field.path, { position_m: inputs.map((input) => Number(input.value)), sigma_m: Number(sigma.value) });
   };
-  wanted.onchange = () => {
-    numbers.hidden = !wanted.checked;
-    if (!wanted.checked) return change(field.path, null);
-    if (sure.value === "") sure.value = "0.01";
+  enabled.onchange = () => {
+    numbers.hidden = !enabled.checked;
+    if (!enabled.checked) return change(field.path, null);
+    if (sigma.value === "") sigma.value = "0.01";
     inputs[0].focus();
-    told();
+    submit();
   };
-  for (const input of [...inputs, sure]) input.onchange = told;
+  for (const input of [...inputs, sigma]) input.onchange = submit;
   writers.set(field.path, (value) => {
     const entered = inputs.every((input) => input.value !== "");
-    if (value === null && wanted.checked && (!entered || numbers.contains(document.activeElement))) return; // the tape is being read
-    wanted.checked = value !== null;
+    if (value === null && enabled.checked && (!entered || numbers.contains(document.activeElement))) return; // the values are still being entered
+    enabled.checked = value !== null;
     numbers.hidden = value === null;
-    if (value === null) return; // what was entered waits until it is wanted again
+    if (value === null) return; // keep what was entered, in case it is enabled again
     inputs.forEach((input, index) => write(input, value.position_m[index]));
-    write(sure, value.sigma_m);
+    write(sigma, value.sigma_m);
   });
-  const head = row(field, make("span", "control", [wanted]));
+  const head = row(field, make("span", "control", [enabled]));
   const box = make("div", "position", [head, numbers]);
   box.dataset.field = field.path;
   return box;
@@ -171,7 +171,7 @@ function number(low, high) {
   return input;
 }
 
-/** A field that is being typed in keeps its text. @param {HTMLInputElement} input @param {any} value */
+/** Set the value of a field, unless it is being edited. @param {HTMLInputElement} input @param {any} value */
 function write(input, value) {
   if (document.activeElement !== input) input.value = value === null || value === undefined ? "" : String(value);
 }
@@ -196,7 +196,7 @@ const idOf = (field) => `option-${field.path.replaceAll(".", "-")}`;
 /** @param {string} text */
 const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
-/** Put the values of the view into the fields. */
+/** Fill the fields with the values of the view. */
 function fill() {
   const options = /** @type {Record<string, any>|undefined} */ (state.view?.options);
   if (!options) return;
@@ -210,13 +210,13 @@ function fill() {
   }
 }
 
-/** Show the fields that count for a method. @param {string} method */
+/** Show only the fields that a method uses. @param {string} method */
 function showFieldsOf(method) {
   for (const line of /** @type {NodeListOf<HTMLElement>} */ (page.querySelectorAll("[data-field]"))) line.hidden = IDLE[method]?.(line.dataset.field ?? "") ?? false;
   for (const part of /** @type {NodeListOf<HTMLElement>} */ (page.querySelectorAll(".part"))) part.hidden = !part.querySelector("[data-field]:not([hidden])");
 }
 
-/** Words of the server with the option's label in place of its name. @param {string} words */
+/** Replace option names in a message of the server by their labels. @param {string} words */
 function inLabels(words) {
   const fields = (state.recording?.option_groups ?? []).flatMap((group) => group.options).filter((field) => field.path.includes("."));
   return fields.reduce((text, field) => text.replace(new RegExp(`(option )?\\b${field.path.replaceAll(".", "\\.")}(\\.\\w+)?\\b`, "g"), labelOf(field)), words);
@@ -229,7 +229,7 @@ async function change(path, value) {
   const options = groups.reduce((tree, group) => ({ [group]: tree }), /** @type {Record<string, any>} */ ({ [name]: value }));
   const refusal = await send({ type: "options_changed", options });
   if (!refusal) return settled(path);
-  toast(inLabels(refusal), "The option is back at its last value.", path);
+  toast(inLabels(refusal), "The option keeps its previous value.", path);
   /** @type {HTMLElement|null} */ (document.activeElement)?.blur();
   fill();
 }

@@ -1,14 +1,14 @@
 // @ts-check
 /**
- * Runs in the 3D view's frame, before viser's own script. Viser draws as often as it can, and shares its thread with our page:
- * without a graphics card every drawing holds the picture up. So the 3D view draws at full rate only while a hand is on it, and
- * the picture goes first.
+ * Runs in the 3D view's frame, before viser's own script. Viser draws as often as it can and shares its thread with our page;
+ * without a graphics card, every drawing delays the picture. The 3D view therefore draws at full rate only while the user moves
+ * it, and the picture has priority.
  */
 {
-  /** Least time between two drawings. ms */
+  /** Minimum time between two drawings [ms]. */
   const QUIET = 125;
   const PLAYING = 500;
-  /** How long after the last touch the view counts as being moved. ms */
+  /** How long after the last input the view counts as being moved [ms]. */
   const TOUCH = 1200;
 
   const frame = window.requestAnimationFrame.bind(window);
@@ -26,7 +26,7 @@
     return Math.max(drawn + (page.playing ? PLAYING : QUIET), page.holdUntil ?? 0);
   }
 
-  /** Draw when it is time, all callbacks in one frame. */
+  /** Draw when it is time, with all callbacks in one frame. */
   function schedule() {
     if (coming) return;
     coming = true;

@@ -1,5 +1,5 @@
 // @ts-check
-/** The table of pairs: by time or by residual, one line per click; press a line to go there, its tick leaves it out. */
+/** The table of pairs, one row per click, sorted by time, range or residual; click a row to go there, its checkbox to exclude it. */
 
 import { comeTo } from "./arriving.js";
 import { residualColour } from "./colours.js";
@@ -16,9 +16,9 @@ const sorting = { key: "frame", descending: false };
 /** @type {{key: "frame"|"residual_px"|"range_m"|null, label: string, hint: string}[]} */
 const COLUMNS = [
   { key: null, label: "Click", hint: "" },
-  { key: "frame", label: "Time", hint: "Time of the frame from the first one. Press to sort." },
-  { key: "range_m", label: "Range", hint: "Distance of the reflector from the radar. Press to sort." },
-  { key: "residual_px", label: "Residual", hint: "Distance between the click and the reprojection of its radar position. Press to sort." },
+  { key: "frame", label: "Time", hint: "Time since the first frame. Click to sort." },
+  { key: "range_m", label: "Range", hint: "Distance from the radar to the reflector. Click to sort." },
+  { key: "residual_px", label: "Residual", hint: "Distance between the click and the reprojection of its radar position. Click to sort." },
   { key: null, label: "Use", hint: "" },
 ];
 let drawn = "";
@@ -34,18 +34,18 @@ export function sorted() {
   return [...clicks()].sort((a, b) => sign * ((a[sorting.key] ?? -1) - (b[sorting.key] ?? -1)) || a.frame - b.frame);
 }
 
-/** The click that the walk has come to. @type {string|null} */
-let walkedTo = null;
+/** The click that nextWorst went to last. @type {string|null} */
+let lastVisited = null;
 
-/** Go to the pair that does not agree, else to the largest residual; then, as long as one walks on, to the next smaller one. */
+/** Go to the worst pair, outliers first, then by residual; when called again, to the next one. */
 export function nextWorst() {
   const ranked = clicks().filter((click) => click.residual_px !== null && click.state !== "excluded");
-  const doubt = (/** @type {Click} */ click) => Number(click.state === "outlier");
-  ranked.sort((a, b) => doubt(b) - doubt(a) || Number(b.residual_px) - Number(a.residual_px));
+  const outlier = (/** @type {Click} */ click) => Number(click.state === "outlier");
+  ranked.sort((a, b) => outlier(b) - outlier(a) || Number(b.residual_px) - Number(a.residual_px));
   if (!ranked.length) return;
-  const at = walkedTo === state.selected ? ranked.findIndex((click) => click.id === walkedTo) : -1;
+  const at = lastVisited === state.selected ? ranked.findIndex((click) => click.id === lastVisited) : -1;
   const next = ranked[(at + 1) % ranked.length];
-  walkedTo = next.id;
+  lastVisited = next.id;
   comeTo(next.frame);
   select(next.id);
 }
@@ -93,8 +93,8 @@ function line(click) {
   const act = make("input", "act", []);
   act.type = "checkbox";
   act.checked = !excluded;
-  act.setAttribute("aria-label", `Use ${click.id} in the solve`);
-  act.dataset.hint = excluded ? "Left out of the solve; press to use it again (X)" : "Used in the solve; press to leave it out (X)";
+  act.setAttribute("aria-label", `Use ${click.id} in the calibration`);
+  act.dataset.hint = excluded ? "Excluded. Click to include it again (X)" : "Used in the calibration. Click to exclude it (X)";
   act.dataset.act = "exclude";
   const range = click.range_m === null ? "–" : `${click.range_m.toFixed(1)} m`;
   const row = make("tr", `row ${click.state}`, [
@@ -110,7 +110,7 @@ function line(click) {
   return row;
 }
 
-/** Three digits. @param {number} value */
+/** Three significant digits. @param {number} value */
 const digits = (value) => (value < 0.995 ? value.toFixed(2) : value < 999.5 ? value.toPrecision(3) : value.toFixed(0));
 
 /** @param {Click} click */
@@ -121,12 +121,12 @@ function explain(click) {
   const lines = [`${click.id}: click at ${click.u_px.toFixed(1)}, ${click.v_px.toFixed(1)} px`];
   if (click.projected_px) lines.push(`reprojected at ${click.projected_px.map((value) => value.toFixed(1)).join(", ")} px`);
   if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${click.azimuth_deg?.toFixed(1)}° left, ${click.elevation_deg?.toFixed(1)}° up`);
-  if (rangeApart(click)) lines.push(`${rangeApart(click)}: the wrong target, or the reflector was carried on. Look at the frame, or leave the pair out.`);
+  if (rangeApart(click)) lines.push(`${rangeApart(click)}: wrong target, or the reflector was being moved. Check the frame, or exclude the pair.`);
   if (click.note) lines.push(click.note);
   return lines.join("\n");
 }
 
-/** The shape says the state again. @param {string} clickState @param {string} colour */
+/** The shape shows the state, in addition to the colour. @param {string} clickState @param {string} colour */
 function glyph(clickState, colour) {
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   svg.setAttribute("viewBox", "0 0 12 12");
@@ -144,7 +144,7 @@ function glyph(clickState, colour) {
   return svg;
 }
 
-/** The click whose line an element lies in. @param {Element} element */
+/** The id of the click whose row contains an element. @param {Element} element */
 const idOf = (element) => /** @type {HTMLElement|null} */ (element.closest("[data-id]"))?.dataset.id;
 
 /** @param {MouseEvent} event */
@@ -161,7 +161,7 @@ function pressed(event) {
   if (!click) return;
   select(click.id);
   if (target.closest("[data-act]")) {
-    event.preventDefault(); // the tick follows the server's word
+    event.preventDefault(); // the checkbox changes once the server confirms
     return void toggleExcluded();
   }
   comeTo(click.frame);

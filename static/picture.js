@@ -1,5 +1,5 @@
 // @ts-check
-/** The camera frame on its canvas: box, zoom, pan, and when to draw again. */
+/** The camera frame on its canvas: size, zoom, pan and redrawing. */
 
 import { drawMarks } from "./marks.js";
 import * as geometry from "./geometry.js";
@@ -11,7 +11,7 @@ const picture = /** @type {HTMLCanvasElement} */ (document.getElementById("pictu
 export const marks = /** @type {HTMLCanvasElement} */ (document.getElementById("marks"));
 const paper = /** @type {CanvasRenderingContext2D} */ (picture.getContext("2d", { alpha: false }));
 const ink = /** @type {CanvasRenderingContext2D} */ (marks.getContext("2d"));
-/** From this many device px per image px on, pixels are shown as squares: their edges snap to device px, so not before. */
+/** From this many device px per image px on, pixels are shown as squares; not below, since their edges snap to device px. */
 const SQUARES_FROM = 8;
 let drawPicture = false;
 let drawInk = false;
@@ -29,7 +29,7 @@ export function startPicture() {
   measure();
 }
 
-/** The ratio of device to CSS pixels changes with the browser's zoom and the monitor. */
+/** Follow the ratio of device to CSS pixels, which changes with the browser's zoom and the monitor. */
 function watchRatio() {
   matchMedia(`(resolution: ${window.devicePixelRatio}dppx)`).addEventListener(
     "change",
@@ -53,13 +53,13 @@ function measure() {
   emit("box");
 }
 
-/** The first frame takes the place of what was shown before it. */
+/** Discard the preview once the first frame is shown. */
 function dropPreview() {
   state.preview?.bitmap.close();
   state.preview = null;
 }
 
-/** The first frame tells how large the picture is. */
+/** Take the size of the picture from the first frame. */
 function takeSize() {
   const shown = state.shown ?? state.preview;
   if (!shown || (shown.width === viewport.imageWidth && shown.height === viewport.imageHeight)) return;
@@ -107,7 +107,7 @@ export function fit() {
   emit("box");
 }
 
-/** Zoom at a point of the box; in the middle without one. @param {number} factor @param {number} [x] @param {number} [y] CSS px */
+/** Zoom at a point of the box, by default in the middle. @param {number} factor @param {number} [x] @param {number} [y] CSS px */
 export function zoomBy(factor, x = viewport.width / 2, y = viewport.height / 2) {
   geometry.zoomAt(factor, x, y);
   redraw();

@@ -1,16 +1,16 @@
 // @ts-check
-/** Which frame is on the screen: stepping, playing, and the requests for frames (few on their way, the newest wins). */
+/** Which frame is on the screen: stepping, playing, and the requests for frames (few in flight, the newest wins). */
 
 import { clicks, emit, select, state } from "./state.js";
 import { requestNumber, tell } from "./socket.js";
 
 const KEPT = 12;
-/** Frames asked for and not here yet, while playing. */
+/** Maximum number of requests in flight while playing. */
 const CREDIT = 2;
 /** @type {Map<number, import("./state.js").Shown>} */
 const kept = new Map();
 let newest = 0;
-/** Requests on their way; an answer to one is an answer to all before it. @type {number[]} */
+/** Requests in flight; an answer to one also settles all before it. @type {number[]} */
 let coming = [];
 let startedAt = 0;
 let startedFrom = 0;
@@ -28,7 +28,7 @@ export function goTo(index) {
   tellCursor();
 }
 
-/** Step over real frames; stops playing. @param {number} count */
+/** Step by recorded frames; stops playing. @param {number} count */
 export function step(count) {
   pause();
   goTo(state.cursor + count);
@@ -50,7 +50,7 @@ export function play() {
   requestAnimationFrame(tick);
 }
 
-/** The clock of play starts again at the frame of now. */
+/** Restart the playback clock at the current frame. */
 function restart() {
   startedAt = performance.now();
   startedFrom = state.seconds[state.cursor];
@@ -58,7 +58,7 @@ function restart() {
   coming = [];
 }
 
-/** Scrub while playing or not. @param {number} index */
+/** Jump to a frame, whether playing or not. @param {number} index */
 export function jump(index) {
   goTo(index);
   if (state.playing) restart();
@@ -103,7 +103,7 @@ function request(index) {
   if (sent) coming.push(newest);
 }
 
-/** Ask again after the line came back. */
+/** Request the current frame again after a reconnection. */
 export function requestAgain() {
   coming = [];
   kept.clear();
@@ -112,7 +112,7 @@ export function requestAgain() {
   tellCursor();
 }
 
-/** A frame arrived. @param {any} header @param {Uint8Array<ArrayBuffer>} data */
+/** Take a frame that has arrived. @param {any} header @param {Uint8Array<ArrayBuffer>} data */
 export async function receiveFrame(header, data) {
   if (header.index < 0) return receivePreview(header, data);
   coming = coming.filter((request) => request > header.request);
@@ -124,7 +124,7 @@ export async function receiveFrame(header, data) {
   if (wanted) show(shown);
 }
 
-/** A picture arrived before the recording is open. @param {any} header @param {Uint8Array<ArrayBuffer>} data */
+/** Take a picture that has arrived before the recording is open. @param {any} header @param {Uint8Array<ArrayBuffer>} data */
 async function receivePreview(header, data) {
   const preview = await decoded(header, data);
   if (state.shown) return preview.bitmap.close();
@@ -139,7 +139,7 @@ async function decoded(header, data) {
   return { bitmap, scale: header.scale, width: header.width_px, height: header.height_px };
 }
 
-/** A frame could not be read. @param {number|null} request */
+/** Note that a frame could not be read. @param {number|null} request */
 export function frameFailed(request) {
   coming = coming.filter((number) => request === null || number > request);
 }
@@ -169,14 +169,14 @@ function show(shown) {
   emit("shown");
 }
 
-/** A click in the frame on screen is the selected one. @param {number} index */
+/** Select the click of the frame on screen. @param {number} index */
 function selectHere(index) {
   const here = clicks().find((click) => click.frame === index && click.id !== "");
   if (here) select(here.id);
   else if (!state.playing) select(null);
 }
 
-/** Tell the server where this tab is: it answers with the overlay and moves the 3D view. */
+/** Tell the server which frame this tab shows; it answers with the overlay and updates the 3D view. */
 export function tellCursor() {
   tell({ type: "cursor", index: state.cursor, playing: state.playing, selected: state.selected, light: document.documentElement.dataset.theme === "light" });
 }

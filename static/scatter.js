@@ -1,5 +1,5 @@
 // @ts-check
-/** Residuals as a scatter: how far right (du) and down (dv) each reprojection lies from its click. A cloud off the middle is a bias. */
+/** Scatter plot of the residuals: how far right (du) and down (dv) each reprojection is from its click. An off-centre cloud indicates a bias. */
 
 import { ink, residualColour, themeColour } from "./colours.js";
 import { make } from "./notices.js";
@@ -15,13 +15,13 @@ export function startScatter() {
   canvas.id = "scatter";
   canvas.tabIndex = -1;
   canvas.setAttribute("role", "img");
-  canvas.dataset.hint = "Reprojection minus click of every pair. A cloud off the middle means a bias; press a mark to go to its frame.";
+  canvas.dataset.hint = "Reprojection minus click for every pair. An off-centre cloud indicates a bias. Click a mark to go to its frame.";
   document.querySelector("#page-pose .pose")?.append(canvas);
   canvas.addEventListener("click", pressed);
   on(["view", "selected", "theme", "box"], draw);
 }
 
-/** Half the width of the plot [px of the image], a round number that holds every inlier. */
+/** Half the width of the plot [px of the image], a round number that covers every inlier. */
 function reach() {
   const agreeing = clicks().filter((click) => click.state === "inlier" && click.projected_px);
   const farthest = Math.max(1, ...agreeing.flatMap(offset).map(Math.abs));
@@ -32,7 +32,7 @@ function reach() {
 /** @param {import("./messages.js").ClickRow} click @returns {number[]} */
 const offset = (click) => (click.projected_px ? [click.projected_px[0] - click.u_px, click.projected_px[1] - click.v_px] : []);
 
-/** Place of a click in the plot; those beyond lie on its edge. @param {import("./messages.js").ClickRow} click @param {number} most @returns {[number, number]} */
+/** Position of a click in the plot; clicks out of range are drawn on its edge. @param {import("./messages.js").ClickRow} click @param {number} most @returns {[number, number]} */
 function place(click, most) {
   const [du, dv] = offset(click).map((value) => Math.min(1.06, Math.max(-1.06, value / most)));
   const half = side / 2;

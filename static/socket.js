@@ -1,7 +1,7 @@
 // @ts-check
 /**
- * The channel to the server: sends events, repeats what was not confirmed when the line was cut, hands messages to their reader.
- * Undo and redo are not repeated: doing them twice is another thing than doing them once.
+ * The channel to the server: sends events, resends those that were not confirmed before the connection was lost, and passes
+ * messages to their reader. Undo and redo are not resent, because they must not be applied twice.
  */
 
 /** @type {WebSocket|null} */
@@ -14,7 +14,7 @@ const waiting = new Map();
 /** @type {{message: (message: any) => void, frame: (header: any, data: Uint8Array<ArrayBuffer>) => void, connection: (connected: boolean) => void}} */
 let reader;
 
-/** One name per tab: the 3D view of this tab carries the same. */
+/** The name of this tab; its 3D view uses the same. */
 export const tab = Array.from(crypto.getRandomValues(new Uint8Array(9)), (byte) => byte.toString(36)).join("");
 
 /** Open the channel and keep it open. @param {typeof reader} given */
@@ -44,7 +44,7 @@ function lost() {
   for (const [request, { repeats, resolve }] of waiting) {
     if (repeats) continue;
     waiting.delete(request);
-    resolve("the connection was lost before the server confirmed it");
+    resolve("The connection was lost before the server confirmed the change.");
   }
   reader.connection(false);
   setTimeout(open, delay);
@@ -67,9 +67,9 @@ function unpack(buffer) {
 }
 
 /**
- * Send an event; it is kept until the server confirms it.
+ * Send an event, and keep it until the server confirms it.
  * @param {Record<string, any>} message
- * @returns {Promise<string|null>} null when confirmed, else what the server said against it
+ * @returns {Promise<string|null>} null when confirmed, else why it was refused
  */
 export function send(message) {
   const request = nextRequest++;
@@ -83,19 +83,19 @@ export function send(message) {
 
 /** @param {number} request */
 function lostNow(request) {
-  waiting.get(request)?.resolve("not connected");
+  waiting.get(request)?.resolve("Not connected.");
   waiting.delete(request);
 }
 
-/** Send something that is worthless later: a cursor, a request for a frame. @param {Record<string, any>} message @returns {boolean} whether it went out */
+/** Send something that is useless later, such as a cursor or a request for a frame. @param {Record<string, any>} message @returns {boolean} whether it was sent */
 export function tell(message) {
   if (socket?.readyState !== WebSocket.OPEN) return false;
   socket.send(JSON.stringify(message));
   return true;
 }
 
-/** A number for a request that is answered by other means. */
+/** A number for a request that does not go through `send`. */
 export const requestNumber = () => nextRequest++;
 
-/** How many events the server has not confirmed. */
+/** Number of events that the server has not confirmed. */
 export const unconfirmed = () => waiting.size;

@@ -1,5 +1,5 @@
 // @ts-check
-/** The 3D view: viser's own page in a frame of ours. It has its own line to the server; the name of this tab ties the two. */
+/** The 3D view: viser's own page in an iframe. It has its own connection to the server; the name of this tab links the two. */
 
 import { listen } from "./keys.js";
 import { make } from "./notices.js";
@@ -13,10 +13,10 @@ const VIEWPOINTS = [
   ["behind", "Behind", "Look forward from behind the radar."],
   ["above", "Above", "Look down on the radar; forward is up."],
   ["side", "Side", "Look from the right-hand side."],
-  ["camera", "Camera", "Look from where the camera is."],
+  ["camera", "Camera", "Look from the camera's position."],
 ];
 
-/** How long the 3D view waits after a hand was on the picture, so that mark and overlay are painted first. ms */
+/** How long the 3D view waits after input on the page, so that mark and overlay are painted first [ms]. */
 const HOLD = 250;
 
 /** What static/pace.js reads in the 3D view's frame. */
@@ -41,7 +41,7 @@ export function startSpace() {
   frame.src = `viser/${tab}/`;
 }
 
-/** The 3D view follows the theme. */
+/** Apply the theme to the 3D view. */
 function tint() {
   const root = frame.contentDocument?.documentElement;
   if (root) root.dataset.theme = document.documentElement.dataset.theme ?? "dark";

@@ -1,5 +1,5 @@
 // @ts-check
-/** What the page knows, and who wants to hear of changes. Truth lives in the server: this is its last word. */
+/** The state of the page, and its listeners. The session is held by the server; this is what it sent last. */
 
 /** @typedef {import("./messages.js").View} View */
 /** @typedef {import("./messages.js").ClickRow} Click */
@@ -8,7 +8,7 @@
 
 export const state = {
   /** While the recording is being opened. @type {import("./messages.js").Opening|null} */ opening: null,
-  /** A picture of it to look at meanwhile: no frame yet, so nothing can be clicked in it. @type {Omit<Shown, "index">|null} */ preview: null,
+  /** A preview shown meanwhile; it is not a frame yet, so it cannot be clicked. @type {Omit<Shown, "index">|null} */ preview: null,
   /** @type {import("./messages.js").RecordingNote|null} */ recording: null,
   /** @type {View|null} */ view: null,
   /** @type {import("./messages.js").PlacementRow[]} */ placements: [],
@@ -23,7 +23,7 @@ export const state = {
   /** @type {{u: number, v: number}|null} */ hover: null,
   layers: { returns: true, others: true, ellipses: true, predictions: true },
   /** Seconds of each frame from the first one. @type {Float64Array} */ seconds: new Float64Array(0),
-  /** Marks as the person left them, until the server's view has them. @type {Map<string, {u: number, v: number}>} */ local: new Map(),
+  /** Marks as the user left them, until the server's view has them. @type {Map<string, {u: number, v: number}>} */ local: new Map(),
 };
 
 /** @type {Map<string, Set<() => void>>} */
@@ -37,7 +37,7 @@ export function on(topics, listener) {
   }
 }
 
-/** Say that a topic changed. @param {Topic} topic */
+/** Notify the listeners of a topic. @param {Topic} topic */
 export function emit(topic) {
   for (const listener of listeners.get(topic) ?? []) listener();
 }
@@ -85,13 +85,13 @@ export const clickIn = (index) => clicks().find((click) => click.frame === index
 /** The selected click. @returns {Click|undefined} */
 export const selectedClick = () => clicks().find((click) => click.id !== "" && click.id === state.selected);
 
-/** The placement that a frame lies in. @param {number} index @returns {import("./messages.js").PlacementRow|undefined} */
+/** The placement that includes a frame. @param {number} index @returns {import("./messages.js").PlacementRow|undefined} */
 export function placementAt(index) {
   const time = state.seconds[index];
   return state.placements.find((placement) => placement.start_s <= time && time <= placement.end_s);
 }
 
-/** Whether some click lies within a placement. @param {import("./messages.js").PlacementRow} placement */
+/** Whether a placement has a click. @param {import("./messages.js").PlacementRow} placement */
 export function isClicked(placement) {
   return clicks().some((click) => {
     const time = state.seconds[click.frame];
@@ -99,14 +99,14 @@ export function isClicked(placement) {
   });
 }
 
-/** A range this far from the placement's is another target [m]; the reflector's own returns scatter by a few decimetres. */
+/** A range that differs this much from the placement's is another target [m]; the reflector's own returns scatter by a few decimetres. */
 const APART_M = 0.75;
 
-/** Says when the radar position taken for a click is not the one that the timeline shows; "" when it is. @param {Click} click */
+/** Returns a message if the radar position used for a click is not that of the placement in the timeline, else "". @param {Click} click */
 export function rangeApart(click) {
   const placement = placementAt(click.frame);
   if (!placement || click.range_m === null || Math.abs(click.range_m - placement.range_m) < APART_M) return "";
-  return `This pair uses ${click.range_m.toFixed(1)} m; the placement here is at ${placement.range_m.toFixed(1)} m`;
+  return `This pair is at ${click.range_m.toFixed(1)} m, but the placement is at ${placement.range_m.toFixed(1)} m`;
 }
 
 /** Change the selection. @param {string|null} id */

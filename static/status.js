@@ -1,5 +1,5 @@
 // @ts-check
-/** The lines around: recording, clock, buttons, status, progress, the pixel under the hand. */
+/** The header and the status line: recording, clock, buttons, status, progress, the pixel under the pointer. */
 
 import { icon, make } from "./notices.js";
 import { toDevice, viewport, zoom } from "./geometry.js";
@@ -9,9 +9,9 @@ import { nextWords } from "./steps.js";
 
 /** @param {string} id */
 const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
-/** What has nothing to work on before the recording is open. */
+/** Buttons that are disabled until the recording is open. */
 const NEED_FRAMES = ["export", "play", "step-back", "step-forward", "previous-placement", "next-placement"];
-/** A return this near to the hand is spelt out [CSS px]. */
+/** A return this close to the pointer is shown in the readout [CSS px]. */
 const REACH = 8;
 
 export function startStatus() {
@@ -38,9 +38,9 @@ function drawRecording() {
   if (!recording) return;
   get("recording-name").textContent = recording.name;
   const picture = `${recording.width_px} × ${recording.height_px} px`;
-  get("recording-topics").replaceChildren(...recording.sensors.map(sensorFact), fact("picture", picture, `Every frame has ${picture}.`));
+  get("recording-topics").replaceChildren(...recording.sensors.map(sensorFact), fact("picture", picture, `Size of every frame: ${picture}`));
   get("status-right").textContent = `cocalib ${recording.version}`;
-  get("status-right").dataset.hint = `Every click is kept at once in\n${recording.session.folder}`;
+  get("status-right").dataset.hint = `Every click is saved immediately in\n${recording.session.folder}`;
 }
 
 /** @param {string} name @param {string} value @param {string} hint */
@@ -50,17 +50,17 @@ function fact(name, value, hint) {
   return made;
 }
 
-/** A topic; times of receiving stand out, since the driver's delay is in them. @param {import("./messages.js").SensorNote} sensor */
+/** A topic; receive times are highlighted, since they include the driver's delay. @param {import("./messages.js").SensorNote} sensor */
 function sensorFact(sensor) {
   const made = fact(sensor.name, sensor.topic, [`${sensor.name}: ${sensor.topic}`, ...sensor.about].join("\n"));
-  if (sensor.clock === "receive") made.append(make("small", "by-receiving", "time of receiving"));
+  if (sensor.clock === "receive") made.append(make("small", "by-receiving", "receive time"));
   return made;
 }
 
 function drawStatus() {
   const view = state.view;
   get("connection").classList.toggle("off", !state.connected);
-  get("connection").dataset.hint = state.connected ? "Connected. Every click is kept on disk at once." : "Not connected.";
+  get("connection").dataset.hint = state.connected ? "Connected. Every click is saved to disk immediately." : "Not connected.";
   get("connection").dataset.stage = view?.stage ?? "collecting";
   const opening = state.opening;
   const words = opening || !view ? [opening?.problem || opening?.doing || "Opening the recording…"] : [view.status, nextWords()].filter(Boolean);
@@ -76,7 +76,7 @@ function drawStatus() {
   get("progress").hidden = !running && !reading;
   const bar = /** @type {HTMLProgressElement} */ (get("progress-bar"));
   get("progress-label").textContent = reading ? "" : (progress?.label ?? "");
-  if (reading) return bar.removeAttribute("value"); // nobody knows how long the rest takes
+  if (reading) return bar.removeAttribute("value"); // the remaining time is unknown
   if (!progress || !running) return;
   bar.max = progress.total;
   bar.value = progress.done;
@@ -107,7 +107,7 @@ function drawReadout() {
   get("readout").textContent = state.shown ? parts.join("   ") : "";
 }
 
-/** The radar return under the hand, in words. @param {{u: number, v: number}} point */
+/** The radar return under the pointer, as text. @param {{u: number, v: number}} point */
 function nearReturn(point) {
   const overlay = state.overlay;
   if (!overlay?.returns || !state.layers.returns || overlay.index !== state.shown?.index) return null;

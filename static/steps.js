@@ -1,16 +1,16 @@
 // @ts-check
-/** What to do next: three steps while there is no calibration, one line on the frame, and the same words in the status. */
+/** What to do next: three steps while there is no calibration, one line on the frame, and the same text in the status line. */
 
 import { make } from "./notices.js";
 import { clickIn, clicks, isClicked, on, placementAt, rangeApart, state } from "./state.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
-/** Fewer pairs than this give no pose; the server says so too. */
+/** Minimum number of pairs for a pose; the server enforces it too. */
 const FEWEST = 4;
-/** What is clicked: a corner reflector returns the wave as if from there. */
+/** The point to click: a corner reflector's echo seems to come from there. */
 const CENTRE = "the inner corner, where its three sheets meet";
 
-/** Words with keys between them. @typedef {(string|{key: string})[]} Words */
+/** Text with keys in between. @typedef {(string|{key: string})[]} Words */
 
 export function startGuide() {
   on(["opening", "shown", "view", "placements", "playing", "overlay"], drawGuide);
@@ -20,14 +20,14 @@ export function startGuide() {
 export function drawSteps() {
   const count = clicks().filter((click) => click.state !== "excluded").length;
   const found = state.placements.length;
-  const foundNone = "The radar shows no clear dwell: step to a frame in which the reflector stands still.";
-  const goesOn = state.recording ? "The radar is searched for places where the reflector stood still…" : "Once the recording is open, the radar is searched for places where the reflector stood still.";
+  const foundNone = "No placement was found in the radar data. Go to a frame in which the reflector stands still.";
+  const goesOn = state.recording ? "Searching the radar data for places where the reflector stood still…" : "Once the recording is open, the radar data is searched for places where the reflector stood still.";
   const searching = state.placementsKnown ? foundNone : goesOn;
   const now = count === 0 ? 0 : count < FEWEST ? 1 : 2;
   const steps = [
-    ["Go to a placement", found ? [key("N"), ` jumps to the next of ${found} that the radar has found.`] : [searching]],
-    ["Click the reflector's centre", [`That is ${CENTRE}. Wheel zooms at the cursor; `, key("Alt"), "+arrows move the mark by 0.1 px."]],
-    [`Do so for ${FEWEST} placements or more`, [count ? `${count} done. ` : "", "Near and far, left and right: the pose appears by itself and gets surer with each."]],
+    ["Go to a placement", found ? [key("N"), ` jumps to the next of ${found} found in the radar data.`] : [searching]],
+    ["Click the reflector's centre", [`That is ${CENTRE}. Zoom with the wheel; `, key("Alt"), "+arrows move the mark by 0.1 px."]],
+    [`Repeat for at least ${FEWEST} placements`, [count ? `${count} done. ` : "", "Spread them: near and far, left and right. The pose appears automatically and improves with each one."]],
   ];
   const items = steps.map(([title, text], index) =>
     make("li", index < now ? "done" : index === now ? "now" : "", [
@@ -48,10 +48,10 @@ function drawGuide() {
   guide.replaceChildren(...words.text.map((word) => (typeof word === "string" ? word : key(word.key))));
 }
 
-/** What goes on before there is a frame. @returns {{text: Words, act: boolean}|null} */
+/** What to show before there is a frame. @returns {{text: Words, act: boolean}|null} */
 function opening() {
   const now = state.opening;
-  return now && !now.problem ? { text: [state.preview ? "A first look while the recording is opened; clicking begins as soon as that is done" : now.doing], act: false } : null;
+  return now && !now.problem ? { text: [state.preview ? "Preview: you can click once the recording is open" : now.doing], act: false } : null;
 }
 
 /** @param {number} index @returns {{text: Words, act: boolean}|null} */
@@ -63,45 +63,45 @@ function advice(index) {
     const number = state.placements.indexOf(placement) + 1;
     return { text: [`Placement ${number} of ${state.placements.length}, ${placement.range_m.toFixed(1)} m away: click the reflector's inner corner, where its three sheets meet`], act: true };
   }
-  const next = nextDeed();
+  const next = nextAction();
   return next ? { text: next, act: false } : null;
 }
 
-/** What is the matter with the pair of this frame; otherwise what comes next. @param {import("./messages.js").ClickRow} click @returns {{text: Words, act: boolean}|null} */
+/** What is wrong with the pair of this frame, or else what to do next. @param {import("./messages.js").ClickRow} click @returns {{text: Words, act: boolean}|null} */
 function afterClick(click) {
   const apart = rangeApart(click);
-  if (apart) return { text: [`${apart}: correct the mark, or `, { key: "X" }, " leaves the pair out"], act: true };
-  if (click.state === "outlier") return { text: ["This pair does not agree with the others: correct the mark, or ", { key: "X" }, " leaves it out"], act: true };
-  if (click.state === "unpaired") return { text: ["The radar saw nothing here: click another frame of this placement, or go on with ", { key: "N" }], act: true };
-  const next = nextDeed();
+  if (apart) return { text: [`${apart}. Correct the mark, or press `, { key: "X" }, " to exclude the pair"], act: true };
+  if (click.state === "outlier") return { text: ["This pair does not agree with the others. Correct the mark, or press ", { key: "X" }, " to exclude it"], act: true };
+  if (click.state === "unpaired") return { text: ["No radar position here. Click another frame of this placement, or press ", { key: "N" }, " for the next one"], act: true };
+  const next = nextAction();
   return next ? { text: next, act: false } : null;
 }
 
 /** The next thing to do with the placements; null when there is nothing to say. @returns {Words|null} */
-export function nextDeed() {
+export function nextAction() {
   const view = state.view;
-  if (view?.stage === "unsolvable") return null; // what to do stands in the orange box
+  if (view?.stage === "unsolvable") return null; // the orange box says what to do
   const wrong = clicks().filter((click) => click.state === "outlier").length;
   if (view?.stage === "solved" && wrong) {
     const used = clicks().filter((click) => click.state === "inlier").length + wrong;
-    return [`${used - wrong} of ${used} pairs agree: `, { key: "J" }, wrong === 1 ? " shows the one that does not" : ` shows the ${wrong} that do not, one by one`];
+    return [`${used - wrong} of ${used} pairs agree. Press `, { key: "J" }, wrong === 1 ? " to see the outlier" : ` to see the ${wrong} outliers one by one`];
   }
   const left = state.placements.filter((placement) => !isClicked(placement)).length;
-  if (left) return [`${left} placement${left > 1 ? "s" : ""} left: `, { key: "N" }, " goes to the next"];
+  if (left) return [`${left} placement${left > 1 ? "s" : ""} left. Press `, { key: "N" }, " for the next one"];
   if (!state.placements.length || !view?.has_calibration || view.warnings.length) return null;
-  return ["Every placement is clicked: ", { key: "E" }, " exports the calibration"];
+  return ["Every placement has a click. Press ", { key: "E" }, " to export the calibration"];
 }
 
-/** The same for the status line: after what the server says, where that leaves it open. @returns {string} */
+/** The same for the status line, after the server's status where that does not say it. @returns {string} */
 export function nextWords() {
   const view = state.view;
   if (!view || view.stage === "unsolvable" || view.stage === "solving") return "";
   const lost = clicks().some((click) => click.state === "unpaired");
   if (lost || (view.reference && !view.has_calibration)) return view.hint;
-  const deed = view.stage === "solved" || view.clicks.length ? nextDeed() : null;
-  if (!deed) return view.hint;
-  const words = deed.map((word) => (typeof word === "string" ? word : word.key)).join("");
+  const action = view.stage === "solved" || view.clicks.length ? nextAction() : null;
+  if (!action) return view.hint;
+  const words = action.map((word) => (typeof word === "string" ? word : word.key)).join("");
   if (view.stage !== "solved") return words;
-  const told = view.status.includes("pairs agree") ? words.replace(/^\d+ of \d+ pairs agree: /, "") : words;
-  return [told, view.warnings.length || words.startsWith("Every") ? view.hint : ""].filter(Boolean).join("  ·  ");
+  const rest = view.status.includes("pairs agree") ? words.replace(/^\d+ of \d+ pairs agree\. /, "") : words;
+  return [rest, view.warnings.length || words.startsWith("Every") ? view.hint : ""].filter(Boolean).join("  ·  ");
 }

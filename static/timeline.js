@@ -1,5 +1,5 @@
 // @ts-check
-/** The timeline: placements, clicks as stems as high as their residual, radar activity; press to go there, wheel to zoom. */
+/** The timeline: placements, clicks as stems with the residual as height, radar activity; click to go there, wheel to zoom. */
 
 import { drawLanes, lanes } from "./lanes.js";
 import { jump, nearestIndex } from "./player.js";
@@ -8,9 +8,9 @@ import { clicks, on, state } from "./state.js";
 
 const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById("timeline"));
 const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
-/** A press this near to a stem goes to its frame [CSS px]. */
+/** A press this close to a stem goes to its frame [CSS px]. */
 const REACH = 5;
-/** The seconds that are shown. */
+/** The visible span of time [s]. */
 export const span = { from: 0, to: 1 };
 /** @type {number|null} */
 let pointer = null;
@@ -98,7 +98,7 @@ function zoom(event) {
   redraw();
 }
 
-/** Keep the frame of now in sight. */
+/** Keep the current frame in view. */
 function follow() {
   const now = state.seconds[state.cursor];
   if (now === undefined || (now >= span.from && now <= span.to) || dragging) return;
@@ -122,7 +122,7 @@ function redraw() {
   });
 }
 
-/** What a screen reader hears. */
+/** Update what a screen reader says. */
 function label() {
   canvas.setAttribute("aria-valuemin", "0");
   canvas.setAttribute("aria-valuemax", String(Math.max(0, state.seconds.length - 1)));

@@ -1,6 +1,6 @@
-"""What the person has done so far, as a value: Session, the events that change it, and the pure functions that apply them.
+"""What the user has done so far, as a value: Session, the events that change it, and the pure functions that apply them.
 
-Nothing here knows files, threads or screens.
+Nothing here deals with files, threads or screens.
 """
 
 from app.session.applying import EventError, apply

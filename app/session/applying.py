@@ -25,11 +25,11 @@ __all__ = ["EventError", "apply"]
 
 
 class EventError(CalibrationError):
-    """An event that does not fit the session or the recording; the session stays as it was."""
+    """An event that does not fit the session or the recording; the session is unchanged."""
 
 
 def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
-    """Return the session after an event; the very same one when the event changes nothing.
+    """Return the session after an event; the same object if the event changes nothing.
 
     Raises:
         EventError: the event does not fit the session or the recording.
@@ -47,7 +47,7 @@ def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
 
 @singledispatch
 def _changed(event: Event, session: Session, facts: RecordingFacts) -> Session:
-    """Return the session with what the event says in it; `apply` counts the revision."""
+    """Return the session with the event applied; `apply` increments the revision."""
     raise TypeError(f"not an event of the session: {event!r}")
 
 
@@ -102,7 +102,7 @@ def _imported(event: ClicksImported, session: Session, facts: RecordingFacts) ->
         _require_pixel(click.u_px, click.v_px, facts)
         _require_sigma(click)
         if click.image_time in times:
-            raise EventError(f"two of the clicks lie in the frame at {_seconds(click.image_time)}; keep one per frame")
+            raise EventError(f"two of the clicks are in the frame at {_seconds(click.image_time)}; keep one per frame")
         times.add(click.image_time)
     clicks = [click for click in session.clicks if click.image_time not in times]
     taken = {click.id for click in clicks}
@@ -130,7 +130,7 @@ def _click(session: Session, click_id: str) -> ReflectorClick:
 def _require_frame(time: TimeNs, facts: RecordingFacts) -> None:
     if facts.frame_at(time) is None:
         raise EventError(
-            f"no frame of {facts.name} has the stamp {_seconds(time)}; a click belongs to a frame, by its exact stamp"
+            f"no frame of {facts.name} has the stamp {_seconds(time)}; a click needs the exact stamp of its frame"
         )
 
 
@@ -143,7 +143,9 @@ def _require_pixel(u_px: float, v_px: float, facts: RecordingFacts) -> None:
 
 def _require_sigma(click: ReflectorClick) -> None:
     if click.sigma_px is not None and not 0.0 < click.sigma_px < math.inf:
-        raise EventError(f"click '{click.id}' has a sigma_px of {click.sigma_px:g}; give a number above 0, or none")
+        raise EventError(
+            f"click '{click.id}' has a sigma_px of {click.sigma_px:g}; give a number above 0, or leave it out"
+        )
 
 
 def _seconds(time: TimeNs) -> str:

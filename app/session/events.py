@@ -28,7 +28,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class ClickPlaced:
-    """The reflector's centre was clicked in a frame; a click that this frame already has moves here."""
+    """The reflector's centre was clicked in a frame; a click that this frame already has is moved."""
 
     image_time: TimeNs
     u_px: float
@@ -53,7 +53,7 @@ class ClickRemoved:
 
 @dataclass(frozen=True, slots=True)
 class ClickExcluded:
-    """A click was left out of the solve, or taken in again."""
+    """A click was excluded, or included again."""
 
     id: str
     excluded: bool
@@ -61,26 +61,26 @@ class ClickExcluded:
 
 @dataclass(frozen=True, slots=True)
 class OptionsChanged:
-    """These are the options from now on."""
+    """All options were set."""
 
     options: CalibrationOptions
 
 
 @dataclass(frozen=True, slots=True)
 class OptionsEdited:
-    """Some options were set; the others stay. `settled` turns it into OptionsChanged."""
+    """Some options were set; the others stay. `settled` turns this into OptionsChanged."""
 
     changes: tuple[OptionChange, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Cleared:
-    """All clicks were thrown away; the options stay."""
+    """All clicks were deleted; the options stay."""
 
 
 @dataclass(frozen=True, slots=True)
 class ClicksImported:
-    """Clicks from a file join the session; where a frame has one already, the file's wins."""
+    """Clicks from a file were added to the session; they replace clicks in the same frames."""
 
     clicks: tuple[ReflectorClick, ...]
 
@@ -96,12 +96,12 @@ class Solved:
 
 @dataclass(frozen=True, slots=True)
 class Undo:
-    """Take the last change back."""
+    """Undo the last change."""
 
 
 @dataclass(frozen=True, slots=True)
 class Redo:
-    """Make the change again that was taken back last."""
+    """Redo the change that was undone last."""
 
 
 Event: TypeAlias = (

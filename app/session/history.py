@@ -1,4 +1,4 @@
-"""Undo and redo as steps like any other: replaying a journal and living through it are the same function."""
+"""Undo and redo as steps like any other, so that working and replaying a journal use the same function."""
 
 from dataclasses import dataclass, field, replace
 
@@ -12,7 +12,7 @@ __all__ = ["History", "advance", "settled"]
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """The session of now, with those before it (undo) and those taken back (redo), nearest last."""
+    """The current session, with those before it (undo) and those undone (redo), nearest last."""
 
     present: Session = field(default_factory=Session)
     past: tuple[Session, ...] = ()
@@ -20,7 +20,7 @@ class History:
 
 
 def advance(history: History, step: Step, facts: RecordingFacts) -> History:
-    """Take one step; a step that changes nothing returns the very same History.
+    """Apply one step; a step that changes nothing returns the same History object.
 
     Raises:
         EventError: the event does not fit the session or the recording.
@@ -39,7 +39,7 @@ def advance(history: History, step: Step, facts: RecordingFacts) -> History:
 
 
 def settled(step: Step, session: Session) -> Step:
-    """Turn "set these options" into "these are the options": what is journalled no longer depends on what was before.
+    """Turn a change of some options into the full set of options, so that the journalled step does not depend on earlier ones.
 
     Raises:
         OptionError: an option is unknown, of the wrong type or out of range.
@@ -64,7 +64,7 @@ def _redone(history: History) -> History:
 
 
 def _resumed(kept: Session, current: Session) -> Session:
-    """Return to a kept session under a new revision, so that no answer on its way can be taken for an answer to this."""
+    """Return to a kept session under a new revision, so that no pending answer can be mistaken for an answer to this."""
     revision = current.revision + 1
     return replace(
         kept,

@@ -1,4 +1,4 @@
-"""The session as a value, and the little it must know about the recording."""
+"""The session as a value, and what it must know about the recording."""
 
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -17,14 +17,14 @@ Outcome: TypeAlias = Calibration | Unsolvable
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordingFacts:
-    """The little that clicks must fit.
+    """What clicks are checked against.
 
     Attributes:
-        name: what the person calls the recording.
+        name: what the user calls the recording.
         image_times: (m,) stamps of the frames [ns], ascending and unique.
         width_px: columns of a frame.
         height_px: rows of a frame.
-        radar_axes: what a person said about the radar's axes and units; None for nothing.
+        radar_axes: what the user specified about the radar's axes and units; None if nothing.
     """
 
     name: str
@@ -42,22 +42,22 @@ class RecordingFacts:
         return index if index < len(self.image_times) and int(self.image_times[index]) == time else None
 
     def has_pixel(self, u_px: float, v_px: float) -> bool:
-        """Tell whether a pixel lies on the frame, whose edge is half a pixel outside the outermost pixel centres."""
+        """Return whether a pixel is on the frame, whose edge is half a pixel outside the outermost pixel centres."""
         return -0.5 <= u_px <= self.width_px - 0.5 and -0.5 <= v_px <= self.height_px - 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """Everything the person decided, and the answer to it.
+    """Everything the user decided, and the resulting outcome.
 
     Attributes:
         clicks: sorted by time; at most one per frame.
         options: what the next solve uses.
-        next_click: number of the next id ("c7"); grows only, so that no id is ever given twice.
-        revision: grows by one with every change of clicks or options, undo and redo included.
-        outcome: the newest answer; it stays while a newer one is being worked out.
+        next_click: number of the next id ("c7"); it only increases, so that no id is used twice.
+        revision: increases by one with every change of clicks or options, including undo and redo.
+        outcome: the latest answer; it stays while a newer one is being computed.
         outcome_revision: the revision that `outcome` answers; -1 before the first.
-        checked: while there is no calibration, the clicks under the one that was given for review.
+        checked: while there is no calibration, the clicks evaluated under the one given for review.
     """
 
     clicks: tuple[ReflectorClick, ...] = ()
@@ -70,7 +70,7 @@ class Session:
 
     @property
     def is_solved(self) -> bool:
-        """Whether the outcome answers the clicks and options of now."""
+        """Whether the outcome answers the current clicks and options."""
         return self.outcome is not None and self.outcome_revision == self.revision
 
     @property

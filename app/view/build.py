@@ -1,4 +1,4 @@
-"""From the session to the View, in one pure call."""
+"""Build the View of a session, in one pure call."""
 
 from app.session import History, RecordingFacts, Session
 from app.view.advice import advice_for
@@ -12,16 +12,14 @@ from calib_core.results import Calibration, DataWarning
 
 __all__ = ["view"]
 
-"""Fewer pairs than this give no pose."""
-
 
 def view(history: History, facts: RecordingFacts, reference: Reference | None = None) -> View:
-    """Say everything there is to draw about the session of now.
+    """Return everything there is to draw about the current session.
 
     Args:
         history: the session with what can be undone and redone.
         facts: the recording's frames.
-        reference: a calibration to look at; None without one.
+        reference: a calibration to review; None if there is none.
     """
     session = history.present
     outcome = session.outcome
@@ -63,20 +61,20 @@ def _stage(session: Session) -> Stage:
 
 
 def _missing(session: Session) -> int:
-    """How many placements are missing before a solve can be tried; those that the radar did not see do not count."""
+    """Return how many placements are still needed to solve; clicks without a radar position do not count."""
     unseen = {row.id for row in _unpaired(session)}
     usable = sum(not click.excluded and click.id not in unseen for click in session.clicks)
     return max(0, MIN_PAIRS - usable)
 
 
 def _unpaired(session: Session) -> tuple[Unpaired, ...]:
-    """Clicks of now that found no radar position, as far as the newest answer knows."""
+    """Return the current clicks without a radar position, according to the latest outcome."""
     here = {click.id for click in session.clicks}
     return tuple(row for row in session.outcome.unpaired if row.id in here) if session.outcome else ()
 
 
 def _waits_for_clicks(session: Session) -> bool:
-    """Whether more placements are all that is missing, as far as the newest answer knows."""
+    """Return whether more placements are all that is missing, according to the latest outcome."""
     blocked = isinstance(session.outcome, Unsolvable) and session.outcome.code != "too-few-pairs"
     return _missing(session) > 0 and not blocked
 
@@ -98,14 +96,14 @@ def _words(session: Session, stage: Stage, reference: Reference | None) -> tuple
 
 
 def _still_missing(session: Session, missing: int) -> str:
-    """Say what a calibration of one's own takes beyond the reference, once there is a click."""
+    """Return what a new calibration still needs, once there is a click."""
     if _unpaired(session):
         return _next_click(session)
     return f"{missing} more placement{'s' if missing > 1 else ''} for a new calibration." if session.clicks else ""
 
 
 def _next_step(calibration: Calibration) -> str:
-    """Return what the first warning asks for; without warnings, the best next place."""
+    """Return the hint of the first warning; without warnings, the best next placement."""
     if calibration.warnings:
         return sentence(calibration.warnings[0].hint)
     advice = advice_for(calibration)
@@ -116,11 +114,11 @@ def _next_click(session: Session) -> str:
     unpaired = _unpaired(session)
     if not unpaired:
         return (
-            "Step to a frame in which the reflector stands still, and click its centre: "
+            "Go to a frame in which the reflector stands still and click its centre: "
             "the inner corner, where its three sheets meet."
         )
-    count = "The click" if len(session.clicks) == 1 else f"{len(unpaired)} of {len(session.clicks)} clicks"
-    return f"{count} found no radar position: {unpaired[0].reason}. {sentence(unpaired[0].hint)}"
+    count = "The click has" if len(session.clicks) == 1 else f"{len(unpaired)} of {len(session.clicks)} clicks have"
+    return f"{count} no radar position: {unpaired[0].reason}. {sentence(unpaired[0].hint)}"
 
 
 def _agreement(calibration: Calibration) -> str:

@@ -1,4 +1,4 @@
-"""One row per click: its state, its reprojection, its ellipse and what to say about it."""
+"""One row per click: its state, its reprojection, its ellipse and a note."""
 
 from collections.abc import Mapping
 
@@ -27,7 +27,7 @@ def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
 
 
 def ellipse_of(covariance_px2: Points2) -> Ellipse | None:
-    """Return the 95 % ellipse of a (2, 2) covariance [px^2]; None where it is not known."""
+    """Return the 95 % ellipse of a (2, 2) covariance [px^2]; None if it is not known."""
     if not np.all(np.isfinite(covariance_px2)):
         return None
     squares, axes = np.linalg.eigh((covariance_px2 + covariance_px2.T) / 2.0)
@@ -74,7 +74,7 @@ def _row(
 def _state(click: ReflectorClick, pair: PairResult) -> ClickState:
     if click.excluded:
         return "excluded"
-    if pair.excluded:  # taken in again since that answer
+    if pair.excluded:  # included again since that outcome
         return "pending"
     return "inlier" if pair.inlier else "outlier"
 
@@ -85,10 +85,11 @@ def _finite_pixel(pair: PairResult) -> tuple[float, float] | None:
 
 
 def _note(state: ClickState, residual_px: float | None, pair: PairResult) -> str:
-    away = "behind the camera" if residual_px is None else f"{plain(residual_px)} px from the click"
+    where = "is behind the camera" if residual_px is None else f"reprojects {plain(residual_px)} px from the click"
     if state == "outlier":
-        sure = "" if np.isnan(pair.outlier_probability) else f" ({plain(100 * pair.outlier_probability, 2)} % sure)"
-        return f"Does not agree with the others{sure}: its radar position comes out {away}. Check the click, or exclude it."
+        unknown = np.isnan(pair.outlier_probability)
+        chance = "" if unknown else f" (outlier probability {plain(100 * pair.outlier_probability, 2)} %)"
+        return f"Disagrees with the other pairs{chance}: its radar position {where}. Check the click, or exclude it."
     if state == "excluded":
-        return f"Left out of the solve; its radar position comes out {away}."
+        return f"Excluded; its radar position {where}."
     return ""

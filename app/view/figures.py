@@ -1,4 +1,4 @@
-"""The figures beside the picture, each with one sentence that explains it."""
+"""The figures next to the picture, each with one sentence that explains it."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from calib_core.results import Calibration
 __all__ = ["metric_figures", "pose_figures", "residual_limit_px"]
 
 _HELD_OUT_RATIO = 1.5
-"""A held-out error this much above the fitted one says that the pose leans on single pairs."""
+"""A higher ratio of held-out to fitted error means that the pose depends too much on single pairs."""
 
 
 def metric_figures(calibration: Calibration) -> tuple[Figure, ...]:
@@ -25,16 +25,18 @@ def metric_figures(calibration: Calibration) -> tuple[Figure, ...]:
     return (
         _figure("aed", "AED", metrics.aed_px, f"Mean distance between click and reprojection {over} (paper: AED)."),
         _held_out_figure(calibration),
-        _figure("cdsd", "CDSD", metrics.cdsd_px, "Standard deviation of these distances, over N - 1 (paper: CDSD)."),
         _figure(
-            "rms", "RMS", metrics.rms_px, "Root mean square of these distances: large ones weigh more than in AED."
+            "cdsd", "CDSD", metrics.cdsd_px, "Standard deviation of these distances, with divisor N - 1 (paper: CDSD)."
+        ),
+        _figure(
+            "rms", "RMS", metrics.rms_px, "Root mean square of these distances: large ones count more than in AED."
         ),
         Figure(
             "inliers",
             "pairs that agree",
             f"{agreeing} of {used}",
             "",
-            "Pairs that agree on the pose, of all that were not excluded by hand.",
+            "Pairs that agree on the pose, out of all that you have not excluded.",
             "good" if agreeing == used else "plain",
         ),
     )
@@ -45,18 +47,18 @@ def _figure(key: str, label: str, value_px: float, hint: str) -> Figure:
 
 
 def _held_out_figure(calibration: Calibration) -> Figure:
-    """Return the honest error, and say so when it is far above the fitted one."""
+    """Return the held-out error, with a warning if it is far above the fitted one."""
     metrics = calibration.metrics
     hint = "Mean distance when each pair is predicted from all the others: the error to expect at a new placement."
     figure = _figure("held_out_aed", "held-out AED", metrics.held_out_aed_px, hint)
     if metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px:
-        warning = "It is well above AED, so the pose leans on single pairs: add placements."
+        warning = "It is well above AED, so the pose depends on single pairs: add placements."
         return replace(figure, hint=f"{hint} {warning}", level="warning")
     return figure
 
 
 def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:
-    """Return where the camera sits and where it looks, seen from the radar, with one standard deviation."""
+    """Return the camera's position and angles relative to the radar, with one standard deviation."""
     mounting = mounting_of(calibration)
     figures = [
         Figure(key, label, with_sigma(100 * float(value), 100 * float(sigma)), "cm", hint)
@@ -73,26 +75,24 @@ def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:
 
 
 def _radar_figures(calibration: Calibration) -> tuple[Figure, ...]:
-    """Return how far off the radar's own angles are, where correcting them would pay."""
+    """Return the error of the radar's own angles, if correcting it would help."""
     angle_map = calibration.angle_map
     if angle_map is None:
         return ()
     hint = (
-        "The radar's angles are off smoothly with direction, which no pose can take out. Correcting them by the map in "
-        f"calibration.json (radar_angle_map) brings AED from {plain(angle_map.raw_aed_px)} to "
-        f"{plain(angle_map.corrected_aed_px)} px, each pair corrected by what the others say."
+        "The radar's angle errors vary smoothly with direction, so no pose can remove them. Correcting them with the map "
+        f"in calibration.json (radar_angle_map) reduces AED from {plain(angle_map.raw_aed_px)} to "
+        f"{plain(angle_map.corrected_aed_px)} px, each pair being corrected from the other pairs only."
     )
     return (
-        Figure(
-            "radar_angles", "radar's angles off by", f"up to {plain(np.rad2deg(angle_map.largest_rad))}", "deg", hint
-        ),
+        Figure("radar_angles", "radar angle error", f"up to {plain(np.rad2deg(angle_map.largest_rad))}", "deg", hint),
     )
 
 
 def residual_limit_px(calibration: Calibration) -> float | None:
-    """Return the length beyond which a residual deserves a look [px].
+    """Return the length above which a residual should be checked [px].
 
-    The paper's method: RANSAC's threshold. Otherwise the middle one of the 95 % ellipses' longer half axes.
+    With the paper's method, RANSAC's threshold; otherwise the median of the 95 % ellipses' semi-major axes.
     """
     if calibration.options.method == "paper":
         return calibration.options.paper.ransac_threshold_px
@@ -118,12 +118,12 @@ _ANGLES = (
     (
         "roll",
         "roll",
-        "Camera tipped to its right, compared with looking straight along the radar, ± one standard deviation.",
+        "Camera tilted to its right, relative to looking along the radar's x axis, ± one standard deviation.",
     ),
     (
         "pitch",
         "pitch",
-        "Camera looking down, compared with looking straight along the radar, ± one standard deviation.",
+        "Camera looking down, relative to looking along the radar's x axis, ± one standard deviation.",
     ),
-    ("yaw", "yaw", "Camera looking left, compared with looking straight along the radar, ± one standard deviation."),
+    ("yaw", "yaw", "Camera looking left, relative to looking along the radar's x axis, ± one standard deviation."),
 )

@@ -1,4 +1,4 @@
-"""What a client draws: plain numbers and finished text, nothing left to decide."""
+"""What a client draws: plain numbers and final text, with nothing left to decide."""
 
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -16,11 +16,11 @@ Stage: TypeAlias = Literal["collecting", "solving", "solved", "unsolvable"]
 
 @dataclass(frozen=True, slots=True)
 class Ellipse:
-    """Where 95 % of the residuals of a good pair would lie, around its reprojection.
+    """The region around a reprojection that contains 95 % of the residuals of a good pair.
 
     Attributes:
-        semi_major_px: the longer half axis.
-        semi_minor_px: the shorter one.
+        semi_major_px: semi-major axis.
+        semi_minor_px: semi-minor axis.
         angle_rad: from the image's x axis (right) towards its y axis (down) to the longer axis.
     """
 
@@ -31,7 +31,7 @@ class Ellipse:
 
 @dataclass(frozen=True, slots=True)
 class ClickRow:
-    """One click, its mark on the picture and its line in the table.
+    """One click: its mark on the picture and its row in the table.
 
     Attributes:
         id: the click's id.
@@ -39,16 +39,16 @@ class ClickRow:
         frame: index of its frame.
         u_px: column of the click.
         v_px: row of the click.
-        state: what the newest answer says about it; "pending" when it says nothing.
-        projected_px: where its radar position comes out on the frame (u, v); None where it does not.
-        residual_px: length of projected_px minus the click of now; None without projected_px.
-        ellipse: None where the method has no noise model.
+        state: according to the latest outcome; "pending" if that does not cover it.
+        projected_px: reprojection of its radar position (u, v); None if it has none.
+        residual_px: length of projected_px minus the current click; None without projected_px.
+        ellipse: None if the method has no noise model.
         range_m: of its radar position; None without one.
         azimuth_deg: of its radar position, positive to the left.
         elevation_deg: of its radar position, positive upwards.
-        returns: how many radar returns the position averages; None where it is not known.
-        outlier_probability: 0 to 1; None where the method has none.
-        note: one sentence for people; "" when there is nothing to say.
+        returns: how many radar returns the position averages; None if unknown.
+        outlier_probability: 0 to 1; None if the method has none.
+        note: text for the user; "" when there is nothing to say.
     """
 
     id: str
@@ -70,15 +70,15 @@ class ClickRow:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """One number as it is shown.
+    """One number as displayed.
 
     Attributes:
         key: for programs, such as "aed"; stable.
-        label: for people, such as "AED".
-        value: formatted, with its standard deviation where that is known: "12.4", "0.31 ± 0.08".
-        unit: such as "px"; "" where it has none.
+        label: for display, such as "AED".
+        value: formatted, with its standard deviation if that is known: "12.4", "0.31 ± 0.08".
+        unit: such as "px"; "" if it has none.
         hint: one sentence that explains the number, shown on hover.
-        level: whether it is fine or needs a look.
+        level: whether it needs attention.
     """
 
     key: str
@@ -97,10 +97,10 @@ class Advice:
         u_px: column where it would appear.
         v_px: row.
         range_m: how far from the radar.
-        gain: present uncertainty over the one expected afterwards, at least 1.
-        may_stop: no place is worth the walk.
-        position_radar_m: the place.
-        words: the same as one or two sentences.
+        gain: present uncertainty divided by the one expected afterwards, at least 1.
+        may_stop: no further placement would help noticeably.
+        position_radar_m: (x, y, z) in the radar frame.
+        words: the same as text, one or two sentences.
     """
 
     u_px: float
@@ -118,24 +118,24 @@ class View:
 
     Attributes:
         revision: of the session; grows with every change.
-        stage: where the work stands.
+        stage: how far the session has come.
         status: the same in a few words: "4 more placements needed", "solving…", "solved: 18 of 20 pairs agree".
         hint: the next thing to do; "" when there is none.
-        solving: an answer to this revision is being worked out; what is shown answers an older one.
-        solved_revision: the revision that the figures answer; -1 without figures.
-        can_undo: whether there is a change to take back.
-        can_redo: whether there is one to make again.
+        solving: this revision is being solved; what is shown belongs to an older one.
+        solved_revision: the revision that the figures belong to; -1 without figures.
+        can_undo: whether there is a change to undo.
+        can_redo: whether there is a change to redo.
         has_calibration: whether there is a calibration to download.
         method: the one in the options.
         clicks: in order of image time.
         metrics: how well the pairs agree.
-        pose: where the camera sits and looks, seen from the radar.
-        warnings: the newest answer's.
-        options: as they are now; changes are sent as a part of this tree.
-        residual_limit_px: residuals beyond this deserve a look; None without a calibration.
+        pose: the camera's position and angles relative to the radar.
+        warnings: of the latest outcome.
+        options: the current ones; changes are sent as a part of this tree.
+        residual_limit_px: residuals above this should be checked; None without a calibration.
         advice: where to put the reflector next; None without a calibration.
-        reference: file name of the calibration that was given to look at; "" without one.
-        comparison: how far the solved calibration lies from it; empty without either.
+        reference: file name of the calibration under review; "" if there is none.
+        comparison: how far the solved calibration is from the reference; empty if either is missing.
     """
 
     revision: int

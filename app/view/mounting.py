@@ -1,4 +1,4 @@
-"""How the camera is mounted, in the words of a person with a tape measure: position and tilt, seen from the radar."""
+"""How the camera is mounted, as one would measure it: position and tilt relative to the radar."""
 
 from dataclasses import dataclass
 
@@ -16,14 +16,14 @@ OPTICAL_FROM_BODY: Matrix33 = frozen_array([[0, -1, 0], [0, 0, -1], [1, 0, 0]], 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mounting:
-    """The camera seen from the radar.
+    """The position and orientation of the camera relative to the radar.
 
     Attributes:
         position_m: (3,) camera centre in the radar frame.
-        position_sigma_m: (3,) its standard deviations; NaN where unknown.
-        roll_pitch_yaw_rad: (3,) turns about the radar's x, y, z axes, Rz(yaw) Ry(pitch) Rx(roll), from looking straight
-            forward. Positive roll tips the camera to its right, positive pitch looks down, positive yaw looks left.
-        roll_pitch_yaw_sigma_rad: (3,) their standard deviations; NaN where unknown.
+        position_sigma_m: (3,) its standard deviations; NaN if unknown.
+        roll_pitch_yaw_rad: (3,) rotations about the radar's x, y, z axes, Rz(yaw) Ry(pitch) Rx(roll), relative to looking
+            straight forward. Positive roll tips the camera to its right, positive pitch looks down, positive yaw looks left.
+        roll_pitch_yaw_sigma_rad: (3,) their standard deviations; NaN if unknown.
     """
 
     position_m: Vector3
@@ -59,7 +59,7 @@ def _roll_pitch_yaw(radar_from_body: Matrix33) -> tuple[float, float, float]:
 
 
 def _angle_rates(roll: float, pitch: float) -> Matrix33:
-    """Return d(roll, pitch, yaw) / d(turn about the body's own axes); it grows without bound as pitch nears 90 degrees."""
+    """Return d(roll, pitch, yaw) / d(rotation about the body's own axes); it grows without bound as pitch nears 90 degrees."""
     s, c = np.sin(roll), np.cos(roll)
     cos_pitch = max(float(np.cos(pitch)), 1e-9)
     tan_pitch = np.sin(pitch) / cos_pitch

@@ -1,4 +1,4 @@
-"""Numbers as people read them: as many digits as the number has earned."""
+"""Format numbers with as many digits as are significant."""
 
 import math
 
@@ -8,7 +8,7 @@ _DASH = "–"
 
 
 def plain(value: float, digits: int = 3) -> str:
-    """Write a number with so many digits that count, more only before the point; a dash where it is not finite."""
+    """Format a number with this many significant digits, more only before the decimal point; a dash if it is not finite."""
     if not math.isfinite(value):
         return _DASH
     if value == 0:
@@ -17,9 +17,9 @@ def plain(value: float, digits: int = 3) -> str:
 
 
 def with_sigma(value: float, sigma: float) -> str:
-    """Write a number and its standard deviation with the same decimals: "0.31 ± 0.08".
+    """Format a number and its standard deviation with the same number of decimals: "0.31 ± 0.08".
 
-    The standard deviation keeps two digits when they begin with 10 to 35 and one digit above, the habit of physicists.
+    The standard deviation gets two digits if these are 10 to 35, and one digit above that, as is usual in physics.
     """
     if not math.isfinite(value):
         return _DASH
@@ -34,7 +34,7 @@ def with_sigma(value: float, sigma: float) -> str:
 
 
 def _exponent(value: float, digits: int) -> int:
-    """Return the power of ten of the first digit, after rounding to so many digits."""
+    """Return the power of ten of the first digit, after rounding to this many digits."""
     return int(f"{abs(value):.{digits - 1}e}".partition("e")[2])
 
 

@@ -1,4 +1,4 @@
-"""A calibration from a file, to be looked at: shown until the clicks give one of their own, then compared with it."""
+"""A calibration from a file, for review: shown until the clicks give a new one, then compared with it."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,7 +20,7 @@ class Reference:
 
     Attributes:
         name: of its file.
-        calibration: the pose in it, seen through the camera of the recording.
+        calibration: the pose in it, with the camera of the recording.
     """
 
     name: str
@@ -28,28 +28,25 @@ class Reference:
 
 
 def shown_calibration(session: Session, reference: Reference | None) -> Calibration | None:
-    """Return what the picture and the 3D view are drawn with: the session's own answer, else the reference, else nothing."""
+    """Return the calibration to draw with: the session's own, else the reference's, else None."""
     if isinstance(session.outcome, Calibration):
         return session.outcome
     return reference.calibration if reference else None
 
 
 def reference_words(session: Session, reference: Reference) -> str:
-    """Say that the reference is on the screen and, once there are clicks, how far they lie from it."""
+    """Return the status text: the reference is shown, and, once there are clicks, how far they are from it."""
     distances_px = [pair.distance_px for pair in session.checked if np.isfinite(pair.distance_px)]
     if not distances_px:
         return f"Showing the calibration from {reference.name}; click reflectors to check or replace it"
     count = len(distances_px)
-    lie = "1 click lies" if count == 1 else f"{count} clicks lie"
-    mean = "" if count == 1 else " on average"
-    return (
-        f"Showing the calibration from {reference.name}; {lie} {plain(float(np.mean(distances_px)))} px from it{mean}"
-    )
+    which = "residual of 1 click" if count == 1 else f"mean residual of {count} clicks"
+    return f"Showing the calibration from {reference.name}; {which}: {plain(float(np.mean(distances_px)))} px"
 
 
 @lru_cache(maxsize=4)
 def comparison_figures(reference: Reference, calibration: Calibration) -> tuple[Figure, ...]:
-    """Return how far the solved calibration lies from the reference: in degrees, centimetres, and pixels by distance."""
+    """Return how far the solved calibration is from the reference: in degrees, centimetres, and pixels by distance."""
     both = compare(imported(CalibrationFile(reference.calibration)), imported(CalibrationFile(calibration)))
     return (
         Figure(
@@ -58,7 +55,7 @@ def comparison_figures(reference: Reference, calibration: Calibration) -> tuple[
             with_sigma(both.rotation_deg, both.rotation_sigma_deg),
             "deg",
             f"Angle between the solved rotation and the one from {reference.name}, ± the standard deviation of this "
-            "difference by the covariances that are known.",
+            "difference according to the known covariances.",
         ),
         Figure(
             "position_apart",
@@ -75,14 +72,14 @@ def comparison_figures(reference: Reference, calibration: Calibration) -> tuple[
 
 def _pixels(at: PixelDifference) -> Figure:
     known = np.isfinite(at.sigma_px)
-    expected = f" By the covariances {plain(at.sigma_px)} px are to be expected." if known else ""
+    expected = f" The covariances predict {plain(at.sigma_px)} px." if known else ""
     return Figure(
         f"apart_{at.distance_m:g}_m",
         f"at {at.distance_m:g} m",
         f"{plain(at.rms_px)}",
         "px",
-        f"How far apart the two project what is {at.distance_m:g} m away: root mean square over the image, "
-        f"{plain(at.max_px)} px at most.{expected}",
+        f"Distance in the picture between the two reprojections of a point {at.distance_m:g} m away: root mean square "
+        f"over the image, {plain(at.max_px)} px at most.{expected}",
         "warning" if known and at.rms_px > 3 * at.sigma_px else "plain",
     )
 
@@ -90,5 +87,5 @@ def _pixels(at: PixelDifference) -> Figure:
 def _chance(both: Comparison) -> tuple[Figure, ...]:
     if not np.isfinite(both.p_value):
         return ()
-    words = "Chance of a difference this large if both were right and independent."
-    return (Figure("apart_chance", "chance", plain(both.p_value, 2), "", words),)
+    words = "Probability of a difference this large if both are right and independent."
+    return (Figure("apart_chance", "probability", plain(both.p_value, 2), "", words),)

@@ -1,4 +1,4 @@
-"""Phrases of the core as sentences on the screen."""
+"""Turn phrases of the core into sentences for the screen."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ __all__ = ["sentence", "warning_in_sentences"]
 
 
 def sentence(phrase: str) -> str:
-    """Begin with a capital and end with a full stop; nothing stays nothing, and names such as /radar or c14 stay as they are."""
+    """Capitalize the phrase and add a full stop; an empty phrase stays empty, names such as /radar or c14 are not capitalized."""
     phrase = phrase.strip()
     if not phrase:
         return ""

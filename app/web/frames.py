@@ -1,4 +1,4 @@
-"""Camera frames for the page and the 3D view: recorded bytes untouched, half-size proxies, thumbnails; decoded off the loop."""
+"""Camera frames for the page and the 3D view: untouched bytes, half-size proxies, thumbnails; decoded off the event loop."""
 
 import asyncio
 from collections import OrderedDict
@@ -16,7 +16,7 @@ __all__ = ["Frame", "FrameStore", "Size"]
 Size = Literal["full", "half", "thumbnail"]
 
 HALF_ABOVE_PX = 2_500_000
-"""Pictures above this many pixels are halved while playing [px]."""
+"""Pictures with more pixels than this are sent at half size while playing [px]."""
 THUMBNAIL_WIDTH_PX = 480
 _PROXY_QUALITY, _THUMBNAIL_QUALITY = 85, 80
 
@@ -31,7 +31,7 @@ class Frame:
         format: which of the two.
         width_px: columns of the recorded picture, whatever the size of this one.
         height_px: rows of the recorded picture.
-        scale: size of this picture over the recorded one: 1, 0.5 or less.
+        scale: size of this picture relative to the recorded one: 1, 0.5 or less.
     """
 
     index: int
@@ -43,7 +43,7 @@ class Frame:
 
 
 class FrameStore:
-    """Frames by index and size, the newest used kept in memory, each made once however many ask. Lives on one event loop."""
+    """Frames by index and size, cached by last use; concurrent requests share one read. Runs on one event loop."""
 
     def __init__(self, source: Recording, count: int, executor: Executor, *, budget_bytes: int = 256 << 20) -> None:
         self._source = source
@@ -60,7 +60,7 @@ class FrameStore:
 
     @property
     def kept_bytes(self) -> int:
-        """How much the kept frames weigh."""
+        """Size of the frames in memory [bytes]."""
         return self._kept_bytes
 
     async def get(self, index: int, size: Size = "full") -> Frame:
@@ -81,10 +81,10 @@ class FrameStore:
         if task is None:
             task = asyncio.get_running_loop().create_task(self._make(key))
             self._coming[key] = task
-        return await asyncio.shield(task)  # a client that leaves must not take the frame from the others
+        return await asyncio.shield(task)  # a client that leaves must not cancel the frame for the others
 
     def prefetch(self, index: int, size: Size, step: int, *, ahead: int = 3) -> None:
-        """Start on the next frames in the direction of play."""
+        """Start reading the next frames in the direction of playback."""
         for next_index in range(index + step, index + step * (ahead + 1), step) if step and not self._closed else ():
             key: tuple[int, Size] = (next_index, size)
             if 0 <= next_index < self._count and key not in self._kept and key not in self._coming:
@@ -93,7 +93,7 @@ class FrameStore:
                 self._coming[key] = task
 
     async def close(self) -> None:
-        """Drop what is on its way and begin nothing more, so that the event loop can end."""
+        """Cancel pending reads and start no more, so that the event loop can end."""
         self._closed = True
         coming = list(self._coming.values())
         for task in coming:
@@ -118,7 +118,7 @@ class FrameStore:
 
 
 def _retrieve(task: "asyncio.Task[Frame]") -> None:
-    """Take the outcome of a prefetch nobody waits for; whoever asks for the frame gets its error then."""
+    """Consume the outcome of a prefetch that nobody awaits; a later request for the frame raises its error."""
     if not task.cancelled():
         task.exception()
 
@@ -129,7 +129,7 @@ def _full(source: Recording, index: int) -> Frame:
 
 
 def _half(source: Recording, index: int) -> Frame:
-    """Halve a large picture; a small one goes as it is."""
+    """Halve a large picture; return a small one as it is."""
     full = _full(source, index)
     if full.width_px * full.height_px <= HALF_ABOVE_PX:
         return full

@@ -1,4 +1,4 @@
-"""What the radar saw at a frame, and what of it the calibrated camera should see."""
+"""What the radar saw at the time of a frame, and where the calibrated camera should see it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,23 +23,23 @@ _NEAREST_WITHIN_S = 0.3
 
 @dataclass(frozen=True, slots=True)
 class RadarSight:
-    """Reads the radar around single moments."""
+    """Reads the radar around single times."""
 
     recording: RadarSource
 
     def scan_at(self, time: TimeNs) -> RadarScan | None:
-        """Return the scan nearest to a moment, rows without a position dropped; None when none is near."""
+        """Return the scan nearest to a time, without returns that lack a position; None if none is near."""
         scans = self.recording.radar_scans_around([time], _NEAREST_WITHIN_S)
         return _finite(scans.scan(scans.nearest(time))) if len(scans) else None
 
     def window(self, time: TimeNs, options: CalibrationOptions) -> Points3:
-        """Return the still returns (n, 3) [m] of the window around a click."""
+        """Return the static returns (n, 3) [m] of the window around a click."""
         scans = self.recording.radar_scans_around([time], options.locating.window_s / 2)
         return static_returns(scans, options.gating).points_radar_m
 
 
 def still_returns(scan: RadarScan, options: GatingOptions) -> Flags:
-    """Tell which returns are slow enough to be the reflector; a radar without Doppler calls all of them still."""
+    """Return which returns are slow enough to be the reflector; without Doppler, all of them are."""
     return ~(np.abs(scan.doppler_mps) > options.max_speed_mps)
 
 
@@ -50,14 +50,14 @@ def overlay_of(
     placements: Sequence[Placement],
     reference: Reference | None = None,
 ) -> Overlay:
-    """Carry the returns of a scan, and the placements of the moment, into a frame.
+    """Project the returns of a scan, and the placements at that time, into a frame.
 
     Args:
         index: of the frame.
         session: its newest calibration is used.
-        scan: the nearest one; None when there is none.
-        placements: those that the frame lies in.
-        reference: drawn with as long as the session has no calibration of its own.
+        scan: the nearest one; None if there is none.
+        placements: those that include the frame.
+        reference: used as long as the session has no calibration of its own.
     """
     calibration = shown_calibration(session, reference)
     if calibration is None:

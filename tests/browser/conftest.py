@@ -17,14 +17,14 @@ from tests.find_browser import find_browser
 
 @pytest.fixture(scope="module")
 def playwright_driver() -> Iterator[Playwright]:
-    """Start Playwright; it keeps an event loop running in this thread, so other modules must not find it here."""
+    """Start Playwright per module: it keeps an event loop running in this thread, which would disturb other modules."""
     with sync_playwright() as driver:
         yield driver
 
 
 @pytest.fixture(scope="module")
 def launch(playwright_driver: Playwright) -> Iterator[Callable[..., Browser]]:
-    """Start browsers with further flags; all are closed at the end."""
+    """Start browsers with extra flags; all are closed at the end."""
     path, running = find_browser(), []
 
     def start_browser(*flags: str) -> Browser:
@@ -44,7 +44,7 @@ def chromium(launch: Callable[..., Browser]) -> Browser:
 
 @pytest.fixture(scope="session", autouse=True)
 def own_state_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Keep the cookie's key out of the user's own folder."""
+    """Keep the cookie's key out of the user's state folder."""
     patch = pytest.MonkeyPatch()
     patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
     yield
@@ -79,7 +79,7 @@ def server(workspace: Workspace, sample: Recording) -> Iterator[RunningServer]:
 
 @pytest.fixture
 def open_page(chromium: Browser) -> Iterator[Callable[..., Driver]]:
-    """Open pages; at the end none of them has complained, and none has asked anybody but this machine."""
+    """Open pages; at the end, check that none logged an error or contacted another machine."""
     drivers: list[Driver] = []
     contexts = []
 

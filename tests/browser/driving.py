@@ -1,4 +1,4 @@
-"""Words for driving the page: wait for a condition, click an image point, read the state."""
+"""Drive the page: wait for a condition, click an image point, read the state."""
 
 import math
 import time
@@ -20,7 +20,7 @@ FLAGS = [
 
 
 class Driver:
-    """One open page and what a person does with it."""
+    """One open page and what a user does with it."""
 
     def __init__(self, page: Page, url: str, ready: str = "__cocalib.state.shown") -> None:
         self.page = page
@@ -58,12 +58,12 @@ class Driver:
         return self.page.evaluate(f"() => ({expression})")
 
     def drawn(self) -> None:
-        """Wait until the browser has laid out and drawn twice: what was asked for before is on the screen."""
+        """Wait until the browser has laid out and drawn twice, so that earlier changes are on the screen."""
         self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     @property
     def view(self) -> Any:
-        """The last view of the server."""
+        """The last view sent by the server."""
         return self.value("__cocalib.state.view")
 
     def frame_at(self, stamp: dict[str, int]) -> int:
@@ -81,7 +81,7 @@ class Driver:
         self.until(f"__cocalib.state.shown.index === {index} && __cocalib.state.shown.scale === 1")
 
     def place_of(self, u: float, v: float) -> tuple[float, float]:
-        """Return where an image point lies on the page [CSS px]."""
+        """Return the position of an image point on the page [CSS px]."""
         x, y = self.value(
             "(() => { const box = document.getElementById('marks').getBoundingClientRect();"
             f"const [x, y] = __cocalib.toCss({u}, {v}); return [box.left + x, box.top + y]; }})()"
@@ -110,7 +110,7 @@ class Driver:
         self.settle()
 
     def settle(self) -> None:
-        """Wait until nothing is on its way: no unconfirmed event, no mark of the hand, no solve."""
+        """Wait until nothing is pending: no unconfirmed event, no local mark, no solve."""
         self.until("__cocalib.unconfirmed() === 0 && __cocalib.state.local.size === 0 && !__cocalib.state.view.solving")
 
     def click_sample(self, truth: dict[str, Any], count: int | None = None) -> None:
@@ -122,7 +122,7 @@ class Driver:
         self.settle()
 
     def text(self, selector: str) -> str:
-        """Return what an element says."""
+        """Return the text of an element."""
         return self.page.inner_text(selector)
 
     def zoom_to(self, u: float, v: float, factor: float) -> None:

@@ -1,4 +1,4 @@
-"""A person calibrates the sample in a real browser."""
+"""A user calibrates the sample in a real browser."""
 
 import json
 from collections.abc import Callable
@@ -76,7 +76,7 @@ def test_excluding_a_pair_solves_again_and_greys_its_row(page: Driver, truth: An
     assert page.view["metrics"] == before["metrics"]
 
 
-def test_a_mark_can_be_dragged_nudged_placed_anew_and_removed(page: Driver, truth: Any) -> None:
+def test_a_mark_can_be_dragged_nudged_placed_again_and_removed(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 1)
     [placed] = page.view["clicks"]
     u, v = placed["u_px"], placed["v_px"]
@@ -98,7 +98,7 @@ def test_a_mark_can_be_dragged_nudged_placed_anew_and_removed(page: Driver, trut
     assert page.view["clicks"] == []
 
 
-def test_dragging_beside_a_mark_pans_and_places_nothing(page: Driver) -> None:
+def test_dragging_away_from_a_mark_pans_and_places_nothing(page: Driver) -> None:
     page.zoom_to(400, 300, 3)
     before = page.place_of(400, 300)
     page.drag((400, 300), (430, 310))
@@ -133,7 +133,7 @@ def test_playing_shows_frame_after_frame_and_space_stops_it(page: Driver) -> Non
     page.until("__cocalib.state.shown.index === __cocalib.state.cursor")
 
 
-def test_keys_work_while_the_hand_is_in_the_3d_view(page: Driver) -> None:
+def test_keys_work_while_the_3d_view_has_the_focus(page: Driver) -> None:
     space = page.page.frame_locator("#space-view").locator("canvas").last
     space.wait_for(state="attached")
     space.click(position={"x": 60, "y": 120})
@@ -142,7 +142,7 @@ def test_keys_work_while_the_hand_is_in_the_3d_view(page: Driver) -> None:
     page.until("__cocalib.state.shown.index === 2")
 
 
-def test_the_method_and_its_options_can_be_changed_and_taken_back(page: Driver, truth: Any) -> None:
+def test_the_method_and_its_options_can_be_changed_and_reset(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 8)
     robust = page.view["metrics"]
     page.page.click("#tab-options")
@@ -156,18 +156,18 @@ def test_the_method_and_its_options_can_be_changed_and_taken_back(page: Driver, 
     page.page.fill('[data-path="noise.sigma_px"] input', "5000")
     page.page.press('[data-path="noise.sigma_px"] input', "Enter")
     page.until("document.querySelector('.toast')")
-    assert "Uncertainty of a click: 5000 is out of range" in page.text(".toast")
+    assert "Click uncertainty: 5000 is out of range" in page.text(".toast")
     page.until("document.querySelector('[data-path=\"noise.sigma_px\"] input').value === '2'")
-    page.page.get_by_label("Uncertainty of a click").fill("3")
+    page.page.get_by_label("Click uncertainty").fill("3")
     page.page.keyboard.press("Enter")
     page.until("document.querySelector('.toast') === null")
 
 
-def test_a_camera_position_counts_once_it_is_entered_and_not_before(page: Driver, truth: Any) -> None:
+def test_a_camera_position_is_used_only_once_it_is_entered(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 6)
     without = page.view
     page.page.click("#tab-options")
-    page.page.get_by_label("Camera position by tape").check()
+    page.page.get_by_label("Measured camera position").check()
     assert page.view["options"]["solving"]["camera_position"] is None
     rotation, translation = (np.array(truth["camera_from_radar"][key]) for key in ("rotation", "translation_m"))
     for name, value in zip(("forward", "left", "up"), -rotation.T @ translation, strict=True):
@@ -202,7 +202,7 @@ def test_two_tabs_see_the_same(
     assert page.view == other.view
 
 
-def test_a_page_that_is_loaded_again_is_where_it_was(page: Driver, truth: Any) -> None:
+def test_a_reloaded_page_shows_the_same_frame(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 4)
     before, frame = page.view, page.value("__cocalib.state.cursor")
     page.page.reload()

@@ -26,7 +26,7 @@ def solved(page: Driver, workspace: Workspace, project_root: Path) -> Driver:
 
 
 def choose(page: Driver, name: str) -> None:
-    """Choose a format and wait for its text; where it is for rectified pictures only, say that they are."""
+    """Choose a format and wait for its text; if it is for rectified pictures only, say that they are."""
     page.page.click(f'{DIALOG} [data-export="{name}"]')
     if name != "clicks" and format_named(name).is_for_rectified:
         page.page.check(RECTIFIED)
@@ -98,19 +98,21 @@ def test_the_choice_is_remembered(solved: Driver) -> None:
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("T_cam_radar")
 
 
-def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_in_words(solved: Driver, tmp_path: Path) -> None:
+def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_with_a_reason(
+    solved: Driver, tmp_path: Path
+) -> None:
     solved.page.click("#export")
     choose(solved, "autoware")
     before = read_any(saved(solved, tmp_path).read_bytes())
-    solved.page.fill('[aria-label="x of the radar in its parent"]', "3.5")
+    solved.page.fill('[aria-label="x of the radar in the parent frame"]', "3.5")
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("x: 3.5")
     after = read_any(saved(solved, tmp_path).read_bytes())
     np.testing.assert_allclose(
         after.camera_from_radar.as_matrix(), before.camera_from_radar.as_matrix(), rtol=0, atol=1e-12
     )
-    solved.page.fill('[aria-label="qw of the radar in its parent"]', "0.5")
+    solved.page.fill('[aria-label="qw of the radar in the parent frame"]', "0.5")
     expect(solved.page.locator(f"{DIALOG} .reason")).to_contain_text("length")
-    solved.page.fill('[aria-label="qw of the radar in its parent"]', "1")
+    solved.page.fill('[aria-label="qw of the radar in the parent frame"]', "1")
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("x: 3.5")
 
 
@@ -179,7 +181,7 @@ def test_copy_puts_the_text_on_the_clipboard(solved: Driver) -> None:
     assert read_any(copied).format == "matrix"
 
 
-def test_warnings_of_the_calibration_stand_beside_the_text(page: Driver, truth: Any) -> None:
+def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 4)
     warnings = page.view["warnings"]
     page.page.click("#export")

@@ -1,4 +1,4 @@
-"""The page leads on: after a click, after a wrong one, after a jump while zoomed in, and without a mouse."""
+"""The page guides the user: after a click, after a wrong one, after a jump while zoomed in, and without a mouse."""
 
 from typing import Any
 
@@ -19,10 +19,10 @@ def test_a_wrong_click_is_named_and_found_by_j(page: Driver, truth: Any) -> None
     page.press("n")
     page.until("__cocalib.state.view.clicks.filter((click) => click.state === 'outlier').length === 1")
     assert "9 of 10 pairs agree" in page.text("#status-text")
-    assert "J shows the one that does not" in page.text("#status-text")
+    assert "Press J to see the outlier" in page.text("#status-text")
     page.press("j")
     page.until(f"__cocalib.state.shown.index === {page.frame_at(wrong['best_image_time'])}")
-    assert "X leaves" in page.text("#guide")
+    assert "press X to exclude" in page.text("#guide")
 
 
 def test_a_jump_shows_the_reflector_also_when_zoomed_in(page: Driver, truth: Any) -> None:
@@ -68,7 +68,7 @@ def test_a_placement_can_be_marked_without_a_mouse(page: Driver, truth: Any) -> 
     assert (last["u_px"], last["v_px"]) == pytest.approx(guess)
 
 
-def test_a_failure_of_the_papers_method_stands_in_the_warning_box(page: Driver, truth: Any) -> None:
+def test_a_failure_of_the_papers_method_is_shown_in_the_warning_box(page: Driver, truth: Any) -> None:
     page.click_sample(truth, 9)
     page.page.click("#tab-options")
     assert page.page.locator('[data-path="paper.ransac_threshold_px"]').is_hidden()

@@ -1,4 +1,4 @@
-"""The page as a person finds it: what it says first, how it is laid out, what the 3D view shows, and that it remembers."""
+"""The page as a user finds it: what it says first, its layout, what the 3D view shows, and what it remembers."""
 
 import cv2
 import numpy as np
@@ -10,7 +10,7 @@ pytestmark = pytest.mark.browser
 
 
 def pixels(page: Driver, selector: str) -> np.ndarray:
-    """Return what is on the screen there: (h, w, 3) BGR."""
+    """Return a screenshot of an element: (h, w, 3) BGR."""
     picture = cv2.imdecode(np.frombuffer(page.page.locator(selector).screenshot(), np.uint8), cv2.IMREAD_COLOR)
     assert picture is not None
     return np.asarray(picture)
@@ -19,7 +19,7 @@ def pixels(page: Driver, selector: str) -> np.ndarray:
 def test_a_new_user_is_told_what_to_do_and_led_to_the_first_click(page: Driver) -> None:
     page.until("__cocalib.state.placementsKnown")
     assert page.page.locator(".steps li").count() == 3
-    assert "that the radar has found" in page.text(".steps li.now")
+    assert "found in the radar data" in page.text(".steps li.now")
     assert page.text('[data-key="aed"] dd') == "–"
     assert page.page.get_attribute("#export", "class") in (None, "")
     page.press("n")
@@ -27,7 +27,7 @@ def test_a_new_user_is_told_what_to_do_and_led_to_the_first_click(page: Driver) 
     assert page.text("#guide").startswith("Placement 1 of")
     u, v = page.value("[__cocalib.viewport.imageWidth / 2, __cocalib.viewport.imageHeight / 2]")
     page.click(u, v)
-    assert page.text("#guide").endswith("placements left: N goes to the next")
+    assert page.text("#guide").endswith("placements left. Press N for the next one")
     assert page.text("#guide") in page.text("#status-text")
     assert page.page.locator(".steps li.done").count() == 1
     assert page.page.locator(".pairs .row").count() == 1
@@ -48,7 +48,7 @@ def test_the_3d_view_shows_the_scene_and_none_of_visers_own_panels(page: Driver)
         assert all(not part.is_visible() for part in space.locator(panel).all())
 
 
-def test_dividers_and_theme_are_kept_for_the_next_time(page: Driver) -> None:
+def test_dividers_and_theme_are_remembered(page: Driver) -> None:
     before = page.value("__cocalib.viewport.width")
     bar = page.page.locator("#divider-x").bounding_box()
     assert bar is not None

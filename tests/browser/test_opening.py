@@ -1,4 +1,4 @@
-"""While a large recording is still being opened: its first picture is there, nothing can be clicked, and then all goes on."""
+"""While a large recording is being opened: its first picture is shown, nothing can be clicked, and then the page starts."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -23,7 +23,7 @@ OPENING = Opening("long.bag", "Opening long.bag (5.1 GB): reading its index and 
 
 @contextmanager
 def opening(picture_of: Recording) -> Iterator[RunningServer]:
-    """Be in the middle of opening a recording that takes its time."""
+    """Serve a recording that is still being opened."""
     with Service(OPTIONS, OPENING, partial(first_picture, picture_of.paths), let_in_after_s=0) as service:
         server = service._early.result(timeout=40)
         assert server is not None
@@ -58,7 +58,7 @@ def test_the_first_picture_is_there_and_nothing_can_be_done_to_it_until_the_reco
         for at in ((u, v), (914, 242), (100, 130)):
             assert shade_at(page, *at) == pytest.approx(picture[at[1], at[0], ::-1], abs=12)
         assert OPENING.doing in page.text("#status-text")
-        assert "first look" in page.text("#guide")
+        assert "Preview" in page.text("#guide")
         assert page.text("#recording-name") == "long.bag"
         page.page.mouse.click(*page.place_of(u, v))
         for key in (

@@ -1,4 +1,4 @@
-"""Somebody else's calibration on the page: looked at, checked by clicks, compared with the own one."""
+"""Someone else's calibration on the page: shown, checked by clicks, compared with the new one."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -40,11 +40,11 @@ def test_a_calibration_is_shown_checked_and_compared(
         page.click_sample(truth, 1)
         (first,) = page.view["clicks"]
         assert first["residual_px"] < 30
-        assert "1 click lies" in page.text("#status-text")
+        assert "residual of 1 click" in page.text("#status-text")
         page.click_sample(truth)
         figures = {figure["key"]: figure for figure in page.view["comparison"]}
         assert float(figures["rotation_apart"]["value"].split()[0]) < 1.0
-        assert "Solved, against factory.txt" in page.text("#page-pose")
+        assert "Difference from factory.txt" in page.text("#page-pose")
         assert "at 20 m" in page.text("#page-pose .apart")
         assert page.text("#status-text").startswith("Solved")
     finally:

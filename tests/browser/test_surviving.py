@@ -1,4 +1,4 @@
-"""Nothing is lost: not by killing the server, not by clicking while it is gone, not by what a recording calls itself."""
+"""Nothing is lost: not by killing the server, not by clicking while it is down, not by odd names in a recording."""
 
 import os
 import re
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.browser
 
 
 class Process:
-    """The program as a person starts it: `cocalib demo`."""
+    """The program as a user starts it: `cocalib demo`."""
 
     def __init__(self, folder: Path, port: int) -> None:
         command = [
@@ -66,8 +66,8 @@ def starter(tmp_path: Path) -> Iterator[Callable[[], Process]]:
         process.kill()
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="kill -9 is a matter of POSIX")
-def test_killing_the_server_loses_no_click_and_the_page_comes_back_by_itself(
+@pytest.mark.skipif(sys.platform == "win32", reason="kill -9 needs POSIX")
+def test_killing_the_server_loses_no_click_and_the_page_reconnects_by_itself(
     starter: Callable[[], Process], open_page: Callable[..., Driver], truth: Any
 ) -> None:
     process = starter()
@@ -76,7 +76,7 @@ def test_killing_the_server_loses_no_click_and_the_page_comes_back_by_itself(
     before = page.view
     process.kill()
     page.until("!__cocalib.state.connected")
-    assert "does not answer" in page.text("#banner")
+    assert "is not responding" in page.text("#banner")
     u, v = truth["placements"][4]["pixel_px"]
     page.page.mouse.click(*page.place_of(u + 30, v + 20))
     page.until("__cocalib.unconfirmed() === 1")
@@ -89,14 +89,14 @@ def test_killing_the_server_loses_no_click_and_the_page_comes_back_by_itself(
     assert places[0] == places[1]
     moved = after["clicks"][4]
     assert (moved["u_px"], moved["v_px"]) == pytest.approx((u + 30, v + 20), abs=1.0), (
-        "the click of the dead time arrived"
+        "the click made while the server was down arrived"
     )
     assert not page.page.is_visible("#banner")
     page.page.frame_locator("#space-view").locator("canvas").last.wait_for(state="attached")
     page.complaints[:] = [text for text in page.complaints if "WebSocket connection" not in text]
 
 
-def test_what_a_recording_calls_itself_is_text_and_never_runs(open_page: Callable[..., Driver], tmp_path: Path) -> None:
+def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Driver], tmp_path: Path) -> None:
     hostile = '<img src=x onerror="window.hit=1"><script>window.hit=1</script>'
     recording = PictureRecording(grey_pictures(3), image_topic=hostile, radar_topic=f"radar{hostile}")
     workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name=f"name{hostile}")

@@ -1,4 +1,4 @@
-"""The session on disk: a journal of every step, kept before anybody is told of it, and a snapshot to start again from.
+"""The session on disk: a journal of every step, written before the step is announced, and a snapshot to restart from.
 
 A session is a folder, `NAME.cocalib-session/`, with `journal.jsonl` (one line per step, only ever appended to), `session.json`
 (the clicks and options, replaced as a whole from time to time) and `lock` (held while a process has the session open).

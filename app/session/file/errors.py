@@ -1,4 +1,4 @@
-"""The one error of session files."""
+"""The error of session files."""
 
 from calib_core.errors import CalibrationError
 
@@ -6,4 +6,4 @@ __all__ = ["SessionFileError"]
 
 
 class SessionFileError(CalibrationError):
-    """A session that cannot be opened, read or written; what is on disk stays as it is."""
+    """A session that cannot be opened, read or written; what is on disk is unchanged."""

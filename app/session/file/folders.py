@@ -1,4 +1,4 @@
-"""Where a session lies: beside its recording when that folder can be written, else in the user's own state folder."""
+"""Where a session is stored: next to its recording if that folder is writable, else in the user's state folder."""
 
 import hashlib
 import tempfile
@@ -13,18 +13,18 @@ _SUFFIX = ".cocalib-session"
 
 
 def recording_session_folder(paths: Sequence[Path]) -> Path:
-    """Return the session folder of a recording: where one is already, else beside it, else in the state folder.
+    """Return the session folder of a recording: an existing one, else next to the recording, else in the state folder.
 
     Args:
         paths: the files or folders of the recording, at least one; the first names the session.
     """
     first = paths[0].resolve()
-    beside = first.with_name(first.name + _SUFFIX)
-    at_home = user_session_folder(first.name, key=str(first))
-    for folder in (beside, at_home):
+    adjacent = first.with_name(first.name + _SUFFIX)
+    in_state_folder = user_session_folder(first.name, key=str(first))
+    for folder in (adjacent, in_state_folder):
         if folder.is_dir() and _is_writable(folder):
             return folder
-    return beside if _is_writable(beside.parent) else at_home
+    return adjacent if _is_writable(adjacent.parent) else in_state_folder
 
 
 def user_session_folder(name: str, *, key: str = "") -> Path:
@@ -32,14 +32,14 @@ def user_session_folder(name: str, *, key: str = "") -> Path:
 
     Args:
         name: what the session is of.
-        key: tells sessions of the same name apart, such as the recording's path.
+        key: distinguishes sessions of the same name, such as the recording's path.
     """
     distinct = f"-{hashlib.sha256(key.encode()).hexdigest()[:8]}" if key else ""
     return state_folder() / "sessions" / f"{name}{distinct}{_SUFFIX}"
 
 
 def _is_writable(folder: Path) -> bool:
-    """Try it: permission bits do not tell about read-only media, quotas and network folders."""
+    """Try to write: permission bits do not cover read-only media, quotas and network folders."""
     try:
         with tempfile.TemporaryFile(dir=folder):
             return True

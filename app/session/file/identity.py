@@ -1,4 +1,4 @@
-"""Which recording a session belongs to: the one with exactly these frames, whatever its file is called by now."""
+"""Which recording a session belongs to: the one with exactly these frames, whatever its file is called now."""
 
 import hashlib
 from pathlib import Path
@@ -16,16 +16,16 @@ SCHEMA = "cocalib/session-1"
 
 
 class RecordingForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A recording as a session file names it.
+    """A recording as a session file identifies it.
 
     Attributes:
-        name: what the person called it.
-        frames: how many it has.
+        name: what the user called it.
+        frames: number of frames.
         width_px: columns of a frame.
         height_px: rows of a frame.
         start: stamp of the first frame; None without frames.
         stamps_sha256: of all stamps, as little-endian 64-bit integers.
-        radar_axes: what a person said about the radar's axes; it may change from run to run.
+        radar_axes: what the user specified about the radar's axes; it may change from run to run.
     """
 
     name: str
@@ -38,7 +38,7 @@ class RecordingForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def recording_form(facts: RecordingFacts) -> RecordingForm:
-    """Name a recording."""
+    """Return the identity of a recording."""
     times_ns = facts.image_times
     return RecordingForm(
         name=facts.name,
@@ -52,7 +52,7 @@ def recording_form(facts: RecordingFacts) -> RecordingForm:
 
 
 def require_same_recording(kept: RecordingForm, facts: RecordingFacts, folder: Path) -> None:
-    """Refuse a session of another recording: its clicks would belong to no frame, or to a wrong one.
+    """Refuse a session of another recording: its clicks would belong to no frame, or to the wrong one.
 
     Raises:
         SessionFileError: frames, stamps or image size differ.
@@ -61,9 +61,9 @@ def require_same_recording(kept: RecordingForm, facts: RecordingFacts, folder: P
     if msgspec.structs.replace(kept, name=opened.name, radar_axes=opened.radar_axes) == opened:
         return
     raise SessionFileError(
-        f"{folder}: the session is of {_described(kept)}, but what was opened is {_described(opened)}; "
-        "open the recording and the image topic it was made with, give another --session folder, or begin anew with --fresh "
-        "(the old one is kept beside)"
+        f"{folder}: the session belongs to {_described(kept)}, but the recording is {_described(opened)}; "
+        "open the recording and the image topic it was made with, give another --session folder, or start over with --fresh "
+        "(a backup is kept)"
     )
 
 

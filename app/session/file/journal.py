@@ -1,7 +1,7 @@
-"""The journal: a first line that names the recording, then one line per step, only ever appended to.
+"""The journal: a first line that identifies the recording, then one line per step, only ever appended to.
 
-A line counts once its line end is on the disk; what follows the last line end was never confirmed to anybody. Any other
-damage is refused: the journal is not read past it, and nothing is written.
+A line counts once its line end is on the disk; what follows the last line end was never confirmed. Any other damage is an
+error: the journal is not read past it, and nothing is written.
 """
 
 import os
@@ -34,14 +34,14 @@ class _Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """What a journal led to.
+    """The result of replaying a journal.
 
     Attributes:
         history: the session, with what can be undone and redone.
         steps: how many steps it holds.
         kept_bytes: its length up to the last line end.
-        torn_bytes: what follows that: a step that was being written when the process died.
-        radar_axes: what a person said about the radar's axes when the journal was begun.
+        torn_bytes: length of what follows: a step that was being written when the process died.
+        radar_axes: what the user specified about the radar's axes when the journal was started.
     """
 
     history: History
@@ -52,12 +52,12 @@ class Replayed:
 
 
 def begin_journal(path: Path, facts: RecordingFacts, steps: Sequence[Step], cocalib: str) -> None:
-    """Make a journal, all at once.
+    """Create a journal in one atomic write.
 
     Args:
         path: where it goes.
         facts: the recording it belongs to.
-        steps: what it holds from the beginning.
+        steps: its initial steps.
         cocalib: version of the program.
 
     Raises:
@@ -69,7 +69,7 @@ def begin_journal(path: Path, facts: RecordingFacts, steps: Sequence[Step], coca
 
 
 def replay(path: Path, facts: RecordingFacts) -> Replayed:
-    """Live through a journal again.
+    """Replay a journal.
 
     Raises:
         SessionFileError: it is damaged, of another version, or of another recording.
@@ -100,20 +100,20 @@ class Journal:
         """Write a step.
 
         Raises:
-            SessionFileError: it could not be written whole; the journal is as before.
+            SessionFileError: it could not be written completely; the journal is unchanged.
         """
         self._write(msgspec.json.encode(_Line(self.steps + 1, form_of_step(step))))
         self.steps += 1
 
     def close(self) -> None:
-        """Let go of the file; nothing can be appended any more."""
-        descriptor, self._descriptor = self._descriptor, -1  # a number that is never a file: others reuse the old one
+        """Close the file; nothing can be appended afterwards."""
+        descriptor, self._descriptor = self._descriptor, -1  # never a valid descriptor: the old number may be reused
         if descriptor >= 0:
             os.close(descriptor)
 
     def _write(self, line: bytes) -> None:
         if self._descriptor < 0:
-            raise SessionFileError(f"{self._path}: the session is closed, so the change was not made; start again")
+            raise SessionFileError(f"{self._path}: the session is closed and the change was not made; start again")
         rest = memoryview(line + b"\n")
         try:
             if os.fstat(self._descriptor).st_nlink == 0:
@@ -124,20 +124,20 @@ class Journal:
         except OSError as error:
             self._take_back()
             raise SessionFileError(
-                f"{self._path}: the change could not be kept, so it was not made: {error.strerror}; "
-                "make room or restore the folder, then do it again"
+                f"{self._path}: the change could not be saved and was not made: {error.strerror}; "
+                "free some disk space or restore the folder, then try again"
             ) from error
         self._length += len(line) + 1
 
     def _take_back(self) -> None:
-        """Drop what a failed write left; where even that fails, write nothing more behind it."""
+        """Remove what a failed write left; if even that fails, close the journal."""
         try:
             self._cut()
         except OSError:
             self.close()
 
     def _cut(self) -> None:
-        """Drop what follows the last whole line."""
+        """Truncate after the last complete line."""
         os.ftruncate(self._descriptor, self._length)
         os.lseek(self._descriptor, self._length, os.SEEK_SET)
 
@@ -149,7 +149,7 @@ def _head(line: bytes, path: Path) -> _Head:
         raise _damaged(path, 1, str(error)) from error
     if head.schema != SCHEMA:
         raise SessionFileError(
-            f"{path}: written as '{head.schema}' by cocalib {head.cocalib}, this version reads '{SCHEMA}'; "
+            f"{path}: written as '{head.schema}' by cocalib {head.cocalib}, but this version reads '{SCHEMA}'; "
             "open it with that version, or give another --session folder"
         )
     return head
@@ -159,7 +159,7 @@ def _replayed(history: History, line: bytes, number: int, path: Path, facts: Rec
     try:
         read = msgspec.json.decode(line, type=_Line)
         if read.n != number:
-            raise _damaged(path, number + 1, f"step {read.n} stands where step {number} belongs")
+            raise _damaged(path, number + 1, f"found step {read.n}, expected step {number}")
         return advance(history, step_from_form(read.step), facts)
     except SessionFileError:
         raise
@@ -169,6 +169,6 @@ def _replayed(history: History, line: bytes, number: int, path: Path, facts: Rec
 
 def _damaged(path: Path, line: int, reason: str) -> SessionFileError:
     return SessionFileError(
-        f"{path}: line {line} is damaged ({reason}); nothing was changed. To go on from the last snapshot beside it, "
-        f"session.json, rename {path.name} and open the recording again; to begin anew, give another --session folder"
+        f"{path}: line {line} is damaged ({reason}); nothing was changed. To continue from the last snapshot, session.json in "
+        f"the same folder, rename {path.name} and open the recording again; to start over, give another --session folder"
     )

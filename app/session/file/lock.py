@@ -1,4 +1,4 @@
-"""One process per session: a lock that the system lets go of by itself when the process dies."""
+"""One process per session: a lock that the operating system releases when the process dies."""
 
 import os
 import socket
@@ -9,7 +9,7 @@ from app.session.file.errors import SessionFileError
 
 __all__ = ["FolderLock"]
 
-_LOCKED_BYTE = 1 << 20  # far behind the text: Windows lets nobody read a locked byte
+_LOCKED_BYTE = 1 << 20  # far past the text: Windows does not allow reading a locked byte
 
 
 class FolderLock:
@@ -30,17 +30,17 @@ class FolderLock:
             os.close(self._descriptor)
             if not isinstance(error, BlockingIOError | PermissionError):
                 raise SessionFileError(
-                    f"{path}: this file system does not lock files: {error.strerror}; give a --session folder on a local disk"
+                    f"{path}: this file system has no file locks: {error.strerror}; give a --session folder on a local disk"
                 ) from error
             raise SessionFileError(
-                f"{folder}: the session is open already, in {holder}; use that page, close it, or give another --session folder"
+                f"{folder}: the session is already open in {holder}; use that page, close it, or give another --session folder"
             ) from None
         os.ftruncate(self._descriptor, 0)
         os.write(self._descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode())
 
     def close(self) -> None:
-        """Let go; the file stays, since deleting it would race with the next holder."""
-        descriptor, self._descriptor = self._descriptor, -1  # never closed twice: others reuse the number
+        """Release the lock; the file stays, since deleting it would race with the next holder."""
+        descriptor, self._descriptor = self._descriptor, -1  # never closed twice: the number may be reused
         if descriptor >= 0:
             os.close(descriptor)
 

@@ -1,4 +1,4 @@
-"""A session folder, opened: what was in it, and how new steps get there."""
+"""An open session folder: what was in it, and how new steps are added."""
 
 import logging
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ class Restored:
     """What was found in a session folder.
 
     Attributes:
-        folder: where it lies.
+        folder: its path.
         history: the session, with what can be undone and redone.
         steps: how many steps the journal held; 0 for a new session.
-        torn_bytes: length of a half-written last line that was dropped; nobody had been told that it was kept.
-        from_snapshot: the journal was missing, so the snapshot was taken.
-        warnings: what else a person must know before going on.
+        torn_bytes: length of a half-written last line that was dropped; it had never been confirmed.
+        from_snapshot: the journal was missing, so the snapshot was used.
+        warnings: what else the user must know before continuing.
     """
 
     folder: Path
@@ -41,18 +41,18 @@ class Restored:
 
     @property
     def note(self) -> str:
-        """One sentence about anything unusual; "" when all was as it should be."""
+        """A sentence about anything unusual; "" if there is nothing."""
         if self.from_snapshot:
             return (
-                "The journal was missing: the clicks come from the last snapshot, and what was before cannot be undone."
+                "The journal was missing. The clicks are from the last snapshot, and earlier changes cannot be undone."
             )
         if self.torn_bytes:
-            return "The last change was being written when the program stopped; it is not in the session."
+            return "The program stopped while the last change was being written; it is not in the session."
         return ""
 
 
 class SessionFile:
-    """Keeps the steps of one session, from `open_session_file` to `close`. One thread at a time."""
+    """Stores the steps of one session, from `open_session_file` to `close`. To be used by one thread at a time."""
 
     def __init__(self, facts: RecordingFacts, lock: FolderLock, journal: Journal, restored: Restored) -> None:
         self.restored = restored
@@ -63,10 +63,10 @@ class SessionFile:
         self._snapshot_steps = -1
 
     def append(self, step: Step, history: History) -> None:
-        """Keep a step for good before returning; `history` is what it leads to.
+        """Store a step on disk before returning; `history` is the state after it.
 
         Raises:
-            SessionFileError: it could not be written; the file is as before.
+            SessionFileError: it could not be written; the file is unchanged.
         """
         self._journal.append(step)
         self._history = history
@@ -74,13 +74,13 @@ class SessionFile:
             self.keep_snapshot()
 
     def close(self) -> None:
-        """Write the snapshot and let go of the folder."""
+        """Write the snapshot and release the folder."""
         self.keep_snapshot()
         self._journal.close()
         self._lock.close()
 
     def keep_snapshot(self) -> None:
-        """Write the snapshot unless it is up to date; the journal holds everything, so a failure is only logged."""
+        """Write the snapshot unless it is up to date; the journal is complete, so a failure is only logged."""
         if self._snapshot_steps == self._journal.steps:
             return
         path, steps = self.restored.folder / _SNAPSHOT, self._journal.steps
@@ -92,20 +92,22 @@ class SessionFile:
 
 
 def open_session_file(folder: Path, facts: RecordingFacts) -> SessionFile:
-    """Open the session in a folder, or begin one there.
+    """Open the session in a folder, or start one there.
 
     Args:
-        folder: made when it is missing.
+        folder: created if missing.
         facts: the recording, which must be the one that the session belongs to.
 
     Raises:
         SessionFileError: it cannot be written, is open in another process, is damaged, or is of another recording.
-            What is on the disk stays as it is.
+            What is on the disk is unchanged.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise SessionFileError(f"{folder}: cannot be made: {error.strerror}; give another --session folder") from error
+        raise SessionFileError(
+            f"{folder}: cannot be created: {error.strerror}; give another --session folder"
+        ) from error
     lock = FolderLock(folder)
     try:
         journal, restored = _opened(folder, facts)
@@ -117,12 +119,12 @@ def open_session_file(folder: Path, facts: RecordingFacts) -> SessionFile:
         raise
     opened = SessionFile(facts, lock, journal, restored)
     if restored.warnings:
-        opened.keep_snapshot()  # so that the axes of now are known although the process may be killed
+        opened.keep_snapshot()  # so that the current axes are stored even if the process is killed
     return opened
 
 
 def set_aside(folder: Path) -> Path | None:
-    """Move a session folder out of the way, beside itself, so that the next open begins anew.
+    """Rename a session folder, adding a number, so that the next open starts a new session.
 
     Returns:
         where it is now; None when there was none.
@@ -156,12 +158,10 @@ def _opened(folder: Path, facts: RecordingFacts) -> tuple[Journal, Restored]:
 
 
 def _about_axes(before: str | None, now: str | None) -> tuple[DataWarning, ...]:
-    """Say that the radar is read otherwise than the last time; the clicks are pixels and stay right."""
+    """Warn that the radar is read differently from last time; the clicks are pixels and stay valid."""
     if before == now:
         return ()
     was, is_now = (f"with --radar-axes {axes}" if axes else "without --radar-axes" for axes in (before, now))
-    message = (
-        f"the session was last open {was}, and is now open {is_now}: every click is solved anew with the axes of now"
-    )
+    message = f"the session was last opened {was}, now {is_now}: all clicks are solved again with the new axes"
     again = f"start again with --radar-axes {before}" if before else "start again without --radar-axes"
-    return (DataWarning("other-axes", message, f"if that was not meant, {again}"),)
+    return (DataWarning("other-axes", message, f"if that was not intended, {again}"),)

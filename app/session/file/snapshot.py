@@ -1,4 +1,4 @@
-"""The snapshot: clicks and options as of some step, replaced as a whole, to start again from when the journal is gone."""
+"""The snapshot: clicks and options at some step, replaced as a whole, to restart from if the journal is lost."""
 
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def write_snapshot(path: Path, session: Session, *, facts: RecordingFacts, steps: int, cocalib: str) -> None:
-    """Replace the snapshot: a reader finds the old one or the new one, never a part.
+    """Replace the snapshot atomically: a reader sees the old one or the new one, never a part.
 
     Raises:
         OSError: it cannot be written; the old one stays.
@@ -42,11 +42,11 @@ def write_snapshot(path: Path, session: Session, *, facts: RecordingFacts, steps
 
 
 def snapshot_axes(path: Path, otherwise: str | None) -> str | None:
-    """Return what was said about the radar's axes when the snapshot was written.
+    """Return what was specified about the radar's axes when the snapshot was written.
 
     Args:
         path: of the snapshot.
-        otherwise: the answer where there is no snapshot, or a damaged one, of which the journal has no need.
+        otherwise: returned if the snapshot is missing or damaged, since the journal does not need it.
     """
     try:
         return msgspec.json.decode(path.read_bytes(), type=_Snapshot).recording.radar_axes
@@ -64,10 +64,12 @@ def read_snapshot(path: Path, facts: RecordingFacts) -> tuple[Step, ...]:
         snapshot = msgspec.json.decode(path.read_bytes(), type=_Snapshot)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise SessionFileError(
-            f"{path}: the snapshot is damaged ({error}); move it away to begin anew, or give another --session folder"
+            f"{path}: the snapshot is damaged ({error}); move it away to start over, or give another --session folder"
         ) from error
     if snapshot.schema != SCHEMA:
-        raise SessionFileError(f"{path}: written as '{snapshot.schema}', this version reads '{SCHEMA}'; move it away")
+        raise SessionFileError(
+            f"{path}: written as '{snapshot.schema}', but this version reads '{SCHEMA}'; move it away"
+        )
     require_same_recording(snapshot.recording, facts, path.parent)
     clicks = ClicksImported(tuple(click_from_form(click) for click in snapshot.clicks))
     return (OptionsChanged(options_from_tree(snapshot.options)), clicks)

@@ -1,4 +1,4 @@
-"""The JSON form of each step: what the journal holds, and what the page sends for the same steps."""
+"""The JSON form of each step, in the journal and in messages from the page."""
 
 from functools import singledispatch
 from typing import Annotated, Any, TypeAlias
@@ -54,12 +54,12 @@ class StampForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @classmethod
     def of(cls, stamp: Stamp) -> "StampForm":
-        """Write a stamp."""
+        """Convert a stamp to its JSON form."""
         return cls(stamp.sec, stamp.nanosec)
 
     @property
     def stamp(self) -> Stamp:
-        """The time as the session knows it."""
+        """The stamp as the session uses it."""
         return Stamp(self.sec, self.nanosec)
 
 
@@ -98,20 +98,20 @@ class ClickRemovedForm(_Form, frozen=True, tag="click_removed"):
 
 
 class ClickExcludedForm(_Form, frozen=True, tag="click_excluded"):
-    """A click left out or taken in."""
+    """A click excluded, or included again."""
 
     id: ClickId
     excluded: bool
 
 
 class OptionsChangedForm(_Form, frozen=True, tag="options_changed"):
-    """Options by group and name; the journal holds all of them, a page may send some."""
+    """Options by group and name; the journal contains all of them, a page may send only some."""
 
     options: dict[str, Any]
 
 
 class ClearedForm(_Form, frozen=True, tag="cleared"):
-    """All clicks thrown away."""
+    """All clicks deleted."""
 
 
 class ClicksImportedForm(_Form, frozen=True, tag="clicks_imported"):
@@ -121,11 +121,11 @@ class ClicksImportedForm(_Form, frozen=True, tag="clicks_imported"):
 
 
 class UndoForm(_Form, frozen=True, tag="undo"):
-    """The last change taken back."""
+    """The last change undone."""
 
 
 class RedoForm(_Form, frozen=True, tag="redo"):
-    """The change made again that was taken back last."""
+    """The last undone change redone."""
 
 
 StepForm: TypeAlias = (
@@ -142,19 +142,19 @@ StepForm: TypeAlias = (
 
 
 def form_of_click(click: ReflectorClick) -> ClickForm:
-    """Write a click."""
+    """Convert a click to its JSON form."""
     stamp = StampForm.of(Stamp.of(click.image_time))
     return ClickForm(click.id, stamp, (click.u_px, click.v_px), click.sigma_px, click.excluded)
 
 
 def click_from_form(form: ClickForm) -> ReflectorClick:
-    """Read a click."""
+    """Convert a click from its JSON form."""
     return ReflectorClick(form.image_time.stamp.time, form.id, *form.pixel_px, form.sigma_px, form.excluded)
 
 
 @singledispatch
 def form_of_step(step: Step) -> StepForm:
-    """Write a step; answers of the solver and half-finished option edits have no form.
+    """Convert a step to its JSON form; answers of the solver and partial option edits have none.
 
     Raises:
         TypeError: the step has no form.
@@ -164,7 +164,7 @@ def form_of_step(step: Step) -> StepForm:
 
 @singledispatch
 def step_from_form(form: StepForm) -> Step:
-    """Read a step.
+    """Convert a step from its JSON form.
 
     Raises:
         OptionError: an option is unknown, of the wrong type or out of range.

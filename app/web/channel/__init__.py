@@ -1,1 +1,1 @@
-"""The page's channel: what it sends and gets, and what all tabs share."""
+"""The page's channel: the messages sent and received, and what all tabs share."""

@@ -1,4 +1,4 @@
-"""One page's channel: reads what it wants, answers in order, never lets it wait for another page."""
+"""One page's channel: reads its messages and answers them in order, without waiting for other pages."""
 
 import asyncio
 import time
@@ -38,7 +38,7 @@ from calib_core.measurements import RadarScan, TimeNs
 __all__ = ["Channel", "Socket"]
 
 _SPACE_EVERY_S = 0.34
-"""While playing, the 3D view is drawn no oftener than this: it shares the page's main thread [s]."""
+"""Minimum time between two drawings of the 3D view while playing: it shares the page's main thread [s]."""
 
 
 class Socket(Protocol):
@@ -50,13 +50,13 @@ class Socket(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Cursor:
-    """Where a page is.
+    """What a page shows.
 
     Attributes:
         index: of the frame.
         playing: frames follow one another quickly.
         selected: id of the selected click.
-        light: the page has its light theme on.
+        light: the page uses its light theme.
     """
 
     index: int = 0
@@ -66,7 +66,7 @@ class Cursor:
 
 
 class Channel:
-    """One page. Lives on the event loop."""
+    """One page. Runs on the event loop."""
 
     def __init__(self, hub: Hub) -> None:
         self.outbox = Outbox()
@@ -79,7 +79,7 @@ class Channel:
         self._forward = True
 
     async def run(self, socket: Socket) -> None:
-        """Serve the page until it goes; what the socket raises then goes to the caller."""
+        """Serve the page until it disconnects; the socket's exception is then raised to the caller."""
         self._hub.tabs.add(self)
         sending = asyncio.create_task(self.outbox.deliver(socket.send))
         reading = asyncio.create_task(self._read(socket))
@@ -96,7 +96,7 @@ class Channel:
             await asyncio.gather(sending, reading, return_exceptions=True)
 
     def refresh(self) -> None:
-        """The session changed, or the 3D view came: draw again."""
+        """Draw again, after a change of the session or once the 3D view is connected."""
         self._overlay.give(self._cursor)
         self._space.give(self._cursor)
 
@@ -110,7 +110,7 @@ class Channel:
                 self.outbox.put(encode(Problem(sentence(str(error)), request=request_of(text))))
 
     async def _obey(self, incoming: Incoming) -> None:
-        """Do what the page wants.
+        """Carry out a command of the page.
 
         Raises:
             CalibrationError: it cannot be done; nothing changed.
@@ -127,12 +127,12 @@ class Channel:
                 self.scene.look_from(command.viewpoint)
         else:
             workspace = self._hub.workspace
-            deed = (
+            change = (
                 partial(workspace.import_clicks, command.text, command.name)
                 if isinstance(command, ImportWanted)
                 else partial(workspace.dispatch, command)
             )
-            await asyncio.get_running_loop().run_in_executor(self._hub.steps, deed)
+            await asyncio.get_running_loop().run_in_executor(self._hub.steps, change)
         if incoming.request is not None:
             self.outbox.put(encode(Done(incoming.request)))
 
@@ -170,7 +170,7 @@ class Channel:
         self.outbox.put(encode(overlay), kind="overlay")
 
     async def _draw_space(self, cursor: Cursor) -> None:
-        """Draw the 3D view; while playing, then rest: the last frame is always drawn."""
+        """Draw the 3D view; while playing, pause afterwards. The last frame is always drawn."""
         if self.scene is None:
             return
         started = time.monotonic()
@@ -191,7 +191,7 @@ class Channel:
             await asyncio.sleep(max(0.0, started + _SPACE_EVERY_S - time.monotonic()))
 
     async def _scan(self, stamp: TimeNs) -> RadarScan | None:
-        """Return the scan of a moment; a scan that cannot be read is none."""
+        """Return the scan at a time; None if it cannot be read."""
         try:
             return await asyncio.get_running_loop().run_in_executor(self._hub.executor, self._hub.radar.scan_at, stamp)
         except CalibrationError:

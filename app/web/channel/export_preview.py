@@ -1,4 +1,4 @@
-"""What the export panel shows of one format: the file's text, what its numbers are, and the proof that it reads back."""
+"""What the export panel shows of one format: the file's text, what its numbers mean, and the result of reading it back."""
 
 import re
 from dataclasses import dataclass
@@ -45,9 +45,9 @@ class FormatRow:
 
     Attributes:
         key: what `--to` takes.
-        label: one line for people.
+        label: one line for display.
         takes_parent: the radar can be posed in a third frame.
-        takes_rectified: a person may have to say that the pictures are rectified.
+        takes_rectified: the user may have to state that the pictures are rectified.
     """
 
     key: str
@@ -63,22 +63,22 @@ class ExportPreview:
     Attributes:
         key: of the format.
         file_name: what to call the file: recording, then format.
-        text: the file, or what is in it where it is binary.
-        is_binary: the file itself is no text.
+        text: the file, or its contents as text if it is binary.
+        is_binary: the file itself is not text.
         size_bytes: of the file.
-        numbers: what the file's numbers are.
-        notes: what a person must know who uses it.
-        is_for_rectified: it is written only because the pictures are said to be rectified.
-        carries: which way the pose in the file carries points, as it is read back.
-        axes: of the camera frame whose pose the file states: optical, or its body frame.
+        numbers: what the file's numbers mean.
+        notes: what a user of the file must know.
+        is_for_rectified: it is written only because the user stated that the pictures are rectified.
+        carries: direction of the pose in the file, as read back.
+        axes: of the camera frame that the file uses: optical, or its body frame.
         check: what `cocalib check` says about the file.
-        check_is_good: whether it found nothing wrong.
+        check_is_good: whether it found no problem.
         radar_frame: name of the radar's frame.
         camera_frame: name of the camera's optical frame.
         rotation: camera_from_radar, by rows.
         translation_m: of camera_from_radar.
         quaternion_xyzw: of camera_from_radar.
-        warnings: what the solve warns of.
+        warnings: of the calibration.
     """
 
     key: str
@@ -103,7 +103,7 @@ class ExportPreview:
 
 @dataclass(frozen=True, slots=True)
 class NoPreview:
-    """There is nothing to save yet: why, and what to do."""
+    """Why there is nothing to save yet, and what to do."""
 
     reason: str
 
@@ -117,10 +117,10 @@ def format_rows() -> tuple[FormatRow, ...]:
 
 
 def parent_in(query: str) -> RigidTransform | None:
-    """Return the radar's pose in a third frame as an address gives it, `parent_from_radar=x,y,z,qx,qy,qz,qw`, if it does.
+    """Return the radar's pose in a third frame from a URL's query, `parent_from_radar=x,y,z,qx,qy,qz,qw`; None without one.
 
     Raises:
-        InputError: it is not seven numbers, or no pose.
+        InputError: it is not seven numbers, or not a pose.
     """
     given = parse_qs(query).get(_PARENT)
     if not given:
@@ -133,22 +133,22 @@ def parent_in(query: str) -> RigidTransform | None:
 
 
 def rectified_in(query: str) -> bool:
-    """Tell whether an address says that the pictures are rectified, `rectified=1`.
+    """Return whether a URL's query says that the pictures are rectified, `rectified=1`.
 
     Raises:
-        InputError: it says something else about it.
+        InputError: the value is neither 0 nor 1.
     """
     given = parse_qs(query, keep_blank_values=True).get(_RECTIFIED, ["0"])[-1]
     if given not in ("0", "1"):
-        raise InputError(f"{_RECTIFIED}: {given!r} is neither 1 nor 0; 1 says that the pictures are rectified")
+        raise InputError(f"{_RECTIFIED}: {given!r} is neither 0 nor 1; 1 means that the pictures are rectified")
     return given == "1"
 
 
 def exported(file: CalibrationFile, key: str, query: str) -> Export:
-    """Write a calibration in a format, with the pose and the word about the pictures that the address may hold.
+    """Write a calibration in a format, with the parent's pose and the rectified flag of a URL's query.
 
     Raises:
-        InputError: the format cannot carry this calibration, or has no third frame.
+        InputError: the format cannot hold this calibration, or has no third frame.
     """
     return export(file, key, parent_from_radar=parent_in(query), rectified=rectified_in(query))
 
@@ -159,11 +159,11 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
     Args:
         file: the calibration.
         key: of the format.
-        query: of the address; it may pose the radar in a third frame, and say that the pictures are rectified.
-        recording_name: what the person calls the recording.
+        query: of the URL; it may give the radar's pose in a third frame, and say that the pictures are rectified.
+        recording_name: what the user calls the recording.
 
     Raises:
-        InputError: the format cannot carry this calibration, or has no third frame.
+        InputError: the format cannot hold this calibration, or has no third frame.
     """
     written, form = exported(file, key, query), format_named(key)
     report = check(read_any(written.data, written.file_name), against=imported(file))
@@ -193,12 +193,12 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
 
 
 def _read_back(report: CheckReport) -> str:
-    """Say in one line what reading the file back has shown."""
+    """Return the result of reading the file back, in one line."""
     first = report.results[0]
-    return "Read back: the pose is the one solved." if first.code == "agrees" else f"Read back: {first.message}."
+    return "Read back: the pose matches the solved one." if first.code == "agrees" else f"Read back: {first.message}."
 
 
 def _slug(name: str) -> str:
-    """Return a recording's name as the beginning of a file's: letters, digits and underscores."""
+    """Return a recording's name as the start of a file name: letters, digits and underscores."""
     stem = Path(name).stem if re.search(r"\.\w{2,6}$", name) else name
     return re.sub(r"\W+", "_", stem.removeprefix("the ")).strip("_") or "recording"

@@ -1,4 +1,4 @@
-"""What all tabs share: the workspace's news, the survey of the radar, the frames; and which tab has which 3D view."""
+"""What all tabs share: the latest View, the survey of the radar, and the frames."""
 
 import asyncio
 import logging
@@ -30,7 +30,7 @@ from calib_core.recordings import Recording, TopicSummary, clock_lines
 
 __all__ = ["Hub", "Tab"]
 
-_SEARCHING = "Searching the radar for the reflector"
+_SEARCHING = "Searching the radar data for placements"
 _log = logging.getLogger(__name__)
 
 
@@ -40,11 +40,11 @@ class Tab(Protocol):
     outbox: Outbox
 
     def refresh(self) -> None:
-        """The session changed: draw the overlay and the 3D view again."""
+        """Draw the overlay and the 3D view again, after a change of the session."""
 
 
 class Hub:
-    """Lives on viser's event loop, but for the workspace's callback."""
+    """Runs on viser's event loop, except for the workspace's callback."""
 
     def __init__(self, workspace: Workspace, recording: Recording, executor: Executor) -> None:
         self.workspace = workspace
@@ -60,7 +60,7 @@ class Hub:
         self._searching: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Begin to listen to the workspace, and to search the radar."""
+        """Subscribe to the workspace, and start searching the radar."""
         loop = asyncio.get_running_loop()
         self._end_subscription = self.workspace.subscribe(
             lambda view: None if loop.is_closed() else _soon(loop, partial(self._take, view))
@@ -68,7 +68,7 @@ class Hub:
         self._searching = loop.create_task(self._search())
 
     async def end(self) -> None:
-        """Stop listening, and drop what is on its way."""
+        """Unsubscribe, and cancel pending work."""
         self._end_subscription()
         if self._searching is not None:
             self._searching.cancel()
@@ -76,11 +76,11 @@ class Hub:
 
     @property
     def view(self) -> View:
-        """The last news of the workspace."""
+        """The latest View of the workspace."""
         return self._view
 
     def greet(self, outbox: Outbox) -> None:
-        """Tell a page that has just opened what there is."""
+        """Send the current state to a page that has just opened."""
         outbox.put(encode(self._recording_note()), kind="recording")
         outbox.put(encode(self._view), kind="view")
         if self.survey is not None:
@@ -89,7 +89,7 @@ class Hub:
             outbox.put(encode(Progress(_SEARCHING, 0, 1)), kind="progress")
 
     def broadcast(self, message: Outgoing, kind: str) -> None:
-        """Tell all pages; written once."""
+        """Send a message to all pages; it is encoded once."""
         text = encode(message)
         for tab in self.tabs:
             tab.outbox.put(text, kind=kind)
@@ -98,12 +98,12 @@ class Hub:
         self._view = view
         self.broadcast(view, "view")
         if view.solving:
-            return  # overlay and 3D view show the last answer until the next one, and would only hold the solver up
+            return  # overlay and 3D view show the last answer until the next one; redrawing would only slow the solver
         for tab in self.tabs:
             tab.refresh()
 
     async def _search(self) -> None:
-        """Survey the radar once, off the loop."""
+        """Survey the radar once, off the event loop."""
         options = self.workspace.session.options.gating
         try:
             self.survey = await asyncio.get_running_loop().run_in_executor(
@@ -138,7 +138,7 @@ class Hub:
 
 
 def _sensor(name: str, chosen: str | None, topics: Sequence[TopicSummary]) -> SensorNote:
-    """Say how a sensor is read."""
+    """Describe how a sensor is read."""
     topic = next((topic for topic in topics if topic.name == chosen), None)
     if topic is None:
         return SensorNote(name, chosen or "none")
@@ -148,7 +148,7 @@ def _sensor(name: str, chosen: str | None, topics: Sequence[TopicSummary]) -> Se
 
 
 def _soon(loop: asyncio.AbstractEventLoop, call: "partial[None]") -> None:
-    """Run on the loop; a loop that is closing has nobody left to tell."""
+    """Run on the loop; if it is closing, no page is left to notify."""
     try:
         loop.call_soon_threadsafe(call)
     except RuntimeError:

@@ -1,4 +1,4 @@
-"""Work of which only the newest is worth doing: a frame for a scrubbing hand, an overlay, a 3D view."""
+"""Work of which only the newest item matters: a frame while scrubbing, an overlay, a 3D view."""
 
 import asyncio
 import logging
@@ -12,7 +12,7 @@ _log = logging.getLogger(__name__)
 
 
 class NewestWins(Generic[Item]):
-    """Works on one item at a time; of those that came meanwhile, only the newest is kept. Lives on one event loop."""
+    """Processes one item at a time; of those that arrive meanwhile, only the newest is kept. Runs on one event loop."""
 
     def __init__(self, work: Callable[[Item], Awaitable[None]]) -> None:
         self._work = work
@@ -20,14 +20,14 @@ class NewestWins(Generic[Item]):
         self._task: asyncio.Task[None] | None = None
 
     def give(self, item: Item) -> None:
-        """Work on this as soon as the item under way is done."""
+        """Process this as soon as the current item is done."""
         self._next = [item]
         if self._task is None:
             self._task = asyncio.get_running_loop().create_task(self._run())
             self._task.add_done_callback(self._ended)
 
     def close(self) -> None:
-        """Drop what waits and stop what is under way."""
+        """Drop the waiting item and cancel the current one."""
         self._next = []
         if self._task is not None:
             self._task.cancel()

@@ -1,4 +1,4 @@
-"""What waits to be sent to one page: a newer message of a kind takes the place of the older, so a slow page never piles up."""
+"""Messages waiting for one page: a newer one of a kind replaces the older one, so they do not pile up for a slow page."""
 
 import asyncio
 from collections import OrderedDict
@@ -7,11 +7,11 @@ from collections.abc import Awaitable, Callable, Hashable
 __all__ = ["Outbox"]
 
 _MOST = 2000
-"""A page that leaves this many answers unread is not there any more."""
+"""A page that leaves more messages than this unread is considered gone."""
 
 
 class Outbox:
-    """Messages to one page, in order. Lives on one event loop."""
+    """Messages to one page, in order. Runs on one event loop."""
 
     def __init__(self) -> None:
         self._waiting: OrderedDict[Hashable, str | bytes] = OrderedDict()
@@ -19,7 +19,7 @@ class Outbox:
         self._number = 0
 
     def put(self, message: str | bytes, *, kind: str | None = None) -> None:
-        """Send this next. A message with a kind replaces the one of that kind that still waits; others are all sent."""
+        """Queue a message. One with a kind replaces a waiting one of the same kind; all others are sent."""
         self._number += 1
         key: Hashable = kind if kind is not None else self._number
         self._waiting.pop(key, None)
@@ -30,7 +30,7 @@ class Outbox:
         return len(self._waiting)
 
     async def deliver(self, send: Callable[[str | bytes], Awaitable[None]]) -> None:
-        """Hand over one message after the other for ever.
+        """Send the messages one by one, forever.
 
         Raises:
             BufferError: the page has left too many unread.

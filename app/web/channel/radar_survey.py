@@ -1,4 +1,4 @@
-"""What the radar alone tells about the whole recording: where the reflector stood still, and how much there was to see."""
+"""What the radar alone says about the whole recording: where the reflector stood still, and how many returns there were."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ __all__ = ["Activity", "Survey", "placements_at", "survey_of"]
 
 _MOST_SLICES = 800
 _MOST_STATIC_RETURNS = 1_000_000
-"""In one stretch: more than an hour of 25 static returns in each of 10 scans a second; searching it takes some 200 MB."""
+"""Limit of one stretch: more than an hour of 25 static returns in each of 10 scans a second; searching it takes about 200 MB."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +38,8 @@ class Survey:
     """The radar's view of the whole recording.
 
     Attributes:
-        placements: where the reflector stood still, those without a frame left out.
-        rows: the same as the page shows them.
+        placements: where the reflector stood still, without those that no frame shows.
+        rows: the same in the form sent to the page.
         activity: of the radar.
     """
 
@@ -51,8 +51,8 @@ class Survey:
 def survey_of(windows: Iterable[RadarScans], image_times: TimesNs, options: GatingOptions) -> Survey:
     """Survey a whole recording.
 
-    Memory stays bounded: of each window only the static returns are kept, and a recording with more of them than fit is
-    searched one stretch after another.
+    Memory is bounded: only the static returns of each window are kept, and a recording with too many of them is searched one
+    stretch after another.
 
     Args:
         windows: all scans, in order of time.
@@ -70,7 +70,7 @@ def survey_of(windows: Iterable[RadarScans], image_times: TimesNs, options: Gati
 
 
 def _stretches(windows: Iterable[RadarScans], options: GatingOptions) -> Iterator[RadarScans]:
-    """Yield the static returns of a recording; in several pieces where they are too many."""
+    """Yield the static returns of a recording; in several pieces if there are too many."""
     pieces: list[RadarScans] = []
     for window in windows:
         pieces.append(static_returns(window, options))
@@ -81,7 +81,7 @@ def _stretches(windows: Iterable[RadarScans], options: GatingOptions) -> Iterato
 
 
 def _row(placement: Placement, image_times: TimesNs) -> PlacementRow | None:
-    """Return the line of a placement, with the frame nearest to its middle; None when no frame shows it."""
+    """Return the row of a placement, with the frame nearest to its middle; None if no frame shows it."""
     first, last = np.searchsorted(image_times, [placement.start, placement.end])
     if first >= last:
         return None
@@ -98,7 +98,7 @@ def _row(placement: Placement, image_times: TimesNs) -> PlacementRow | None:
 
 
 class _ActivitySum:
-    """Adds up scans and returns by slices of time.
+    """Counts scans and returns by slices of time.
 
     Args:
         image_times: (m,) stamps of the frames [ns], ascending.
@@ -112,7 +112,7 @@ class _ActivitySum:
         self._returns, self._scans = np.zeros(self._slices), np.zeros(self._slices, dtype=np.int64)
 
     def note(self, scans: RadarScans) -> RadarScans:
-        """Add some scans; return them."""
+        """Count some scans; return them."""
         place = ((scans.times_ns - self._origin) / NS_PER_S // self._step_s).astype(np.int64)
         inside = (place >= 0) & (place < self._slices)
         counts = np.diff(scans.first_return)[inside]
@@ -126,7 +126,7 @@ class _ActivitySum:
 
 
 def placements_at(survey: Survey | None, time: int) -> Sequence[Placement]:
-    """Return the placements that a moment [ns] lies in."""
+    """Return the placements that include a time [ns]."""
     if survey is None:
         return ()
     return [placement for placement in survey.placements if placement.start <= time <= placement.end]

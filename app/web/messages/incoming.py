@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 MAX_TEXT_BYTES = 4 * 1024 * 1024
-"""A longer message is refused unread; 10,000 clicks take about one megabyte."""
+"""A longer message is refused without parsing; 10,000 clicks take about one megabyte."""
 
 RequestNumber: TypeAlias = Annotated[int, Meta(ge=0, le=2**53 - 1)]
 FrameIndex: TypeAlias = Annotated[int, Meta(ge=0, le=2**31 - 1)]
@@ -46,7 +46,7 @@ class FrameWanted:
 
     Attributes:
         index: of the frame.
-        request: echoed in the picture's header; a newer request of the same page makes this one void.
+        request: echoed in the picture's header; a newer request of the same page supersedes this one.
         playing: frames follow one another quickly.
         size: "half" is enough while playing.
     """
@@ -59,13 +59,13 @@ class FrameWanted:
 
 @dataclass(frozen=True, slots=True)
 class CursorMoved:
-    """A page looks at another frame: the 3D view and the overlay follow.
+    """A page shows another frame: the 3D view and the overlay follow.
 
     Attributes:
         index: of the frame.
         playing: frames follow one another quickly.
-        selected: id of the click that is selected; None without one.
-        light: the page has its light theme on, and the 3D view follows.
+        selected: id of the selected click; None if there is none.
+        light: the page uses its light theme, and the 3D view follows.
     """
 
     index: int
@@ -79,10 +79,10 @@ Viewpoint: TypeAlias = Literal["behind", "above", "side", "camera"]
 
 @dataclass(frozen=True, slots=True)
 class ViewpointWanted:
-    """A page wants its 3D view to look from somewhere.
+    """A page wants another viewpoint for its 3D view.
 
     Attributes:
-        viewpoint: behind the radar, above it, beside it, or the camera's own place.
+        viewpoint: behind, above or to the side of the radar, or the position of the camera.
     """
 
     viewpoint: Viewpoint
@@ -126,7 +126,7 @@ class HelloForm(_Form, frozen=True, tag="hello"):
 
 
 class FrameForm(_Form, frozen=True, tag="frame"):
-    """The picture of a frame is wanted; exactly one binary message answers, unless a newer request comes first."""
+    """The picture of a frame is requested; exactly one binary message answers, unless a newer request comes first."""
 
     index: FrameIndex
     request: RequestNumber
@@ -135,7 +135,7 @@ class FrameForm(_Form, frozen=True, tag="frame"):
 
 
 class CursorForm(_Form, frozen=True, tag="cursor"):
-    """Another frame is looked at."""
+    """Another frame is shown."""
 
     index: FrameIndex
     playing: bool = False
@@ -144,7 +144,7 @@ class CursorForm(_Form, frozen=True, tag="cursor"):
 
 
 class ViewpointForm(_Form, frozen=True, tag="viewpoint"):
-    """The 3D view should look from somewhere."""
+    """Another viewpoint is requested for the 3D view."""
 
     viewpoint: Viewpoint
 
@@ -174,7 +174,7 @@ def parse(text: str | bytes) -> Incoming:
         OptionError: it names an option that does not exist or gives it a value of the wrong type.
     """
     if len(text) > MAX_TEXT_BYTES:
-        raise InputError(f"the message is longer than {MAX_TEXT_BYTES // 2**20} MB; no message of the page is")
+        raise InputError(f"the message is longer than {MAX_TEXT_BYTES // 2**20} MB, the maximum")
     try:
         fields = msgspec.json.decode(text)
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError) as error:
@@ -185,11 +185,11 @@ def parse(text: str | bytes) -> Incoming:
         form = msgspec.convert(fields, _TYPES[kind])
         return Incoming(_command(form), msgspec.convert(request, RequestNumber | None))
     except msgspec.ValidationError as error:
-        raise InputError(f"the message '{kind}' is not as it should be: {error}") from error
+        raise InputError(f"invalid message '{kind}': {error}") from error
 
 
 def request_of(text: str | bytes) -> int | None:
-    """Return the request number of a message that `parse` refused; None when it has none that can be read."""
+    """Return the request number of a message that `parse` refused; None if it has none that can be read."""
     try:
         return msgspec.json.decode(text[:MAX_TEXT_BYTES], type=_Envelope).request
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
@@ -204,7 +204,7 @@ def _kind(fields: object) -> str:
         return kind
     near = difflib.get_close_matches(str(kind)[:80], _TYPES, n=1)
     advice = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(_TYPES)}"
-    raise InputError(f"there is no message of the type '{str(kind)[:80]}'; {advice}")
+    raise InputError(f"unknown message type '{str(kind)[:80]}'; {advice}")
 
 
 @singledispatch

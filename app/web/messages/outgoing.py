@@ -54,7 +54,7 @@ class StampColumns:
 
 @dataclass(frozen=True, slots=True)
 class SessionNote:
-    """Where the session is kept and what was found there.
+    """Where the session is stored and what was found there.
 
     Attributes:
         folder: path on the server's machine.
@@ -73,9 +73,9 @@ class SensorNote:
 
     Attributes:
         name: "radar" or "camera".
-        topic: its topic; "none" where there is none.
-        clock: what its times are by: "header" or "receive"; "" where that is not known.
-        about: what is read, which clock was chosen and why, and what is odd about it, line by line.
+        topic: its topic; "none" if there is none.
+        clock: the source of its times, "header" or "receive"; "" if unknown.
+        about: what is read, which clock was chosen and why, and anything unusual, line by line.
     """
 
     name: str
@@ -86,11 +86,11 @@ class SensorNote:
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """The recording is being opened: at most a picture of it can be seen, and nothing can be clicked yet.
+    """The recording is being opened: there is at most a preview, and nothing can be clicked yet.
 
     Attributes:
-        name: what the person calls it.
-        doing: what is going on, in words.
+        name: what the user calls it.
+        doing: what is being done, as text.
         problem: why it cannot be opened; "" while it is being opened.
     """
 
@@ -101,10 +101,10 @@ class Opening:
 
 @dataclass(frozen=True, slots=True)
 class RecordingNote:
-    """The recording, told once to each page.
+    """The recording, sent once to each page.
 
     Attributes:
-        name: what the person calls it.
+        name: what the user calls it.
         radar_topic: its radar.
         image_topic: its camera.
         width_px: columns of a frame.
@@ -112,9 +112,9 @@ class RecordingNote:
         frame_times: the stamp of every frame.
         start: the stamp of the first frame.
         radar: the stamp of every radar scan.
-        warnings: what is odd about the recording.
+        warnings: about the recording.
         sensors: how the radar and the camera are read.
-        session: where the work is kept.
+        session: where the session is stored.
         version: of the program.
         option_groups: how to draw the options; their values are in the view.
     """
@@ -136,7 +136,7 @@ class RecordingNote:
 
 @dataclass(frozen=True, slots=True)
 class PlacementRow:
-    """A dwell of the reflector that the radar has seen.
+    """A placement found in the radar data.
 
     Attributes:
         start_s: since the first frame [s].
@@ -167,8 +167,8 @@ class OverlayReturn(msgspec.Struct, frozen=True, array_like=True):
         u_px: column.
         v_px: row.
         range_m: from the radar.
-        doppler_mps: positive moving away; None or NaN where the radar has none.
-        snr_db: None or NaN where the radar has none.
+        doppler_mps: positive moving away; None or NaN if the radar has none.
+        snr_db: None or NaN if the radar has none.
         static: slow enough to be the reflector.
     """
 
@@ -186,9 +186,9 @@ class Overlay:
 
     Attributes:
         index: of the frame.
-        revision: of the session whose calibration carried the returns.
+        revision: of the session whose calibration projected the returns.
         returns: None without a calibration.
-        guesses: pixels (u, v) at which the reflector may be.
+        guesses: pixels (u, v) at which the reflector is expected.
     """
 
     index: int
@@ -199,7 +199,7 @@ class Overlay:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Something long is under way."""
+    """Progress of a long operation."""
 
     label: str
     done: int
@@ -208,7 +208,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Something the person asked for could not be done.
+    """A request of the user could not be carried out.
 
     Attributes:
         message: what and why.
@@ -223,21 +223,21 @@ class Problem:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """A message with a request number was carried out (and kept, if it was a step)."""
+    """A message with a request number was carried out (and stored, if it was a step)."""
 
     request: int
 
 
 @dataclass(frozen=True, slots=True)
 class FrameHeader:
-    """What comes before the bytes of a picture.
+    """The header that precedes the bytes of a picture.
 
     Attributes:
-        index: of the frame; -1 where it is shown while the recording is being opened, and is none yet.
-        request: the number of the message it answers; 0 where it answers none.
+        index: of the frame; -1 for the preview shown while the recording is being opened.
+        request: the number of the message it answers; 0 if it answers none.
         width_px: columns of the recorded frame.
         height_px: rows of the recorded frame.
-        scale: size of this picture over the recorded one.
+        scale: size of this picture relative to the recorded one.
         format: of the bytes.
     """
 
@@ -265,13 +265,13 @@ TYPES: Mapping[type, str] = {
 
 
 def encode(message: Outgoing) -> str:
-    """Write a message to a page as JSON text, with its "type"; a number that is not finite becomes null."""
+    """Encode a message to a page as JSON text, with its "type"; a number that is not finite becomes null."""
     body = msgspec.json.encode(message).decode()
     separator = "," if len(body) > 2 else ""
     return f'{{"type":"{TYPES[type(message)]}"{separator}{body[1:]}'
 
 
 def encode_frame(header: FrameHeader, data: bytes) -> bytes:
-    """Write a picture: length of the header (32 bits, little-endian), the header as JSON, the picture's own bytes."""
+    """Encode a picture: length of the header (32 bits, little-endian), the header as JSON, the picture's own bytes."""
     text = msgspec.json.encode(header)
     return b"".join((struct.pack("<I", len(text)), text, data))

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["FIELD_OF_VIEW_RAD", "LOOK_AT", "STAND_AT", "Sight", "TabScene"]
 
 STAND_AT, LOOK_AT = (-5.0, 0.0, 3.6), (6.0, 0.0, -0.4)
-"""Where the 3D view's camera begins: behind and above the radar, looking forward."""
+"""Initial position and target of the 3D view's camera: behind and above the radar, looking forward."""
 
 FIELD_OF_VIEW_RAD = 0.75
 
@@ -54,15 +54,15 @@ class Sight:
     """Everything that one 3D view shows at one moment.
 
     Attributes:
-        session: with the newest answer.
+        session: with the latest answer.
         view: of the same session.
         selected: id of the selected click; None without one.
         scan: of the frame; None when there is none.
-        window: (n, 3) still returns around the selected click [m].
+        window: (n, 3) static returns around the selected click [m].
         picture: a thumbnail of the frame; None when it cannot be read.
-        camera: the recording's intrinsics, for the time before a calibration.
-        reference: a calibration to look at until there is one; None without one.
-        light: drawn on a light ground.
+        camera: the recording's intrinsics, used until there is a calibration.
+        reference: a calibration to show until there is a new one; None if there is none.
+        light: drawn on a light background.
     """
 
     session: Session
@@ -77,7 +77,7 @@ class Sight:
 
 
 class TabScene:
-    """The nodes of one tab's 3D view. Properties are assigned, nodes are never added twice. Any one thread at a time."""
+    """The nodes of one tab's 3D view: added once, then changed by assigning properties. To be used by one thread at a time."""
 
     def __init__(self, client: "viser.ClientHandle") -> None:
         self._client = client
@@ -112,7 +112,7 @@ class TabScene:
         )
 
     def show(self, sight: Sight) -> None:
-        """Show this."""
+        """Draw a Sight."""
         with self._lock, self._client.atomic():
             self._show_theme(sight)
             self._show_scan(sight)
@@ -137,7 +137,7 @@ class TabScene:
             camera.position, camera.look_at = stand, target
 
     def _show_theme(self, sight: Sight) -> None:
-        """Paint what is drawn in one colour for the ground it is seen on."""
+        """Recolour the single-colour nodes to suit the background."""
         palette = LIGHT if sight.light else DARK
         if palette is self._palette:
             return
@@ -161,7 +161,7 @@ class TabScene:
         _fill_cloud(self._window, sight.window, window)
 
     def _show_pose(self, sight: Sight) -> None:
-        """Move the frustum, and the ground below the lowest chosen return; nothing moves while the answer stays."""
+        """Move the frustum, and the ground to the lowest chosen return, whenever the answer changes."""
         outcome = sight.session.outcome
         if outcome is self._posed:
             return
@@ -205,7 +205,7 @@ class TabScene:
             self._name.text = f"{chosen[0].id}: {np.linalg.norm(point):.2f} m, {_residual(chosen[0])}"
 
     def _show_advice(self, sight: Sight) -> None:
-        """Ring the place where another placement pays most."""
+        """Draw a ring around the best next placement."""
         advice = sight.view.advice
         if advice is None or advice.may_stop:
             self._next.visible = self._next_name.visible = False
@@ -222,7 +222,7 @@ class TabScene:
             return
         self._pictured = picture.index
         self._frustum._format = "jpeg"
-        self._frustum._image_data = picture.data  # the compressed bytes as they are; the public property encodes again
+        self._frustum._image_data = picture.data  # compressed bytes as they are; the public property encodes again
 
 
 def _residual(pair: PairResult) -> str:
@@ -255,7 +255,7 @@ def _cloud(scene: "viser.SceneApi", name: str, size_m: float) -> Any:
 
 
 def _lines(scene: "viser.SceneApi", name: str, thickness_px: float, colour: tuple[int, int, int]) -> Any:
-    """Add line segments of one colour: viser takes the colours of single points for linear light, one colour as it is."""
+    """Add line segments of one colour: viser treats per-point colours as linear light, but takes one colour as it is."""
     return scene.add_line_segments(
         name, _NO_LINE, colour, thickness=thickness_px, thickness_units="screen", visible=False
     )

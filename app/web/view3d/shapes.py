@@ -32,14 +32,14 @@ Colour: TypeAlias = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Palette:
-    """Colours of the 3D view that depend on the ground they are seen on.
+    """Colours of the 3D view that depend on the background.
 
     Attributes:
         still: returns that can be the reflector.
         moving: returns that cannot.
-        window: still returns around the selected click.
+        window: static returns around the selected click.
         ray: the selected click's ray.
-        next: ring of the advised place.
+        next: ring of the best next placement.
         solved: the camera with a calibration.
         rings: of equal range.
         cells: lines of the grid.
@@ -84,7 +84,7 @@ _STROKES = {
 
 
 def residual_colours(residuals_px: Values, limit_px: float) -> np.ndarray:
-    """Return (n, 3) colours of residuals: blue for small ones, sand at the limit's neighbourhood, red for large; NaN grey."""
+    """Return (n, 3) colours of residuals: blue for small ones, sand near the limit, red for large ones, grey for NaN."""
     share = np.clip(residuals_px / max(limit_px, 1e-9), 0.0, 1.0)
     colours = np.stack([np.interp(share, _RAMP_AT, channel) for channel in _RAMP.T], axis=1)
     colours[np.isnan(residuals_px)] = GREY
@@ -117,7 +117,7 @@ def range_numbers(*, every_m: float, up_to_m: float, height_m: float = 0.5) -> n
 def rays_to(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:
     """Return, for each pair, the click's ray from the camera to the depth of the return: segments (n, 2, 3).
 
-    The gap between a ray's end and the return is the residual, in space.
+    The gap between a ray's end and the return shows the residual in 3D.
     """
     radar_from_camera = calibration.camera_from_radar.inverse()
     pixels = np.array([pair.pixel_px for pair in pairs]).reshape(-1, 2)
@@ -132,12 +132,12 @@ def rays_to(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarr
 def ellipsoids(
     points_radar_m: Points3, noise: NoiseOptions, noise_scale: tuple[float, float, float, float]
 ) -> np.ndarray:
-    """Return three great circles of each point's 95 % ellipsoid by the noise model: segments (n, 2, 3).
+    """Return three great circles of each point's 95 % ellipsoid under the noise model: segments (n, 2, 3).
 
     Args:
         points_radar_m: (m, 3).
         noise: standard deviations assumed of range, azimuth and elevation.
-        noise_scale: estimated over assumed standard deviation of (click, range, azimuth, elevation).
+        noise_scale: estimated divided by assumed standard deviation of (click, range, azimuth, elevation).
     """
     sigma = np.array(
         [noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), np.deg2rad(noise.sigma_elevation_deg)]
@@ -158,7 +158,7 @@ def ellipsoids(
 
 
 def next_place(places_radar_m: Points3, *, radius_m: float = 0.5, dashes: int = 12) -> np.ndarray:
-    """Return a dashed level ring around each place, and a plumb line through it: segments (n, 2, 3).
+    """Return a dashed level ring around each place, and a vertical line through it: segments (n, 2, 3).
 
     Args:
         places_radar_m: (m, 3).
@@ -175,10 +175,10 @@ def next_place(places_radar_m: Points3, *, radius_m: float = 0.5, dashes: int = 
 
 
 def nominal_camera_from_radar() -> RigidTransform:
-    """Return the pose of a camera at the radar's place that looks along its x axis: where to begin without a calibration."""
+    """Return the pose of a camera at the radar's position that looks along its x axis, for use without a calibration."""
     return RigidTransform(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]), np.zeros(3))
 
 
 def vertical_field_of_view_rad(camera: Camera) -> float:
-    """Return the angle that the picture's height spans, lens distortion left aside."""
+    """Return the angle that the picture's height spans, ignoring lens distortion."""
     return 2.0 * float(np.arctan2(camera.height_px / 2.0, camera.matrix_px[1, 1]))

@@ -1,4 +1,4 @@
-"""From clicks to an answer: the shared function, the calibration's text, and the worker."""
+"""From clicks to a calibration: the shared function, the calibration's text, and the worker."""
 
 import json
 import logging
@@ -36,7 +36,7 @@ CLICK = ReflectorClick(TimeNs(10**18), "c1", 1.0, 2.0)
 
 
 class Radar:
-    """A radar recording that notes what it was asked for."""
+    """A radar recording that records what was requested."""
 
     def __init__(self, answer: Callable[[], RadarScans] = RadarScans) -> None:
         self.asked: list[tuple[tuple[int, ...], float]] = []
@@ -137,7 +137,7 @@ def test_the_text_says_what_went_in(sample: Path, recording: Recording, solved: 
     assert (file.frames.radar, file.frames.camera) == (recording.radar_frame, recording.camera_frame)
 
 
-def test_the_text_says_what_a_person_said_about_axes(sample: Path, solved: Calibration) -> None:
+def test_the_text_says_what_the_user_specified_about_axes(sample: Path, solved: Calibration) -> None:
     options = RecordingOptions(radar_axes="forward,right,up")
     with open_recording([sample / "camera.bag", sample / "radar.bag"], options) as recording:
         provenance = json.loads(calibration_text(solved, recording))["provenance"]
@@ -146,7 +146,7 @@ def test_the_text_says_what_a_person_said_about_axes(sample: Path, solved: Calib
 
 
 class Renamed:
-    """A recording whose recorder named its frames oddly."""
+    """A recording with odd frame names."""
 
     def __init__(self, recording: Recording, radar_frame: str, camera_frame: str) -> None:
         self._recording = recording
@@ -228,7 +228,7 @@ def test_too_few_pairs_in_a_file_are_an_answer_and_no_file_of_pairs_is_an_error(
 
 
 class Gate:
-    """A radar that reads nothing until it is let."""
+    """A radar that blocks reads until it is opened."""
 
     def __init__(self) -> None:
         self.entered, self.open = threading.Event(), threading.Event()
@@ -255,7 +255,7 @@ class Answers:
         return self.all[-1]
 
 
-def test_of_several_waiting_requests_only_the_newest_is_worked_on() -> None:
+def test_of_several_waiting_requests_only_the_newest_is_solved() -> None:
     gate, answers = Gate(), Answers()
     radar = Radar(gate)
     worker = SolverWorker(radar, CAMERA)
@@ -271,7 +271,7 @@ def test_of_several_waiting_requests_only_the_newest_is_worked_on() -> None:
     assert len(radar.asked) == 2
 
 
-def test_a_recording_that_cannot_be_read_is_told_as_the_answer() -> None:
+def test_a_recording_that_cannot_be_read_is_reported_as_the_answer() -> None:
     def broken() -> RadarScans:
         raise RecordingError("radar.bag: chunk 7 is damaged; copy the file again")
 
@@ -284,7 +284,7 @@ def test_a_recording_that_cannot_be_read_is_told_as_the_answer() -> None:
     assert (outcome.code, outcome.reason) == ("unreadable", "radar.bag: chunk 7 is damaged; copy the file again")
 
 
-def test_a_fault_of_the_program_is_logged_and_told_and_the_worker_goes_on(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(caplog: pytest.LogCaptureFixture) -> None:
     faults = iter([True])
 
     def faulty() -> RadarScans:

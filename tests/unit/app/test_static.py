@@ -1,4 +1,4 @@
-"""The page's files fit together, and lean on nothing but themselves."""
+"""The page's files fit together, and depend only on each other."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The one mutable cell: order of journal and telling, threads, answers, import and download."""
+"""The only mutable state: order of journalling and notifying, threads, answers, import and download."""
 
 import threading
 from collections.abc import Callable
@@ -85,14 +85,16 @@ def test_a_click_is_seen_at_once_and_the_answer_later(workspace: Workspace, solv
     assert seen[-1] == workspace.view == view(workspace.history, FACTS)
 
 
-def test_a_step_is_journalled_before_anybody_is_told(workspace: Workspace, journal: ListJournal) -> None:
+def test_a_step_is_journalled_before_subscribers_are_notified(workspace: Workspace, journal: ListJournal) -> None:
     journalled: list[int] = []
     workspace.subscribe(lambda shown: journalled.append(len(journal.steps)))
     workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
     assert journalled == [0, 1]
 
 
-def test_a_step_that_cannot_be_kept_is_not_made(workspace: Workspace, journal: ListJournal, solver: HeldSolver) -> None:
+def test_a_step_that_cannot_be_stored_is_not_made(
+    workspace: Workspace, journal: ListJournal, solver: HeldSolver
+) -> None:
     seen: list[View] = []
     workspace.subscribe(seen.append)
     journal.refuse = True
@@ -146,7 +148,7 @@ def test_a_restored_session_is_solved_at_once(journal: ListJournal, solver: Held
     assert solver.revisions == [1]
 
 
-def test_an_answer_that_comes_within_the_request_does_not_lock_up(journal: ListJournal) -> None:
+def test_an_answer_that_comes_within_the_request_does_not_deadlock(journal: ListJournal) -> None:
     class Immediate(HeldSolver):
         def request(self, revision: int, clicks, options, when_done: Callable[[Solved], None]) -> None:
             when_done(Solved(revision, NO_ANSWER))
@@ -169,7 +171,7 @@ def test_a_subscriber_may_dispatch(workspace: Workspace) -> None:
     assert seen == [0, 1, 2, 1]
 
 
-def test_an_ended_subscription_hears_nothing_more(workspace: Workspace) -> None:
+def test_an_ended_subscription_receives_nothing_more(workspace: Workspace) -> None:
     seen: list[View] = []
     end = workspace.subscribe(seen.append)
     end()
@@ -227,7 +229,7 @@ def test_a_file_that_holds_no_clicks_is_refused_with_its_name(workspace: Workspa
         workspace.import_clicks("[]", "holiday.json")
 
 
-def test_close_stops_the_solver_and_lets_go_of_the_journal(
+def test_close_stops_the_solver_and_closes_the_journal(
     workspace: Workspace, journal: ListJournal, solver: HeldSolver
 ) -> None:
     workspace.close()
@@ -259,7 +261,7 @@ class BareRecording:
         return RadarScans()
 
 
-def test_a_workspace_opened_again_has_the_clicks_of_before(tmp_path: Path) -> None:
+def test_a_workspace_opened_again_has_the_earlier_clicks(tmp_path: Path) -> None:
     for expected in ([], ["c1"]):
         workspace = open_workspace(BareRecording(), camera=None, session_folder=tmp_path / "s", name="drive")
         assert [click.id for click in workspace.restored.history.present.clicks] == expected
@@ -267,7 +269,7 @@ def test_a_workspace_opened_again_has_the_clicks_of_before(tmp_path: Path) -> No
         workspace.close()
 
 
-def test_a_recording_without_frames_is_refused_in_words() -> None:
+def test_a_recording_without_frames_is_refused_with_a_clear_error() -> None:
     recording = BareRecording()
     recording.image_times = np.zeros(0, dtype=np.int64)
     with pytest.raises(InputError, match="drive: has no frames to click in"):

@@ -46,7 +46,7 @@ def placed(*frames: int) -> Session:
     return session
 
 
-def lived(*steps) -> History:
+def history_of(*steps) -> History:
     history = History()
     for step in steps:
         history = advance(history, step, FACTS)
@@ -82,7 +82,7 @@ def test_a_removed_click_is_gone_and_its_id_is_not_given_again() -> None:
 
 
 def test_an_id_that_was_undone_is_not_given_again() -> None:
-    history = lived(
+    history = history_of(
         ClickPlaced(frame_time(1), 1.0, 1.0),
         Undo(),
         ClickPlaced(frame_time(2), 1.0, 1.0),
@@ -91,7 +91,7 @@ def test_an_id_that_was_undone_is_not_given_again() -> None:
     assert [click.id for click in history.present.clicks] == ["c2", "c3"]
 
 
-def test_an_excluded_click_stays_and_can_be_taken_in_again() -> None:
+def test_an_excluded_click_stays_and_can_be_included_again() -> None:
     excluded = apply(placed(3), ClickExcluded("c1", True), FACTS)
     assert excluded.clicks[0].excluded
     assert apply(excluded, ClickExcluded("c1", False), FACTS).clicks == placed(3).clicks
@@ -115,7 +115,7 @@ def test_clearing_removes_the_clicks_and_the_answer_and_keeps_the_options() -> N
         Solved(7, NO_ANSWER),
     ],
 )
-def test_an_event_that_changes_nothing_returns_the_very_same_session(event) -> None:
+def test_an_event_that_changes_nothing_returns_the_same_session_object(event) -> None:
     session = placed(3)
     assert apply(session, event, FACTS) is session
     history = History(session)
@@ -144,11 +144,11 @@ def test_an_event_that_changes_nothing_returns_the_very_same_session(event) -> N
             ClicksImported(
                 (ReflectorClick(frame_time(0), "a", 1.0, 1.0), ReflectorClick(frame_time(0), "b", 2.0, 1.0))
             ),
-            "two of the clicks lie in the frame",
+            "two of the clicks are in the frame",
         ),
     ],
 )
-def test_an_event_that_does_not_fit_is_refused_in_words(event, words: str) -> None:
+def test_an_event_that_does_not_fit_is_refused_with_a_clear_error(event, words: str) -> None:
     with pytest.raises(EventError) as refused:
         apply(placed(3), event, FACTS)
     assert words in str(refused.value)
@@ -160,7 +160,7 @@ def test_the_frame_reaches_half_a_pixel_beyond_its_outermost_pixel_centres(u_px:
     assert apply(Session(), ClickPlaced(frame_time(0), u_px, v_px), FACTS).clicks[0].u_px == u_px
 
 
-def test_imported_clicks_join_the_session_and_win_in_their_frames() -> None:
+def test_imported_clicks_are_added_and_replace_those_in_the_same_frames() -> None:
     imported = ClicksImported((ReflectorClick(frame_time(4), "p1", 5.0, 5.0, sigma_px=0.5, excluded=True),))
     session = apply(placed(3, 4), imported, FACTS)
     assert session.clicks == (placed(3).clicks[0], imported.clicks[0])
@@ -191,14 +191,14 @@ def test_edited_options_change_only_what_they_name() -> None:
     assert settled(event, placed(3)) == OptionsChanged(session.options)
 
 
-def test_an_answer_to_the_revision_of_now_is_kept() -> None:
+def test_an_answer_to_the_current_revision_is_kept() -> None:
     session = apply(placed(3), Solved(1, NO_ANSWER), FACTS)
     assert session.outcome is NO_ANSWER
     assert session.is_solved
     assert not session.needs_solving
 
 
-def test_an_answer_stays_shown_while_a_newer_one_is_worked_out() -> None:
+def test_an_answer_stays_shown_while_a_newer_one_is_computed() -> None:
     session = apply(apply(placed(3), Solved(1, NO_ANSWER), FACTS), ClickMoved("c1", 1.0, 1.0), FACTS)
     assert session.outcome is NO_ANSWER
     assert session.needs_solving
@@ -210,42 +210,42 @@ def test_an_answer_to_an_older_revision_changes_nothing() -> None:
 
 
 def test_an_answer_is_no_step_that_can_be_undone() -> None:
-    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), Solved(1, NO_ANSWER))
+    history = history_of(ClickPlaced(frame_time(1), 1.0, 1.0), Solved(1, NO_ANSWER))
     assert len(history.past) == 1
     assert history.present.outcome is NO_ANSWER
 
 
-def test_undo_takes_the_last_change_back_and_redo_makes_it_again() -> None:
-    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), ClickMoved("c1", 2.0, 2.0))
+def test_undo_reverts_the_last_change_and_redo_repeats_it() -> None:
+    history = history_of(ClickPlaced(frame_time(1), 1.0, 1.0), ClickMoved("c1", 2.0, 2.0))
     undone = advance(history, Undo(), FACTS)
     assert undone.present.clicks[0].u_px == 1.0
     assert advance(undone, Redo(), FACTS).present.clicks == history.present.clicks
 
 
-def test_undo_and_redo_with_nothing_to_do_return_the_very_same_history() -> None:
+def test_undo_and_redo_with_nothing_to_do_return_the_same_history_object() -> None:
     history = History()
     assert advance(history, Undo(), FACTS) is history
     assert advance(history, Redo(), FACTS) is history
 
 
-def test_a_new_change_forgets_what_was_taken_back() -> None:
-    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), Undo(), ClickPlaced(frame_time(2), 1.0, 1.0))
+def test_a_new_change_drops_what_was_undone() -> None:
+    history = history_of(ClickPlaced(frame_time(1), 1.0, 1.0), Undo(), ClickPlaced(frame_time(2), 1.0, 1.0))
     assert advance(history, Redo(), FACTS) is history
 
 
 def test_undo_brings_the_old_answer_back_without_asking_again() -> None:
-    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), Solved(1, NO_ANSWER), ClickMoved("c1", 2.0, 2.0), Undo())
+    history = history_of(ClickPlaced(frame_time(1), 1.0, 1.0), Solved(1, NO_ANSWER), ClickMoved("c1", 2.0, 2.0), Undo())
     assert history.present.is_solved
     assert history.present.outcome is NO_ANSWER
 
 
 def test_undo_to_a_state_that_was_never_answered_asks_again() -> None:
-    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), ClickMoved("c1", 2.0, 2.0), Undo())
+    history = history_of(ClickPlaced(frame_time(1), 1.0, 1.0), ClickMoved("c1", 2.0, 2.0), Undo())
     assert history.present.needs_solving
 
 
-def test_an_answer_under_way_during_undo_cannot_land_on_another_state() -> None:
-    history = lived(ClickPlaced(frame_time(1), 1.0, 1.0), ClickPlaced(frame_time(2), 1.0, 1.0))
+def test_an_answer_pending_during_undo_is_not_applied_to_another_state() -> None:
+    history = history_of(ClickPlaced(frame_time(1), 1.0, 1.0), ClickPlaced(frame_time(2), 1.0, 1.0))
     revision = history.present.revision
     history = advance(history, Undo(), FACTS)
     history = advance(history, ClickPlaced(frame_time(3), 9.0, 9.0), FACTS)

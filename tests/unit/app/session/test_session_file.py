@@ -1,4 +1,4 @@
-"""A session on disk: what is kept, what is given back, and what is refused without touching it."""
+"""A session on disk: what is stored, what is restored, and what is refused without being changed."""
 
 import errno
 import os
@@ -68,7 +68,7 @@ def keep(session_file: SessionFile, *steps) -> History:
 
 
 def kept(folder: Path, *steps) -> History:
-    """Live through steps in a session of its own and close it."""
+    """Apply steps in a new session and close it."""
     session_file = open_session_file(folder, FACTS)
     history = keep(session_file, *steps)
     session_file.close()
@@ -82,7 +82,7 @@ def test_a_step_comes_back_from_its_json_form_bit_for_bit(step) -> None:
 
 
 @pytest.mark.parametrize("step", [Solved(1, Unsolvable("a", "b", "c")), OptionsEdited(())])
-def test_answers_and_half_finished_edits_are_not_journalled(step) -> None:
+def test_answers_and_partial_edits_are_not_journalled(step) -> None:
     with pytest.raises(TypeError, match="is not journalled"):
         form_of_step(step)
 
@@ -96,7 +96,7 @@ def test_a_session_comes_back_with_everything_that_can_be_undone_and_redone(tmp_
     session_file.close()
 
 
-def test_a_session_goes_on_where_it_stopped(tmp_path: Path) -> None:
+def test_a_session_continues_where_it_stopped(tmp_path: Path) -> None:
     kept(tmp_path, ClickPlaced(TIMES[1], 1.0, 1.0))
     kept(tmp_path, ClickPlaced(TIMES[2], 2.0, 2.0))
     history = kept(tmp_path, Undo())
@@ -145,7 +145,7 @@ def test_a_process_killed_outright_loses_nothing_that_was_confirmed(tmp_path: Pa
     session_file.close()
 
 
-def test_a_half_written_last_line_is_dropped_and_told(tmp_path: Path) -> None:
+def test_a_half_written_last_line_is_dropped_and_reported(tmp_path: Path) -> None:
     history = kept(tmp_path, *STEPS[:3])
     journal = tmp_path / "journal.jsonl"
     whole = journal.read_bytes()
@@ -171,7 +171,7 @@ def damaged(line: int, text: bytes, whole: bytes) -> bytes:
         (2, b'{"n":2,"step":{"type":"click_placed","image', "line 3 is damaged"),
         (2, b"\x00\x00\xff\xfe", "line 3 is damaged"),
         (2, b"", "line 3 is damaged"),
-        (2, b'{"n":7,"step":{"type":"cleared"}}', "step 7 stands where step 2 belongs"),
+        (2, b'{"n":7,"step":{"type":"cleared"}}', "found step 7, expected step 2"),
         (2, b'{"n":2,"step":{"type":"click_removed","id":"c9"}}', "there is no click 'c9'"),
         (2, b'{"n":2,"step":{"type":"options_changed","options":{"nois":{}}}}', "unknown option 'nois'"),
         (2, b'{"n":2,"step":{"type":"juggled"}}', "Invalid value 'juggled'"),
@@ -179,7 +179,7 @@ def damaged(line: int, text: bytes, whole: bytes) -> bytes:
         (0, b'{"schema":"cocalib/session-1"', "line 1 is damaged"),
     ],
 )
-def test_a_damaged_journal_is_refused_in_words_and_left_alone(
+def test_a_damaged_journal_is_refused_with_a_clear_error_and_left_alone(
     tmp_path: Path, line: int, text: bytes, words: str
 ) -> None:
     kept(tmp_path, *STEPS[:4])
@@ -243,10 +243,11 @@ def test_the_snapshot_is_at_most_ten_steps_behind(tmp_path: Path) -> None:
         RecordingFacts("other", np.zeros(0, dtype=np.int64), 640, 480),
     ],
 )
-def test_a_session_of_another_recording_is_refused_in_words(tmp_path: Path, other: RecordingFacts) -> None:
+def test_a_session_of_another_recording_is_refused_with_a_clear_error(tmp_path: Path, other: RecordingFacts) -> None:
     kept(tmp_path, STEPS[0])
     with pytest.raises(
-        SessionFileError, match=r"the session is of 'drive' \(50 frames of 640 x 480 px from 1700000000\.123456789 s\)"
+        SessionFileError,
+        match=r"the session belongs to 'drive' \(50 frames of 640 x 480 px from 1700000000\.123456789 s\)",
     ):
         open_session_file(tmp_path, other)
 
@@ -258,13 +259,13 @@ def test_a_recording_that_was_renamed_is_still_the_same(tmp_path: Path) -> None:
     session_file.close()
 
 
-def test_other_radar_axes_than_the_last_time_are_told_and_harm_no_click(tmp_path: Path) -> None:
+def test_radar_axes_that_changed_since_last_time_give_a_warning_and_harm_no_click(tmp_path: Path) -> None:
     kept(tmp_path, STEPS[0])
     turned = replace(FACTS, radar_axes="forward,right,up")
     killed = open_session_file(tmp_path, turned)
-    (told,) = killed.restored.warnings
-    assert told.code == "other-axes"
-    assert "last open without --radar-axes, and is now open with --radar-axes forward,right,up" in told.message
+    (warning,) = killed.restored.warnings
+    assert warning.code == "other-axes"
+    assert "last opened without --radar-axes, now with --radar-axes forward,right,up" in warning.message
     assert len(killed.restored.history.present.clicks) == 1
     killed._journal.close()  # as a kill leaves it: nothing is written on the way out
     killed._lock.close()
@@ -276,7 +277,7 @@ def test_other_radar_axes_than_the_last_time_are_told_and_harm_no_click(tmp_path
     forgotten.close()
 
 
-def test_a_session_without_clicks_has_no_axes_to_tell_of(tmp_path: Path) -> None:
+def test_a_session_without_clicks_gives_no_warning_about_axes(tmp_path: Path) -> None:
     kept(tmp_path)
     opened = open_session_file(tmp_path, replace(FACTS, radar_axes="degrees"))
     assert opened.restored.warnings == ()
@@ -285,7 +286,7 @@ def test_a_session_without_clicks_has_no_axes_to_tell_of(tmp_path: Path) -> None
 
 def test_a_session_that_is_open_elsewhere_is_refused_with_the_process_named(tmp_path: Path) -> None:
     session_file = open_session_file(tmp_path, FACTS)
-    with pytest.raises(SessionFileError, match=rf"is open already, in process {os.getpid()} on "):
+    with pytest.raises(SessionFileError, match=rf"is already open in process {os.getpid()} on "):
         open_session_file(tmp_path, FACTS)
     session_file.close()
     open_session_file(tmp_path, FACTS).close()
@@ -317,7 +318,7 @@ def test_a_full_disk_refuses_the_step_and_leaves_the_journal_as_it_was(
 
     with monkeypatch.context() as patch:
         patch.setattr(os, "write", full)
-        with pytest.raises(SessionFileError, match="could not be kept, so it was not made: No space left on device"):
+        with pytest.raises(SessionFileError, match="could not be saved and was not made: No space left on device"):
             session_file.append(STEPS[1], history)
     assert (tmp_path / "journal.jsonl").read_bytes() == before
     history = advance(history, STEPS[1], FACTS)
@@ -328,7 +329,7 @@ def test_a_full_disk_refuses_the_step_and_leaves_the_journal_as_it_was(
     again.close()
 
 
-def test_a_disk_that_cannot_even_take_back_stops_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_cannot_even_truncate_stops_the_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session_file = open_session_file(tmp_path, FACTS)
     history = keep(session_file, STEPS[0])
 
@@ -363,13 +364,13 @@ def test_a_folder_deleted_under_an_open_session_is_noticed(tmp_path: Path) -> No
     session_file.close()
 
 
-def test_a_place_that_is_no_folder_is_refused_in_words(tmp_path: Path) -> None:
+def test_a_path_that_is_no_folder_is_refused_with_a_clear_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(SessionFileError, match=r"cannot be made: .*; give another --session folder"):
+    with pytest.raises(SessionFileError, match=r"cannot be created: .*; give another --session folder"):
         open_session_file(tmp_path / "file" / "s", FACTS)
 
 
-def test_a_session_set_aside_is_kept_beside_under_the_next_free_number(tmp_path: Path) -> None:
+def test_a_session_set_aside_is_renamed_with_the_next_free_number(tmp_path: Path) -> None:
     folder = tmp_path / "s"
     assert set_aside(folder) is None
     for number in (1, 2):
@@ -381,19 +382,19 @@ def test_a_session_set_aside_is_kept_beside_under_the_next_free_number(tmp_path:
 
 def test_a_session_that_is_open_is_not_set_aside(tmp_path: Path) -> None:
     session_file = open_session_file(tmp_path / "s", FACTS)
-    with pytest.raises(SessionFileError, match="is open already"):
+    with pytest.raises(SessionFileError, match="is already open"):
         set_aside(tmp_path / "s")
     session_file.close()
     assert (tmp_path / "s" / "journal.jsonl").exists()
 
 
-def test_the_session_lies_beside_its_recording(tmp_path: Path) -> None:
+def test_the_session_is_stored_next_to_its_recording(tmp_path: Path) -> None:
     assert (
         recording_session_folder([tmp_path / "drive.bag", tmp_path / "b.bag"]) == tmp_path / "drive.bag.cocalib-session"
     )
 
 
-def test_beside_a_folder_that_cannot_be_written_the_session_lies_in_the_state_folder(
+def test_if_the_folder_cannot_be_written_the_session_is_stored_in_the_state_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "platform", "linux")
@@ -411,9 +412,9 @@ def test_a_session_that_exists_in_the_state_folder_is_found_again(
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     recording = tmp_path / "drive.bag"
-    at_home = user_session_folder("drive.bag", key=str(recording.resolve()))
-    at_home.mkdir(parents=True)
-    assert recording_session_folder([recording]) == at_home
+    in_state_folder = user_session_folder("drive.bag", key=str(recording.resolve()))
+    in_state_folder.mkdir(parents=True)
+    assert recording_session_folder([recording]) == in_state_folder
 
 
 @pytest.mark.parametrize(

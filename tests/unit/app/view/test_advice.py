@@ -1,4 +1,4 @@
-"""Where to put the reflector next, as the page says it."""
+"""Where to put the reflector next, as shown on the page."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def solved(count: int, options: CalibrationOptions | None = None) -> Calibration
     return outcome
 
 
-def test_the_advised_place_lies_in_the_picture_and_in_the_words() -> None:
+def test_the_advised_place_is_in_the_picture_and_in_the_text() -> None:
     calibration = solved(6)
     advice = advice_for(calibration)
     assert advice is not None
@@ -25,7 +25,7 @@ def test_the_advised_place_lies_in_the_picture_and_in_the_words() -> None:
     assert calibration.camera.in_image(np.array([[advice.u_px, advice.v_px]]))[0]
     assert advice.range_m == pytest.approx(np.linalg.norm(advice.position_radar_m))
     assert f"{advice.position_radar_m[0]:.1f} m ahead" in advice.words
-    assert "surer" in advice.words
+    assert "would reduce the pose uncertainty by" in advice.words
 
 
 def test_the_side_is_named_as_the_radar_sees_it() -> None:
@@ -40,8 +40,8 @@ def test_many_placements_are_enough() -> None:
     advice = advice_for(solved(400))
     assert advice is not None
     assert advice.may_stop
-    assert "You may stop" in advice.words
+    assert "No further placement is needed" in advice.words
 
 
-def test_the_papers_method_gives_no_advice_for_it_has_no_covariance() -> None:
+def test_the_papers_method_gives_no_advice_since_it_has_no_covariance() -> None:
     assert advice_for(solved(30, CalibrationOptions(method="paper"))) is None

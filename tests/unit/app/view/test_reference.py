@@ -1,4 +1,4 @@
-"""A calibration that is given for review: shown until the clicks give their own, then compared with it."""
+"""A calibration given for review: shown until the clicks give a new one, then compared with it."""
 
 import dataclasses
 from pathlib import Path
@@ -87,7 +87,7 @@ def test_the_first_click_already_has_a_residual_against_it(facts, reference):
     seen = view(
         History(Session((click,), revision=1, outcome=FEW, outcome_revision=1, checked=(checked,))), facts, reference
     )
-    assert seen.status == "Showing the calibration from other.yaml; 1 click lies 5.00 px from it"
+    assert seen.status == "Showing the calibration from other.yaml; residual of 1 click: 5.00 px"
     assert seen.hint == "3 more placements for a new calibration."
     (row,) = seen.clicks
     assert row.state == "pending"
@@ -95,7 +95,7 @@ def test_the_first_click_already_has_a_residual_against_it(facts, reference):
     assert row.range_m == pytest.approx(np.linalg.norm(point))
 
 
-def test_once_solved_the_own_calibration_is_drawn_and_compared(facts, file):
+def test_once_solved_the_new_calibration_is_drawn_and_compared(facts, file):
     moved = file.calibration.camera_from_radar.perturbed(np.array([0, 0, 0.05, 0, np.deg2rad(0.5), 0]))
     other = Reference("other.yaml", dataclasses.replace(file.calibration, camera_from_radar=moved))
     session = Session(clicked(4), revision=1, outcome=file.calibration, outcome_revision=1)
@@ -125,7 +125,7 @@ def test_every_format_becomes_calibration_1_and_stays_the_same_calibration(file,
         assert "imported" in {warning.code for warning in again.calibration.warnings}
 
 
-def test_what_cannot_be_taken_over_is_refused_in_words(file, tmp_path):
+def test_what_cannot_be_adopted_is_refused_with_a_clear_error(file, tmp_path):
     text = export(file, "tf2").data.decode()
     with pytest.raises(InputError, match="tf2 carries no camera"):
         adopt(read_any(text), "x.sh")
@@ -156,7 +156,7 @@ def test_a_calibration_brings_its_camera_where_it_fits_the_frames(file, tmp_path
     assert camera_in(path, camera.width_px + 1, camera.height_px) is None
 
 
-def test_bad_frames_and_mirrored_rotations_are_refused_in_words():
+def test_bad_frames_and_mirrored_rotations_are_refused_with_a_clear_error():
     with pytest.raises(InputError, match="no name"):
         FrameNames("", "camera")
     with pytest.raises(InputError, match="both frames"):

@@ -1,4 +1,4 @@
-"""What the screen shows for a session: words, figures, rows, ellipses."""
+"""What the screen shows for a session: texts, figures, rows, ellipses."""
 
 from dataclasses import replace
 
@@ -109,7 +109,7 @@ def test_an_unsolvable_session_shows_reason_and_hint() -> None:
     assert not seen.has_calibration
 
 
-def test_what_more_clicks_cannot_mend_is_told_from_the_first_click_on() -> None:
+def test_what_more_clicks_cannot_fix_is_reported_from_the_first_click_on() -> None:
     seen = shown(1, Unsolvable("no-camera", "the intrinsics are missing", "give --camera"))
     assert (seen.stage, seen.status) == ("unsolvable", "The intrinsics are missing.")
 
@@ -127,13 +127,13 @@ def test_clicks_that_the_radar_did_not_see_do_not_count_and_say_why() -> None:
     seen = shown(5, Unsolvable("too-few-pairs", "3 of at least 4 pairs", "click more", unseen))
     assert (seen.stage, seen.status) == ("collecting", "1 more placement needed")
     assert seen.hint == (
-        "2 of 5 clicks found no radar position: the nearest radar scan is 9.00 s away. Check that both clocks agree."
+        "2 of 5 clicks have no radar position: the nearest radar scan is 9.00 s away. Check that both clocks agree."
     )
     assert [row.state for row in seen.clicks] == ["unpaired", "pending", "unpaired", "pending", "pending"]
     assert "9.00 s away" in seen.clicks[0].note
 
 
-def test_figures_stay_while_a_newer_answer_is_worked_out() -> None:
+def test_figures_stay_while_a_newer_answer_is_computed() -> None:
     seen = shown(5, calibration(*FIVE), ClickMoved("c1", 11.0, 20.0))
     assert (seen.stage, seen.status, seen.solving) == ("solving", "Solving…", True)
     assert seen.has_calibration
@@ -141,7 +141,7 @@ def test_figures_stay_while_a_newer_answer_is_worked_out() -> None:
     assert seen.metrics
 
 
-def test_what_can_be_undone_and_redone_is_told() -> None:
+def test_the_view_says_what_can_be_undone_and_redone() -> None:
     seen = view(clicked(2, Undo()), FACTS)
     assert (seen.can_undo, seen.can_redo) == (True, True)
     assert not view(clicked(1), FACTS).can_redo
@@ -169,7 +169,7 @@ def test_the_residual_follows_a_moved_click_at_once() -> None:
     assert row.residual_px == pytest.approx(2.0)
 
 
-def test_each_state_of_a_click_is_told_in_words() -> None:
+def test_each_state_of_a_click_has_a_note() -> None:
     outcome = calibration(
         pair("c1"),
         pair("c2", inlier=False),
@@ -181,12 +181,12 @@ def test_each_state_of_a_click_is_told_in_words() -> None:
     rows = {row.id: row for row in view(history, FACTS).clicks}
     assert [row.state for row in rows.values()] == ["inlier", "outlier", "excluded", "unpaired", "pending"]
     assert rows["c2"].note.startswith(
-        "Does not agree with the others (97 % sure): its radar position comes out 5.00 px"
+        "Disagrees with the other pairs (outlier probability 97 %): its radar position reprojects 5.00 px"
     )
-    assert rows["c3"].note == "Left out of the solve; its radar position comes out 5.00 px from the click."
+    assert rows["c3"].note == "Excluded; its radar position reprojects 5.00 px from the click."
     assert rows["c4"].note == "The radar has no scan here. Click where both recordings overlap."
-    taken_in = view(advance(history, ClickExcluded("c3", False), FACTS), FACTS)
-    assert taken_in.clicks[2].state == "pending"
+    included = view(advance(history, ClickExcluded("c3", False), FACTS), FACTS)
+    assert included.clicks[2].state == "pending"
 
 
 def test_a_radar_position_behind_the_camera_has_no_reprojection() -> None:
@@ -208,7 +208,7 @@ def test_every_figure_has_a_value_and_a_sentence_that_explains_it() -> None:
     assert all(figure.hint.endswith(".") and len(figure.hint) > 20 for figure in figures.values())
 
 
-def test_smooth_angle_errors_of_the_radar_are_a_figure_where_correcting_them_pays() -> None:
+def test_smooth_angle_errors_of_the_radar_are_a_figure_if_correcting_them_helps() -> None:
     simulated = simulate_pairs(30, rng=np.random.default_rng(7), noise=NoiseProfile(0.008, 0.1, 0.25))
     solved = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions())
     assert isinstance(solved, Calibration)
@@ -233,11 +233,11 @@ def test_a_figure_that_was_not_computed_is_a_dash() -> None:
     assert figures["held_out_aed"].level == "plain"
 
 
-def test_a_pose_that_leans_on_single_pairs_stands_out() -> None:
+def test_a_pose_that_depends_on_single_pairs_stands_out() -> None:
     metrics = Metrics(2.0, 1.0, 2.1, n=5, held_out_aed_px=6.0)
     figures = {figure.key: figure for figure in shown(5, calibration(*FIVE, metrics=metrics)).metrics}
     assert figures["held_out_aed"].level == "warning"
-    assert "leans on single pairs" in figures["held_out_aed"].hint
+    assert "depends on single pairs" in figures["held_out_aed"].hint
 
 
 def test_a_pose_without_covariance_is_shown_without_one() -> None:
@@ -281,7 +281,7 @@ def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings(
         (NAN, "–"),
     ],
 )
-def test_a_plain_number_has_three_digits_that_count(value: float, text: str) -> None:
+def test_a_plain_number_has_three_significant_digits(value: float, text: str) -> None:
     assert plain(value) == text
 
 
@@ -301,7 +301,9 @@ def test_a_plain_number_has_three_digits_that_count(value: float, text: str) -> 
         (NAN, 1.0, "–"),
     ],
 )
-def test_a_number_with_a_standard_deviation_has_the_digits_it_has_earned(value: float, sigma: float, text: str) -> None:
+def test_a_number_with_a_standard_deviation_has_the_digits_that_it_justifies(
+    value: float, sigma: float, text: str
+) -> None:
     assert with_sigma(value, sigma) == text
 
 

@@ -1,4 +1,4 @@
-"""Frames go out as they were recorded, are made once, and never on the event loop."""
+"""Frames are sent as recorded, read once, and never on the event loop."""
 
 import asyncio
 import threading
@@ -78,7 +78,7 @@ def test_a_thumbnail_is_a_small_jpeg(executor: ThreadPoolExecutor, size: tuple[i
     assert picture.shape[1] == min(480, size[0])
 
 
-def test_many_who_ask_at_once_cost_one_read_off_the_event_loop(executor: ThreadPoolExecutor) -> None:
+def test_concurrent_requests_share_one_read_off_the_event_loop(executor: ThreadPoolExecutor) -> None:
     pictures = Pictures(64, 48)
 
     async def ask() -> None:
@@ -106,7 +106,7 @@ def test_the_loop_runs_on_while_a_frame_is_read(executor: ThreadPoolExecutor) ->
     asyncio.run(ask())
 
 
-def test_who_leaves_early_does_not_take_the_frame_from_the_others(executor: ThreadPoolExecutor) -> None:
+def test_a_client_that_leaves_early_does_not_cancel_the_frame_for_others(executor: ThreadPoolExecutor) -> None:
     pictures = Pictures(64, 48)
     pictures.may_read.clear()
 
@@ -158,7 +158,7 @@ def test_prefetching_goes_in_the_direction_of_play_and_stops_at_the_end(
     assert sorted(pictures.read) == expected
 
 
-def test_a_broken_frame_is_an_error_to_who_asks_and_only_then(executor: ThreadPoolExecutor) -> None:
+def test_a_broken_frame_is_an_error_only_when_it_is_requested(executor: ThreadPoolExecutor) -> None:
     pictures = Pictures(64, 48)
 
     async def ask() -> None:
@@ -177,7 +177,7 @@ def test_there_is_no_frame_outside_the_recording(executor: ThreadPoolExecutor, i
         asyncio.run(FrameStore(Pictures(64, 48), 10, executor).get(index))
 
 
-def test_a_closed_store_leaves_nothing_on_its_way_and_begins_nothing(executor: ThreadPoolExecutor) -> None:
+def test_a_closed_store_leaves_nothing_pending_and_starts_nothing(executor: ThreadPoolExecutor) -> None:
     pictures = Pictures(64, 48)
     pictures.may_read.clear()
 

@@ -1,4 +1,4 @@
-"""The channel's words: what is understood, what is refused, and what is written."""
+"""The channel's messages: what is understood, what is refused, and what is written."""
 
 import json
 import struct
@@ -100,12 +100,12 @@ def test_a_frame_is_asked_for_with_the_number_its_picture_will_carry() -> None:
         ("hello", "not JSON"),
         ("[1]", "not a JSON object"),
         ("null", "not a JSON object"),
-        ("{}", "no message of the type 'None'; known: click_placed"),
-        ('{"type":"click_place"}', "no message of the type 'click_place'; did you mean 'click_placed'?"),
-        ('{"type":["undo"]}', "no message of the type"),
+        ("{}", "unknown message type 'None'; known: click_placed"),
+        ('{"type":"click_place"}', "unknown message type 'click_place'; did you mean 'click_placed'?"),
+        ('{"type":["undo"]}', "unknown message type"),
         (
             '{"type":"undo","colour":"red"}',
-            "the message 'undo' is not as it should be: Object contains unknown field `colour`",
+            "invalid message 'undo': Object contains unknown field `colour`",
         ),
         ('{"type":"click_removed"}', "missing required field `id`"),
         ('{"type":"click_removed","id":""}', "length >= 1"),
@@ -122,15 +122,15 @@ def test_a_frame_is_asked_for_with_the_number_its_picture_will_carry() -> None:
         ),
         ('{"type":"click_placed","image_time":{"sec":-1,"nanosec":0},"pixel_px":[1,2]}', "`$.image_time.sec`"),
         ('{"type":"click_placed","image_time":{"sec":1e30,"nanosec":0},"pixel_px":[1,2]}', "`$.image_time.sec`"),
-        ('{"type":"undo","request":-1}', "not as it should be"),
-        ('{"type":"undo","request":"1"}', "not as it should be"),
+        ('{"type":"undo","request":-1}', "invalid message 'undo'"),
+        ('{"type":"undo","request":"1"}', "invalid message 'undo'"),
         ('{"type":"frame","index":-1,"request":1}', "`$.index`"),
         ('{"type":"frame","index":1}', "missing required field `request`"),
         ('{"type":"frame","index":1,"request":1,"size":"huge"}', "`$.size`"),
         ('{"type":"options_changed","options":[]}', "`$.options`"),
     ],
 )
-def test_what_is_not_understood_is_refused_in_words(text: str, words: str) -> None:
+def test_what_is_not_understood_is_refused_with_a_clear_error(text: str, words: str) -> None:
     with pytest.raises(InputError) as refused:
         parse(text)
     assert words in str(refused.value)
@@ -149,7 +149,7 @@ def test_a_message_that_is_too_long_or_too_deep_is_refused() -> None:
 
 
 @given(st.one_of(st.text(max_size=200), st.binary(max_size=200)))
-def test_nothing_that_arrives_can_do_more_than_be_refused(text: str | bytes) -> None:
+def test_arbitrary_input_is_refused(text: str | bytes) -> None:
     with pytest.raises(CalibrationError):
         parse(text)
     assert request_of(text) is None or isinstance(request_of(text), int)
@@ -229,7 +229,7 @@ def test_a_message_to_the_page_carries_its_type(message, written: dict[str, obje
     assert json.loads(encode(message)) == written
 
 
-def test_a_recording_is_told_with_every_nanosecond_and_every_option_described() -> None:
+def test_a_recording_is_sent_with_every_nanosecond_and_every_option_described() -> None:
     stamps = StampColumns.of(FACTS.image_times)
     note = RecordingNote("d", "/r", "/i", 640, 480, stamps, Stamp(1, 2), stamps, (), (), SessionNote("/s", 0), "0.1")
     written = json.loads(encode(note))

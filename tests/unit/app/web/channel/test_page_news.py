@@ -1,4 +1,4 @@
-"""What goes to a page: the newest of each kind, in order, and never more than it can read."""
+"""What is sent to a page: the newest of each kind, in order, and never more than it can read."""
 
 import asyncio
 import logging
@@ -57,7 +57,7 @@ def test_a_page_that_reads_nothing_is_given_up() -> None:
         asyncio.run(outbox.deliver(never))
 
 
-def test_of_the_work_that_waits_only_the_newest_is_done() -> None:
+def test_of_the_waiting_work_only_the_newest_is_done() -> None:
     worked: list[int] = []
 
     async def run() -> None:
@@ -183,7 +183,7 @@ def test_the_scan_of_a_frame_is_the_nearest_one_and_none_when_none_is_near() -> 
     assert sight.scan_at(TimeNs(int(60e9))) is None
 
 
-def test_without_a_calibration_nothing_is_carried_into_the_picture() -> None:
+def test_without_a_calibration_nothing_is_projected_into_the_picture() -> None:
     overlay = overlay_of(3, Session(), scan(0, [[5, 0, 0]]), ())
     assert overlay.returns is None
     assert overlay.guesses == ()

@@ -56,7 +56,7 @@ def test_a_ray_of_an_exact_click_ends_at_its_return() -> None:
     assert rays[:, 0] == pytest.approx(np.broadcast_to(centre, (4, 3)), abs=1e-12)
 
 
-def test_rings_lie_at_their_ranges_and_numbers_on_the_ground_beside_them() -> None:
+def test_rings_are_at_their_ranges_and_numbers_on_the_ground_next_to_them() -> None:
     ranges = polar_from_cartesian(range_rings(every_m=5, up_to_m=30).reshape(-1, 3))[:, 0]
     assert set(np.round(ranges, 9)) == {5, 10, 15, 20, 25, 30}
     numbers = range_numbers(every_m=10, up_to_m=20)
@@ -151,7 +151,7 @@ def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear(d
     assert "/selected" not in drawn.names()
 
 
-def test_the_advised_place_is_ringed_until_one_may_stop(drawn: Drawn) -> None:
+def test_the_best_next_placement_is_ringed_until_no_more_are_needed(drawn: Drawn) -> None:
     seen = sight(calibration())
     advice = Advice(10.0, 20.0, 5.0, 1.4, False, (4.0, 3.0, 0.0), "There.")
     drawn.scene.show(replace(seen, view=replace(seen.view, advice=advice)))
