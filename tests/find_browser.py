@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 __all__ = ["BrowserMissingError", "find_browser"]
@@ -37,10 +38,17 @@ def find_browser() -> Path:
         if not _runs(chosen):
             raise BrowserMissingError(f"COCALIB_BROWSER={chosen} does not run; correct it or unset it")
         return Path(chosen)
-    for candidate in (*(path for name in _NAMES if (path := shutil.which(name))), *_PLACES, _playwright_build()):
+    for candidate in _candidates():
         if candidate and _runs(candidate):
             return Path(candidate)
     raise BrowserMissingError(_ADVICE)
+
+
+def _candidates() -> Iterator[str]:
+    """Yield paths to try; Playwright is only started when nothing else runs."""
+    yield from (path for name in _NAMES if (path := shutil.which(name)))
+    yield from _PLACES
+    yield _playwright_build()
 
 
 def _runs(path: str) -> bool:
