@@ -190,7 +190,7 @@ def test_a_recording_without_messages_is_refused_but_can_be_inspected(container,
 def test_a_recording_without_radar_or_camera_names_what_there_is(ros, write, plain, jpeg):
     radar = write(ros, [row for row in plain(ros, jpeg) if "radar" in row[0]], name="radar")
     text = refusal(radar)
-    assert "no camera image topic that can be read; topics: /radar/points (sensor_msgs/" in text
+    assert "no readable camera image topic; topics: /radar/points (sensor_msgs/" in text
     assert "--image-topic" in text
     camera = write(ros, [row for row in plain(ros, jpeg) if "camera" in row[0]], name="camera")
     assert "no radar topic that can be read" in refusal(camera)
@@ -206,7 +206,7 @@ def test_a_recording_without_radar_or_camera_names_what_there_is(ros, write, pla
 def test_a_wrong_choice_of_topic_names_the_right_ones(ros, write, plain, jpeg):
     path = write(ros, plain(ros, jpeg))
     text = refusal(path, RecordingOptions(radar_topic="/radar/point"))
-    assert "there is no topic /radar/point; radar topics: /radar/points" in text
+    assert "no topic /radar/point; radar topics: /radar/points" in text
     text = refusal(path, RecordingOptions(image_topic="/radar/points"))
     assert "is not a camera image topic; camera image topics: /camera/image/compressed" in text
     text = refusal(path, RecordingOptions(camera_info_topic="/nope"))
@@ -222,7 +222,7 @@ def test_sensors_without_a_time_in_common_are_refused_with_both_intervals(ros, w
     text = refusal([radar, camera])
     assert "/radar/points (2023-11-14 22:13:20.000 UTC to 2023-11-14 22:13:21.900 UTC)" in text
     assert "/camera/image/compressed (2023-11-15 22:13:20.050 UTC to 2023-11-15 22:13:21.950 UTC)" in text
-    assert "no time in common: 86398.1 s apart" in text
+    assert "do not overlap in time: 86398.1 s apart" in text
     with inspect_recording([radar, camera]) as recording:
         assert [warning.code for warning in recording.warnings] == ["no-overlap"]
 
@@ -237,7 +237,7 @@ def test_a_damaged_definition_of_another_topic_harms_nothing(ros1, write, plain,
     with open_recording(path) as recording:
         (topic,) = [topic for topic in recording.topics if topic.name == "/odd"]
         assert topic.problem is not None
-        assert "a line that is no field: 'float32 $alue'" in topic.problem
+        assert "a line that is not a field: 'float32 $alue'" in topic.problem
         assert len(recording.radar_scans()) == 20
 
 

@@ -61,7 +61,7 @@ def test_png_is_encoded_and_frames_that_do_not_fit_are_left_out_and_counted(ros1
 def test_another_suffix_and_a_missing_library_are_said_and_leave_no_file(ros1, write, jpeg, tmp_path, monkeypatch):
     path = write(ros1, camera_rows(ros1, [jpeg]))
     with open_recording(path, require=("image",)) as recording:
-        with pytest.raises(InputError, match=r"can be written as \.mp4, \.mov, \.mkv"):
+        with pytest.raises(InputError, match=r"unsupported video format; use \.mp4, \.mov, \.mkv"):
             write_video(recording, tmp_path / "camera.avi")
         with pytest.raises(InputError, match=r"absent/camera\.mp4: cannot be written: no such file or directory"):
             write_video(recording, tmp_path / "absent" / "camera.mp4")

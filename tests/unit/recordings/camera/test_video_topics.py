@@ -107,7 +107,7 @@ def test_frames_before_the_first_key_frame_are_left_out_and_said(coded, ros2, wr
     with open_recording(recorded(write, ros2, foxglove, codec, packets[3:]), require=("image",)) as recording:
         (warning,) = recording.warnings
         assert warning.code == "video-before-key"
-        assert "the first 7 frames of /camera/video come before its first key frame" in warning.message
+        assert "the first 7 frames of /camera/video precede its first key frame" in warning.message
         assert len(recording.image_times) == FRAMES - KEY_EVERY
         assert number_in(recording.image(0)) == KEY_EVERY
 
@@ -126,7 +126,7 @@ def test_a_damaged_frame_does_not_take_the_next_key_frame_down(coded, ros2, writ
 
 def test_video_without_start_codes_is_explained(ros2, write) -> None:
     path = recorded(write, ros2, foxglove, "h264", [bytes([0, 0, 0, 9]) + bytes(9)])
-    with pytest.raises(RecordingError, match=r"say h264 but have no start codes \(Annex B\)"):
+    with pytest.raises(RecordingError, match=r"are declared as h264 but have no start codes \(Annex B\)"):
         open_recording(path, require=("image",))
 
 

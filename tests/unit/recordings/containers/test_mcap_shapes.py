@@ -45,7 +45,7 @@ def test_a_file_that_was_not_closed_is_read_up_to_its_end_and_said(shape, ros2, 
     with open_recording(path) as recording:
         assert len(recording.radar_times) == 40
         assert [warning.code for warning in recording.warnings] == ["not-closed"]
-        assert "120 whole messages" in recording.warnings[0].message
+        assert "120 complete messages" in recording.warnings[0].message
 
 
 def test_an_encoding_that_is_not_of_ros_is_a_problem_of_its_topic(ros2, plain, jpeg, tmp_path):
@@ -53,7 +53,7 @@ def test_an_encoding_that_is_not_of_ros_is_a_problem_of_its_topic(ros2, plain, j
     path.write_bytes(mcap(ros2, plain(ros2, jpeg), encoding="protobuf"))
     with inspect_recording(path) as recording:
         assert {topic.kind for topic in recording.topics} == {"other"}
-        assert "encoded as 'protobuf'; only ros1 and cdr can be read" in str(recording.topics[0].problem)
+        assert "encoded as 'protobuf', but only ros1 and cdr are supported" in str(recording.topics[0].problem)
     with pytest.raises(MessageError, match="protobuf"):
         open_recording(path, RecordingOptions(radar_topic="/radar/points"))
 

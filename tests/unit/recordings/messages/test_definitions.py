@@ -90,11 +90,11 @@ def test_code_in_a_definition_is_never_run(text, ros1, write, tmp_path, monkeypa
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("float32 x y z\nno!", "a line that is no field: 'no!'"),
-        ("Unknown x", "uses test_msgs/Unknown, which the recording does not define"),
+        ("float32 x y z\nno!", "a line that is not a field: 'no!'"),
+        ("Unknown x", "uses test_msgs/Unknown, which is not defined in the recording"),
         ("Thing again", "contains itself"),
-        ("float64[99999999] x", "a fixed array of 99999999 elements; it is refused"),
-        ("float32 x\n=====\nnonsense", "begins with 'nonsense', not MSG:"),
+        ("float64[99999999] x", "a fixed array of 99999999 elements; at most"),
+        ("float32 x\n=====\nnonsense", "begins with 'nonsense' instead of MSG:"),
     ],
 )
 def test_definitions_that_make_no_sense_are_refused_in_words(text, words):

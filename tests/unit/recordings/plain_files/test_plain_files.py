@@ -78,7 +78,7 @@ def test_written_times_are_read_exactly(text, unit, expected) -> None:
     assert read_time(text, unit) == expected
 
 
-@pytest.mark.parametrize(("text", "words"), [("yesterday", "'yesterday' is no time"), ("12345", "has 5 digits")])
+@pytest.mark.parametrize(("text", "words"), [("yesterday", "'yesterday' is not a time"), ("12345", "has 5 digits")])
 def test_what_is_no_time_is_refused(text, words) -> None:
     with pytest.raises(RecordingError, match=words):
         read_time(text)
@@ -137,13 +137,13 @@ def test_pictures_without_a_time_are_left_out_and_said(tmp_path) -> None:
         assert len(recording.image_times) == 1
         (warning,) = recording.warnings
     assert warning.code == "unstamped-files"
-    assert "2 of 3 files have no time and are left out; the first is notes.png" in warning.message
+    assert "2 of 3 files have no time and are skipped; the first is notes.png" in warning.message
 
 
 def test_pictures_without_any_times_are_refused_in_words(tmp_path) -> None:
     text = refusal(pictures(tmp_path / "front", ["a.png", "b.png"]))
-    assert "the names carry no times (a.png)" in text
-    assert "put a CSV with the columns file,time_ns beside them" in text
+    assert "no times in the file names (a.png)" in text
+    assert "add a CSV with the columns file,time_ns to the folder" in text
 
 
 def test_one_damaged_picture_does_not_take_the_others_down(tmp_path) -> None:
@@ -152,7 +152,7 @@ def test_one_damaged_picture_does_not_take_the_others_down(tmp_path) -> None:
     with open_recording(folder, require=("image",)) as recording:
         assert len(recording.image_times) == 3
         np.testing.assert_array_equal(recording.image(2), pixels(2))
-        with pytest.raises(RecordingError, match="is no picture that can be read"):
+        with pytest.raises(RecordingError, match="is not a readable picture"):
             recording.image(1)
 
 
@@ -216,7 +216,7 @@ def test_an_ascii_pcd_is_read_and_a_packed_one_is_explained(tmp_path) -> None:
     np.testing.assert_array_equal(scans.points_radar_m, [[1, 2, 3], [4, 5, 6]])
     assert np.diff(scans.first_return).tolist() == [2, 0, 0, 0]
     assert "3 radar messages could not be read" in warning.message
-    assert "'binary_compressed' data; binary and ascii can be read" in warning.message
+    assert "'binary_compressed' data, but only binary and ascii are supported" in warning.message
 
 
 def delft(folder: Path, count: int = 3) -> np.ndarray:
@@ -246,7 +246,7 @@ def test_a_bin_file_of_another_kind_is_explained(tmp_path) -> None:
     (tmp_path / "radar" / "00000.bin").write_bytes(bytes(30))
     with inspect_recording(tmp_path / "radar") as recording:
         assert recording.radar_topic is None
-        assert "no multiple of 28: not a View-of-Delft radar file" in str(recording.topics[0].problem)
+        assert "not a multiple of 28: not a View-of-Delft radar file" in str(recording.topics[0].problem)
 
 
 # -- radar CSV
@@ -296,15 +296,15 @@ def test_units_in_the_header_are_followed(tmp_path, header, row) -> None:
     ("text", "words"),
     [
         ("time_ns,x_ft,y_m\n1,2,3\n", "column 'x_ft' has the unknown unit 'ft'; known units: m, cm, mm, km"),
-        ("time_ns,x,y_m\n1,2,3\n", "column 'x' names no unit; write x_m"),
+        ("time_ns,x,y_m\n1,2,3\n", "column 'x' has no unit; write x_m"),
         ("time_fortnights,x_m,y_m\n1,2,3\n", "column 'time_fortnights' has the unknown unit 'fortnights'"),
-        ("x_m,y_m\n1,2\n", "no column of time; the first line must name columns and units, such as time_ns,x_m"),
+        ("x_m,y_m\n1,2\n", "no time column; the first line must name columns and units, such as time_ns,x_m"),
         ("time_ns,x_m,snr_db\n1,2,3\n", "no position; x_m and y_m, or range_m and azimuth_deg, are needed"),
-        ("time_ns,range_m,r_m,azimuth_deg\n1,2,3,4\n", "two columns say the same"),
-        ("time_ns,x_m,y_m\n", "the file has a header and no rows"),
+        ("time_ns,range_m,r_m,azimuth_deg\n1,2,3,4\n", "two columns hold the same quantity"),
+        ("time_ns,x_m,y_m\n", "the file has a header but no rows"),
         ("time_ns,x_m,y_m\n1,2,3\n2,two,3\n", "line 3: could not convert string to float: 'two'"),
         ("time_ns,x_m,y_m\n1,2\n", "line 2: too few columns"),
-        ("", "no column of time"),
+        ("", "no time column"),
     ],
 )
 def test_a_csv_that_leaves_something_open_is_refused_in_words(tmp_path, text, words) -> None:
@@ -353,7 +353,7 @@ def test_a_video_without_its_start_or_without_frames_is_refused_in_words(tmp_pat
     assert "give the time of its first frame with --video-start" in refusal(video(tmp_path / "cam.avi"))
     assert "--video-start: 'noon' is no time" in refusal(tmp_path / "cam.avi", video_start="noon")
     (tmp_path / "b.mp4").write_bytes(b"nothing of the kind")
-    assert "no video that can be read" in refusal(tmp_path / "b.mp4", video_start="1700000000")
+    assert "not a readable video" in refusal(tmp_path / "b.mp4", video_start="1700000000")
 
 
 def test_a_start_without_a_video_is_refused_rather_than_ignored(project_root: Path) -> None:

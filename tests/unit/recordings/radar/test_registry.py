@@ -134,7 +134,7 @@ def azimuth(xyz: np.ndarray) -> np.ndarray:
         ({"azimuth": lambda p: -azimuth(p)}, "radar-azimuth-mirrored", "have opposite signs"),
         ({"azimuth": lambda p: -np.degrees(azimuth(p))}, "radar-azimuth-mirrored", "have opposite signs"),
         ({"azimuth": lambda p: 0.4 + 0.3 * length(p)}, "radar-azimuth-contradicts", "disagree in every unit and sign"),
-        ({"elevation": lambda p: 0 * length(p)}, "radar-elevation-zero", "is always 0, yet the positions have heights"),
+        ({"elevation": lambda p: 0 * length(p)}, "radar-elevation-zero", "is always 0, but the heights of the positions are not"),
     ],
 )
 def test_columns_that_contradict_the_positions_are_said(columns, code, words, ros1, write, cloud_points) -> None:
@@ -181,7 +181,7 @@ def test_radians_read_as_degrees_are_said(ros2, write) -> None:
     with opened(write, ros2, [message]) as recording:
         (warning,) = recording.warnings
     assert warning.code == "radar-angle-unit"
-    assert "little for degrees" in warning.message
+    assert "small for degrees" in warning.message
 
 
 # -- axes that a person tells
@@ -206,11 +206,11 @@ def test_the_words_for_axes_become_a_signed_permutation(words, expected) -> None
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        ("forward,north,up", "'north' is no direction; forward, backward"),
-        ("forward,left", "say where the message's x, y and z point"),
+        ("forward,north,up", "'north' is unknown; use forward, backward"),
+        ("forward,left", "give the directions of the message's x, y and z"),
         ("forward,left,up,degrees,radians", "at most one unit"),
-        ("", "say where the message's x, y and z point"),
-        ("forward,backward,up", "two of the directions lie on one line"),
+        ("", "give the directions of the message's x, y and z"),
+        ("forward,backward,up", "two of the directions lie on the same axis"),
     ],
 )
 def test_axes_that_make_no_sense_are_refused_in_words(words, complaint) -> None:
@@ -224,7 +224,7 @@ def test_axes_that_a_person_tells_hold_for_positions_and_noise_and_are_shown(ros
     messages = [ros.cloud(START_NS + i * 10**8, points[: 5 - i]) for i in range(2)]
     with opened(write, ros, messages, radar_axes="right,forward,up") as recording:
         found = recording.radar_scans().points_radar_m[:5]
-        assert "axes as told: x right, y forward, z up" in describe(recording)
+        assert "axes as given: x right, y forward, z up" in describe(recording)
         assert recording.radar_axes == "right,forward,up"
     np.testing.assert_array_equal(found, np.stack([points["y"], -points["x"], points["z"]], axis=1))
 
@@ -250,7 +250,7 @@ def test_the_noise_of_a_track_turns_with_its_axes(ros1, write) -> None:
 
 
 def test_an_option_of_nonsense_is_refused_before_anything_is_read(ros1, write, plain, jpeg) -> None:
-    with pytest.raises(OptionError, match="'sideways' is no direction"):
+    with pytest.raises(OptionError, match="'sideways' is unknown"):
         open_recording(write(ros1, plain(ros1, jpeg)), RecordingOptions(radar_axes="sideways"))
 
 
