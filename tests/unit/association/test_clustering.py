@@ -1,4 +1,4 @@
-"""Clusters of a window, and what makes one of them the reflector."""
+"""Clusters of a window, and the scores that select the reflector."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_two_objects_are_two_clusters_and_never_one_mean() -> None:
     assert ranges == pytest.approx(sorted(np.linalg.norm([POST, REFLECTOR], axis=1)), abs=0.01)
 
 
-def test_a_cluster_knows_in_how_many_scans_it_was_seen() -> None:
+def test_a_cluster_counts_the_scans_it_was_seen_in() -> None:
     (cluster,) = clusters_of(window({REFLECTOR: 30.0}, scans=20), most=6)
     assert (cluster.scans, cluster.returns, cluster.persistence) == (20, 20, 1.0)
     assert cluster.snr_db == pytest.approx(30.0, abs=1.0)
@@ -50,7 +50,7 @@ def test_an_empty_window_has_no_cluster() -> None:
     assert clusters_of(RadarScans(), most=6) == ()
 
 
-def test_what_is_always_there_loses_to_what_is_new_even_when_it_is_stronger() -> None:
+def test_a_new_cluster_scores_above_a_permanent_stronger_one() -> None:
     places = [(8.0, 1.0, -1.0), (6.0, 0.5, -1.0), (10.0, -1.5, -1.0), (4.0, 0.0, -1.0)]
     windows = [window({place: 20.0, POST: 35.0}, start_s=100.0 * i, seed=i) for i, place in enumerate(places)]
     clusters = [clusters_of(one, most=6) for one in windows]
@@ -60,7 +60,7 @@ def test_what_is_always_there_loses_to_what_is_new_even_when_it_is_stronger() ->
         assert scores.sum() == pytest.approx(1.0)
 
 
-def test_windows_of_the_same_placement_are_no_witnesses_against_it() -> None:
+def test_windows_of_the_same_placement_do_not_lower_its_novelty() -> None:
     windows = [window({REFLECTOR: 20.0, POST: 21.0}, start_s=0.5 * i) for i in range(5)]
     clusters = [clusters_of(one, most=6) for one in windows]
     for scores in scores_of(windows, clusters):
