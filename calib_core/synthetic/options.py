@@ -18,26 +18,26 @@ Container = Literal["ros1", "mcap", "db3"]
 
 @dataclass(frozen=True, slots=True)
 class SimulationOptions:
-    """What is simulated; the same options give the same bytes."""
+    """The options of a simulated recording; the same options give the same bytes."""
 
     scene: SceneName = "rooftop"
-    """Where it happens: a rooftop, an open field, a narrow aisle between shelves, a yard with a checkerboard wall."""
+    """The scene: a rooftop, an open field, a narrow aisle between shelves, or a yard with a checkerboard wall."""
     radar: RadarName = "awr1843"
     """A TI AWR1843 with its bins, or a finer imaging radar."""
     placements: int = 20
-    """How often the reflector is put down."""
+    """Number of placements of the reflector."""
     dwell_s: float = 6.0
-    """How long it stays each time, from being released to being picked up again [s]."""
+    """How long the reflector stays at each placement, from release to pick-up [s]."""
     heights: bool = False
-    """Put it on a tripod of varying height instead of on the ground."""
+    """Put the reflector on a tripod of varying height instead of on the ground."""
     clutter: Clutter = "scene"
-    """Static radar returns: none, what the scene shows, or also strong objects nobody sees."""
+    """Static radar returns: none, those of the scene, or also strong objects that the camera does not see."""
     person: bool = True
-    """Whether a person carries the reflector; without, it is simply there."""
+    """Whether a person carries the reflector; otherwise it appears by itself."""
     camera_model: CameraModel = "plumb_bob"
     """Lens model."""
     field_of_view_deg: float | None = None
-    """Horizontal field of view before distortion [deg]; without it 75, for equidistant 110."""
+    """Horizontal field of view before distortion [deg]; 75 by default, 110 for equidistant."""
     width_px: int = 1280
     """Columns of the image."""
     height_px: int = 720
@@ -47,7 +47,7 @@ class SimulationOptions:
     radar_rate_hz: float = 10.0
     """Scans per second."""
     angle_bins: bool = True
-    """Report azimuths on the lattice of the radar's angle bins; otherwise the peak is interpolated."""
+    """Report azimuths on the radar's angle bins; otherwise the peak is interpolated."""
     radar_message: RadarMessage = "filled"
     """In ROS 1 bags: one RadarScan message per return, all fields filled ("filled") or range, bearing, Doppler bin and
     intensity left zero as the stock driver does ("stock"), or one PointCloud2 per scan ("cloud")."""
@@ -60,7 +60,7 @@ class SimulationOptions:
     stamp_jitter_s: float = 0.002
     """Standard deviation of both sensors' timing [s]."""
     dropped_share: float = 0.01
-    """Share of frames and of scans that never arrive."""
+    """Share of frames and of scans that are lost."""
     clock_offset_s: float = 0.0
     """By how much the radar's stamps are ahead of the camera's clock [s]."""
     click_sigma_px: float = 0.7
@@ -68,13 +68,13 @@ class SimulationOptions:
     start_s: int = 1_760_000_000
     """When the recording starts [s since 1970]."""
     seed: int = 1
-    """Of every random draw."""
+    """Seed of every random draw."""
     rig: RigOptions = field(default_factory=RigOptions)
     """How the sensors are mounted."""
 
     def __post_init__(self) -> None:
         _require(self.placements >= 1, "placements", self.placements, "at least 1")
-        _require(self.dwell_s >= 3.5, "dwell_s", self.dwell_s, "at least 3.5 s: the person has to step away and return")
+        _require(self.dwell_s >= 3.5, "dwell_s", self.dwell_s, "at least 3.5 s, for the person to step away and return")
         _require(min(self.camera_rate_hz, self.radar_rate_hz) > 0, "rates", self.camera_rate_hz, "more than 0 Hz")
         _require(1 <= self.jpeg_quality <= 100, "jpeg_quality", self.jpeg_quality, "1 to 100")
         _require(0.0 <= self.dropped_share < 0.9, "dropped_share", self.dropped_share, "0 to 0.9")

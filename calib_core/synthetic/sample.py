@@ -1,4 +1,4 @@
-"""Make the sample recording again, bit for bit: python -m calib_core.synthetic.sample sample_data."""
+"""Regenerate the sample recording, bit for bit: python -m calib_core.synthetic.sample sample_data."""
 
 import argparse
 import shutil
@@ -48,7 +48,7 @@ the pinned packages.
 
 
 def write_sample(folder: Path) -> tuple[Path, ...]:
-    """Write the sample into a folder of its own below another, replacing what is there, and return its files.
+    """Write the sample to its own folder below another, replacing what is there, and return its files.
 
     Args:
         folder: the parent, such as sample_data.
@@ -70,9 +70,9 @@ def write_sample(folder: Path) -> tuple[Path, ...]:
 
 
 def main(arguments: list[str]) -> int:
-    """Write the sample where the command line says."""
-    parser = argparse.ArgumentParser(prog="calib_core.synthetic.sample", description="Make the sample recording again.")
-    parser.add_argument("folder", type=Path, help="the folder to write it below, such as sample_data")
+    """Write the sample to the folder given on the command line."""
+    parser = argparse.ArgumentParser(prog="calib_core.synthetic.sample", description="Regenerate the sample recording.")
+    parser.add_argument("folder", type=Path, help="the parent folder, such as sample_data")
     for path in write_sample(parser.parse_args(arguments).folder):
         print(f"{path}  {path.stat().st_size / 1e6:.2f} MB")
     return 0
