@@ -88,7 +88,7 @@ class RadarScan:
 
     Attributes:
         time: the stamp of the scan.
-        points_radar_m: (n, 3) positions; x forward, y left, z up. May hold NaN where the message does.
+        points_radar_m: (n, 3) positions; x forward, y left, z up. May contain NaN if the message does.
         doppler_mps: (n,) radial velocity, positive moving away; NaN where the message has none.
         snr_db: (n,) signal-to-noise ratio or another amplitude in dB; NaN where the message has none.
         sigma_polar: (n, 3) standard deviations of range [m], azimuth and elevation [rad]; NaN where the message has none.

@@ -94,8 +94,8 @@ def _angle_errors(calibration: Calibration, pairs: list[PairResult]) -> _AngleEr
     pixels = np.array([pair.pixel_px for pair in pairs])
     polar = polar_from_cartesian(np.array([pair.point_radar_m for pair in pairs]))
     by_click, distance_m = _on_the_rays(calibration.camera, calibration.camera_from_radar, pixels, polar[:, 0])
-    aside, _ = _on_the_rays(calibration.camera, calibration.camera_from_radar, pixels + _ONE_PX, polar[:, 0])
-    one_px = np.hypot(*(aside - by_click).T)
+    shifted, _ = _on_the_rays(calibration.camera, calibration.camera_from_radar, pixels + _ONE_PX, polar[:, 0])
+    one_px = np.hypot(*(shifted - by_click).T)
     off = by_click - polar[:, 1:]
     off[:, 0] = (off[:, 0] + np.pi) % (2 * np.pi) - np.pi
     with np.errstate(invalid="ignore"):

@@ -1,7 +1,7 @@
 """Graduated non-convexity (GNC): the pose that most pairs agree on, candidates being associated in each step.
 
 Residuals are whitened by S = C + J V J^T, so one radius in standard deviations suits every radar, range and lens; a
-threshold in pixels cannot. The radius of the Geman-McClure loss shrinks from nearly least squares to nearly a vote.
+threshold in pixels cannot. The radius of the Geman-McClure loss shrinks from nearly least squares to one that ignores outliers.
 All starts are iterated together as one batch of arrays: for a few dozen pairs, call overhead dominates the run time.
 """
 

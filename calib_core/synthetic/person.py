@@ -64,10 +64,10 @@ def _joint(hip: Vector3, target: Vector3, upper_m: float, lower_m: float, toward
     along = reach / max(length, 1e-9)
     length = min(length, full)
     near = (length**2 + upper_m**2 - lower_m**2) / (2.0 * max(length, 1e-9))
-    aside = np.sqrt(max(upper_m**2 - near**2, 0.0))
+    sideways = np.sqrt(max(upper_m**2 - near**2, 0.0))
     pole = towards - along * float(towards @ along)
     pole = pole / max(float(np.linalg.norm(pole)), 1e-9)
-    return hip + near * along + aside * pole, hip + length * along
+    return hip + near * along + sideways * pole, hip + length * along
 
 
 def _axes(state: PersonState) -> tuple[Vector3, Vector3, Vector3]:

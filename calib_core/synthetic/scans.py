@@ -248,5 +248,5 @@ def _behind(person: PersonState, world_m: Points3) -> Flags:
     far = np.linalg.norm(world_m[:, :2], axis=1)
     along = world_m[:, :2] / np.maximum(far, 1e-9)[:, None]
     depth = along @ person.place_m
-    aside = np.abs(along[:, 0] * person.y_m - along[:, 1] * person.x_m)
-    return (aside < _SHOULDER_M) & (depth > 0.0) & (depth < far - 0.45)
+    sideways = np.abs(along[:, 0] * person.y_m - along[:, 1] * person.x_m)
+    return (sideways < _SHOULDER_M) & (depth > 0.0) & (depth < far - 0.45)

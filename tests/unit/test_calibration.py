@@ -76,14 +76,14 @@ def test_fewer_than_four_pairs_are_unsolvable_with_the_count() -> None:
 def test_an_excluded_pair_is_shown_but_changes_nothing() -> None:
     simulated = simulate_pairs(12, rng=np.random.default_rng(4))
     without = calibrate_pairs(simulated.pairs[:-1], simulated.camera, MEASURED)
-    aside = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED, frozenset({"p12"}))
+    shown = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED, frozenset({"p12"}))
     assert isinstance(without, Calibration)
-    assert isinstance(aside, Calibration)
-    assert aside.camera_from_radar.as_matrix().tobytes() == without.camera_from_radar.as_matrix().tobytes()
-    assert aside.pairs[-1].excluded
-    assert not aside.pairs[-1].inlier
-    assert np.isfinite(aside.pairs[-1].distance_px)
-    assert aside.metrics == without.metrics
+    assert isinstance(shown, Calibration)
+    assert shown.camera_from_radar.as_matrix().tobytes() == without.camera_from_radar.as_matrix().tobytes()
+    assert shown.pairs[-1].excluded
+    assert not shown.pairs[-1].inlier
+    assert np.isfinite(shown.pairs[-1].distance_px)
+    assert shown.metrics == without.metrics
 
 
 def test_the_paper_method_is_dispatched() -> None:

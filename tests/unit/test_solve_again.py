@@ -33,9 +33,9 @@ def without_provenance(text: str) -> dict[str, object]:
 def solved(request: pytest.FixtureRequest, project_root: Path) -> Calibration:
     options = OPTIONS[request.param]
     clicks, scans, camera = read_rooftop(project_root, 4.0)
-    aside = [replace(click, excluded=i in (2, 7), sigma_px=1.5 if i == 4 else None) for i, click in enumerate(clicks)]
-    lost = replace(aside[0], id="lost", image_time=aside[0].image_time + 10**12)
-    outcome = calibrate([*aside, lost], scans, camera, options)
+    marked = [replace(click, excluded=i in (2, 7), sigma_px=1.5 if i == 4 else None) for i, click in enumerate(clicks)]
+    lost = replace(marked[0], id="lost", image_time=marked[0].image_time + 10**12)
+    outcome = calibrate([*marked, lost], scans, camera, options)
     assert isinstance(outcome, Calibration)
     assert [one.id for one in outcome.unpaired] == ["lost"]
     return outcome

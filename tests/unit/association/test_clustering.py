@@ -77,7 +77,7 @@ def test_sigma_keeps_its_floor_however_many_returns_are_averaged() -> None:
 
 def test_sigmas_in_the_message_replace_the_assumed_ones() -> None:
     plain = window({REFLECTOR: 30.0})
-    told = RadarScans(
+    with_sigmas = RadarScans(
         plain.times_ns,
         plain.first_return,
         plain.points_radar_m,
@@ -85,15 +85,15 @@ def test_sigmas_in_the_message_replace_the_assumed_ones() -> None:
         plain.snr_db,
         np.tile([0.1, 0.02, 0.04], (len(plain.points_radar_m), 1)),
     )
-    (candidate,) = candidates_of(clusters_of(told, most=6), np.ones(1), LocatingOptions(), NoiseOptions())
+    (candidate,) = candidates_of(clusters_of(with_sigmas, most=6), np.ones(1), LocatingOptions(), NoiseOptions())
     assert candidate.sigma_polar == pytest.approx([0.1, 0.02, 0.04], rel=0.02)
 
 
 def test_the_assumed_angle_noise_grows_to_the_side() -> None:
     ahead = candidate_at(np.array([10.0, 0.0, 0.0]), NoiseOptions())
     assert ahead.sigma_polar == pytest.approx(floor_sigma_polar(np.array([10.0, 0.0, 0.0]), NoiseOptions()))
-    aside = floor_sigma_polar(np.array([5.0, 5.0, 0.0]), NoiseOptions())
-    assert aside[1] == pytest.approx(np.sqrt(2.0) * ahead.sigma_polar[1])
+    sideways = floor_sigma_polar(np.array([5.0, 5.0, 0.0]), NoiseOptions())
+    assert sideways[1] == pytest.approx(np.sqrt(2.0) * ahead.sigma_polar[1])
 
 
 def test_the_window_is_centred_on_the_nearest_scan() -> None:

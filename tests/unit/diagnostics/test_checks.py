@@ -115,8 +115,8 @@ def test_a_wrong_tape_measure_is_contradicted() -> None:
 
 
 def test_a_camera_farther_away_than_expected_is_reported() -> None:
-    aside = RigOptions(camera_offset_m=(0.0, 4.0, 1.0))
-    simulated = simulate_pairs(40, rng=np.random.default_rng(6), noise="imaging", rig_options=aside)
+    far_camera = RigOptions(camera_offset_m=(0.0, 4.0, 1.0))
+    simulated = simulate_pairs(40, rng=np.random.default_rng(6), noise="imaging", rig_options=far_camera)
     assert "camera-far-away" in codes(simulated.pairs, simulated.camera, FREE)
 
 
@@ -154,10 +154,10 @@ def test_two_radar_positions_that_fit_one_click_are_reported() -> None:
     first = simulated.pairs[0]
     chosen = first.candidates[0]
     farther = replace(chosen, position_radar_m=1.1 * chosen.position_radar_m, score=0.5)
-    doubtful = replace(first, candidates=(replace(chosen, score=0.5), farther))
+    ambiguous = replace(first, candidates=(replace(chosen, score=0.5), farther))
     (warning,) = (
         one
-        for one in warnings([doubtful, *simulated.pairs[1:]], simulated.camera, measured())
+        for one in warnings([ambiguous, *simulated.pairs[1:]], simulated.camera, measured())
         if one.code == "uncertain-association"
     )
     assert "p1" in warning.message

@@ -58,8 +58,8 @@ def test_the_camera_is_not_pulled_backwards_by_many_noisy_pairs() -> None:
 def test_the_noise_level_is_found_from_either_side(factor: float) -> None:
     simulated = simulate_pairs(60, rng=np.random.default_rng(2))
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED)
-    told = measurements.scaled([1.0, factor, factor, factor])
-    refined = fit_errors_in_variables(told, GncSolution(simulated.camera_from_radar, 0.0, 1.0), estimate_scale=True)
+    assumed = measurements.scaled([1.0, factor, factor, factor])
+    refined = fit_errors_in_variables(assumed, GncSolution(simulated.camera_from_radar, 0.0, 1.0), estimate_scale=True)
     assert refined.noise_scale[2] == pytest.approx(1.0 / factor, rel=0.3)
     assert refined.noise_scale[3] == pytest.approx(1.0 / factor, rel=0.3)
 
