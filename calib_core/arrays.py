@@ -1,4 +1,4 @@
-"""Array types that name their shape, and the one way an array enters a value."""
+"""Array types named by their shape, and `frozen_array`, through which every array enters a dataclass."""
 
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -37,21 +37,21 @@ TimesNs: TypeAlias = Int64[np.ndarray, "n"]
 """Stamps, nanoseconds since the epoch."""
 
 Indices: TypeAlias = Int64[np.ndarray, "n"]
-"""Places in another array: rows, owners, offsets."""
+"""Indices into another array: rows, owners, offsets."""
 
 
 def frozen_array(values: Any, shape: tuple[int | None, ...], *, dtype: Any = np.float64) -> Any:
     """Make values a read-only, contiguous array and check its shape.
 
-    They are copied, unless they are such an array already, or a part of one: nobody can change it.
+    The values are copied unless they already are a read-only array or a view of one.
 
     Args:
-        values: anything NumPy can make an array of.
-        shape: the length of each axis; None where any length will do.
+        values: anything NumPy can convert to an array.
+        shape: the length of each axis; None for any length.
         dtype: the element type of the copy.
 
     Raises:
-        ValueError: the shape is another one.
+        ValueError: the shape is different.
     """
     array = np.array(values, dtype=dtype, order="C", copy=None if _is_frozen(values) else True)
     if array.size == 0 and len(shape) == 2 and array.ndim == 1:
@@ -65,7 +65,7 @@ def frozen_array(values: Any, shape: tuple[int | None, ...], *, dtype: Any = np.
 
 
 def _is_frozen(values: Any) -> bool:
-    """Tell whether nobody can write to an array: neither through it nor through what it is a part of."""
+    """Return whether an array and every array it is a view of are read-only."""
     array = values
     while isinstance(array, np.ndarray):
         if array.flags.writeable:

@@ -1,4 +1,4 @@
-"""The whole of it: clicks and radar returns go in, camera_from_radar comes out."""
+"""The whole pipeline: clicks and radar returns go in, camera_from_radar comes out."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -32,11 +32,11 @@ __all__ = ["calibrate", "calibrate_pairs", "solve_again"]
 
 _STARTS_MEASURED = 3
 _STARTS_FREE = 6
-_OPEN_ROTATION_RAD = 0.5  # a rotation less certain than that is not known
+_UNDETERMINED_ROTATION_RAD = 0.5  # a larger standard deviation means that the pairs do not determine the rotation
 _AGREEING_SHARE = 0.9
 _PLAUSIBLE_SCALE = 1.8
 _NEAR_PRIOR = 4.0  # standard deviations
-_PAIRS_TO_START = 150  # more do not make a start better
+_PAIRS_TO_START = 150  # more do not improve the initialization
 
 
 def calibrate(
@@ -69,7 +69,7 @@ def calibrate_pairs(
     options: CalibrationOptions | None = None,
     excluded: frozenset[str] = frozenset(),
 ) -> Calibration | Unsolvable:
-    """Calibrate from pairs that exist already, such as those of a pairs file.
+    """Calibrate from existing pairs, such as those of a pairs file.
 
     Args:
         pairs: in any order; results come in order of image time, pairs without a time in the order given.
@@ -87,21 +87,21 @@ def calibrate_pairs(
 
 
 def solve_again(calibration: Calibration, options: CalibrationOptions | None = None) -> Calibration | Unsolvable:
-    """Calibrate from the pairs that a calibration kept: with the same options the answer is the same, to the last bit.
+    """Solve again from the pairs that a calibration kept; with the same options the result is the same, bit for bit.
 
-    What only the recording can tell is taken over: clicks without a radar position, and the warnings about clocks.
+    Whatever depends on the recording is copied: clicks without a radar position, and the warnings about clocks.
 
     Args:
         calibration: solved here, or read from a calibration-1 file.
-        options: what to solve with; None takes the calibration's own.
+        options: None takes the calibration's own.
 
     Raises:
-        InputError: the calibration does not hold the candidates of its pairs.
+        InputError: the calibration does not contain the candidates of its pairs.
     """
     kept = [pair.measured for pair in calibration.pairs if pair.measured is not None]
     if not kept or len(kept) < len(calibration.pairs):
         raise InputError(
-            f"{len(calibration.pairs) - len(kept)} of {len(calibration.pairs)} pairs come without their candidates, as in "
+            f"{len(calibration.pairs) - len(kept)} of {len(calibration.pairs)} pairs have no candidates, as in "
             "files of version 0.1 and of other tools; solve from the recording and the clicks"
         )
     options = options or calibration.options
@@ -116,7 +116,7 @@ def solve_again(calibration: Calibration, options: CalibrationOptions | None = N
 
 
 def _with_noise(pair: Pair, options: CalibrationOptions) -> Pair:
-    """Give candidates of the paper's method, which assumes no noise, the assumed one."""
+    """Add the assumed noise to candidates of the paper's method, which has no noise model."""
     if all(np.isfinite(candidate.sigma_polar).all() for candidate in pair.candidates):
         return pair
     return replace(pair, candidates=tuple(candidate_at(one.position_radar_m, options.noise) for one in pair.candidates))
@@ -138,20 +138,20 @@ def _solved(
         return fit
     refined = fit.refined
     uncertainty = pose_covariance(refined)
-    open_rad = float(np.sqrt(uncertainty.covariance[3:, 3:].diagonal().max()))
-    if not open_rad < _OPEN_ROTATION_RAD:
-        return _no_shape(len(used))
+    rotation_sigma_rad = float(np.sqrt(uncertainty.covariance[3:, 3:].diagonal().max()))
+    if not rotation_sigma_rad < _UNDETERMINED_ROTATION_RAD:
+        return _degenerate(len(used))
     left_out = leave_one_out(refined, uncertainty.information)
-    doubts = find_influential_pairs(measurements, refined, uncertainty.information)
-    refined, uncertainty = average_over_influential_pairs(refined, uncertainty, doubts)
+    influential = find_influential_pairs(measurements, refined, uncertainty.information)
+    refined, uncertainty = average_over_influential_pairs(refined, uncertainty, influential)
     metrics = fit_metrics(measurements, refined, left_out)
-    findings = SolvedFit(
+    solved_fit = SolvedFit(
         ids=tuple(pair.id for pair in used),
         measurements=measurements,
         refined=refined,
         uncertainty=uncertainty,
         left_out=left_out,
-        doubts=doubts,
+        influential_pairs=influential,
         inliers=refined.inliers,
         alternatives=fit.found,
         mirror_gain=fit.mirror_gain,
@@ -167,7 +167,7 @@ def _solved(
         metrics=metrics,
         pairs=tuple(results[pair.id] for pair in shown),
         unpaired=unpaired,
-        warnings=warnings_of(findings),
+        warnings=warnings_of(solved_fit),
         options=options,
         noise_scale=_four(refined.noise_scale),
         covariance_quantile=uncertainty.quantile,
@@ -186,22 +186,22 @@ def _four(values: Values) -> tuple[float, float, float, float]:
 
 
 def _canonical(pair: Pair) -> tuple[int, str, float, float]:
-    """Order pairs so that the order they came in cannot change a bit of the result."""
+    """Return a sort key, so that the input order cannot change a bit of the result."""
     return (pair.image_time or 0, pair.id, float(pair.pixel_px[0]), float(pair.pixel_px[1]))
 
 
 def _too_few(used: int, excluded: int, unpaired: int) -> Unsolvable:
-    aside = "".join(f", {count} {what}" for count, what in ((excluded, "excluded"), (unpaired, "unpaired")) if count)
+    others = "".join(f", {count} {what}" for count, what in ((excluded, "excluded"), (unpaired, "unpaired")) if count)
     return Unsolvable(
         "too-few-pairs",
-        f"{used} of at least {MIN_PAIRS} pairs{aside}",
-        "click the reflector at more placements; ten or more, spread over the picture, near and far, are a good set",
+        f"{used} of at least {MIN_PAIRS} required pairs{others}",
+        "click the reflector at more placements: ten or more, near and far, spread over the picture",
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fit:
-    """The fit, the poses the other starts ended in, and what mirrored axes would gain."""
+    """The fit, the GNC solutions of all starts, and the likelihood gain of mirrored axes."""
 
     refined: ErrorsInVariablesFit
     found: tuple[GncSolution, ...]
@@ -209,17 +209,17 @@ class _Fit:
 
 
 def _best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> _Fit | Unsolvable:
-    """Start from several poses, keep what the pairs agree on most, and fit it."""
+    """Run GNC from several initial poses and refine the most likely solution by errors in variables."""
     estimate_scale, seed = options.noise.estimate_scale, options.solving.seed
     few = _some_pairs(measurements)
     most = _STARTS_MEASURED if measurements.prior.measured else _STARTS_FREE
     starts = initial_poses(few, most=most, rng=np.random.default_rng(seed))
     found = solve_gnc(few, starts, estimate_scale=estimate_scale)
     if not found:
-        return _no_shape(len(measurements))
+        return _degenerate(len(measurements))
     refined = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale)
     gain = -np.inf
-    if not _beyond_doubt(measurements, refined):
+    if not _clearly_not_mirrored(measurements, refined):
         fitted = refined if few is measurements else None
         gain = mirror_gain(few, found[0], plain=fitted, estimate_scale=estimate_scale, seed=seed)
     inliers = int(refined.inliers.sum())
@@ -229,8 +229,8 @@ def _best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> _F
     return _Fit(refined, found, gain)
 
 
-def _beyond_doubt(measurements: PairMeasurements, refined: ErrorsInVariablesFit) -> bool:
-    """Tell whether pairs and a measured camera position agree so well that mirrored axes are out of the question."""
+def _clearly_not_mirrored(measurements: PairMeasurements, refined: ErrorsInVariablesFit) -> bool:
+    """Return whether pairs and a measured camera position agree so well that mirrored axes need no test."""
     agreeing = refined.inliers.mean() >= _AGREEING_SHARE and float(refined.noise_scale.max()) < _PLAUSIBLE_SCALE
     assumed = associate(measurements, refined.camera_from_radar)[1].squared.mean() / 2.0
     agreeing = agreeing and float(assumed) < _PLAUSIBLE_SCALE**2
@@ -242,7 +242,7 @@ def _mirrored(reason: str) -> Unsolvable:
     return Unsolvable(
         "mirrored-axes",
         f"{reason}; with one radar axis mirrored they fit better",
-        "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) where the positions come from",
+        "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) at the source",
     )
 
 
@@ -252,10 +252,10 @@ def _some_pairs(measurements: PairMeasurements) -> PairMeasurements:
     return measurements.some(np.linspace(0, len(measurements) - 1, _PAIRS_TO_START).round().astype(np.int64))
 
 
-def _no_shape(count: int) -> Unsolvable:
+def _degenerate(count: int) -> Unsolvable:
     return Unsolvable(
         "degenerate-placements",
-        f"the {count} placements do not fix the pose: they lie at one place or along one line",
+        f"the {count} placements do not determine the pose: they lie at one place or on one line",
         "spread the placements: near and far, left and right",
     )
 
@@ -264,6 +264,6 @@ def _no_pose(reason: str) -> Unsolvable:
     return Unsolvable(
         "no-pose",
         reason,
-        "check that clicks and radar belong to the same moments, that the intrinsics are of this camera at this image "
-        "size, and that the placements are spread over the picture",
+        "check that clicks and radar data are from the same times, that the intrinsics belong to this camera at this "
+        "image size, and that the placements are spread over the picture",
     )

@@ -1,18 +1,18 @@
-"""The tree of errors. Each says what was found, where, and what to do.
+"""The exception hierarchy. Each message says what was found, where, and what to do.
 
 CalibrationError
  ├── RecordingError       a recording cannot be opened or read
  │    └── MessageError    one message, or one topic, cannot be decoded
- ├── InputError           a file of ours (clicks, pairs, camera, calibration) is malformed
+ ├── InputError           one of our files (clicks, pairs, camera, calibration) is malformed
  ├── OptionError          an option is misspelt or out of range
- └── UnsolvableError      an answer was asked for where the data give none
+ └── UnsolvableError      a calibration was requested that the data cannot give
 """
 
 __all__ = ["CalibrationError", "InputError", "MessageError", "OptionError", "RecordingError", "UnsolvableError"]
 
 
 class CalibrationError(Exception):
-    """Any input this package refuses; the text is made to be shown as it is, in one line."""
+    """Any input this package rejects; the message is one line and can be shown as it is."""
 
 
 class RecordingError(CalibrationError):
@@ -20,7 +20,7 @@ class RecordingError(CalibrationError):
 
 
 class MessageError(RecordingError):
-    """A message, or all of a topic, that cannot be decoded."""
+    """A message, or a whole topic, that cannot be decoded."""
 
 
 class InputError(CalibrationError):
@@ -32,4 +32,4 @@ class OptionError(CalibrationError):
 
 
 class UnsolvableError(CalibrationError):
-    """A calibration was asked for where the data give none; raised by `Unsolvable.unwrap` only."""
+    """A calibration was requested that the data cannot give; raised by `Unsolvable.unwrap` only."""

@@ -1,4 +1,4 @@
-"""Rigid motion: target_from_source, and the algebra of it."""
+"""Rigid transforms, named target_from_source, and their algebra."""
 
 import math
 from dataclasses import dataclass
@@ -32,9 +32,9 @@ def skew(vector: Vector3) -> Matrix33:
 
 
 def rotation_exp(rotation_vector_rad: np.ndarray) -> np.ndarray:
-    """Turn rotation vectors (..., 3) into matrices (..., 3, 3) by Rodrigues' formula, with its series near zero.
+    """Convert rotation vectors (..., 3) to matrices (..., 3, 3) by Rodrigues' formula, with its series near zero.
 
-    A single vector takes scalar arithmetic, which is more than twice as fast.
+    A single vector uses scalar arithmetic, which is more than twice as fast.
     """
     vector = np.asarray(rotation_vector_rad, dtype=np.float64)
     if vector.ndim > 1:
@@ -59,9 +59,9 @@ def _rotations_exp(vectors_rad: np.ndarray) -> np.ndarray:
 
 
 def rotation_log(rotation: Matrix33) -> Vector3:
-    """Turn a rotation matrix into its rotation vector [rad], of length 0 to pi.
+    """Convert a rotation matrix to its rotation vector [rad], of length 0 to pi.
 
-    The quaternion carries it, so that angles next to 0 and next to pi keep their digits.
+    The conversion goes through the quaternion, so that angles near 0 and near pi keep full precision.
     """
     w, *xyz = quaternion_wxyz_from_matrix(rotation)
     vector = np.array(xyz)
@@ -96,7 +96,7 @@ def quaternion_wxyz_from_matrix(rotation: Matrix33) -> np.ndarray:
 
 
 def matrix_from_quaternion_wxyz(quaternion: np.ndarray) -> Matrix33:
-    """Return the rotation matrix of a quaternion (w, x, y, z), normalised first.
+    """Return the rotation matrix of a quaternion (w, x, y, z), which is normalised first.
 
     Raises:
         ValueError: the quaternion is zero or not finite.
@@ -135,7 +135,7 @@ def euler_from_rotation(rotation: Matrix33) -> Vector3:
 
 
 def _determinant(matrix: Matrix33) -> float:
-    """Multiply out the determinant: for a single 3 x 3, much quicker than NumPy's factorisation."""
+    """Expand the determinant: for a single 3 x 3 matrix this is much faster than NumPy's factorisation."""
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
     return float(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
 
@@ -167,12 +167,12 @@ class RigidTransform:
 
     @classmethod
     def identity(cls) -> "RigidTransform":
-        """Return the transform that moves nothing."""
+        """Return the identity transform."""
         return cls(np.eye(3), np.zeros(3))
 
     @classmethod
     def from_matrix(cls, matrix: np.ndarray) -> "RigidTransform":
-        """Take the top rows of a homogeneous (4, 4) or (3, 4) matrix."""
+        """Make a transform from a homogeneous (4, 4) or (3, 4) matrix."""
         matrix = np.asarray(matrix, dtype=np.float64)
         return cls(matrix[:3, :3], matrix[:3, 3])
 
@@ -188,7 +188,7 @@ class RigidTransform:
         return RigidTransform(self.rotation.T, -self.rotation.T @ self.translation_m)
 
     def adjoint(self) -> Matrix66:
-        """Return the matrix that carries an error (dt, dtheta) [m, rad] of source into target axes about target's origin."""
+        """Return the matrix that maps an error (dt, dtheta) [m, rad] from source to target axes, about the target's origin."""
         adjoint = np.zeros((6, 6))
         adjoint[:3, :3] = self.rotation
         adjoint[3:, 3:] = self.rotation
@@ -198,7 +198,7 @@ class RigidTransform:
     def perturbed(self, error: np.ndarray) -> "RigidTransform":
         """Apply an error (dt, dtheta) [m, rad]: t = t_hat + dt, R = Exp(dtheta) R_hat; the result is re-orthonormalised."""
         rotation = rotation_exp(np.asarray(error[3:6])) @ self.rotation
-        # a rotation but for rounding: one Newton step to the nearest one squares what it is off by
+        # a rotation up to rounding: one Newton step towards the nearest rotation squares the error
         rotation = 1.5 * rotation - 0.5 * rotation @ (rotation.T @ rotation)
         return RigidTransform(rotation, self.translation_m + np.asarray(error[:3]))
 
@@ -226,7 +226,7 @@ def rotation_jacobian(turned_m: np.ndarray, d_point: np.ndarray, out: np.ndarray
     Args:
         turned_m: (..., 3, n) R p, the points in camera axes before the translation.
         d_point: (..., 3, 2, n) d pixel / d camera point [px/m].
-        out: where the result goes.
+        out: receives the result.
     """
     x, y, z = (turned_m[..., axis, None, :] for axis in range(3))
     a, b, c = (d_point[..., axis, :, :] for axis in range(3))

@@ -1,4 +1,4 @@
-"""What the sensors and the person measured: radar scans, clicks, and the pairs they make."""
+"""Measurements: radar scans, clicks, and the pairs made from them."""
 
 from dataclasses import dataclass, field
 from typing import NewType, NoReturn
@@ -25,16 +25,16 @@ __all__ = [
 ]
 
 TimeNs = NewType("TimeNs", int)
-"""Nanoseconds since the epoch. Never a float: a float64 of today is off by up to 128 ns."""
+"""Nanoseconds since the epoch. Never a float: a float64 of the present time is off by up to 128 ns."""
 
 NS_PER_S = 1_000_000_000
 
 MIN_PAIRS = 4
-"""The fewest pairs that fix a pose: three leave up to four poses; the fourth decides."""
+"""The fewest pairs that determine a pose: three leave up to four solutions, the fourth selects one."""
 
 
 def time_from_parts(sec: int, nanosec: int) -> TimeNs:
-    """Join the two integers that ROS 2 and our JSON files carry."""
+    """Make a time from the two integers used by ROS 2 and by our JSON files."""
     return TimeNs(sec * NS_PER_S + nanosec)
 
 
@@ -45,7 +45,7 @@ def time_parts(time: TimeNs) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class Stamp:
-    """A time as JSON carries it: two integers, because a JavaScript number cannot hold nanoseconds of today."""
+    """A time as stored in JSON: two integers, because a JavaScript number cannot hold present times in nanoseconds."""
 
     sec: int
     nanosec: int
@@ -88,7 +88,7 @@ class RadarScan:
 
     Attributes:
         time: the stamp of the scan.
-        points_radar_m: (n, 3) positions; x forward, y left, z up. May hold NaN where the message does.
+        points_radar_m: (n, 3) positions; x forward, y left, z up. May contain NaN if the message does.
         doppler_mps: (n,) radial velocity, positive moving away; NaN where the message has none.
         snr_db: (n,) signal-to-noise ratio or another amplitude in dB; NaN where the message has none.
         sigma_polar: (n, 3) standard deviations of range [m], azimuth and elevation [rad]; NaN where the message has none.
@@ -120,12 +120,12 @@ def _no_first_return() -> Indices:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RadarScans:
-    """Many scans of one radar as columns: what pairing and the timeline work on.
+    """Many scans of one radar as columns, as used by pairing and by the timeline.
 
     Attributes:
         times_ns: (m,) one stamp per scan, ascending.
         first_return: (m + 1,) scan i owns the rows first_return[i] to first_return[i + 1].
-        points_radar_m: (n, 3) as in RadarScan, all scans below one another.
+        points_radar_m: (n, 3) as in RadarScan, all scans concatenated.
         doppler_mps: (n,).
         snr_db: (n,).
         sigma_polar: (n, 3).
@@ -173,7 +173,7 @@ class RadarScans:
         )
 
     def scan(self, index: int) -> RadarScan:
-        """Return one scan by its place in time order."""
+        """Return one scan by its index in time order."""
         rows = slice(int(self.first_return[index]), int(self.first_return[index + 1]))
         return RadarScan(
             time=TimeNs(int(self.times_ns[index])),
@@ -184,7 +184,7 @@ class RadarScans:
         )
 
     def nearest(self, time: TimeNs) -> int:
-        """Find the scan whose stamp is nearest; of two equally near, the earlier one.
+        """Find the scan with the nearest stamp; of two equally near, the earlier one.
 
         Raises:
             ValueError: there are no scans.
@@ -221,12 +221,12 @@ class Candidate:
 
     Attributes:
         position_radar_m: (3,) mean of its returns.
-        sigma_polar: (3,) standard deviations of range [m], azimuth [rad], elevation [rad] of that position, floors included.
-        covariance_m2: (3, 3) the same in Cartesian axes of the radar frame.
-        score: plausibility before any pose is known, 0 to 1; the candidates of one pair add up to at most 1.
-        returns: how many returns it averages.
-        scans: in how many scans they lie.
-        snr_db: their mean; NaN when the radar reports none.
+        sigma_polar: (3,) standard deviations of range [m], azimuth [rad], elevation [rad] of that position, noise floor included.
+        covariance_m2: (3, 3) the same in the Cartesian axes of the radar frame.
+        score: plausibility before any pose is known, 0 to 1; the scores of one pair sum to at most 1.
+        returns: number of returns averaged.
+        scans: number of scans they come from.
+        snr_db: their mean SNR; NaN if the radar reports none.
     """
 
     position_radar_m: Vector3
@@ -271,12 +271,12 @@ class Pair:
 
 @dataclass(frozen=True, slots=True)
 class Unpaired:
-    """A click that found no radar position, and why.
+    """A click without a radar position, and why.
 
     Attributes:
         id: the click's id.
-        code: one word for programs, such as "no-scan", "no-static-return".
-        reason: one sentence for people.
+        code: identifier for programs, such as "no-scan", "no-static-return".
+        reason: one sentence for the user.
         hint: what to do about it.
     """
 
@@ -288,13 +288,13 @@ class Unpaired:
 
 @dataclass(frozen=True, slots=True)
 class Unsolvable:
-    """The expected answer when the data cannot give a calibration. It is a value, not an error.
+    """The outcome when the data cannot give a calibration. It is a value, not an error.
 
     Attributes:
-        code: one word for programs, such as "too-few-pairs".
+        code: identifier for programs, such as "too-few-pairs".
         reason: what is missing, with figures.
         hint: what to do about it.
-        unpaired: clicks that found no radar position; often they are why.
+        unpaired: clicks without a radar position; often the cause.
     """
 
     code: str

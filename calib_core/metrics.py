@@ -1,7 +1,7 @@
-"""The paper's figures (AED, CDSD, Acc) and the honest ones beside them.
+"""The paper's metrics (AED, CDSD, Acc), plus RMS and the held-out AED.
 
-All of them are about pixels, and none of them is the accuracy of the pose: a worse pose can have the smaller AED
-(docs/paper.md). The covariance and the held-out AED are what to trust.
+They measure pixels, not the accuracy of the pose: a worse pose can have a smaller AED (docs/paper.md). To judge a pose,
+use its covariance and the held-out AED.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ ZeroFrames = Literal["keep", "drop"]
 
 
 def distances(projected_px: Points2, pixels_px: Points2) -> Values:
-    """Return e_i = |projected_i - clicked_i| for each pair: (n,) [px] (paper, the distance under AED's sum)."""
+    """Return e_i = |projected_i - clicked_i| for each pair: (n,) [px] (paper: the distance that AED averages)."""
     return np.asarray(np.linalg.norm(np.asarray(projected_px) - np.asarray(pixels_px), axis=1), dtype=np.float64)
 
 
@@ -57,7 +57,7 @@ def rms(distances_px: Values) -> float:
 
 
 def inside_boxes(pixels_px: Points2, boxes_px: np.ndarray) -> Flags:
-    """Tell which pixels fall within at least one detection box, edges included: (n,). A NaN pixel falls into none.
+    """Return which pixels (n,) lie within at least one detection box, edges included. A NaN pixel lies in none.
 
     Args:
         pixels_px: (n, 2) reprojected radar returns of one frame.
@@ -74,15 +74,15 @@ def acc(inside: Sequence[Flags], *, zero_frames: ZeroFrames = "keep") -> float |
     """Return the share of reprojected radar returns that fall within detection boxes, averaged over frames (paper, Acc).
 
     Acc = (1 / F) sum over frames of (returns inside a box) / (returns). A frame without returns has no share and does not
-    count in F. The authors also delete the frames whose share is 0 before they average, which can only raise the figure:
-    a calibration that misses half of the frames entirely would still score 100 %. So zero frames are kept unless asked.
+    count in F. The authors also drop the frames whose share is 0 before averaging, which can only raise the figure: a
+    calibration that misses half of the frames entirely would still score 100 %. Zero frames are kept by default.
 
     Args:
         inside: per frame, the (n,) flags of inside_boxes.
-        zero_frames: "keep" them (honest), or "drop" them to compare with the published figures.
+        zero_frames: "keep" them, or "drop" them to compare with the published figures.
 
     Returns:
-        0 to 1, or None where no frame counts.
+        0 to 1, or None if no frame counts.
     """
     shares = [float(np.mean(flags)) for flags in inside if len(flags)]
     if zero_frames == "drop":
@@ -98,13 +98,13 @@ def metrics_of(
     chi2: float = float("nan"),
     degrees_of_freedom: int = 0,
 ) -> Metrics:
-    """Gather the figures over one set of pairs.
+    """Compute the metrics of one set of pairs.
 
     Args:
-        distances_px: (n,) lengths of the reprojection errors of the pairs that count.
-        held_out_distances_px: (m,) the same with each pair predicted from the others; None where it was not computed.
+        distances_px: (n,) lengths of the reprojection errors of the pairs included.
+        held_out_distances_px: (m,) the same with each pair predicted from the others; None if not computed.
         acc: the paper's Acc, 0 to 1; None without boxes.
-        chi2: sum of squared whitened residuals; NaN where the method has no noise model.
+        chi2: sum of squared whitened residuals; NaN if the method has no noise model.
         degrees_of_freedom: of chi2.
     """
     return Metrics(

@@ -1,4 +1,4 @@
-"""Radar polar coordinates, the noise of a return, and the map of a radar's own angle errors.
+"""Radar polar coordinates, the covariance of a radar position, and the map of a radar's angle errors.
 
 Radar frame: x forward, y left, z up (docs/conventions.md). Azimuth is positive to the left, elevation upwards.
 """
@@ -19,12 +19,12 @@ __all__ = [
     "position_planes",
 ]
 
-_WORTH_SAYING = 0.97
-"""AED with the map over AED without it, above which the gain may be chance."""
+_LARGEST_AED_RATIO = 0.97
+"""Ratio of the AED with the map to the AED without it; above this the gain may be due to chance."""
 
 
 def cartesian_from_polar(polar: Points3) -> Points3:
-    """Turn (range [m], azimuth [rad], elevation [rad]) rows into x, y, z [m] (paper section III: polar to Cartesian)."""
+    """Convert (range [m], azimuth [rad], elevation [rad]) rows to x, y, z [m] (paper section III: polar to Cartesian)."""
     polar = np.asarray(polar, dtype=np.float64)
     range_m, azimuth_rad, elevation_rad = polar[..., 0], polar[..., 1], polar[..., 2]
     across = range_m * np.cos(elevation_rad)
@@ -34,9 +34,9 @@ def cartesian_from_polar(polar: Points3) -> Points3:
 
 
 def position_planes(polar: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Turn polar planes (3, n) into positions (3, n) [m] and d position / d polar (3, 3, n), position first.
+    """Convert polar planes (3, n) to positions (3, n) [m] and d position / d polar (3, 3, n), position axis first.
 
-    The same as `cartesian_from_polar` and `cartesian_jacobian`, laid out for speed: one row per coordinate.
+    The same as `cartesian_from_polar` and `cartesian_jacobian`, with one row per coordinate for speed.
     """
     range_m = polar[0]
     (cos_azimuth, cos_elevation), (sin_azimuth, sin_elevation) = np.cos(polar[1:]), np.sin(polar[1:])
@@ -51,7 +51,7 @@ def position_planes(polar: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def polar_from_cartesian(points_radar_m: Points3) -> Points3:
-    """Turn x, y, z [m] rows into (range [m], azimuth [rad], elevation [rad]); the origin becomes zeros."""
+    """Convert x, y, z [m] rows to (range [m], azimuth [rad], elevation [rad]); the origin maps to zeros."""
     points = np.asarray(points_radar_m, dtype=np.float64)
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     across = np.hypot(x, y)
@@ -59,7 +59,7 @@ def polar_from_cartesian(points_radar_m: Points3) -> Points3:
 
 
 def direction_cosines(points_radar_m: Points3) -> Points3:
-    """Turn x, y, z [m] rows into (r [m], u, w): u = y / r, w = z / r, in which a radar's errors are about constant."""
+    """Convert x, y, z [m] rows to (r [m], u, w): u = y / r, w = z / r, in which a radar's errors are about constant."""
     points = np.asarray(points_radar_m, dtype=np.float64)
     range_m = np.linalg.norm(points, axis=-1)
     safe_m = np.where(range_m > 0, range_m, 1.0)
@@ -81,7 +81,7 @@ def cartesian_jacobian(polar: Points3) -> np.ndarray:
 
 
 def covariance_from_sigma_polar(points_radar_m: Points3, sigma_polar: Points3) -> np.ndarray:
-    """Carry standard deviations of range [m], azimuth and elevation [rad] into (n, 3, 3) Cartesian covariances [m^2]."""
+    """Convert standard deviations of range [m], azimuth and elevation [rad] to Cartesian covariances (n, 3, 3) [m^2]."""
     jacobian = cartesian_jacobian(polar_from_cartesian(points_radar_m))
     scaled = jacobian * np.asarray(sigma_polar, dtype=np.float64)[..., None, :]
     return scaled @ np.swapaxes(scaled, -1, -2)
@@ -89,15 +89,15 @@ def covariance_from_sigma_polar(points_radar_m: Points3, sigma_polar: Points3) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AngleMap:
-    """What to add to the radar's angles, on a grid of directions; in between linear, beyond the edge as at the edge.
+    """Corrections to the radar's angles on a grid of directions: linear in between, constant beyond the edge.
 
     Attributes:
         azimuth_rad: (a,) of the columns, ascending.
         elevation_rad: (e,) of the rows, ascending.
         correction_rad: (e, a, 2) to add to a measured (azimuth, elevation).
-        sigma_rad: (e, a, 2) standard deviation of the smooth error that is left.
-        raw_aed_px: AED of the pairs it was learnt from, under the pose as it is.
-        corrected_aed_px: the same with each pair corrected by what the others say of its direction.
+        sigma_rad: (e, a, 2) standard deviation of the remaining smooth error.
+        raw_aed_px: AED of the pairs it was learnt from, without the map.
+        corrected_aed_px: the same with each pair corrected as the others predict.
     """
 
     azimuth_rad: Values
@@ -115,7 +115,7 @@ class AngleMap:
             object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
         for lines in (self.azimuth_rad, self.elevation_rad):
             if len(lines) < 2 or not (np.diff(lines) > 0).all():
-                raise ValueError("the lines of an angle map must ascend, two or more of them")
+                raise ValueError("an angle map needs two or more grid lines per axis, in ascending order")
 
     @property
     def largest_rad(self) -> float:
@@ -124,8 +124,8 @@ class AngleMap:
 
     @property
     def pays(self) -> bool:
-        """Whether pairs that the map has not seen come out clearly closer to their clicks with it."""
-        return self.corrected_aed_px < _WORTH_SAYING * self.raw_aed_px
+        """Whether clamped-out pairs reproject clearly closer to their clicks with the map."""
+        return self.corrected_aed_px < _LARGEST_AED_RATIO * self.raw_aed_px
 
     def corrected(self, points_radar_m: Points3) -> Points3:
         """Return the positions (n, 3) with their angles corrected and their ranges kept."""
@@ -140,7 +140,7 @@ class AngleMap:
 
 
 def _cell(lines: Values, values: Values) -> tuple[np.ndarray, np.ndarray]:
-    """Return the index (n,) of the line below each value, and how far (n, 1) it is to the next; NaN stays NaN."""
-    held = np.clip(values, lines[0], lines[-1])
-    below = np.clip(np.searchsorted(lines, held, side="right") - 1, 0, len(lines) - 2)
-    return below, ((held - lines[below]) / (lines[below + 1] - lines[below]))[:, None]
+    """Return the index (n,) of the line below each value, and its share (n, 1) of the way to the next; NaN stays NaN."""
+    clamped = np.clip(values, lines[0], lines[-1])
+    below = np.clip(np.searchsorted(lines, clamped, side="right") - 1, 0, len(lines) - 2)
+    return below, ((clamped - lines[below]) / (lines[below + 1] - lines[below]))[:, None]

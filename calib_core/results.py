@@ -1,4 +1,4 @@
-"""What a calibration is: the pose, how sure it is, and what each pair says about it."""
+"""The result of a calibration: the pose, its uncertainty, metrics, warnings, and each pair's residual."""
 
 from dataclasses import dataclass, field
 from typing import Self
@@ -17,11 +17,11 @@ __all__ = ["Calibration", "CheckPoint", "DataWarning", "InputFile", "Metrics", "
 
 @dataclass(frozen=True, slots=True)
 class DataWarning:
-    """Something about the data that a person must decide on.
+    """A problem in the data or the result that the user must decide on.
 
     Attributes:
-        code: one word for programs, such as "mirrored-axes"; stable.
-        message: what is the matter, with figures.
+        code: identifier for programs, such as "mirrored-axes"; stable.
+        message: what is wrong, with figures.
         hint: what to do about it.
     """
 
@@ -32,7 +32,7 @@ class DataWarning:
 
 @dataclass(frozen=True, slots=True)
 class InputFile:
-    """A file, or the files of a folder in order of their names, by its content: what a calibration was made from.
+    """An input of a calibration, identified by its content: a file, or the files of a folder in order of their names.
 
     Attributes:
         name: without its folder.
@@ -47,16 +47,16 @@ class InputFile:
 
 @dataclass(frozen=True, slots=True)
 class Metrics:
-    """The paper's figures over the inlier pairs, and the honest ones beside them.
+    """The paper's metrics over the inlier pairs, plus RMS, held-out AED and chi2.
 
     Attributes:
         aed_px: average Euclidean distance, divided by N (paper, AED).
         cdsd_px: corrected standard deviation of the distances, divided by N - 1 (paper, CDSD); NaN below 2 pairs.
         rms_px: root mean square distance.
-        held_out_aed_px: AED with each pair predicted from the others (leave one out); NaN where it was not computed.
+        held_out_aed_px: AED with each pair predicted from the others (leave-one-out); NaN if not computed.
         acc: share of reprojected points inside detection boxes (paper, Acc), 0 to 1; None without boxes.
-        n: pairs the figures are over.
-        chi2: sum of squared whitened residuals; NaN where the method has no noise model.
+        n: number of pairs.
+        chi2: sum of squared whitened residuals; NaN if the method has no noise model.
         degrees_of_freedom: of chi2.
     """
 
@@ -77,16 +77,16 @@ class PairResult:
     Attributes:
         id: the click's id.
         pixel_px: (2,) the click.
-        projected_px: (2,) the chosen radar position seen through camera_from_radar; NaN when it lies behind the camera.
+        projected_px: (2,) the chosen radar position projected through camera_from_radar; NaN if it lies behind the camera.
         point_radar_m: (3,) the chosen radar position as measured.
         inlier: it took part in the final pose.
-        excluded: a person left it out.
-        outlier_probability: 0 to 1; NaN where the method has none.
-        influence: how far leaving it out moves the pose, in standard deviations; NaN where it was not computed.
+        excluded: the user left it out.
+        outlier_probability: 0 to 1; NaN if the method has none.
+        influence: how far leaving it out moves the pose, in standard deviations; NaN if not computed.
         candidate: which of the pair's candidates was chosen.
-        expected_covariance_px2: (2, 2) covariance of the residual by the noise model; NaN where there is none.
+        expected_covariance_px2: (2, 2) covariance of the residual under the noise model; NaN if there is none.
         image_time: stamp of the clicked frame; None for pairs from a pairs file.
-        measured: the pair it came from, with all its candidates: what is needed to solve again; None where it was not kept.
+        measured: the pair it came from, with all its candidates, as needed to solve again; None if it was not kept.
     """
 
     id: str
@@ -121,7 +121,7 @@ class PairResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CheckPoint:
-    """A radar point and the pixel it must come out at: whoever reads the file can prove the direction with it."""
+    """A radar point and the pixel it must project to, so that a reader of the file can verify the transform's direction."""
 
     radar_m: Vector3
     pixel_px: Vector2
@@ -133,13 +133,13 @@ class CheckPoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NextPlacement:
-    """A place to go to, and what it promises.
+    """The advised next placement and its expected gain.
 
     Attributes:
         position_radar_m: (3,) in the radar frame.
         pixel_px: (2,) where it appears in the picture.
-        gain: present uncertainty over the one expected afterwards (standard deviations), at least 1.
-        may_stop: no place promises a gain worth the walk.
+        gain: present over expected uncertainty (standard deviations), at least 1.
+        may_stop: no further placement would reduce the uncertainty noticeably.
     """
 
     position_radar_m: Vector3
@@ -162,15 +162,15 @@ class Calibration:
         camera: the intrinsics it was solved with.
         metrics: the figures.
         pairs: in order of image time, excluded ones included.
-        unpaired: clicks that found no radar position.
-        warnings: what a person must know before using it.
-        options: what it was solved with.
-        noise_scale: estimated over assumed standard deviation of (click, range, azimuth, elevation); ones where not estimated.
-        covariance_quantile: the factor on covariance whose ellipsoid holds 95 % for 6 degrees of freedom.
-        iterative_px: the paper's Algorithm 1 only: mean reprojection error of RANSAC with the iterative solver.
+        unpaired: clicks without a radar position.
+        warnings: what to know before using it.
+        options: the options it was solved with.
+        noise_scale: estimated over assumed standard deviation of (click, range, azimuth, elevation); ones if not estimated.
+        covariance_quantile: the factor on covariance that gives the 95 % ellipsoid of the 6 parameters.
+        iterative_px: Algorithm 1 of the paper only: mean reprojection error of RANSAC with the iterative solver.
         sqpnp_px: the same with SQPnP.
-        angle_map: the radar's own smooth angle errors; None where there is nothing to gain by correcting them.
-        next_placement: where the next placement would help most; None where no place is known.
+        angle_map: the radar's smooth angle errors; None if correcting them gains nothing.
+        next_placement: where the next placement would help most; None if no place is known.
     """
 
     camera_from_radar: RigidTransform
@@ -192,13 +192,13 @@ class Calibration:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
 
     def reproject(self, points_radar_m: Points3) -> Points2:
-        """Carry radar points (n, 3) [m] to pixels (n, 2); NaN where the lens does not see them."""
+        """Project radar points (n, 3) [m] to pixels (n, 2); NaN where the lens does not see them."""
         return self.camera.project(self.camera_from_radar @ points_radar_m)
 
     def pixel_covariance(self, points_radar_m: Points3) -> np.ndarray:
         """Return the covariance (n, 2, 2) [px^2] of where true radar points project; NaN where the lens does not see them.
 
-        It holds the uncertainty of the pose alone: the noise of a measured radar position comes on top.
+        It covers the uncertainty of the pose only; the noise of a measured radar position is not included.
 
         Args:
             points_radar_m: (n, 3).
@@ -215,7 +215,7 @@ class Calibration:
         return self
 
     def __str__(self) -> str:
-        """Sum up the calibration in eight lines."""
+        """Summarize the calibration in eight lines."""
         used = [pair for pair in self.pairs if not pair.excluded]
         agreeing = sum(pair.inlier for pair in used)
         sigma = np.sqrt(np.diag(self.covariance))

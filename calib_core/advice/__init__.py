@@ -1,1 +1,1 @@
-"""What to do with a calibration: where the next placement pays, and the radar's own angle errors as a map."""
+"""Advice from a calibration: where the next placement helps most, and a map of the radar's angle errors."""

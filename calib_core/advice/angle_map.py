@@ -1,13 +1,13 @@
-"""The radar's own angle errors as a map over direction: what to add to a measured azimuth and elevation.
+"""Angle map: the radar's smooth angle errors by direction, as corrections to add to a measured azimuth and elevation.
 
-An array's calibration error changes slowly with direction, stays the same for years, and no rigid transform can take it
-out. The residuals of a calibration show it: where the click says the reflector is, less where the radar says it is, at
-the radar's range. Each of the two angles gets a Gaussian process over direction,
+An array's calibration error changes slowly with direction, is stable for years, and cannot be removed by a rigid
+transform. The residuals of a calibration show it: the direction of the click minus the direction measured by the radar, at
+the radar's range. Each of the two angles is modelled as a Gaussian process over direction,
 
     y_i = f(x_i) + e_i,   f ~ GP(0, a^2 exp(-|x - x'|^2 / 2 l^2)),   e_i ~ N(0, s^2 + click_i^2),              (7)
 
-and every (a, l, s) of a grid counts by its probability (marginal likelihood), a = 0 among them, so that the map comes out
-flat where the pairs show nothing but independent noise. The pose is held: the map goes with it and with no other.
+and every (a, l, s) of a grid is weighted by its marginal likelihood; the grid includes a = 0, so that the map is flat where
+the pairs show nothing but independent noise. The pose is fixed: the map is valid for this pose only.
 """
 
 from dataclasses import dataclass
@@ -24,26 +24,26 @@ __all__ = ["learn_angle_map"]
 
 _LEAST_PAIRS = 8
 _MOST_PAIRS = 120
-"""Neighbours say the same: beyond this many the pairs are thinned out."""
+"""Beyond this many the pairs are thinned out, because neighbours are redundant."""
 
 _LENGTHS_RAD = np.deg2rad([10.0, 14.0, 20.0, 28.0])
 _SMOOTH_RAD = np.deg2rad([0.0, 0.2, 0.4, 0.8, 1.6, 3.2])
 _INDEPENDENT_RAD = np.deg2rad([0.05, 0.1, 0.2, 0.4, 0.8, 1.6])
-_IMPROBABLE = 1e-3  # against the likeliest
+_IMPROBABLE = 1e-3  # relative to the most likely
 _STEP_RAD = np.deg2rad(5.0)
 _BEYOND_RAD = np.deg2rad(10.0)
 _ONE_PX = np.array([1.0, 0.0])
 _DECIMALS = 6
-"""Of the map [rad]: far finer than any radar, and short in a file."""
+"""Decimals of the map [rad]: far finer than any radar, and compact in a file."""
 
 _MOST_OFF_RAD = np.deg2rad(15.0)
-"""A pair farther off is no smooth error of the radar."""
+"""A larger difference is not a smooth error of the radar."""
 
 
 def learn_angle_map(calibration: Calibration) -> AngleMap | None:
     """Learn the radar's smooth angle errors from the inlier pairs of a calibration.
 
-    None where they cannot be learnt: fewer than eight pairs, or a pose without a noise model (the paper's method).
+    None if they cannot be learnt: fewer than eight pairs, or a pose without a noise model (the paper's method).
 
     Args:
         calibration: of the default method.
@@ -51,16 +51,16 @@ def learn_angle_map(calibration: Calibration) -> AngleMap | None:
     pairs = _thinned([pair for pair in calibration.pairs if pair.inlier and not pair.excluded])
     if calibration.options.method == "paper" or len(pairs) < _LEAST_PAIRS:
         return None
-    seen = _observe(calibration, pairs)
-    if len(seen.polar) < _LEAST_PAIRS:
+    observed = _angle_errors(calibration, pairs)
+    if len(observed.polar) < _LEAST_PAIRS:
         return None
-    directions = seen.polar[:, 1:]
+    directions = observed.polar[:, 1:]
     elevation, azimuth = (_axis(directions[:, angle]) for angle in (1, 0))
     grid = np.stack([*np.meshgrid(azimuth, elevation)], axis=-1).reshape(-1, 2)
-    fields = [_learn(directions, seen.off_rad[:, angle], seen.click_rad, grid) for angle in (0, 1)]
-    if np.ptp(directions[:, 1]) == 0.0:  # a radar without elevation says nothing about its error
+    fields = [_learn(directions, observed.off_rad[:, angle], observed.click_rad, grid) for angle in (0, 1)]
+    if np.ptp(directions[:, 1]) == 0.0:  # a radar without elevation does not show its elevation error
         fields[1] = _Field(*(np.zeros_like(part) for part in (fields[1].mean, fields[1].sigma, fields[1].held_out)))
-    polar = seen.polar.copy()
+    polar = observed.polar.copy()
     polar[:, 1:] += np.stack([field.held_out for field in fields], axis=1)
     shape = (len(elevation), len(azimuth), 2)
     return AngleMap(
@@ -68,8 +68,8 @@ def learn_angle_map(calibration: Calibration) -> AngleMap | None:
         elevation_rad=elevation.round(_DECIMALS),
         correction_rad=np.stack([field.mean for field in fields], axis=1).reshape(shape).round(_DECIMALS),
         sigma_rad=np.stack([field.sigma for field in fields], axis=1).reshape(shape).round(_DECIMALS),
-        raw_aed_px=_aed_px(calibration, seen, seen.polar),
-        corrected_aed_px=_aed_px(calibration, seen, polar),
+        raw_aed_px=_aed_px(calibration, observed, observed.polar),
+        corrected_aed_px=_aed_px(calibration, observed, polar),
     )
 
 
@@ -80,8 +80,8 @@ def _thinned(pairs: list[PairResult]) -> list[PairResult]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Seen:
-    """Pixels (n, 2), measured polar positions (n, 3), angles by the click less measured (n, 2), a click's part in them (n,)."""
+class _AngleErrors:
+    """Pixels (n, 2), measured polar positions (n, 3), clicked minus measured angles (n, 2), their sigma from the click (n,)."""
 
     pixels_px: Points2
     polar: Points3
@@ -89,25 +89,25 @@ class _Seen:
     click_rad: Values
 
 
-def _observe(calibration: Calibration, pairs: list[PairResult]) -> _Seen:
+def _angle_errors(calibration: Calibration, pairs: list[PairResult]) -> _AngleErrors:
     """Measure the angle errors: the reflector lies on the click's ray at the radar's range."""
     pixels = np.array([pair.pixel_px for pair in pairs])
     polar = polar_from_cartesian(np.array([pair.point_radar_m for pair in pairs]))
     by_click, distance_m = _on_the_rays(calibration.camera, calibration.camera_from_radar, pixels, polar[:, 0])
-    aside, _ = _on_the_rays(calibration.camera, calibration.camera_from_radar, pixels + _ONE_PX, polar[:, 0])
-    one_px = np.hypot(*(aside - by_click).T)
+    shifted, _ = _on_the_rays(calibration.camera, calibration.camera_from_radar, pixels + _ONE_PX, polar[:, 0])
+    one_px = np.hypot(*(shifted - by_click).T)
     off = by_click - polar[:, 1:]
     off[:, 0] = (off[:, 0] + np.pi) % (2 * np.pi) - np.pi
     with np.errstate(invalid="ignore"):
         kept = (distance_m > 0) & (np.abs(off) < _MOST_OFF_RAD).all(axis=1) & np.isfinite(one_px)
     click = calibration.options.noise.sigma_px * one_px
-    return _Seen(pixels[kept], polar[kept], off[kept], click[kept])
+    return _AngleErrors(pixels[kept], polar[kept], off[kept], click[kept])
 
 
 def _on_the_rays(
     camera: Camera, camera_from_radar: RigidTransform, pixels_px: Points2, range_m: Values
 ) -> tuple[Points2, Values]:
-    """Return azimuth and elevation (n, 2) of the point on each pixel's ray at this range from the radar, and its distance."""
+    """Return azimuth and elevation (n, 2) of the point on each pixel's ray at this radar range, and its distance (n,)."""
     direction = camera.rays(pixels_px) @ camera_from_radar.rotation
     centre = camera_from_radar.inverse().translation_m
     along = direction @ centre
@@ -116,13 +116,13 @@ def _on_the_rays(
     return polar_from_cartesian(centre + distance_m[:, None] * direction)[:, 1:], distance_m
 
 
-def _aed_px(calibration: Calibration, seen: _Seen, polar: Points3) -> float:
+def _aed_px(calibration: Calibration, observed: _AngleErrors, polar: Points3) -> float:
     projected = calibration.camera.project(calibration.camera_from_radar @ cartesian_from_polar(polar))
-    return float(np.nanmean(np.linalg.norm(projected - seen.pixels_px, axis=1)))
+    return float(np.nanmean(np.linalg.norm(projected - observed.pixels_px, axis=1)))
 
 
 def _axis(angles_rad: Values) -> Values:
-    """Return the grid's lines over these angles and a little beyond, at multiples of the step."""
+    """Return grid lines that cover these angles with a margin, at multiples of the step."""
     first = np.floor((angles_rad.min() - _BEYOND_RAD) / _STEP_RAD)
     last = np.ceil((angles_rad.max() + _BEYOND_RAD) / _STEP_RAD)
     return np.asarray(np.arange(first, last + 1) * _STEP_RAD)
@@ -130,7 +130,7 @@ def _axis(angles_rad: Values) -> Values:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Field:
-    """One angle's smooth error: mean and sigma (g,) on the grid, and at each pair (n,) as the others predict it."""
+    """One angle's smooth error: mean and sigma (g,) on the grid, and its leave-one-out prediction at each pair (n,)."""
 
     mean: Values
     sigma: Values
@@ -138,13 +138,15 @@ class _Field:
 
 
 def _learn(directions: Points2, off_rad: Values, click_rad: Values, grid: Points2) -> _Field:
-    """Regress one angle's error on direction by equation (7), a click's part taken as the same for all pairs.
+    """Regress one angle's error on direction by equation (7), with the same click noise for all pairs.
 
-    Then every covariance of one length has the kernel's own axes U, K = U diag(k) U^T: V = U diag(a^2 k + s^2) U^T.
+    All covariances of one length then share the kernel's eigenvectors U: K = U diag(k) U^T, V = U diag(a^2 k + s^2) U^T.
     """
     noise = np.repeat(_INDEPENDENT_RAD**2, len(_SMOOTH_RAD)) + float(np.median(click_rad)) ** 2
     smooth = np.tile(_SMOOTH_RAD**2, len(_INDEPENDENT_RAD))
-    flat = np.where(smooth == 0.0, np.log(len(_LENGTHS_RAD)), 0.0)  # without a smooth part all lengths are one
+    flat = np.where(
+        smooth == 0.0, np.log(len(_LENGTHS_RAD)), 0.0
+    )  # without a smooth part all lengths are the same model
     between, to_grid = _squared(directions, directions), _squared(grid, directions)
     bases = [np.linalg.eigh(np.exp(-0.5 * between / length_rad**2)) for length_rad in _LENGTHS_RAD]
     precisions = [1.0 / (np.outer(smooth, np.maximum(strength, 0.0)) + noise[:, None]) for strength, _ in bases]

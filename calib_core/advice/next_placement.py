@@ -1,4 +1,4 @@
-"""Where to put the reflector next: the place that shrinks the pose's uncertainty most, and when to stop."""
+"""Next placement: where a further pair would reduce the pose's uncertainty most, and when to stop."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ from calib_core.results import Calibration, NextPlacement
 
 __all__ = ["PlacementLimits", "next_placement"]
 
-_ENOUGH_GAIN = 1.04  # a placement that shrinks the uncertainty by less is hardly worth the walk
+_ENOUGH_GAIN = 1.04  # a placement that gains less is not worth the effort
 _MARGIN_SHARE = 0.04  # of the image, kept free at its edges
 
 
 @dataclass(frozen=True, slots=True)
 class PlacementLimits:
-    """Where a person can put the reflector, on the plane that the present placements lie on."""
+    """Where the reflector can be put, on the plane of the existing placements."""
 
     min_range_m: float = 2.0
     """Nearest place [m]."""
@@ -30,7 +30,7 @@ class PlacementLimits:
 
 
 def next_placement(calibration: Calibration, *, limits: PlacementLimits | None = None) -> NextPlacement | None:
-    """Find the place whose pair would shrink the uncertainty most (A-optimal design); None where no place is free.
+    """Find the place whose pair would reduce the uncertainty most (A-optimal design); None if no place is free.
 
     Args:
         calibration: of the default method, with its covariance.
@@ -53,7 +53,7 @@ def next_placement(calibration: Calibration, *, limits: PlacementLimits | None =
 
 
 def _free_places(calibration: Calibration, used: Points3, limits: PlacementLimits) -> Points3:
-    """Lay a polar grid on the plane of the used places and keep what both sensors see and nobody has used."""
+    """Return the points of a polar grid on the plane of the used places that both sensors see and that are not used yet."""
     range_m = np.geomspace(limits.min_range_m, limits.max_range_m, 10)
     azimuth_rad = np.deg2rad(np.linspace(-limits.max_azimuth_deg, limits.max_azimuth_deg, 21))
     grid = np.stack(np.meshgrid(range_m, azimuth_rad, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -68,10 +68,10 @@ def _free_places(calibration: Calibration, used: Points3, limits: PlacementLimit
 
 
 def _heights(places: np.ndarray, used: Points3) -> Values:
-    """Return z on the plane z = a x + b y + c through the used places, its slopes held down where they leave it open."""
+    """Return z on the plane z = a x + b y + c through the used places, with regularized slopes."""
     design = np.column_stack([used[:, :2], np.ones(len(used))])
-    held = np.vstack([design, np.diag([1.0, 1.0, 0.0])])
-    plane = np.linalg.lstsq(held, np.concatenate([used[:, 2], np.zeros(3)]), rcond=None)[0]
+    regularized = np.vstack([design, np.diag([1.0, 1.0, 0.0])])
+    plane = np.linalg.lstsq(regularized, np.concatenate([used[:, 2], np.zeros(3)]), rcond=None)[0]
     return np.asarray(np.column_stack([places, np.ones(len(places))]) @ plane)
 
 
@@ -84,7 +84,7 @@ def _covariances_after(calibration: Calibration, places: Points3) -> np.ndarray:
 
 
 def _pixel_noise(calibration: Calibration, places: Points3) -> np.ndarray:
-    """Return S = C + J V J^T (n, 2, 2) of a pair at each place, by the estimated noise."""
+    """Return S = C + J V J^T (n, 2, 2) of a pair at each place, with the estimated noise."""
     noise, scale = calibration.options.noise, np.array(calibration.noise_scale)
     sigma = np.array([noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), np.deg2rad(noise.sigma_elevation_deg)])
     covariance = covariance_from_sigma_polar(places, np.tile(sigma * scale[1:], (len(places), 1)))
@@ -94,6 +94,6 @@ def _pixel_noise(calibration: Calibration, places: Points3) -> np.ndarray:
 
 
 def _spread(covariances: np.ndarray, distance_m: float) -> Values:
-    """Sum up covariances (n, 6, 6) in rad^2: rotation, plus position seen from the typical distance."""
+    """Reduce covariances (n, 6, 6) to (n,) [rad^2]: rotation variance, plus position variance at the typical distance."""
     variances = np.diagonal(covariances, axis1=1, axis2=2)
     return np.asarray(variances[:, 3:].sum(axis=1) + variances[:, :3].sum(axis=1) / distance_m**2)

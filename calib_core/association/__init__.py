@@ -1,1 +1,1 @@
-"""Radar returns and clicks become pairs: gating, clustering, pairing, and the placements of a recording."""
+"""Association of clicks with radar returns: gating, clustering, pairing, and the placements of a recording."""

@@ -1,4 +1,4 @@
-"""Pairs from arrays, where radar positions and pixels have been matched already."""
+"""Pairs from arrays of radar positions and pixels that are already matched."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ def pairs_from_arrays(
     noise: NoiseOptions | None = None,
     ids: Sequence[str] | None = None,
 ) -> tuple[Pair, ...]:
-    """Make pairs of radar positions and pixels that belong together already.
+    """Make pairs from matched radar positions and pixels.
 
     Args:
         points_radar_m: (n, 3) reflector positions in the radar frame: x forward, y left, z up.
@@ -33,7 +33,7 @@ def pairs_from_arrays(
         ids: (n,) unique names; None numbers the pairs from 1.
 
     Raises:
-        InputError: the arrays do not fit together, hold numbers that are not finite, or a position lies at the radar.
+        InputError: the arrays differ in length, contain numbers that are not finite, or a position is at the radar.
     """
     points, pixels = (np.asarray(values, dtype=np.float64) for values in (points_radar_m, pixels_px))
     _require_columns(points, 3, "points_radar_m")
@@ -41,14 +41,14 @@ def pairs_from_arrays(
     names = [f"pair-{i + 1}" for i in range(len(points))] if ids is None else [str(name) for name in ids]
     if not len(points) == len(pixels) == len(names):
         raise InputError(
-            f"{len(points)} radar positions, {len(pixels)} pixels and {len(names)} ids: give one of each for every pair"
+            f"{len(points)} radar positions, {len(pixels)} pixels and {len(names)} ids: give one of each per pair"
         )
     if len(set(names)) < len(names):
-        raise InputError("ids: some are given twice; name every pair differently")
+        raise InputError("ids: there are duplicates; give every pair its own id")
     at_radar = np.flatnonzero(~points.any(axis=1))
     if len(at_radar):
         raise InputError(
-            f"points_radar_m[{at_radar[0]}]: lies at the radar itself, which is no return; remove the pair"
+            f"points_radar_m[{at_radar[0]}]: is at the radar's origin, which cannot be a return; remove the pair"
         )
     sigmas = _sigma_polar_rows(sigma_polar, noise or NoiseOptions(), len(points))
     covariances = covariance_from_sigma_polar(points, sigmas)

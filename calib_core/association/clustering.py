@@ -1,8 +1,8 @@
-"""Where the reflector may stand: the static returns around one click become a few candidate positions.
+"""Clustering: the static returns around one click are grouped into a few candidate positions.
 
-The radar's errors are about constant in range and in the direction cosines u = y / r, w = z / r, so clusters are
-sought there. A window is never averaged as a whole: one object beside the reflector would pull the mean off both.
-Averaging inside a cluster does not make angle bins, clutter and calibration errors smaller; hence the noise floor.
+The radar's errors are about constant in range and in the direction cosines u = y / r, w = z / r, so clusters are formed
+in these coordinates. A window is never averaged as a whole: an object near the reflector would pull the mean off both.
+Averaging within a cluster does not reduce the errors of angle bins, clutter and calibration; hence the noise floor.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from calib_core.radar import covariance_from_sigma_polar, direction_cosines
 __all__ = ["Cluster", "candidate_at", "candidates_of", "clusters_of", "scores_of", "window_around"]
 
 CLUSTER_SCALE = np.array([0.06, np.deg2rad(1.2), np.deg2rad(2.5)])
-"""What counts as one step of distance in range [m], u and w: about a range bin, an angle bin, and an elevation error."""
+"""One step of distance in range [m], u and w: about a range bin, an angle bin, and an elevation error."""
 
 _REACH = 2.0  # steps from a cluster's centre to its farthest member
 _SAME_PLACE = 1.5  # steps within which a cluster of another window is the same object
@@ -33,18 +33,18 @@ _LEAST_RELATIVE_SCORE = 0.001
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cluster:
-    """Returns of one window that lie together.
+    """A cluster of returns in one window.
 
     Attributes:
         centre: (3,) amplitude-weighted mean of (range [m], u, w).
-        forward: +1 or -1, the sign of x that (range, u, w) leave open.
+        forward: +1 or -1, the sign of x, which (range, u, w) do not contain.
         scatter: (3,) standard deviation of the members about the centre.
-        message_sigma: (3,) mean of the returns' own range [m], azimuth and elevation [rad] sigmas; NaN where they have none.
+        message_sigma: (3,) mean of the returns' own range [m], azimuth and elevation [rad] sigmas; NaN if they have none.
         amplitude: mean amplitude of the members relative to the strongest return of the window, 0 to 1.
         snr_db: mean SNR of the members; NaN when the radar reports none.
-        returns: how many members.
-        scans: in how many scans they lie.
-        persistence: the share of the window's scans they lie in, 0 to 1.
+        returns: number of members.
+        scans: number of scans they lie in.
+        persistence: share of the window's scans they lie in, 0 to 1.
     """
 
     centre: Vector3
@@ -70,8 +70,8 @@ def window_around(scans: RadarScans, time: TimeNs, *, window_s: float) -> RadarS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Recognised:
-    """A window that equals another one of the same content: what `clusters_of` remembers by."""
+class _WindowKey:
+    """A window that equals any other of the same content: the cache key of `clusters_of`."""
 
     window: RadarScans
     digest: bytes
@@ -80,29 +80,29 @@ class _Recognised:
         return hash(self.digest)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Recognised) and self.digest == other.digest
+        return isinstance(other, _WindowKey) and self.digest == other.digest
 
 
 def clusters_of(window: RadarScans, *, most: int) -> tuple[Cluster, ...]:
-    """Find the clusters of a window, the heaviest first.
+    """Find the clusters of a window, the densest first.
 
-    The windows of the last clicks are remembered: a solve after every click looks at all of them again.
+    Results are cached, because the solve after each click looks at all windows again.
 
     Args:
         window: the static returns around one click.
-        most: how many clusters to look for.
+        most: largest number of clusters.
     """
     if not len(window.points_radar_m):
         return ()
     content = hashlib.blake2b()
     for column in (window.first_return, window.points_radar_m, window.snr_db, window.sigma_polar):
         content.update(np.ascontiguousarray(column).data)
-    return _found_clusters(_Recognised(window, content.digest()), most)
+    return _found_clusters(_WindowKey(window, content.digest()), most)
 
 
 @lru_cache(maxsize=256)
-def _found_clusters(recognised: _Recognised, most: int) -> tuple[Cluster, ...]:
-    window = recognised.window
+def _found_clusters(key: _WindowKey, most: int) -> tuple[Cluster, ...]:
+    window = key.window
     steps = direction_cosines(window.points_radar_m) / CLUSTER_SCALE
     amplitude = _amplitudes(window.snr_db)
     free = np.ones(len(steps), dtype=bool)
@@ -123,7 +123,7 @@ def _found_clusters(recognised: _Recognised, most: int) -> tuple[Cluster, ...]:
 
 
 def _amplitudes(snr_db: Values) -> Values:
-    """Return amplitudes relative to the strongest return; where the radar reports none, all alike."""
+    """Return amplitudes relative to the strongest return; all equal if the radar reports no SNR."""
     if not np.isfinite(snr_db).any():
         return np.ones(len(snr_db))
     known = np.where(np.isfinite(snr_db), snr_db, np.nanmedian(snr_db))
@@ -131,7 +131,7 @@ def _amplitudes(snr_db: Values) -> Values:
 
 
 def _cells(steps: Points3, amplitude: Values) -> tuple[Points3, Values]:
-    """Gather returns in cells of one step: mean position (k, 3) and mass (k,) of the heaviest cells."""
+    """Bin returns into cells of one step: mean position (k, 3) and mass (k,) of the heaviest cells."""
     _, cell = np.unique(np.floor(steps).astype(np.int64), axis=0, return_inverse=True)
     cell = cell.reshape(-1)
     mass = np.bincount(cell, amplitude)
@@ -163,7 +163,7 @@ def _cluster(window: RadarScans, steps: Points3, amplitude: Values, members: Fla
         centre=centre * CLUSTER_SCALE,
         forward=1.0 if weight @ window.points_radar_m[members, 0] >= 0 else -1.0,
         scatter=scatter * CLUSTER_SCALE,
-        message_sigma=own_sigma.mean(axis=0),  # NaN as soon as one return has none
+        message_sigma=own_sigma.mean(axis=0),  # NaN if any return has none
         amplitude=float(weight.mean()),
         snr_db=float(snr_db.mean()),
         returns=int(members.sum()),
@@ -173,10 +173,10 @@ def _cluster(window: RadarScans, steps: Points3, amplitude: Values, members: Fla
 
 
 def scores_of(windows: Sequence[RadarScans], clusters: Sequence[tuple[Cluster, ...]]) -> tuple[Values, ...]:
-    """Score every cluster of every window: amplitude x persistence x novelty, (k,) per window, each adding up to 1.
+    """Score every cluster of every window: amplitude x persistence x novelty, (k,) per window, each summing to 1.
 
-    Novelty is what tells the one reflector, which moves, from what is always there: the share of the other windows in
-    which the place is empty. Windows that overlap show the same placement and are no witnesses.
+    Novelty is the share of the other windows in which the place is empty; it separates the reflector, which moves, from
+    what is always there. Windows that overlap show the same placement and are not compared.
     """
     places = np.array([cluster.centre for own in clusters for cluster in own]).reshape(-1, 3) / CLUSTER_SCALE
     persistence = np.array([cluster.persistence for own in clusters for cluster in own])
@@ -184,29 +184,29 @@ def scores_of(windows: Sequence[RadarScans], clusters: Sequence[tuple[Cluster, .
     spans = np.array([(window.times_ns[0], window.times_ns[-1]) for window in windows], dtype=np.int64).reshape(-1, 2)
     scores = []
     for i, own in enumerate(clusters):
-        witnesses = (spans[:, 0] > spans[i, 1]) | (spans[:, 1] < spans[i, 0])
+        others = (spans[:, 0] > spans[i, 1]) | (spans[:, 1] < spans[i, 0])
         plain = np.array([cluster.amplitude * cluster.persistence**2 for cluster in own])
-        score = plain * _novelty(places[first[i] : first[i + 1]], places, persistence, first, witnesses)
+        score = plain * _novelty(places[first[i] : first[i + 1]], places, persistence, first, others)
         scores.append(score / score.sum() if len(score) else score)
     return tuple(scores)
 
 
-def _novelty(own: Points3, places: Points3, persistence: Values, first: Indices, witnesses: Flags) -> Values:
-    """Return how new each place of one window (k, 3) is, 1 when no witness knows it.
+def _novelty(own: Points3, places: Points3, persistence: Values, first: Indices, others: Flags) -> Values:
+    """Return the novelty (k,) of each place of one window, 1 if no other window shows it.
 
     Args:
-        own: in steps.
-        places: (n, 3) of all windows below one another.
+        own: (k, 3) in steps.
+        places: (n, 3) of all windows, concatenated.
         persistence: (n,).
         first: (m + 1,) window j owns the rows first[j] to first[j + 1].
-        witnesses: (m,) the windows that have a say.
+        others: (m,) the windows to compare with.
     """
-    if not len(own) or not witnesses.any():
+    if not len(own) or not others.any():
         return np.ones(len(own))
     filled = np.flatnonzero(np.diff(first) > 0)
     same = ((own[:, None] - places[None]) ** 2).sum(axis=2) <= _SAME_PLACE**2
     seen = np.maximum.reduceat(same * persistence, first[filled], axis=1)
-    occupied = seen[:, witnesses[filled]].sum(axis=1) / witnesses.sum()
+    occupied = seen[:, others[filled]].sum(axis=1) / others.sum()
     return np.asarray(np.maximum((1.0 - np.minimum(occupied, 1.0)) ** 4, _NOVELTY_FLOOR))
 
 
@@ -263,15 +263,15 @@ def candidate_at(position_radar_m: Vector3, noise: NoiseOptions, *, score: float
 def floor_sigma_polar(position_radar_m: Vector3, noise: NoiseOptions) -> Vector3:
     """Return the assumed sigma of range [m], azimuth and elevation [rad] of a measured placement.
 
-    The options speak of a placement straight ahead; an array's error is constant in u and w, so it grows as
-    1 / cos(azimuth) and 1 / cos(elevation) to the side.
+    The options refer to a placement straight ahead; an array's error is constant in u and w, so to the side it grows as
+    1 / cos(azimuth) and 1 / cos(elevation).
     """
     assumed = [noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), np.deg2rad(noise.sigma_elevation_deg)]
     return np.asarray(np.array(assumed) / _cosines(position_radar_m))
 
 
 def _cosines(position_radar_m: Vector3) -> Vector3:
-    """Return d(range, u, w) / d(range, azimuth, elevation) on the diagonal, kept away from zero at the rim."""
+    """Return d(range, u, w) / d(range, azimuth, elevation) on the diagonal, at least 0.2."""
     x, y, _ = position_radar_m
     across = float(np.hypot(x, y))
     range_m = max(float(np.linalg.norm(position_radar_m)), 1e-9)

@@ -1,4 +1,4 @@
-"""Which returns can be the reflector: it stands still, within reach, and has a position."""
+"""Gating: keep the returns that can be the reflector, that is static, in range and with a finite position."""
 
 import numpy as np
 
@@ -10,14 +10,14 @@ __all__ = ["static_returns"]
 
 
 def static_returns(scans: RadarScans, options: GatingOptions) -> RadarScans:
-    """Keep the returns that stand still within reach (Algorithm 1: range filter and velocity filter).
+    """Keep the static returns in range (Algorithm 1: range filter and velocity filter).
 
-    A return without a Doppler speed stays: nothing speaks against it. A return without a finite position goes,
-    with its Doppler and SNR. Every scan stays, if need be empty, so that stamps keep their meaning.
+    A return without a Doppler speed is kept. A return without a finite position is dropped, along with its Doppler and
+    SNR. Every scan is kept, even if it becomes empty, so that the stamps stay the same.
 
     Args:
         scans: as the radar reported them.
-        options: largest speed [m/s] and the span of ranges [m].
+        options: largest speed [m/s], smallest and largest range [m].
     """
     return _keep(scans, _can_be_the_reflector(scans, options))
 

@@ -1,4 +1,4 @@
-"""Clicks meet radar positions: each click and the scans around it make one pair, or a reason why not."""
+"""Pairing: each click and the radar scans around it give one pair, or a reason why there is none."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ __all__ = ["Pairing", "pair_clicks"]
 
 @dataclass(frozen=True, slots=True)
 class Pairing:
-    """What became of the clicks, in order of image time.
+    """The clicks with and without a radar position, in order of image time.
 
     Attributes:
         pairs: clicks with at least one radar position.
@@ -29,7 +29,7 @@ class Pairing:
 def pair_clicks(clicks: Sequence[ReflectorClick], scans: RadarScans, options: CalibrationOptions) -> Pairing:
     """Pair every click with the candidate positions in the window around the nearest scan (paper section III).
 
-    Excluded clicks are paired too: what they show is kept out of the solution by the caller, not here.
+    Excluded clicks are paired too; the caller keeps them out of the solution.
 
     Args:
         clicks: in any order; they are sorted by time, then id.

@@ -1,8 +1,9 @@
-"""Where and when the reflector stood still, found from the radar alone: what the timeline shows and the N and P keys visit.
+"""Placement detection: where and when the reflector stood still, found from the radar alone.
 
-A placement is a strong static return that appears, stays in one place for seconds, and leaves. What is there all the time
-is clutter. What appears together with something stronger is its ghost, or the person who waits beside the reflector: there
-is one reflector, so of two dwells at the same time only one is a placement.
+A placement is a strong static return that appears, stays in one place for seconds, and disappears. What is there all the
+time is clutter. What appears together with something stronger is its multipath ghost, or the person waiting next to the
+reflector: there is one reflector, so of two simultaneous dwells only one is a placement. The timeline shows the
+placements, and the N and P keys step through them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,15 +23,15 @@ CELL = np.array([0.08, 0.04, 0.08])
 """Size of a cell in range [m], u = y / r and w = z / r: the reflector's returns scatter over a few of them."""
 
 _REACH = np.array([0.07, 0.035, 0.09])  # of a dwell's returns about their median, in the same coordinates
-_LARGEST_GAP_S = 0.7  # a longer silence ends a dwell
-_SEED_GAP_S = 1.2  # in one cell alone, for the returns may alternate between neighbours
+_LARGEST_GAP_S = 0.7  # a longer gap ends a dwell
+_SEED_GAP_S = 1.2  # within one cell, because the returns may alternate between neighbouring cells
 _SEED_SHARE_OF_DWELL = 0.5
 _LEAST_PRESENCE = 0.4  # share of a dwell's scans that show it
-_MOST_PRESENCE_ELSEWHEN = 0.25  # the same for the rest of the recording, relative to the dwell's
+_MOST_PRESENCE_OUTSIDE = 0.25  # the same for the rest of the recording, relative to the dwell's
 _MOST_OF_RECORDING = 0.5  # what stays longer is part of the scene
 _MARGIN_S = 1.0  # around a dwell, where the reflector is being put down or picked up
 _SHORTEST_OVERLAP_S = 0.5
-_WEAKER_DB = 10.0  # below the typical placement: somebody stands still, or a door moved
+_WEAKER_DB = 10.0  # below the typical placement: a person standing still, or a door that moved
 _MOST_SEEDS = 4000
 
 
@@ -42,8 +43,8 @@ class Placement:
         start: stamp of the first scan that shows it.
         end: stamp of the last.
         position_radar_m: (3,) median of its returns.
-        score: 0 to 1: how steadily it is seen, how new it is, and how strong it is among the placements.
-        snr_db: mean of its returns; NaN when the radar reports none.
+        score: 0 to 1: product of its presence, its novelty and its strength among the placements.
+        snr_db: mean of its returns; NaN if the radar reports none.
     """
 
     start: TimeNs
@@ -57,14 +58,14 @@ class Placement:
 
 
 def find_placements(scans: RadarScans, options: GatingOptions, *, min_dwell_s: float = 2.0) -> tuple[Placement, ...]:
-    """Find the intervals during which the reflector stood still, by their start. They do not overlap.
+    """Find the intervals during which the reflector stood still, sorted by start. They do not overlap.
 
-    The time it takes grows with n log n of the returns.
+    Takes O(n log n) time for n returns.
 
     Args:
         scans: of a whole recording; novelty is judged against the rest of it. A reflector that stays at one place for
-            more than half of the recording cannot be told from the scene.
-        options: which returns are static and within reach.
+            more than half of the recording is taken for part of the scene.
+        options: which returns are static and in range.
         min_dwell_s: the shortest placement [s].
     """
     grid = _Grid.of(static_returns(scans, options))
@@ -158,8 +159,10 @@ def _seeds(grid: _Grid, min_dwell_s: float) -> Iterator[_Seed]:
     lasted_s = times_s[end - 1] - times_s[start]
     in_cell = np.diff(grid.first)[np.searchsorted(grid.first, start, side="right") - 1]
     inside = (end - start) / (lasted_s + _MARGIN_S)
-    elsewhen = (in_cell - (end - start)) / np.maximum(grid.times_s[-1] - lasted_s, _MARGIN_S)
-    likely = (lasted_s >= _SEED_SHARE_OF_DWELL * min_dwell_s) & (elsewhen <= 2.0 * _MOST_PRESENCE_ELSEWHEN * inside)
+    presence_outside = (in_cell - (end - start)) / np.maximum(grid.times_s[-1] - lasted_s, _MARGIN_S)
+    likely = (lasted_s >= _SEED_SHARE_OF_DWELL * min_dwell_s) & (
+        presence_outside <= 2.0 * _MOST_PRESENCE_OUTSIDE * inside
+    )
     rows = np.flatnonzero(likely)
     for i in rows[np.argsort(start[rows] - end[rows], kind="stable")][:_MOST_SEEDS].tolist():
         yield _Seed(int(start[i]), int(end[i]))
@@ -174,34 +177,34 @@ class _Dwell:
         end: last stamp.
         position_radar_m: (3,) median.
         presence: share of its scans that show it.
-        elsewhen: share of the other scans that show the same place.
+        presence_outside: share of the other scans that show the same place.
         snr_db: mean of its returns; NaN when unknown.
-        strength_db: what its reflecting area is proportional to: SNR made good for range; 0 when unknown.
+        strength_db: SNR corrected for range, a measure of the radar cross-section; 0 if unknown.
     """
 
     start: TimeNs
     end: TimeNs
     position_radar_m: Vector3
     presence: float
-    elsewhen: float
+    presence_outside: float
     snr_db: float
     strength_db: float
 
     @property
     def weight(self) -> float:
-        """What decides between two dwells at the same time: strength, steadiness and length [dB]."""
+        """Rank among simultaneous dwells: strength, presence and duration [dB]."""
         lasted_s = (self.end - self.start) / NS_PER_S
         return self.strength_db + float(10.0 * np.log10(self.presence * lasted_s))
 
 
 def _dwell_of(grid: _Grid, seed: _Seed, min_dwell_s: float) -> _Dwell | None:
-    """Follow a seed over its cell's borders: collect the returns around its median, and see when they are there."""
+    """Extend a seed beyond its cell: collect the returns around its median and find when they are present."""
     centre = np.median(grid.cosines[seed.first : seed.last], axis=0)
     rows = grid.around(np.floor(centre / CELL).astype(np.int64))
     seed_times_s = grid.times_s[grid.scan[seed.first : seed.last]]
     members = rows[:0]
     span: tuple[int, int] | None = None
-    for _ in range(2):  # the second time about the median of the dwell itself
+    for _ in range(2):  # the second time around the median of the dwell itself
         members = rows[(np.abs(grid.cosines[rows] - centre) <= _REACH).all(axis=1)]
         span = _span(grid, members, float(np.median(seed_times_s)))
         if span is None:
@@ -210,11 +213,11 @@ def _dwell_of(grid: _Grid, seed: _Seed, min_dwell_s: float) -> _Dwell | None:
         centre = np.median(grid.cosines[members[in_span]], axis=0)
     if span is None or grid.times_s[span[1]] - grid.times_s[span[0]] < min_dwell_s:
         return None
-    return _judged(grid, members, span)
+    return _checked_dwell(grid, members, span)
 
 
 def _span(grid: _Grid, members: Indices, within_s: float) -> tuple[int, int] | None:
-    """Return the first and last scan of the unbroken presence around a time; None where there is none."""
+    """Return the first and last scan of the uninterrupted presence around a time; None if there is none."""
     shown = np.unique(grid.scan[members])
     if not len(shown):
         return None
@@ -226,16 +229,16 @@ def _span(grid: _Grid, members: Indices, within_s: float) -> tuple[int, int] | N
     return int(shown[first]), int(shown[last])
 
 
-def _judged(grid: _Grid, members: Indices, span: tuple[int, int]) -> _Dwell | None:
-    """Measure how steadily a dwell is seen and how new it is; None where it is clutter or chance."""
+def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> _Dwell | None:
+    """Measure the presence inside and outside a dwell's span; None if the dwell is clutter or chance."""
     shown = np.unique(grid.scan[members])
     inside = (shown >= span[0]) & (shown <= span[1])
     presence = float(inside.sum()) / (span[1] - span[0] + 1)
     start_s, end_s = grid.times_s[span[0]], grid.times_s[span[1]]
     others = _outside(grid.times_s, start_s, end_s)
-    elsewhen = float(_outside(grid.times_s[shown], start_s, end_s).sum()) / max(float(others.sum()), 1.0)
+    presence_outside = float(_outside(grid.times_s[shown], start_s, end_s).sum()) / max(float(others.sum()), 1.0)
     stays = end_s - start_s > _MOST_OF_RECORDING * grid.times_s[-1]
-    if stays or presence < _LEAST_PRESENCE or elsewhen > _MOST_PRESENCE_ELSEWHEN * presence:
+    if stays or presence < _LEAST_PRESENCE or presence_outside > _MOST_PRESENCE_OUTSIDE * presence:
         return None
     mine = members[(grid.scan[members] >= span[0]) & (grid.scan[members] <= span[1])]
     position_radar_m = np.median(grid.points_radar_m[mine], axis=0)
@@ -248,7 +251,7 @@ def _judged(grid: _Grid, members: Indices, span: tuple[int, int]) -> _Dwell | No
         end=TimeNs(int(grid.times_ns[span[1]])),
         position_radar_m=position_radar_m,
         presence=presence,
-        elsewhen=elsewhen,
+        presence_outside=presence_outside,
         snr_db=mean_db,
         strength_db=mean_db + 40.0 * float(np.log10(max(range_m, 1e-3))) if len(known) else 0.0,
     )
@@ -259,7 +262,7 @@ def _outside(times_s: Values, start_s: float, end_s: float) -> Flags:
 
 
 def _one_at_a_time(dwells: Sequence[_Dwell]) -> list[_Dwell]:
-    """Of dwells that overlap in time keep the weightiest: there is one reflector."""
+    """Keep only the dwell of largest weight among those that overlap in time: there is one reflector."""
     kept: list[_Dwell] = []
     shortest_ns = _SHORTEST_OVERLAP_S * NS_PER_S
     for dwell in sorted(dwells, key=lambda dwell: (-dwell.weight, dwell.start, dwell.end)):
@@ -270,7 +273,7 @@ def _one_at_a_time(dwells: Sequence[_Dwell]) -> list[_Dwell]:
 
 def _placement(dwell: _Dwell, typical_db: float) -> Placement:
     strength = float(np.clip(1.0 + (dwell.strength_db - typical_db) / (2.0 * _WEAKER_DB), 0.0, 1.0))
-    novelty = 1.0 - dwell.elsewhen / dwell.presence
+    novelty = 1.0 - dwell.presence_outside / dwell.presence
     return Placement(
         start=dwell.start,
         end=dwell.end,

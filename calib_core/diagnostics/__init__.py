@@ -1,1 +1,1 @@
-"""Checks of a solved fit: each says nothing when all is well, and otherwise what is wrong and what to do."""
+"""Checks of a solved fit: each returns no warnings if all is well, otherwise what is wrong and what to do."""

@@ -1,6 +1,6 @@
-"""What a person must know before using a calibration: each doubt with its figures, and what to do about it.
+"""The warnings of a calibration: what is wrong, with figures, and what to do about it.
 
-A check says nothing when all is well. The texts are for people; the codes are for programs and stay as they are.
+A check returns an empty list if all is well. The texts are for people; the codes are for programs and do not change.
 """
 
 import numpy as np
@@ -26,8 +26,8 @@ _NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
 
 
-def warnings_of(findings: SolvedFit) -> tuple[DataWarning, ...]:
-    """Run every check; the gravest come first."""
+def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
+    """Run every check; the most serious warnings come first."""
     checks = (
         mirrored_axes,
         two_poses,
@@ -45,25 +45,27 @@ def warnings_of(findings: SolvedFit) -> tuple[DataWarning, ...]:
         decisive_pair,
         assumed_axes,
     )
-    return tuple(warning for check in checks for warning in check(findings))
+    return tuple(warning for check in checks for warning in check(fit))
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:
-    """Say which parts of the pose the pairs fix, and which rest on where the reflector is thought to stand."""
+    """Warn of a radar without elevation: say what the pairs determine and what depends on the reflector's assumed height."""
     if not is_flat(fit.measurements):
         return []
     position_cm, turn_deg = _sigmas_in_radar_axes(fit)
-    fixed = (
-        f"ranges and azimuths fix forward ± {position_cm[0]:.0f} cm, left ± {position_cm[1]:.0f} cm and the turn about the "
-        f"radar's up axis ± {turn_deg[2]:.1f} deg; up ± {position_cm[2]:.0f} cm and the turns about left ± {turn_deg[1]:.1f}"
-        f" and forward ± {turn_deg[0]:.1f} deg rest on the clicks' rows and on a guess at how high the reflector stood"
+    determined = (
+        f"range and azimuth determine forward ± {position_cm[0]:.0f} cm, left ± {position_cm[1]:.0f} cm and the rotation "
+        f"about the radar's up axis ± {turn_deg[2]:.1f} deg; up ± {position_cm[2]:.0f} cm and the rotations about left ± "
+        f"{turn_deg[1]:.1f} and forward ± {turn_deg[0]:.1f} deg depend on the clicks' rows and on the assumed height of "
+        "the reflector"
     )
     return [
         DataWarning(
             "flat-radar",
-            f"every radar position has elevation 0: this radar measures none, and the true ones are unknown. One sigma: {fixed}",
-            "measure the camera position, and put the reflector's centre at the radar's height at every placement: then the pose "
-            "is better than stated; for a radar that measures elevation, look why it is missing",
+            "every radar position has elevation 0: this radar does not measure elevation, and the true one is unknown. One "
+            f"sigma: {determined}",
+            "measure the camera position, and put the reflector's centre at the radar's height at every placement: the pose "
+            "is then better than stated; if the radar does measure elevation, find out why it is missing",
         )
     ]
 
@@ -86,7 +88,7 @@ def _many_outliers(fit: SolvedFit) -> list[DataWarning]:
         DataWarning(
             "many-outliers",
             f"{len(outliers)} of {len(fit.ids)} pairs do not fit: {listed(outliers)}",
-            "look at each: was the reflector clicked, did it rest, do both recordings run on one clock?",
+            "check each of them: was the reflector clicked, was it at rest, do both recordings use the same clock?",
         )
     ]
 
@@ -98,7 +100,7 @@ def _few_inliers(fit: SolvedFit) -> list[DataWarning]:
     return [
         DataWarning(
             "few-pairs",
-            f"only {count} pairs carry the pose; a wrong one among them could not be told, nor a wrong noise level",
+            f"the pose is based on only {count} pairs; neither a wrong pair nor a wrong noise level could be detected",
             "add placements: ten or more, near and far, on both sides",
         )
     ]
@@ -113,7 +115,7 @@ def _noise_excess(fit: SolvedFit) -> list[DataWarning]:
             "residuals-too-large",
             f"residuals are {np.sqrt(fit.chi2_per_degree):.1f} times what the assumed noise explains "
             f"(chi2 / degrees of freedom {fit.chi2_per_degree:.1f})",
-            "check that the intrinsics belong to this camera, lens and image size; then the assumed radar noise",
+            "check that the intrinsics belong to this camera, lens and image size, then check the assumed radar noise",
         )
     ]
 
@@ -124,10 +126,10 @@ def _smooth_angle_errors(fit: SolvedFit) -> list[DataWarning]:
     return [
         DataWarning(
             "smooth-angle-errors",
-            "neighbouring placements share their residuals: the radar's angles are off by an amount that changes slowly with "
-            f"direction; the stated rotation uncertainty is {fit.uncertainty.growth:.1f} times wider for it",
-            "more placements will not average it away: correct the radar's angles by radar_angle_map of the calibration, or "
-            "calibrate them; the stated uncertainty allows for it",
+            "neighbouring placements have similar residuals: the radar's angles are off by an amount that changes slowly with "
+            f"direction; this makes the stated rotation uncertainty {fit.uncertainty.growth:.1f} times larger",
+            "more placements will not average this out: correct the radar's angles by radar_angle_map of the calibration, or "
+            "calibrate the radar; the stated uncertainty includes the error",
         )
     ]
 
@@ -141,7 +143,7 @@ def _weak_geometry(fit: SolvedFit) -> list[DataWarning]:
     range_m, azimuth_rad, _ = fit.measurements.polar[fit.refined.rows[fit.inliers]].T
     hint = "place the reflector near (2 to 3 m) and far, at both edges of the picture"
     if not fit.measurements.prior.measured:
-        hint = "measure the camera position with a tape: it helps most; and " + hint
+        hint = "measure the camera position with a tape, which helps most; also " + hint
     return [
         DataWarning(
             "weak-geometry",
@@ -153,12 +155,12 @@ def _weak_geometry(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _places(fit: SolvedFit) -> int:
-    """Count the distinct places among the inlier placements, by the radar's own resolution."""
+    """Count the distinct places among the inlier placements, at the radar's resolution."""
     centres = (
         direction_cosines(cartesian_from_polar(fit.measurements.polar[fit.refined.rows[fit.inliers]])) / CLUSTER_SCALE
     )
     apart = sum(((axis[:, None] - axis) ** 2 for axis in centres.T), start=np.zeros((len(centres), len(centres))))
-    first_close = (apart <= 1.0).argmax(axis=1)  # at the latest the place itself
+    first_close = (apart <= 1.0).argmax(axis=1)  # the place itself, if no earlier one is close
     return int((first_close == np.arange(len(centres))).sum())
 
 
@@ -169,7 +171,7 @@ def _same_places(fit: SolvedFit) -> list[DataWarning]:
     return [
         DataWarning(
             "repeated-placements",
-            f"{count} pairs show only {places} places; a radar repeats its error at the same place, so the stated "
+            f"{count} pairs cover only {places} places; a radar repeats its error at the same place, so the stated "
             "uncertainty is too small",
             "move the reflector between clicks; more clicks of one placement add little",
         )

@@ -1,10 +1,10 @@
-"""Do both sensors run on one clock? What static placements can say about it, and what they cannot.
+"""Clock offset: do both sensors use the same clock, as far as static placements can show?
 
-While the reflector rests, radar and camera see the same whatever the clocks say: an offset that leaves every click inside its
-dwell does no harm, and nothing in the pairs shows it. What shows is a click whose reflector the radar does not see at that
-moment, but sees from a little later on, or saw until a little earlier. One such click may be a hasty person; several, all to
-the same side, are a clock, or a habit with the same effect. With [a_i, b_i] the dwell about click i by the radar's stamps,
-counted from the click, an offset s of the radar's stamps puts a_i <= s <= b_i.
+While the reflector rests, radar and camera see the same scene whatever the clocks say: an offset that leaves every click
+inside its dwell does no harm, and the pairs do not show it. What shows is a click whose reflector the radar does not see at
+that moment, but only later or only earlier. One such click may be a mistimed one; several, all to the same side, mean a
+clock offset, or a clicking habit with the same effect. With [a_i, b_i] the dwell around click i by the radar's stamps,
+relative to the click, an offset s of the radar's stamps satisfies a_i <= s <= b_i.
 """
 
 from collections.abc import Sequence
@@ -26,10 +26,10 @@ CLOCK_CODES = ("clock-bias-suspected",)
 """Codes of the warnings that need the recording: pairs alone cannot show them."""
 
 _LEAST_OUTSIDE = 3
-_LEAST_SHARE = 0.25  # of the clicks with a dwell that lie outside of it
-_MOST_OTHER_SIDE = 0.1  # of those, to the other side
-_TOLERANCE_S = 0.3  # a reflector that is being put down, a scan or two that miss it
-_LARGEST_GAP_S = 0.7  # a longer silence ends a dwell
+_LEAST_SHARE = 0.25  # of the clicks with a dwell: those outside it
+_MOST_OTHER_SIDE = 0.1  # of those outside: those to the other side
+_TOLERANCE_S = 0.3  # the reflector is being put down, or one or two scans miss it
+_LARGEST_GAP_S = 0.7  # a longer gap ends a dwell
 _SHORTEST_DWELL_S = 0.5
 _REACH = 1.5  # steps of CLUSTER_SCALE from the candidate to a return of the same reflector
 _STEP_S = 0.05
@@ -38,13 +38,13 @@ _AROUND_S = 4.0  # as far as the scans around a click reach by default
 
 @dataclass(frozen=True, slots=True)
 class ClockOffset:
-    """By how much the radar's stamps seem ahead of the camera's.
+    """The estimated offset of the radar's stamps, positive if they are ahead of the camera's.
 
     Attributes:
         least_s: smallest offset that puts the most clicks inside their dwells; negative: the radar's stamps lag.
-        most_s: the largest, no farther than the scans around the clicks reach.
-        outside: ids of the clicks that lie outside their dwell.
-        clicks: how many clicks have a dwell.
+        most_s: the largest such offset, limited by the scans around the clicks.
+        outside: ids of the clicks outside their dwell.
+        clicks: number of clicks with a dwell.
     """
 
     least_s: float
@@ -54,37 +54,40 @@ class ClockOffset:
 
     @property
     def nearest_s(self) -> float:
-        """The smaller of the two bounds: what the offset is at least."""
+        """The bound of smaller magnitude: the offset is at least this large."""
         return self.least_s if abs(self.least_s) < abs(self.most_s) else self.most_s
 
 
 def clocks(calibration: Calibration, scans: RadarScans) -> list[DataWarning]:
-    """Warn unless both sensors seem to run on one clock: clicks lie before, or after, their dwells by the radar's stamps.
+    """Warn of a clock offset: by the radar's stamps, several clicks lie before, or after, their dwells.
 
     Args:
-        calibration: whose inlier pairs tell which return was the reflector.
-        scans: around the clicks, as the calibration got them.
+        calibration: its inlier pairs say which return was the reflector.
+        scans: around the clicks, as given to the calibration.
     """
     offset = clock_offset(calibration.pairs, scans, calibration.options.gating)
     if offset is None:
         return []
     late = offset.nearest_s > 0
-    seen, against, when = (
-        ("after", "ahead of", "has rested a while") if late else ("before", "behind", "has just been set down")
+    seen, relation, when = (
+        ("after", "ahead of", "has been at rest for a while")
+        if late
+        else ("before", "behind", "has just been put down")
     )
     return [
         DataWarning(
             "clock-bias-suspected",
-            f"the radar sees the reflector only {seen} the moment of {len(offset.outside)} of {offset.clicks} clicks "
-            f"({', '.join(offset.outside[:6])}): its stamps seem {abs(offset.nearest_s):.1f} s or more {against} the camera's",
-            f"compare both clocks (cocalib info), or click where the reflector {when}; if the clicks are at fault, click in the "
+            f"for {len(offset.outside)} of {offset.clicks} clicks ({', '.join(offset.outside[:6])}) the radar sees the "
+            f"reflector only {seen} the click: its stamps seem to be {abs(offset.nearest_s):.1f} s or more {relation} the "
+            "camera's",
+            f"compare both clocks (cocalib info), or click when the reflector {when}; if the clocks agree, click in the "
             "middle of each dwell",
         )
     ]
 
 
 def clock_offset(pairs: Sequence[PairResult], scans: RadarScans, gating: GatingOptions) -> ClockOffset | None:
-    """Find the offset that several clicks outside their dwells agree on; None where they do not, or there are none."""
+    """Find the offset that several clicks outside their dwells agree on; None if they do not agree, or there are none."""
     dwells = _dwells(pairs, scans, gating)
     if not len(dwells.ids):
         return None
@@ -101,7 +104,7 @@ def clock_offset(pairs: Sequence[PairResult], scans: RadarScans, gating: GatingO
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Dwells:
-    """From when to when the radar sees the reflector of each click, counted from the click.
+    """The interval in which the radar sees the reflector of each click, relative to the click.
 
     Attributes:
         ids: of the clicks.
@@ -134,7 +137,7 @@ def _dwells(pairs: Sequence[PairResult], scans: RadarScans, gating: GatingOption
 
 
 def _dwell(static: RadarScans, steps: Points3, place: Values, click_ns: int) -> tuple[float, float] | None:
-    """Return the unbroken presence at a place that lies nearest to a click [s from it]; None where it is too short."""
+    """Return start and end [s after the click] of the presence at a place nearest to a click; None if it is too short."""
     rows = _rows_around(static, click_ns)
     near = ((steps[rows] - place) ** 2).sum(axis=1) <= _REACH**2
     owners = np.searchsorted(static.first_return, np.flatnonzero(near) + rows.start, side="right") - 1

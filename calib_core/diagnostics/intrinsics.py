@@ -1,14 +1,14 @@
-"""Do the intrinsics fit? What another focal length, or another curvature of the lens, would explain of the residuals.
+"""Score test of the intrinsics: how much of the residuals another focal length or radial distortion would explain.
 
-To first order a focal length that is longer by a share a moves a pixel by a d, with d its offset from the principal point;
+To first order, a focal length longer by a share a moves a pixel by a d, with d its offset from the principal point; a
 radial distortion that is off by b moves it by b |d / f|^2 d, whatever the lens model. With whitened residuals e, whitened
 Jacobians J of the pose and g of such an unknown, and M = I - J (J^T J)^-1 J^T, which removes what the pose can explain,
 
     a = g^T M e / g^T M g,    var a = 1 / g^T M g,    F(1, nu - 1) = (a^2 / var a) (nu - 1) / (nu - a^2 / var a),       (8)
 
-for the noise was estimated with nu degrees of freedom by residuals that the wrong intrinsics had made larger. It is a score
-test: one step from the optimum tells it, and no second fit is made. A principal point that is off cannot be told: the
-rotation absorbs it. Nor does a radar without elevation say anything: its own residuals grow towards the near placements.
+because the noise was estimated with nu degrees of freedom from residuals that the wrong intrinsics had made larger. A score
+test takes one step from the optimum and needs no second fit. A wrong principal point cannot be detected: the rotation
+absorbs it. A radar without elevation is not tested: its own residuals grow towards the near placements.
 """
 
 from dataclasses import dataclass
@@ -22,20 +22,20 @@ from calib_core.results import DataWarning
 
 __all__ = ["LensError", "intrinsics", "lens_errors"]
 
-_LEVEL = 0.0025  # chance of a false alarm of either unknown
+_LEVEL = 0.0025  # false-alarm probability of each unknown
 _LEAST_PAIRS = 10
-_LEAST_SQUARED = 8.0  # smaller ones cannot pass, whatever the degrees of freedom
-_LEAST_REDUNDANCY = 0.05  # of the residual's degrees of freedom that must be left unexplained
+_LEAST_SQUARED = 8.0  # a smaller statistic is never significant, whatever the degrees of freedom
+_LEAST_REDUNDANCY = 0.05  # share of the residual's degrees of freedom that must stay unexplained
 
 
 @dataclass(frozen=True, slots=True)
 class LensError:
-    """How far one of the intrinsics seems off.
+    """The estimated error of one of the intrinsics.
 
     Attributes:
-        amount: what the given value lacks; a share of the focal length, or a radial coefficient.
+        amount: to be added to the given value; a share of the focal length, or a radial coefficient.
         sigma: its standard deviation.
-        chance: of an amount as large if the intrinsics were right.
+        chance: probability of an amount as large if the intrinsics were right (p-value).
     """
 
     amount: float
@@ -56,14 +56,14 @@ def intrinsics(fit: SolvedFit) -> list[DataWarning]:
             "intrinsics-suspected",
             what,
             "check that the intrinsics belong to this camera, lens, zoom and image size, or calibrate the camera again; a radar "
-            "whose azimuths are out of scale by as much looks the same",
+            "with an azimuth scale error of the same size looks the same",
         )
     ]
 
 
 def _focal_text(focal: LensError) -> str:
     return (
-        f"residuals grow with the distance from the picture's centre: the focal length given seems "
+        f"residuals grow with the distance from the picture's centre: the given focal length seems "
         f"{100 * abs(focal.amount):.1f} ± {100 * focal.sigma:.1f} % too {'short' if focal.amount > 0 else 'long'}"
     )
 
@@ -73,21 +73,21 @@ def _radial_text(fit: SolvedFit, radial: LensError) -> str:
     outermost = int(np.argmax(np.where(fit.inliers, share, 0.0)))
     reach_px = float(share[outermost] * np.linalg.norm(offset_px[outermost]))
     return (
-        "residuals grow with the cube of the distance from the picture's centre: the lens distortion given seems off, by "
+        "residuals grow with the cube of the distance from the picture's centre: the given lens distortion seems off by "
         f"{abs(radial.amount) * reach_px:.0f} ± {radial.sigma * reach_px:.0f} px at the outermost click"
     )
 
 
 def lens_errors(fit: SolvedFit) -> tuple[LensError, LensError]:
-    """Estimate by how much the focal length and the radial distortion are off, each as if the other were right."""
+    """Estimate the errors of the focal length and of the radial distortion, each as if the other were right."""
     refined = fit.refined
     offset_px, share = _offsets(fit)
     root = np.sqrt(refined.weights)[:, None]
-    belief_residual, belief_jacobian = refined.measurements.prior.rows(refined.camera_from_radar)
+    prior_residual, prior_jacobian = refined.measurements.prior.rows(refined.camera_from_radar)
     moves_px = np.stack([offset_px, offset_px * share[:, None]], axis=2)
     gains = ((refined.model.whitening @ moves_px) * root[:, :, None]).reshape(-1, 2)
-    pose = np.concatenate([(refined.model.pose_jacobian * root[:, :, None]).reshape(-1, 6), belief_jacobian])
-    residual = np.concatenate([(refined.model.residual * root).reshape(-1), belief_residual])
+    pose = np.concatenate([(refined.model.pose_jacobian * root[:, :, None]).reshape(-1, 6), prior_jacobian])
+    residual = np.concatenate([(refined.model.residual * root).reshape(-1), prior_residual])
     explained, _ = np.linalg.qr(pose)
     gains = np.concatenate([gains, np.zeros((3, 2))])
     gains = gains - explained @ (explained.T @ gains)

@@ -1,4 +1,4 @@
-"""Pairs a person must look at: more than one radar position suits them, the others contradict them, or nothing checks them."""
+"""Warnings about single pairs: ambiguous candidates, influential pairs, and pairs that no other pair checks."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from calib_core.results import DataWarning
 __all__ = ["ambiguous_candidates", "contradicted_pairs", "decisive_pair", "listed"]
 
 _AMBIGUOUS_MARGIN = 4.0
-_DECISIVE_LOSS = 8.0  # of certainty, in the direction that suffers most
+_DECISIVE_LOSS = 8.0  # ratio of the standard deviations without and with the pair, in the worst direction
 _LEAST_PAIRS = 6
 
 
@@ -27,14 +27,14 @@ def ambiguous_candidates(fit: SolvedFit) -> list[DataWarning]:
         own = np.sort(cost[owner == i])
         if len(own) > 1:
             margins[i] = own[1] - own[0]
-    doubtful = [fit.ids[i] for i in np.flatnonzero(margins < _AMBIGUOUS_MARGIN)]
-    if not doubtful:
+    ambiguous = [fit.ids[i] for i in np.flatnonzero(margins < _AMBIGUOUS_MARGIN)]
+    if not ambiguous:
         return []
     return [
         DataWarning(
             "uncertain-association",
-            f"more than one radar position suits the click of {listed(doubtful)}",
-            "look at the radar view there; exclude the pair if the chosen return is not the reflector",
+            f"more than one radar position fits the click of {listed(ambiguous)}",
+            "check the radar view at each of them; exclude the pair if the chosen return is not the reflector",
         )
     ]
 
@@ -47,39 +47,39 @@ def _candidate_costs(fit: SolvedFit) -> np.ndarray:
 
 
 def contradicted_pairs(fit: SolvedFit) -> list[DataWarning]:
-    """Name the pairs that the pose leans on and the others contradict."""
+    """Name the influential pairs: the pose depends on them, and the other pairs contradict them."""
     return [
         DataWarning(
             "doubtful-pair",
-            f"without {fit.ids[doubt.pair]} the camera moves {50 * doubt.camera_move_m:.0f} cm, and the other pairs predict it "
-            f"{doubt.standard_deviations:.1f} standard deviations from its click; the stated pose lies midway between the one "
-            "with it and the one without, and its uncertainty allows for both",
-            f"look at the click of {fit.ids[doubt.pair]}; correct it, exclude it, or add placements near it",
+            f"without {fit.ids[influential.pair]} the camera moves {50 * influential.camera_move_m:.0f} cm, and the other "
+            f"pairs predict it {influential.standard_deviations:.1f} standard deviations from its click; the stated pose is "
+            "midway between the poses with and without it, and its uncertainty covers both",
+            f"check the click of {fit.ids[influential.pair]}: correct it, exclude it, or add placements near it",
         )
-        for doubt in fit.doubts
+        for influential in fit.influential_pairs
     ]
 
 
 def decisive_pair(fit: SolvedFit) -> list[DataWarning]:
-    """Name the pair that some direction of the pose hangs on: a mistake in it would go unseen, however large it is."""
+    """Name the pair that alone determines some direction of the pose: no other pair would reveal an error in it."""
     if fit.inliers.sum() < _LEAST_PAIRS:
         return []
     loss = _losses(fit)
     most = int(np.argmax(loss))
-    if loss[most] < _DECISIVE_LOSS or any(doubt.pair == most for doubt in fit.doubts):
+    if loss[most] < _DECISIVE_LOSS or any(influential.pair == most for influential in fit.influential_pairs):
         return []
     return [
         DataWarning(
             "one-pair-decides",
-            f"part of the pose hangs on {fit.ids[most]} alone: without it, that part would be {loss[most]:.0f} times less "
-            "certain, so the other pairs cannot tell whether its click is right",
-            f"look at the click of {fit.ids[most]} again, and add a placement near it",
+            f"part of the pose depends on {fit.ids[most]} alone: without it, that part would be {loss[most]:.0f} times less "
+            "certain, so the other pairs cannot check its click",
+            f"check the click of {fit.ids[most]} again, and add a placement near it",
         )
     ]
 
 
 def _losses(fit: SolvedFit) -> Values:
-    """Return (n,) how many times less certain the pose is without each pair, in the direction that suffers most.
+    """Return the factor (n,) by which the standard deviation grows without each pair, in the worst direction.
 
     Leaving out w J^T J of the information H turns the variance along a direction from v into v / (1 - h); the largest h is
     the largest eigenvalue of w J H^-1 J^T.
@@ -93,6 +93,6 @@ def _losses(fit: SolvedFit) -> Values:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Name the first six, and count the rest."""
+    """List the first six names and count the rest."""
     shown = ", ".join(names[:6])
     return shown if len(names) <= 6 else f"{shown} and {len(names) - 6} more"

@@ -1,4 +1,4 @@
-"""Is it this pose at all? Mirrored axes, a second pose as likely, and a camera where it cannot be."""
+"""Warnings about the pose as a whole: mirrored axes, a second pose, and an implausible camera position."""
 
 from dataclasses import replace
 
@@ -21,21 +21,21 @@ _OTHER_POSE_RAD = np.deg2rad(5.0)
 _OTHER_POSE_SIGMAS = 6.0
 _FAR_CAMERA = 3.0
 _CONTRADICTION_SIGMAS = 4.0
-_SUSPICIOUS_NOISE = 1.6
+_LEAST_CHI2_PER_DEGREE = 1.6
 _PLANE_ROUNDS = 6
-_ONE_IN_A_HUNDRED = 2.33
+_NORMAL_QUANTILE_99 = 2.33
 
 
 def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
-    """Warn where mirrored radar axes are likelier, or as likely."""
+    """Warn if mirrored radar axes are more likely, or about as likely."""
     if fit.mirror_gain > MIRRORED_GAIN:
         return [
             DataWarning(
                 "mirrored-axes",
-                "pairs and expected camera position agree better when one radar axis is mirrored "
+                "pairs and expected camera position agree better with one radar axis mirrored "
                 f"(log-likelihood ratio {fit.mirror_gain / 2:.1f}): the radar's axes look left-handed",
-                "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) where the "
-                "positions come from; do not use this pose",
+                "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) at the source; "
+                "do not use this pose",
             )
         ]
     if fit.mirror_gain > NOT_MIRRORED_GAIN:
@@ -50,26 +50,26 @@ def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
 
 
 def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
-    """Say that the choice between the two hands is not the pairs' own, where it passes for clear."""
-    said = fit.mirror_gain > NOT_MIRRORED_GAIN or is_flat(fit.measurements)
-    if said or fit.measurements.prior.measured or _heights_decide(fit):
+    """Warn if only the expected camera distance, and not the pairs, rules out mirrored axes."""
+    already_warned = fit.mirror_gain > NOT_MIRRORED_GAIN or is_flat(fit.measurements)
+    if already_warned or fit.measurements.prior.measured or _heights_decide(fit):
         return []
     return [
         DataWarning(
             "handedness-assumed",
-            "the placements lie near one plane, where mirrored radar axes fit as well: that none is mirrored rests on the "
-            f"camera being within about {fit.measurements.prior.sigma_m:g} m of the radar",
+            "the placements lie near one plane, so mirrored radar axes fit equally well: that none is mirrored is inferred "
+            f"only from the camera being within about {fit.measurements.prior.sigma_m:g} m of the radar",
             "measure the camera position (0.3 m is enough for this), or add placements at other heights (a tripod)",
         )
     ]
 
 
 def _heights_decide(fit: SolvedFit) -> bool:
-    """Tell whether the placements leave every plane so far that the pairs alone rule mirrored axes out.
+    """Return whether the placements are far enough from any plane that the pairs alone rule out mirrored axes.
 
-    Mirrored axes and a turned camera are a reflection in some plane; it moves a placement by twice its height h above that
-    plane. So twice the log-likelihood falls by about sum (2 h / sigma)^2 with the true heights, by 4 (chi2 - (n - 3)) with
-    measured ones, and the noise of that is asked to matter in one set of a hundred only.
+    Mirrored axes with a rotated camera are a reflection in some plane, which moves a placement by twice its height h above
+    that plane. Twice the log-likelihood therefore falls by about sum (2 h / sigma)^2 with the true heights, by
+    4 (chi2 - (n - 3)) with measured ones; the limit includes the 99 % quantile of the noise of that figure.
     """
     measurements, rows = fit.refined.measurements, fit.refined.rows[fit.inliers]
     points = cartesian_from_polar(measurements.polar[rows])
@@ -81,11 +81,11 @@ def _heights_decide(fit: SolvedFit) -> bool:
         weights = 1.0 / np.einsum("i,nij,j->n", normal, covariances, normal)
         chi2 = min(chi2, float(weights @ (offsets @ normal) ** 2))
     redundancy = max(len(points) - 3, 1)
-    return 4.0 * (chi2 - redundancy) > MIRRORED_GAIN + 4.0 * _ONE_IN_A_HUNDRED * np.sqrt(2.0 * redundancy)
+    return 4.0 * (chi2 - redundancy) > MIRRORED_GAIN + 4.0 * _NORMAL_QUANTILE_99 * np.sqrt(2.0 * redundancy)
 
 
 def two_poses(fit: SolvedFit) -> list[DataWarning]:
-    """Warn where two poses explain the pairs about alike (a plane seen from afar has two)."""
+    """Warn if two poses explain the pairs about equally well (a plane seen from far away has two)."""
     best = fit.alternatives[0]
     for other in fit.alternatives[1:]:
         error = other.camera_from_radar.error_from(fit.refined.camera_from_radar)
@@ -103,7 +103,7 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
 
 
 def camera_position(fit: SolvedFit) -> list[DataWarning]:
-    """Warn of a camera position that contradicts the tape measure, or is much farther away than expected."""
+    """Warn if the camera position contradicts the tape measure, or is much farther away than expected."""
     if fit.measurements.prior.measured:
         return _contradicted_position(fit)
     prior = fit.measurements.prior
@@ -113,32 +113,34 @@ def camera_position(fit: SolvedFit) -> list[DataWarning]:
     return [
         DataWarning(
             "camera-far-away",
-            f"the camera comes out {away_m:.1f} m from the radar; about {prior.sigma_m:g} m was expected",
-            "if the sensors are really that far apart, say so (nominal distance); otherwise suspect axes or intrinsics",
+            f"the solved camera position is {away_m:.1f} m from the radar; about {prior.sigma_m:g} m was expected",
+            "if the sensors really are that far apart, set the nominal distance; otherwise check axes and intrinsics",
         )
     ]
 
 
 def _contradicted_position(fit: SolvedFit) -> list[DataWarning]:
-    """Compare the measured camera position with the one the pairs find on their own.
+    """Compare the measured camera position with the one from the pairs alone.
 
-    A position stated with a small sigma wins over the pairs and only makes the residuals large; so it is set free.
+    A position with a small sigma overrides the pairs and only makes the residuals large, so it becomes a weak prior here.
     """
     prior = fit.measurements.prior
-    if fit.chi2_per_degree < _SUSPICIOUS_NOISE:
+    if fit.chi2_per_degree < _LEAST_CHI2_PER_DEGREE:
         return []
     start = GncSolution(fit.refined.camera_from_radar, 0.0, float(fit.refined.noise_scale.max()))
     alone = fit_errors_in_variables(replace(fit.measurements, prior=prior.weakened()), start, estimate_scale=True)
     away_m = _camera_centre(alone.camera_from_radar) - prior.position_m
     centre_jacobian = prior.rows(alone.camera_from_radar)[1] * prior.sigma_m
-    doubt = centre_jacobian @ pose_covariance(alone).covariance @ centre_jacobian.T + prior.sigma_m**2 * np.eye(3)
-    sigmas = float(np.sqrt(away_m @ np.linalg.solve(doubt, away_m)))
+    difference_covariance = centre_jacobian @ pose_covariance(
+        alone
+    ).covariance @ centre_jacobian.T + prior.sigma_m**2 * np.eye(3)
+    sigmas = float(np.sqrt(away_m @ np.linalg.solve(difference_covariance, away_m)))
     if sigmas < _CONTRADICTION_SIGMAS:
         return []
     return [
         DataWarning(
             "camera-position-contradicted",
-            f"on their own the pairs put the camera {100 * np.linalg.norm(away_m):.0f} cm from where it was measured, "
+            f"the pairs alone place the camera {100 * np.linalg.norm(away_m):.0f} cm from the measured position, "
             f"{sigmas:.1f} standard deviations",
             "measure again from the radar's antennas to the lens: forward, left, up; or state a larger uncertainty",
         )

@@ -1,4 +1,4 @@
-"""All that the checks of a calibration look at, in one value."""
+"""The input of the checks of a calibration, in one value."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ __all__ = ["SolvedFit"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SolvedFit:
-    """All that the checks look at.
+    """The input of the checks.
 
     Attributes:
         ids: of the used pairs, in the order of the measurements.
-        measurements: with the noise as assumed.
+        measurements: with the assumed noise.
         refined: the fit.
         uncertainty: of its pose.
         left_out: leave-one-out.
-        doubts: the pairs that the others contradict.
+        influential_pairs: the pairs that the pose depends on and the others contradict.
         inliers: (n,) which pairs took part.
-        alternatives: where the other starts ended, the most likely first.
-        mirror_gain: by how much mirrored radar axes explain the pairs better; negative: worse.
-        chi2_per_degree: by the noise as assumed.
+        alternatives: the GNC solutions of all starts, the most likely first.
+        mirror_gain: gain in twice the log-likelihood with mirrored radar axes; negative if they fit worse.
+        chi2_per_degree: chi2 per degree of freedom under the assumed noise.
     """
 
     ids: tuple[str, ...]
@@ -36,7 +36,7 @@ class SolvedFit:
     refined: ErrorsInVariablesFit
     uncertainty: PoseCovariance
     left_out: LeaveOneOut
-    doubts: Sequence[InfluentialPair]
+    influential_pairs: Sequence[InfluentialPair]
     inliers: Flags
     alternatives: Sequence[GncSolution]
     mirror_gain: float

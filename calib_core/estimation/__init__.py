@@ -1,1 +1,1 @@
-"""Pairs become a pose with its covariance: measurement model, initialization, GNC, errors in variables, leave-one-out."""
+"""Estimation of the pose and its covariance: measurement model, initialization, GNC, errors in variables, leave-one-out."""

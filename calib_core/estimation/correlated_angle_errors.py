@@ -1,13 +1,13 @@
-"""Smooth angle errors of the radar: what neighbouring placements share, and more placements do not average away.
+"""Correlated angle errors: smooth errors of the radar that neighbouring placements share and that do not average out.
 
-An array's calibration error changes slowly with direction. Residuals of neighbours then resemble each other, and a
-covariance that takes them for independent promises too much. Azimuth and elevation errors b are modelled as Gaussian
-processes over direction, so that the whitened residuals of all pairs together have the covariance
+An array's calibration error changes slowly with direction, so the residuals of neighbouring placements are similar, and a
+covariance that assumes independence is too small. Azimuth and elevation errors b are modelled as Gaussian processes over
+direction, so that the whitened residuals of all pairs together have the covariance
 
     V = tau^2 I + rho^2 B B^T,   B B^T = sum over azimuth and elevation of G K G^T,                       (3)
 
-with G = W d pixel / d angle in sigmas and K(x, x') = exp(-|x - x'|^2 / 2 l^2). How likely the residuals are tells the
-probability of each level and length (restricted marginal likelihood). Least squares stays as it is; its covariance
+with G = W d pixel / d angle in sigmas and K(x, x') = exp(-|x - x'|^2 / 2 l^2). The restricted marginal likelihood
+of the residuals gives the probability of each level and length. The least-squares estimate is unchanged; its covariance
 becomes H^-1 (J^T V J) H^-1.
 """
 
@@ -24,16 +24,16 @@ _INDEPENDENT = (1.0, 0.6, 0.35, 0.15, 0.06)  # tau^2
 _SMOOTH = (0.3, 1.0, 2.5, 6.0, 15.0)  # rho^2
 _MOST_CENTRES = 40
 _LEAST_PAIRS = 7.0
-_RELUCTANCE = 4.5  # prior log-odds of purely independent errors against each single split
-_SURELY_NONE = 0.7
+_INDEPENDENT_LOG_ODDS = 4.5  # prior log-odds of purely independent errors against each single split
+_CLEARLY_INDEPENDENT = 0.7  # probability of purely independent errors
 _NEGLIGIBLE = 1e-10
 
 
 def pose_spread(refined: ErrorsInVariablesFit, information: Matrix66) -> Matrix66 | None:
-    """Return the covariance (6, 6) of the least-squares pose under smooth angle errors; None where nothing speaks for them.
+    """Return the covariance (6, 6) of the least-squares pose under smooth angle errors; None without evidence of them.
 
-    Every split of the noise into independent and smooth parts counts by its probability; how large the smooth part is can
-    only be guessed from a few dozen pairs, and the guess must not be taken for knowledge.
+    Every split of the noise into independent and smooth parts is weighted by its probability: a few dozen pairs determine
+    the size of the smooth part only roughly, so the covariance must not rely on a single estimate of it.
 
     Args:
         refined: the fit.
@@ -41,12 +41,12 @@ def pose_spread(refined: ErrorsInVariablesFit, information: Matrix66) -> Matrix6
     """
     if refined.weights.sum() < _LEAST_PAIRS or refined.degrees_of_freedom <= 0:
         return None
-    inliers = np.flatnonzero(refined.weights > 0.5)  # an outlier's residual, weighed away, would pass for a perfect one
+    inliers = np.flatnonzero(refined.weights > 0.5)  # an outlier's down-weighted residual would look like a perfect one
     residual, jacobian = _weighted_rows(refined, inliers)
     prior = refined.measurements.prior.rows(refined.camera_from_radar)
     levels = [(independent, smooth) for independent in _INDEPENDENT for smooth in _SMOOTH]
     nothing = np.zeros((len(residual), 0))
-    likelihoods = [_log_likelihoods(residual, jacobian, prior, nothing, [(1.0, 0.0)]) + _RELUCTANCE]
+    likelihoods = [_log_likelihoods(residual, jacobian, prior, nothing, [(1.0, 0.0)]) + _INDEPENDENT_LOG_ODDS]
     middles = [(jacobian.T @ jacobian)[None]]
     directions = _directions(refined, inliers)
     for length_rad in _LENGTHS_RAD:
@@ -57,7 +57,7 @@ def pose_spread(refined: ErrorsInVariablesFit, information: Matrix66) -> Matrix6
         middles.append(parts[:, 0] * (jacobian.T @ jacobian) + parts[:, 1] * (shared.T @ shared))
     probability = np.exp(np.concatenate(likelihoods) - np.concatenate(likelihoods).max())
     probability /= probability.sum()
-    if probability[0] > _SURELY_NONE:
+    if probability[0] > _CLEARLY_INDEPENDENT:
         return None
     middle = np.tensordot(probability, np.concatenate(middles), axes=1) + prior[1].T @ prior[1]
     inverse = np.linalg.inv(information)
@@ -86,7 +86,7 @@ def _shape(refined: ErrorsInVariablesFit, inliers: np.ndarray, directions: Point
 
 
 def _directions(refined: ErrorsInVariablesFit, inliers: np.ndarray) -> Points2:
-    """Return azimuth and elevation (n, 2) of each inlier by its click: the measured angles carry the errors in question."""
+    """Return azimuth and elevation (n, 2) of each inlier from its click: the measured angles contain the errors in question."""
     rays = refined.measurements.rays[inliers] @ refined.camera_from_radar.rotation
     directions = polar_from_cartesian(rays)[:, 1:]
     return np.where(np.isfinite(directions), directions, refined.measurements.polar[refined.rows[inliers], 1:])

@@ -1,4 +1,4 @@
-"""The covariance of the pose: the observed information inverted, and widened by errors that the pairs share."""
+"""Pose covariance: the inverse of the observed information, widened by errors that the pairs share."""
 
 from dataclasses import dataclass
 
@@ -12,20 +12,20 @@ from calib_core.estimation.unmeasured_elevation import shared_elevation_spread
 
 __all__ = ["PoseCovariance", "pose_covariance"]
 
-_LEAST_SHARE = 0.25  # of the plain information that the correction for doubtful pairs must leave
+_LEAST_SHARE = 0.25  # of the plain information that must remain after the correction for uncertain weights
 _CHI2_95_6 = 12.591587243743977
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseCovariance:
-    """The pose's error distribution.
+    """The error distribution of the pose.
 
     Attributes:
         covariance: (6, 6) of (dt, dtheta) [m, rad].
-        information: (6, 6) Gauss-Newton Hessian of the fit, for moving it about.
-        quantile: the factor on the covariance whose ellipsoid holds 95 %.
-        condition: condition number of the information of the pairs alone, each unknown in its own scale.
-        growth: by how much smooth angle errors of the radar widen the rotation's standard deviation; 1 without.
+        information: (6, 6) Gauss-Newton Hessian of the fit, for Newton steps from it.
+        quantile: the factor on the covariance that gives the 95 % ellipsoid.
+        condition: condition number of the information of the pairs alone, after scaling each unknown.
+        growth: factor by which smooth angle errors of the radar widen the rotation's standard deviation; 1 without them.
     """
 
     covariance: Matrix66
@@ -38,14 +38,14 @@ class PoseCovariance:
 def pose_covariance(refined: ErrorsInVariablesFit) -> PoseCovariance:
     """Invert the observed information of the mixture at the optimum, and widen it by errors that the pairs share.
 
-    Pairs that may be outliers (0 < w < 1) carry less than w of their Gauss-Newton information: by Louis' identity
+    Pairs that may be outliers (0 < w < 1) contribute less than w of their Gauss-Newton information: by Louis' identity
 
         I = sum w J^T J - sum w (1 - w) g g^T,   g = J^T e   (whitened).
     """
     plain, _ = normal_equations(refined.measurements, refined.camera_from_radar, refined.model, refined.weights)
     gradients = (np.swapaxes(refined.model.pose_jacobian, 1, 2) @ refined.model.residual[:, :, None])[:, :, 0]
-    doubt = refined.weights * (1.0 - refined.weights)
-    lost = (gradients * doubt[:, None]).T @ gradients
+    weight_variance = refined.weights * (1.0 - refined.weights)
+    lost = (gradients * weight_variance[:, None]).T @ gradients
     information = _floored(plain, lost)
     prior_jacobian = refined.measurements.prior.rows(refined.camera_from_radar)[1]
     pairs_only = plain - prior_jacobian.T @ prior_jacobian
@@ -66,7 +66,7 @@ def pose_covariance(refined: ErrorsInVariablesFit) -> PoseCovariance:
 
 
 def _floored(plain: Matrix66, lost: Matrix66) -> Matrix66:
-    """Subtract the lost information, but leave at least a share of the plain one in every direction."""
+    """Subtract the lost information, but keep at least a share of the plain information in every direction."""
     root = np.linalg.cholesky(plain + 1e-12 * np.diag(np.diag(plain)))
     inverse = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(np.eye(6) - inverse @ lost @ inverse.T)
@@ -75,7 +75,7 @@ def _floored(plain: Matrix66, lost: Matrix66) -> Matrix66:
 
 
 def _widened(covariance: Matrix66, plain: Matrix66, spread: Matrix66) -> Matrix66:
-    """Add to a covariance what smooth angle errors add to the plain one, in no direction less than nothing."""
+    """Add to a covariance what smooth angle errors add to the plain one, in every direction at least zero."""
     root = np.linalg.cholesky(plain)
     values, vectors = np.linalg.eigh(root.T @ spread @ root - np.eye(6))
     back = np.linalg.inv(root).T @ vectors
@@ -98,10 +98,10 @@ def _scaled_condition(information: Matrix66) -> float:
 def _quantile(degrees_of_freedom: float, from_pairs: float) -> float:
     """Return the 95 % quantile for 6 parameters: chi-square with the noise known, 6 F(6, nu) with it estimated.
 
-    What a measured camera position contributes needs no estimated noise; the two are mixed by their shares.
+    The contribution of a measured camera position does not depend on the estimated noise; the two are mixed by their shares.
 
     Args:
-        degrees_of_freedom: nu, behind the noise level; 0 where it was not estimated.
+        degrees_of_freedom: nu of the noise level; 0 if it was not estimated.
         from_pairs: the share of the parameters that the pairs determine, 0 to 1.
     """
     if degrees_of_freedom <= 0:

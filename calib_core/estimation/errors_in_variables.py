@@ -1,13 +1,13 @@
-"""The final fit: errors in variables, with a mixture that says which pairs to believe and how large the noise really is.
+"""Errors in variables: the final fit of pose and true reflector positions, with inlier probabilities and noise levels.
 
 Pose and true reflector positions mu are estimated together, by expectation-maximisation over
 
     sum_i w_i [ |z_i - pi(R p(mu_i) + t)|^2_C + |m_i - mu_i|^2_V ] + |c - c0|^2 / sigma_c^2,
 
-the mu_i eliminated exactly (equation (2) of `measurement_model`). Plain PnP takes the noisy m_i for the truth; its bias does not
-shrink with more pairs. w_i is the probability that pair i is no outlier: neither a click anywhere on the image nor a slip,
-which lies near where it should, but several times farther off than noise explains. Each pair is judged by what the others
-predict of it (`leave_one_out_prediction`): judged by a fit and a noise level that it has bent itself, a wrong pair passes.
+with the mu_i eliminated exactly (equation (2) of `linearization`). Plain PnP takes the noisy m_i as the truth; the resulting
+bias does not shrink with more pairs. w_i is the probability that pair i is an inlier: neither an outlier anywhere on the
+image nor a near outlier, several times farther off than noise explains. Each pair is judged by its leave-one-out prediction
+(`leave_one_out_prediction`): a wrong pair would pass a test against a fit and a noise level that it has itself distorted.
 """
 
 from dataclasses import dataclass, field
@@ -37,12 +37,12 @@ _ROUNDS_BEFORE_SCALES = 3
 _ROUNDS_PER_WEIGHING = 3  # weights settle long before noise scales do
 _TOLERANCES = (1e-8, 1e-6)  # of a step in standard deviations of the pose, and of a relative change of the noise scales
 _COARSE_TOLERANCES = (0.02, 0.02)
-_STEADIEST = 0.95  # ratio of one change of the noise scales to the one before, beyond which none is foretold
+_LARGEST_RATIO = 0.95  # of successive changes of the noise scales; above it nothing is extrapolated
 _PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # pseudo-counts of the inlier share
-_SLIP_SHARE = 0.01  # of the pairs that are no outliers anywhere on the image
-_SLIP_FACTOR = 5.0  # how many times noisier a slip is
+_NEAR_OUTLIER_SHARE = 0.01  # of the pairs that are not outliers anywhere on the image
+_NEAR_OUTLIER_FACTOR = 5.0  # how many times noisier a near outlier is
 _LEAST_PAIRS_FOR_SCALES = 5.0
-_NEAR = 6.0  # standard deviations beyond which a pair says nothing about its own true position
+_NEAR = 6.0  # standard deviations beyond which a pair does not update its own true position
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ class ErrorsInVariablesFit:
         measurements: the measurements with the estimated noise.
         model: the linear model at the optimum, whitened by that noise.
         noise_scale: (4,) estimated over assumed sigma of (click, range, azimuth, elevation).
-        degrees_of_freedom: that went into the noise scales, the assumed sigmas' own included; 0 where not estimated.
+        degrees_of_freedom: of the noise scales, those of the assumed sigmas included; 0 if not estimated.
         inlier_share: prior probability of an inlier, estimated.
     """
 
@@ -77,29 +77,29 @@ class ErrorsInVariablesFit:
 
 @dataclass(slots=True)
 class _State:
-    """Where the rounds stand; lives only inside `fit_errors_in_variables`."""
+    """The state of the iteration; used only inside `fit_errors_in_variables`."""
 
     pose: RigidTransform
     polar: np.ndarray | None
     """(3, n) true positions"""
     rows: Indices
     measured: MeasurementPlanes
-    """of those rows, with the noise of the round"""
+    """of those rows, with the noise of the current round"""
     scale: Values
     share: float
     weights: Values = field(default_factory=lambda: np.zeros(0))
     change: Values = field(default_factory=lambda: np.zeros(4))
-    """of the logarithm of the scales in the round before"""
+    """of the logarithm of the scales in the previous round"""
 
-    def rescale(self, scale: Values, *, foretell: bool) -> float:
-        """Take new noise scales; return by how much they differ from the old ones, relatively.
+    def rescale(self, scale: Values, *, extrapolate: bool) -> float:
+        """Set new noise scales; return their largest relative change.
 
-        Their changes shrink by a steady ratio q from round to round, at times slowly. To foretell adds what all later
-        rounds would, q / (1 - q) times the change (Aitken); it saves rounds and moves no fixed point.
+        The changes shrink by a steady ratio q from round to round, at times slowly. Extrapolation (Aitken) adds what all
+        later rounds would, q / (1 - q) times the change; it saves rounds and does not move the fixed point.
         """
         change = np.log(scale / self.scale)
         ratio = float(change @ self.change) / max(float(self.change @ self.change), 1e-300)
-        if foretell and 0.0 < ratio < _STEADIEST:
+        if extrapolate and 0.0 < ratio < _LARGEST_RATIO:
             scale = scale * np.exp(change * (ratio / (1.0 - ratio)))
         self.scale, self.change = scale, change
         return float(np.abs(change).max())
@@ -108,11 +108,11 @@ class _State:
 def fit_errors_in_variables(
     measurements: PairMeasurements, start: GncSolution, *, estimate_scale: bool, coarse: bool = False
 ) -> ErrorsInVariablesFit:
-    """Fit pose, true positions, inlier probabilities and, if wanted, the noise level.
+    """Fit pose, true positions, inlier probabilities and, optionally, the noise level.
 
     Args:
         measurements: all pairs with the assumed noise.
-        start: where graduated non-convexity ended.
+        start: the solution of graduated non-convexity.
         estimate_scale: estimate variance components once there are enough pairs.
         coarse: stop when pose and noise level are known to a few hundredths of a standard deviation.
     """
@@ -131,7 +131,7 @@ def fit_errors_in_variables(
         moved = 0.0
         if estimate_scale and round_ >= _ROUNDS_BEFORE_SCALES and state.weights.sum() >= _LEAST_PAIRS_FOR_SCALES:
             scale, degrees = _variance_components(state, model, parts, hessian)
-            moved = state.rescale(scale, foretell=round_ % _ROUNDS_PER_WEIGHING == 2)
+            moved = state.rescale(scale, extrapolate=round_ % _ROUNDS_PER_WEIGHING == 2)
         settled = step < tolerances[0] and moved < tolerances[1]
         if settled and round_ > _ROUNDS_BEFORE_SCALES and (weigh or coarse):
             break
@@ -141,7 +141,7 @@ def fit_errors_in_variables(
 
 
 def _first_weights(measurements: PairMeasurements, state: _State) -> Values:
-    """Weigh pairs by their plain residuals, there being no fit yet that could predict."""
+    """Weight pairs by their plain residuals, because there is no fit yet to predict them from."""
     odds = log_odds_of(measurements, _model(measurements, state), measurements.log_score[state.rows], state.share)
     return _probability(odds)
 
@@ -153,7 +153,7 @@ def _probability(odds: Values) -> Values:
 def _expect(
     measurements: PairMeasurements, state: _State, *, weigh: bool, scaled: bool
 ) -> tuple[Linearization, NoiseParts]:
-    """Associate candidates and, if so told, weigh pairs at the present pose, each by the others (E-step)."""
+    """Associate candidates at the current pose and, if `weigh`, weight each pair by its prediction from the others (E-step)."""
     if not measurements.one_to_one:
         rows = associate(measurements, state.pose)[0]
         if state.polar is not None:
@@ -174,12 +174,12 @@ def _expect(
 def _log_odds(
     measurements: PairMeasurements, state: _State, model: Linearization, predicted: LeaveOneOutPrediction
 ) -> Values:
-    """Return log odds (n,) of an inlier against a slip or an outlier anywhere on the image."""
+    """Return log odds (n,) of an inlier against a near outlier or an outlier anywhere on the image."""
     area_px2 = measurements.camera.width_px * measurements.camera.height_px
     prior = np.log(state.share) - np.log1p(-state.share) + measurements.log_score[state.rows]
     anywhere = -prior + 0.5 * model.log_determinant - np.log(area_px2)
-    slip = np.log(_SLIP_SHARE) - np.log1p(-_SLIP_SHARE) + predicted.log_density(_SLIP_FACTOR)
-    return np.asarray(predicted.log_density() - np.logaddexp(anywhere, slip))
+    near = np.log(_NEAR_OUTLIER_SHARE) - np.log1p(-_NEAR_OUTLIER_SHARE) + predicted.log_density(_NEAR_OUTLIER_FACTOR)
+    return np.asarray(predicted.log_density() - np.logaddexp(anywhere, near))
 
 
 def _model(measurements: PairMeasurements, state: _State) -> Linearization:
@@ -188,7 +188,7 @@ def _model(measurements: PairMeasurements, state: _State) -> Linearization:
 
 
 def _maximise(measurements: PairMeasurements, state: _State, model: Linearization) -> tuple[float, Matrix66]:
-    """Step pose and true positions (M-step); return the step's length in standard deviations, and the Hessian."""
+    """Update pose and true positions (M-step); return the step's length in standard deviations, and the Hessian."""
     hessian, gradient = normal_equations(measurements, state.pose, model, state.weights)
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
     step = np.linalg.solve(hessian / np.outer(scale, scale) + 1e-12 * np.eye(6), gradient / scale) / scale

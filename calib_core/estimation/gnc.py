@@ -1,8 +1,8 @@
-"""Which pairs agree, and on what pose: graduated non-convexity on whitened residuals, candidates associated on the way.
+"""Graduated non-convexity (GNC): the pose that most pairs agree on, candidates being associated in each step.
 
-Residuals are whitened by S = C + J V J^T, so one radius in standard deviations serves every radar, range and lens; a
-threshold in pixels cannot. The radius of the Geman-McClure loss shrinks from "nearly least squares" to "nearly a vote".
-All starts take their steps together, as one batch of arrays: for a few dozen pairs, the calls are what costs time.
+Residuals are whitened by S = C + J V J^T, so one radius in standard deviations suits every radar, range and lens; a
+threshold in pixels cannot. The radius of the Geman-McClure loss shrinks from nearly least squares to one that ignores outliers.
+All starts are iterated together as one batch of arrays: for a few dozen pairs, call overhead dominates the run time.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from calib_core.geometry import RigidTransform, rotation_exp
 __all__ = ["GncSolution", "associate", "log_odds_of", "mixture_cost", "normal_equations", "solve_gnc"]
 
 RADII = (12.0, 8.0, 5.5, 4.0, 3.0)
-"""Of the Geman-McClure loss, in standard deviations, one after the other."""
+"""Radii of the Geman-McClure loss in standard deviations, in order of use."""
 
 _STEPS_PER_RADIUS = 2
 _INLIER_SHARE = 0.8
@@ -34,7 +34,7 @@ class GncSolution:
     Attributes:
         camera_from_radar: the pose.
         cost: twice the negative log-likelihood of pose and pairs under the inlier / outlier mixture.
-        noise_scale: by how much the assumed noise must grow for the residuals to look like noise; at least 1.
+        noise_scale: the factor on the assumed noise that explains the residuals; at least 1.
     """
 
     camera_from_radar: RigidTransform
@@ -60,18 +60,18 @@ class _Poses:
         return _Poses(self.rotations[which], self.translations_m[which])
 
     def transforms(self) -> list[RigidTransform]:
-        u, _, vt = np.linalg.svd(self.rotations)  # the nearest rotation: steps round a little off
+        u, _, vt = np.linalg.svd(self.rotations)  # the nearest rotation: steps accumulate rounding errors
         return [RigidTransform(r, t) for r, t in zip(u @ vt, self.translations_m, strict=True)]
 
 
 def solve_gnc(
     measurements: PairMeasurements, starts: Sequence[RigidTransform], *, estimate_scale: bool
 ) -> tuple[GncSolution, ...]:
-    """Refine every start by graduated non-convexity; the most likely pose first.
+    """Refine every start by graduated non-convexity; return the most likely pose first.
 
     Args:
         measurements: the pairs.
-        starts: poses to begin at.
+        starts: initial poses.
         estimate_scale: allow a larger noise than assumed.
     """
     if not starts:
@@ -88,7 +88,7 @@ def solve_gnc(
 
 
 def _graduated(measurements: PairMeasurements, poses: _Poses) -> _Poses:
-    """Follow the shrinking radius from all starts at once; of those that end in the same pose only the first stays."""
+    """Run all radii from all starts at once; of the starts that end in the same pose, keep only the first."""
     measured = _of_candidates(measurements)
     for radius in RADII:
         for _ in range(_STEPS_PER_RADIUS):
@@ -100,7 +100,7 @@ def _graduated(measurements: PairMeasurements, poses: _Poses) -> _Poses:
 
 
 def _distinct(poses: _Poses, hessians: np.ndarray) -> list[int]:
-    """Return the starts that no earlier one has come to as well."""
+    """Return the indices of the poses that differ from all earlier ones."""
     kept: list[int] = []
     for i in range(len(hessians)):
         turned = poses.rotations[kept] @ poses.rotations[i].T
@@ -144,14 +144,14 @@ def _associated(
 def normal_equations(
     measurements: PairMeasurements, pose: RigidTransform, model: Linearization, weights: Values
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the Gauss-Newton Hessian (6, 6) and the descent direction's right-hand side (6,), prior included."""
+    """Return the Gauss-Newton Hessian (6, 6) and the right-hand side (6,) of the normal equations, prior included."""
     return _normal_equations(measurements, _Poses(pose.rotation, pose.translation_m), model, weights)
 
 
 def _normal_equations(
     measurements: PairMeasurements, poses: _Poses, model: Linearization, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return Hessians (..., 6, 6) and right-hand sides (..., 6): both are in the product of (residual, Jacobian) rows."""
+    """Return Hessians (..., 6, 6) and right-hand sides (..., 6), both blocks of one product of (residual, Jacobian) rows."""
     rows = model.planes[..., :7, :, :] * np.sqrt(weights)[..., None, None, :]
     rows = rows.reshape(*rows.shape[:-2], -1)
     product = rows @ np.swapaxes(rows, -1, -2)
@@ -160,7 +160,7 @@ def _normal_equations(
 
 
 def _damped(hessians: np.ndarray, gradients: np.ndarray) -> np.ndarray:
-    """Solve for steps (s, 6), held to 0.5 rad and 2 m, with a whiff of damping where the pairs leave a direction open."""
+    """Solve for steps (s, 6) of at most 0.5 rad and 2 m, slightly damped for directions that the pairs do not determine."""
     scale = np.sqrt(np.maximum(np.diagonal(hessians, axis1=1, axis2=2), 1e-12))
     scaled = hessians / (scale[:, :, None] * scale[:, None, :]) + 1e-9 * np.eye(6)
     steps = np.linalg.solve(scaled, (gradients / scale)[:, :, None])[:, :, 0] / scale
@@ -176,19 +176,19 @@ def log_odds_of(measurements: PairMeasurements, model: Linearization, log_score:
 def _log_odds(
     measurements: PairMeasurements, deviance: np.ndarray, log_score: np.ndarray, inlier_share: float
 ) -> np.ndarray:
-    """Return the same from the squared distance plus log det S."""
+    """Return the same from the deviance: squared distance plus log det S."""
     area_px2 = measurements.camera.width_px * measurements.camera.height_px
     prior = np.log(inlier_share) - np.log1p(-inlier_share)
     return np.asarray(log_score - 0.5 * deviance + (prior - np.log(2.0 * np.pi) + np.log(area_px2)))
 
 
 def mixture_cost(measurements: PairMeasurements, pose: RigidTransform) -> float:
-    """Return twice the negative log-likelihood of the mixture, against "all are outliers", with what is known of the camera."""
+    """Return twice the negative log-likelihood of the mixture relative to "all are outliers", camera prior included."""
     return float(_mixture_costs(measurements, _Poses.of([pose]), (1.0,))[0, 0])
 
 
 def _mixture_costs(measurements: PairMeasurements, poses: _Poses, scales: Sequence[float]) -> np.ndarray:
-    """Return the costs (s, k) if all noise were larger by each scale: S grows by its square, log det S by 4 log scale."""
+    """Return the costs (s, k) with all noise multiplied by each scale: S grows by its square, log det S by 4 log scale."""
     rows, model = _associated(measurements, _of_candidates(measurements), poses)
     factors = np.array(scales)[:, None]
     deviance = model.squared[:, None, :] / factors**2 + model.log_determinant[:, None, :] + 4.0 * np.log(factors)

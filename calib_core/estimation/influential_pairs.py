@@ -1,8 +1,8 @@
-"""Pairs that the pose leans on and the others contradict.
+"""Influential pairs: pairs that the pose depends on and that the other pairs contradict.
 
-A wrong pair that few others check is not far enough from their prediction to be counted out: near the camera and at the
-edge of the picture, the pose follows it. Each pair is tested against the prediction of the others, and of the chance of a
-false alarm each gets a share by its leverage: doubt goes where a mistake would cost.
+A wrong pair that few others check can be too close to their prediction to be rejected as an outlier: near the camera and
+at the edge of the picture, the pose follows it. Each pair is tested against its prediction from the others. The
+false-alarm probability is divided among the pairs by leverage, so the test is most sensitive where an error would do most harm.
 """
 
 from collections.abc import Sequence
@@ -19,12 +19,12 @@ from calib_core.estimation.measurement_model import PairMeasurements
 
 __all__ = ["InfluentialPair", "average_over_influential_pairs", "find_influential_pairs"]
 
-_LEVEL = 0.055  # of a false alarm in a whole set of pairs
-_LARGEST_SHARE = 0.25  # of that level that goes to one pair
-_SCREENING = 4.0  # how much more lenient the test by one Newton step is
+_LEVEL = 0.055  # false-alarm probability per set of pairs
+_LARGEST_SHARE = 0.25  # of that level for one pair
+_SCREENING = 4.0  # factor by which the screening by one Newton step is more lenient
 _MOST_REFITS = 2
 _LEAST_PAIRS = 8.0  # fewer cannot check one another
-_LEAST_MOVE = 2.0  # standard deviations: a pair that moves the pose less does little harm
+_LEAST_MOVE = 2.0  # standard deviations; a pair that moves the pose less does little harm
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,9 +33,9 @@ class InfluentialPair:
 
     Attributes:
         pair: its index in the measurements.
-        move: (6,) by how much the pose moves without it, (dt, dtheta) [m, rad].
-        camera_move_m: how far the camera centre moves.
-        standard_deviations: how far the pair lies from what the others predict.
+        move: (6,) change of the pose without it, (dt, dtheta) [m, rad].
+        camera_move_m: distance by which the camera centre moves.
+        standard_deviations: distance of the pair from the prediction of the others.
     """
 
     pair: int
@@ -47,7 +47,7 @@ class InfluentialPair:
 def find_influential_pairs(
     measurements: PairMeasurements, refined: ErrorsInVariablesFit, information: Matrix66
 ) -> tuple[InfluentialPair, ...]:
-    """Find the pairs in doubt; those that looked so at first are left out in earnest.
+    """Find the influential pairs: screen all pairs by one Newton step, then refit without each suspect.
 
     Args:
         measurements: all pairs with the assumed noise.
@@ -66,16 +66,16 @@ def find_influential_pairs(
     chances = tail_chance(one.squared(), one.degrees_of_freedom)
     suspects = np.flatnonzero(chances < _SCREENING * levels)
     worst = suspects[np.argsort(chances[suspects] / levels[suspects], kind="stable")][:_MOST_REFITS]
-    doubts = [_left_out(measurements, refined, int(pair)) for pair in worst]
+    refits = [_left_out(measurements, refined, int(pair)) for pair in worst]
     return tuple(
-        doubt
-        for doubt, chance in doubts
-        if chance < levels[doubt.pair] and doubt.move @ information @ doubt.move > _LEAST_MOVE**2
+        influential
+        for influential, chance in refits
+        if chance < levels[influential.pair] and influential.move @ information @ influential.move > _LEAST_MOVE**2
     )
 
 
 def _shares(refined: ErrorsInVariablesFit, information: Matrix66) -> Values:
-    """Share out the level by the square of each pair's leverage w tr(J H^-1 J^T), to none too much."""
+    """Divide the level among the pairs by squared leverage w tr(J H^-1 J^T), with a limit per pair."""
     jacobian = refined.model.pose_jacobian
     leverage = refined.weights * ((jacobian @ np.linalg.inv(information)) * jacobian).sum(axis=(1, 2))
     return np.minimum(leverage**2 / (leverage**2).sum(), _LARGEST_SHARE)
@@ -84,7 +84,7 @@ def _shares(refined: ErrorsInVariablesFit, information: Matrix66) -> Values:
 def _left_out(
     measurements: PairMeasurements, refined: ErrorsInVariablesFit, pair: int
 ) -> tuple[InfluentialPair, float]:
-    """Fit all pairs but one and predict that one; with the chance of a residual as large."""
+    """Fit all pairs but one and predict that one; return also the probability of a residual as large."""
     others = measurements.some(np.delete(np.arange(len(measurements)), pair))
     start = GncSolution(refined.camera_from_radar, 0.0, 1.0)
     fit = fit_errors_in_variables(others, start, estimate_scale=refined.degrees_of_freedom > 0)
@@ -94,26 +94,26 @@ def _left_out(
     spread = np.eye(2) + jacobian @ pose_covariance(fit).covariance @ jacobian.T
     squared = float(residual @ np.linalg.solve(spread, residual))
     before, after = (one.camera_from_radar.inverse().translation_m for one in (refined, fit))
-    doubt = InfluentialPair(
+    influential = InfluentialPair(
         pair=pair,
         move=fit.camera_from_radar.error_from(refined.camera_from_radar),
         camera_move_m=float(np.linalg.norm(after - before)),
         standard_deviations=float(np.sqrt(squared)),
     )
     degrees = fit.degrees_of_freedom if fit.degrees_of_freedom > 0 else np.inf
-    return doubt, float(tail_chance(np.array([squared]), np.array([degrees]))[0])
+    return influential, float(tail_chance(np.array([squared]), np.array([degrees]))[0])
 
 
 def average_over_influential_pairs(
-    refined: ErrorsInVariablesFit, uncertainty: PoseCovariance, doubts: Sequence[InfluentialPair]
+    refined: ErrorsInVariablesFit, uncertainty: PoseCovariance, influential_pairs: Sequence[InfluentialPair]
 ) -> tuple[ErrorsInVariablesFit, PoseCovariance]:
-    """Put the pose midway between the one with each doubtful pair and the one without it, and state both as likely.
+    """Move the pose midway between those with and without each influential pair, and widen the covariance to cover both.
 
-    Of two values m apart that are equally likely, the middle has the smallest expected squared error, m m^T / 4.
+    Of two equally likely values m apart, the midpoint has the smallest expected squared error, m m^T / 4.
     """
-    if not doubts:
+    if not influential_pairs:
         return refined, uncertainty
-    move = np.sum([0.5 * doubt.move for doubt in doubts], axis=0)
-    covariance = uncertainty.covariance + sum(0.25 * np.outer(doubt.move, doubt.move) for doubt in doubts)
+    move = np.sum([0.5 * pair.move for pair in influential_pairs], axis=0)
+    covariance = uncertainty.covariance + sum(0.25 * np.outer(pair.move, pair.move) for pair in influential_pairs)
     moved = replace(refined, camera_from_radar=refined.camera_from_radar.perturbed(move))
     return moved, replace(uncertainty, covariance=covariance)

@@ -1,8 +1,8 @@
-"""A short list of poses to start from, drawn from pairs of pairs and triples of pairs.
+"""Initialization: a short list of initial poses from minimal two-point and three-point solutions.
 
-Two pairs and a camera centre fix the rotation (Wahba's problem for two directions); three pairs fix the whole pose up to
-four solutions (Grunert's equations). Each draw is scored against all pairs in the radar's own angles, where its noise is
-simple, and the best few that differ are handed on. Nothing here needs to be exact: every start is refined.
+Two pairs and a camera centre determine the rotation (Wahba's problem for two directions); three pairs determine the whole
+pose up to four solutions (P3P by Grunert's equations). Each draw is scored against all pairs in the radar's own angles,
+where its noise is simple, and the best few distinct poses are returned. They need not be exact: every start is refined.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _TWO_POINT_DRAWS = 800
 _THREE_POINT_DRAWS = 300
 _MOST_SCORED_ROWS = 400
 _SCORED_AT_ONCE = 8000  # residuals whose many intermediate arrays fit into the processor's cache
-_FAR = 1e12  # squared residual of what cannot be
+_FAR = 1e12  # squared residual of an impossible position
 _ROBUST_RADIUS = 5.0  # whitened residuals beyond it count as about one outlier each
 _DIFFERENT = 0.15  # rad, or per metre of camera centre: closer starts end in the same pose
 
@@ -45,12 +45,12 @@ class Hypotheses:
 def initial_poses(
     measurements: PairMeasurements, *, most: int, rng: "np.random.Generator"
 ) -> tuple[RigidTransform, ...]:
-    """Draw hypotheses, score them against the pairs and return the best that differ from one another.
+    """Draw hypotheses, score them against the pairs and return the best distinct ones.
 
     Args:
         measurements: the pairs.
         most: how many poses to return.
-        rng: of the draws.
+        rng: random generator of the draws.
     """
     rays = measurements.rays
     usable = np.flatnonzero(np.isfinite(rays).all(axis=1))
@@ -69,7 +69,7 @@ def initial_poses(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Draws:
-    """Which pairs (h, k), and which of their candidate rows (h, k), each hypothesis is made of."""
+    """Which pairs (h, k), and which of their candidate rows (h, k), each hypothesis is made from."""
 
     pairs: Indices
     rows: Indices
@@ -92,7 +92,7 @@ def _draws(measurements: PairMeasurements, usable: Indices, size: int, rng: "np.
 
 
 def two_point_poses(points_radar_m: Points3, rays: Points3, draws: _Draws, centre_m: Vector3) -> Hypotheses:
-    """Turn two directions seen from a known camera centre into two rays (Wahba's problem, both weighted alike)."""
+    """Rotate two directions from a known camera centre onto two rays (Wahba's problem, both weighted equally)."""
     directions = _unit(points_radar_m[draws.rows] - centre_m)
     seen = rays[draws.pairs]
     radar_frames, camera_frames = _frames(directions), _frames(seen)
@@ -168,8 +168,8 @@ def _real_roots(quartic: np.ndarray) -> np.ndarray:
     r = d - a * c / 4.0 + a**2 * b / 16.0 - 3.0 / 256.0 * a**4
     m = _largest_cubic_root(p, p**2 / 4.0 - r, -(q**2) / 8.0)
     side = np.sqrt(2.0 * m)
-    lean = q / np.where(side == 0, 1.0, side)
-    plus, minus = np.sqrt(-2.0 * (p + m + lean)), np.sqrt(-2.0 * (p + m - lean))
+    ratio = q / np.where(side == 0, 1.0, side)
+    plus, minus = np.sqrt(-2.0 * (p + m + ratio)), np.sqrt(-2.0 * (p + m - ratio))
     roots = np.stack([side + plus, side - plus, minus - side, -minus - side], axis=1) / 2.0 - a[:, None] / 4.0
     return np.where(np.abs(roots.imag) < 0.02 * np.abs(roots.real) + 1e-9, roots.real, np.nan)
 
@@ -177,9 +177,9 @@ def _real_roots(quartic: np.ndarray) -> np.ndarray:
 def _largest_cubic_root(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     """Return the root of m^3 + a m^2 + b m + c that is largest in magnitude, for each row (Cardano's formula)."""
     p, q = b - a**2 / 3.0, 2.0 / 27.0 * a**3 - a * b / 3.0 + c
-    swing = np.sqrt(q**2 / 4.0 + p**3 / 27.0)
-    swing = np.where((np.conj(q) * swing).real > 0.0, -swing, swing)  # the sign that does not cancel
-    cube = (-q / 2.0 + swing) ** (1.0 / 3.0)
+    radical = np.sqrt(q**2 / 4.0 + p**3 / 27.0)
+    radical = np.where((np.conj(q) * radical).real > 0.0, -radical, radical)  # the sign without cancellation
+    cube = (-q / 2.0 + radical) ** (1.0 / 3.0)
     cubes = cube * np.exp(2j * np.pi / 3.0 * np.arange(3))[:, None]
     roots = cubes - p / (3.0 * np.where(cubes == 0, 1.0, cubes)) - a / 3.0
     return np.asarray(np.take_along_axis(roots, np.abs(roots).argmax(axis=0)[None], axis=0)[0])
@@ -195,9 +195,9 @@ def _thinned(measurements: PairMeasurements, usable: Indices) -> PairMeasurement
 
 
 def hypothesis_costs(hypotheses: Hypotheses, measurements: PairMeasurements) -> Values:
-    """Score hypotheses by robust angular residuals (h,): each ray, turned back, against the direction to its point.
+    """Score hypotheses (h,) by robust angular residuals: each ray, in radar axes, against the direction to its point.
 
-    The residual is split along azimuth and elevation of the radar, whitened there, and bounded (Geman-McClure).
+    The residual is split into the radar's azimuth and elevation, whitened, and bounded (Geman-McClure).
     """
     variance = (
         measurements.sigma_polar[:, 1:] ** 2
@@ -225,12 +225,12 @@ def hypothesis_costs(hypotheses: Hypotheses, measurements: PairMeasurements) -> 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Scored:
-    """What hypotheses are scored against, as planes: contiguous rows are what makes this quick."""
+    """The data that hypotheses are scored against, as planes: contiguous rows make the scoring fast."""
 
     points_m: np.ndarray
     """(3, m) radar positions"""
     rays: np.ndarray
-    """(3, m) where their clicks look"""
+    """(3, m) rays of their clicks"""
     precision: np.ndarray
     """(2, m) one over the variance of azimuth and elevation [rad^-2]"""
 
@@ -252,7 +252,7 @@ def _focal(measurements: PairMeasurements) -> float:
 
 
 def _best_that_differ(hypotheses: Hypotheses, costs: Values, most: int) -> tuple[RigidTransform, ...]:
-    """Take the cheapest hypothesis, drop all that are like it, and go on."""
+    """Repeatedly take the cheapest hypothesis and drop all that are close to it."""
     left = np.where(np.isfinite(costs), costs, np.inf)
     chosen: list[int] = []
     while len(chosen) < most and np.isfinite(left).any():

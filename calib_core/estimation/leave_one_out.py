@@ -1,4 +1,4 @@
-"""Leave-one-out: each pair predicted by a fit without it, which gives the held-out figures and each pair's influence."""
+"""Leave-one-out: each pair predicted by a fit without it, for the held-out figures and each pair's influence."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ __all__ = ["LeaveOneOut", "leave_one_out"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeaveOneOut:
-    """What happens when each pair is left out in turn.
+    """The effect of leaving out each pair in turn.
 
     Attributes:
-        distance_px: (n,) from the click to where the others predict it.
+        distance_px: (n,) from the click to its prediction by the others.
         influence: (n,) how far the pose moves, in standard deviations.
     """
 
@@ -25,7 +25,7 @@ class LeaveOneOut:
 
 
 def leave_one_out(refined: ErrorsInVariablesFit, information: Matrix66) -> LeaveOneOut:
-    """Leave each pair out by one Newton step: delta_i = -(H - w J_i^T J_i)^-1 w J_i^T e_i.
+    """Leave out each pair by one Newton step: delta_i = -(H - w J_i^T J_i)^-1 w J_i^T e_i.
 
     Args:
         refined: the fit.
@@ -49,5 +49,5 @@ def _projected_after(refined: ErrorsInVariablesFit, moves: np.ndarray, points_ra
     angle = np.linalg.norm(moves[:, 3:], axis=1, keepdims=True)
     axis = moves[:, 3:] / np.maximum(angle, 1e-12)
     along = axis * (axis * turned).sum(axis=1, keepdims=True)
-    swung = along + (turned - along) * np.cos(angle) + np.cross(axis, turned) * np.sin(angle)
-    return refined.measurements.camera.project(swung + refined.camera_from_radar.translation_m + moves[:, :3])
+    rotated = along + (turned - along) * np.cos(angle) + np.cross(axis, turned) * np.sin(angle)
+    return refined.measurements.camera.project(rotated + refined.camera_from_radar.translation_m + moves[:, :3])

@@ -1,14 +1,13 @@
-"""How well the other pairs predict each pair: whether to believe it must not be asked of a fit it has bent itself.
+"""Leave-one-out prediction: each pair predicted from all others by one Newton step, for its inlier probability.
 
-A pair with much leverage pulls the pose to itself, and one with a large residual raises the noise level that judges it.
-Both hide it. So pair i is judged by the pose and the noise that the others give, each by one Newton step from the fit of
-all. With H the information, w the weights, J and e whitened as in `measurement_model`,
+A pair with high leverage pulls the pose towards itself, and one with a large residual raises the noise level it is judged
+by. Both hide an outlier. Pair i is therefore judged by the pose and the noise of the others, each found by one Newton step
+from the fit of all. With H the information, w the weights, J and e whitened as in `linearization`,
 
     P = (H - w_i J_i^T J_i)^-1,    d = P (g - w_i J_i^T e_i),    e_i - J_i d ~ N(0, S_i + J_i P J_i^T),      (4)
 
-g being the gradient of all pairs, and S_i built from the noise scales that the others have at the pose moved by d. No
-matrix is inverted per pair: with C = H^-1, B = C J^T, G = J C J^T and N = (I - w G)^-1, which is 2 x 2, Woodbury's
-identity gives
+where g is the gradient of all pairs, and S_i uses the noise scales of the others at the pose moved by d. No 6 x 6 matrix
+is inverted per pair: with C = H^-1, B = C J^T, G = J C J^T and N = (I - w G)^-1, which is 2 x 2, Woodbury's identity gives
 
     P = C + w B N B^T,    J P = N J C,    J P J^T = N G.                                                     (5)
 """
@@ -36,22 +35,22 @@ __all__ = [
 ]
 
 PSEUDO_REDUNDANCY = 6.0
-"""Pseudo-degrees of freedom that pull each noise scale to what it leans on."""
+"""Pseudo-degrees of freedom that shrink each noise scale towards its prior value."""
 
 PSEUDO_SHARED = 4.0
-"""The same of the level that range, azimuth and elevation share."""
+"""The same for the level that range, azimuth and elevation share."""
 
 COMPONENTS = np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=np.float64)
 """Which of (click, range, azimuth, elevation) each of the five columns of noise belongs to."""
 
 _SCALE_LIMITS = (0.1, 12.0)
-_MANY_DEGREES = 1e9  # as good as infinite
-_OWN_SHARE = 0.999  # of its own information that a pair loses; with all of it, four pairs leave nothing to invert
+_MANY_DEGREES = 1e9  # effectively infinite
+_OWN_SHARE = 0.999  # of its own information that is removed with a pair; removing all of it makes four pairs singular
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NoiseParts:
-    """The whitened noise of each pair taken apart: S = sum of its columns' squares.
+    """The whitened noise of each pair by component: its covariance is the sum of c c^T over the columns c.
 
     Attributes:
         planes: (5, 2, n) W Q^(1/2) of click u, click v, range, azimuth, elevation; they add up to the identity.
@@ -63,7 +62,7 @@ class NoiseParts:
 
     @property
     def columns(self) -> np.ndarray:
-        """The same pair by pair: (n, 2, 5)."""
+        """The planes by pair: (n, 2, 5)."""
         return np.asarray(self.planes.T)
 
     def squared_lengths(self, matrix: "Symmetric") -> np.ndarray:
@@ -103,41 +102,43 @@ class Symmetric:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeaveOneOutPrediction:
-    """What the other pairs say about each pair, whitened by the noise of all.
+    """The prediction of each pair from the others, whitened by the noise of all.
 
     Attributes:
         residual_planes: (2, n) under the pose of the others.
         noise: S by the noise of the others.
-        doubt: J P J^T, what the others leave open.
-        degrees_of_freedom: (n,) behind that noise; infinite where it was not estimated.
+        propagated: J P J^T, the pose covariance of the others propagated to the pixel.
+        degrees_of_freedom: (n,) of that noise; infinite if it was not estimated.
     """
 
     residual_planes: np.ndarray
     noise: Symmetric
-    doubt: Symmetric
+    propagated: Symmetric
     degrees_of_freedom: Values
 
     @property
     def residual(self) -> np.ndarray:
-        """The same pair by pair: (n, 2)."""
+        """The residual by pair: (n, 2)."""
         return np.asarray(self.residual_planes.T)
 
     def squared(self, noise_factor: float = 1.0) -> Values:
-        """Return the squared Mahalanobis distance (n,) of the residual, the pair's own noise larger by a factor."""
+        """Return the squared Mahalanobis distance (n,) of the residual, with the pair's own noise multiplied by a factor."""
         return self._spread(noise_factor).distance(self.residual_planes)
 
     def log_density(self, noise_factor: float = 1.0) -> Values:
-        """Return the logarithm (n,) of Student's density of the whitened residual, the pair's own noise larger by a factor.
+        """Return the log density (n,) of the whitened residual under Student's t, the pair's own noise times a factor.
 
-        In two dimensions it is (1 + T^2 / nu)^(-(nu + 2) / 2) / (2 pi sqrt(det)); with nu infinite the normal one.
+        In two dimensions the density is (1 + T^2 / nu)^(-(nu + 2) / 2) / (2 pi sqrt(det)); with nu infinite, the normal one.
         """
         spread, nu = self._spread(noise_factor), np.minimum(self.degrees_of_freedom, _MANY_DEGREES)
         tail = (nu + 2.0) / 2.0 * np.log1p(spread.distance(self.residual_planes) / nu)
         return np.asarray(-tail - 0.5 * np.log(spread.determinant()) - np.log(2.0 * np.pi))
 
     def _spread(self, noise_factor: float) -> Symmetric:
-        noise, doubt, factor = self.noise, self.doubt, noise_factor**2
-        return Symmetric(factor * noise.uu + doubt.uu, factor * noise.uv + doubt.uv, factor * noise.vv + doubt.vv)
+        noise, propagated, factor = self.noise, self.propagated, noise_factor**2
+        return Symmetric(
+            factor * noise.uu + propagated.uu, factor * noise.uv + propagated.uv, factor * noise.vv + propagated.vv
+        )
 
 
 def tail_chance(squared: Values, degrees_of_freedom: Values) -> Values:
@@ -145,18 +146,18 @@ def tail_chance(squared: Values, degrees_of_freedom: Values) -> Values:
 
     Args:
         squared: (n,) Mahalanobis distances.
-        degrees_of_freedom: (n,) nu; infinite where the noise is known.
+        degrees_of_freedom: (n,) nu; infinite if the noise is known.
     """
     nu = np.minimum(degrees_of_freedom, _MANY_DEGREES)
     return np.asarray(np.exp(-0.5 * nu * np.log1p(squared / nu)))
 
 
 def noise_parts(measurements: PairMeasurements, model: Linearization, sigma_polar: np.ndarray) -> NoiseParts:
-    """Take the whitened noise of each pair apart.
+    """Split the whitened noise of each pair into its components.
 
     Args:
         measurements: with the noise that whitened the model.
-        model: at the present pose.
+        model: at the current pose.
         sigma_polar: (n, 3) of the chosen candidates.
     """
     planes = np.empty((5, *model.planes.shape[1:]))
@@ -178,40 +179,40 @@ def predict_left_out(
 
     Args:
         measurements: with the noise that whitened the model.
-        pose: the present one.
+        pose: the current one.
         model: at that pose.
         weights: (n,) of all pairs.
         parts: of the noise.
-        scale: (4,) estimated over assumed noise; None where the noise is as assumed.
+        scale: (4,) estimated over assumed noise; None if the noise is as assumed.
     """
     hessian, gradient = normal_equations(measurements, pose, model, weights)
     residual, jacobian = model.planes[0], model.planes[1:7]
     inverse = np.linalg.inv(hessian + 1e-12 * np.diag(np.diag(hessian)))
     back = (inverse @ jacobian.reshape(6, -1)).reshape(jacobian.shape)  # B
-    reach = Symmetric.between(jacobian, back)  # G
+    leverage = Symmetric.between(jacobian, back)  # G
     own = _OWN_SHARE * weights
-    freed = _freed(reach, own)  # N
-    # C (g - w J^T e), seen at the pair by J, and what P makes of it
-    aim = (inverse @ gradient)[:, None] - weights * (back * residual).sum(axis=1)
-    seen = freed.of((jacobian * aim[:, None]).sum(axis=0))
+    factor = _woodbury_factor(leverage, own)  # N
+    # C (g - w J^T e), mapped to the pair by J, and the same with P instead of C
+    step = (inverse @ gradient)[:, None] - weights * (back * residual).sum(axis=1)
+    seen = factor.of((jacobian * step[:, None]).sum(axis=0))
     left = residual - seen
-    doubt = Symmetric(
-        freed.uu * reach.uu + freed.uv * reach.uv,
-        freed.uu * reach.uv + freed.uv * reach.vv,
-        freed.uv * reach.uv + freed.vv * reach.vv,
+    propagated = Symmetric(
+        factor.uu * leverage.uu + factor.uv * leverage.uv,
+        factor.uu * leverage.uv + factor.uv * leverage.vv,
+        factor.uv * leverage.uv + factor.vv * leverage.vv,
     )
-    grown, degrees = np.ones((len(weights), 4)), np.full(len(weights), np.inf)
+    growth, degrees = np.ones((len(weights), 4)), np.full(len(weights), np.inf)
     if scale is not None:
-        moves = aim + (back * (own * seen)).sum(axis=1)
-        others = _Others(parts, weights, jacobian, moves, left, doubt, inverse, back, _scaled_by(freed, own))
+        moves = step + (back * (own * seen)).sum(axis=1)
+        others = _Others(parts, weights, jacobian, moves, left, propagated, inverse, back, _scaled_by(factor, own))
         found, degrees = _scales_of_others(others, scale)
-        grown = found / scale
-    return LeaveOneOutPrediction(left, _noise(parts, grown, model), doubt, degrees)
+        growth = found / scale
+    return LeaveOneOutPrediction(left, _noise(parts, growth, model), propagated, degrees)
 
 
-def _freed(reach: Symmetric, weights: Values) -> Symmetric:
+def _woodbury_factor(leverage: Symmetric, weights: Values) -> Symmetric:
     """Return N = (I - w G)^-1."""
-    uu, uv, vv = 1.0 - weights * reach.uu, weights * reach.uv, 1.0 - weights * reach.vv
+    uu, uv, vv = 1.0 - weights * leverage.uu, weights * leverage.uv, 1.0 - weights * leverage.vv
     determinant = uu * vv - uv * uv
     return Symmetric(vv / determinant, uv / determinant, uu / determinant)
 
@@ -220,9 +221,9 @@ def _scaled_by(matrix: Symmetric, factors: Values) -> Symmetric:
     return Symmetric(factors * matrix.uu, factors * matrix.uv, factors * matrix.vv)
 
 
-def _noise(parts: NoiseParts, grown: np.ndarray, model: Linearization) -> Symmetric:
-    """Put the columns together again, each larger by what its scale (n, 4) has grown by."""
-    planes = parts.planes * (COMPONENTS @ grown.T)[:, None, :]
+def _noise(parts: NoiseParts, growth: np.ndarray, model: Linearization) -> Symmetric:
+    """Recombine the columns, each multiplied by the growth (n, 4) of its scale."""
+    planes = parts.planes * (COMPONENTS @ growth.T)[:, None, :]
     uu, vv = (planes**2).sum(axis=0)
     uv = (planes[:, 0] * planes[:, 1]).sum(axis=0)
     unseen = model.whitening_planes[0] == 0.0
@@ -231,7 +232,7 @@ def _noise(parts: NoiseParts, grown: np.ndarray, model: Linearization) -> Symmet
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Others:
-    """What the noise scales without each pair are made of; letters as in equation (5)."""
+    """The inputs of the noise scales without each pair; letters as in equation (5)."""
 
     parts: NoiseParts
     weights: Values
@@ -241,12 +242,12 @@ class _Others:
     """(6, n) d"""
     left: np.ndarray
     """(2, n) e - J d"""
-    doubt: Symmetric
+    propagated: Symmetric
     inverse: np.ndarray
     """(6, 6) C"""
     back: np.ndarray
     """(6, 2, n) B"""
-    freed: Symmetric
+    factor: Symmetric
     """w N"""
 
 
@@ -259,17 +260,19 @@ def _scales_of_others(o: _Others, scale: Values) -> tuple[np.ndarray, Values]:
     linear = (weighted @ along[:, :, None])[:, :, 0]
     quadratic, taken = weighted @ turned, (weighted * weights) @ turned  # (5, 6, 6)
     own = (columns * o.left).sum(axis=1) ** 2
-    bent = (_by_component(quadratic) @ o.moves * o.moves).sum(axis=1)
+    second_order = (_by_component(quadratic) @ o.moves * o.moves).sum(axis=1)
     squares = COMPONENTS.T @ ((weights * along**2).sum(axis=1, keepdims=True) - 2.0 * linear @ o.moves - weights * own)
-    squares = np.maximum(squares + bent, 0.0)
+    squares = np.maximum(squares + second_order, 0.0)
     lengths = weights * (columns**2).sum(axis=1)
-    lost = COMPONENTS.T @ (lengths.sum(axis=1, keepdims=True) - lengths + weights**2 * o.parts.squared_lengths(o.doubt))
+    lost = COMPONENTS.T @ (
+        lengths.sum(axis=1, keepdims=True) - lengths + weights**2 * o.parts.squared_lengths(o.propagated)
+    )
     redundant = np.maximum(lost - _traces(_by_component(taken), o), 0.0).T
     return shrunk_scales(squares.T * scale**2, redundant), redundant.sum(axis=1) + PSEUDO_SHARED
 
 
 def _by_component(five: np.ndarray) -> np.ndarray:
-    """Add up what belongs to the same of (click, range, azimuth, elevation): (5, ...) to (4, ...)."""
+    """Sum the columns of each of (click, range, azimuth, elevation): (5, ...) to (4, ...)."""
     return np.concatenate([five[:1] + five[1:2], five[2:]])
 
 
@@ -279,13 +282,14 @@ def _traces(taken: np.ndarray, o: _Others) -> np.ndarray:
     straight = (o.back * through).sum(axis=1)  # (4, 2, n)
     across = (o.back[:, 0] * through[:, :, 1]).sum(axis=1)
     plain = np.trace(o.inverse @ taken, axis1=1, axis2=2)[:, None]
-    return np.asarray(plain + o.freed.uu * straight[:, 0] + o.freed.vv * straight[:, 1] + 2.0 * o.freed.uv * across)
+    return np.asarray(plain + o.factor.uu * straight[:, 0] + o.factor.vv * straight[:, 1] + 2.0 * o.factor.uv * across)
 
 
 def shrunk_scales(squares: np.ndarray, redundant: np.ndarray) -> np.ndarray:
-    """Turn sums of squares (..., 4), in assumed sigmas, into scales, each leaning on what is known better than itself.
+    """Convert sums of squares (..., 4), in assumed sigmas, to scales, each shrunk towards a better-known value.
 
-    The click leans on its assumed sigma; range, azimuth and elevation lean on the level they share, and that on 1.
+    The click is shrunk towards its assumed sigma; range, azimuth and elevation towards the level they share, and that
+    towards 1.
     """
     shared = (squares[..., 1:].sum(axis=-1) + PSEUDO_SHARED) / (redundant[..., 1:].sum(axis=-1) + PSEUDO_SHARED)
     towards = np.stack([np.ones_like(shared), shared, shared, shared], axis=-1)

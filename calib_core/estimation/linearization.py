@@ -1,11 +1,11 @@
-"""The linear model of clicks and radar positions about a pose, whitened: what every solver stage shares.
+"""Linearization: the whitened linear model of clicks and radar positions about a pose, shared by every solver stage.
 
 A pair is a pixel z with covariance C = sigma_px^2 I, and a measured polar position m = (range, azimuth, elevation) with
 covariance V = diag(sigma_polar^2). With pi the projection and p(mu) the Cartesian position of polar mu, the model is
 
     z = pi(R p(mu) + t) + noise(C),    m = mu + noise(V).                                                  (1)
 
-Linearization at a true position mu, with J = d pi / d mu and e = z - pi(R p(mu) + t) - J (m - mu), the unknown positions
+Linearized at a true position mu, with J = d pi / d mu and e = z - pi(R p(mu) + t) - J (m - mu), the unknown positions
 drop out (the Schur complement of the joint problem):
 
     e ~ N(0, S),    S = C + J V J^T.                                                                       (2)
@@ -27,7 +27,7 @@ _FAR = 1e6  # whitened residual of a position the camera cannot see
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasurementPlanes:
-    """What was measured of n pairs, as planes: one row per coordinate, along which NumPy is quick.
+    """The measurements of n pairs as planes: one row per coordinate, for fast NumPy operations.
 
     Attributes:
         pixels_px: (2, n) clicks.
@@ -44,7 +44,7 @@ class MeasurementPlanes:
     def linearize(
         self, camera: Camera, rotations: np.ndarray, translations_m: np.ndarray, at_polar: np.ndarray | None = None
     ) -> "Linearization":
-        """Linearise and whiten the projection about one pose or many.
+        """Linearize and whiten the projection about one pose or many.
 
         Args:
             camera: the intrinsics.
@@ -56,7 +56,7 @@ class MeasurementPlanes:
         turned_m = rotations @ position_m
         projected_px, d_point = camera.project_planes(turned_m + translations_m[..., None])
         d_polar = (rotations @ turning.reshape(3, -1)).reshape(*rotations.shape[:-2], *turning.shape)
-        # residual, d pixel / d (dt, dtheta), d pixel / d polar, one under the other
+        # residual, d pixel / d (dt, dtheta), d pixel / d polar, stacked
         rows = np.empty((*rotations.shape[:-2], 10, *self.pixels_px.shape))
         np.subtract(self.pixels_px, projected_px, out=rows[..., 0, :, :])
         rows[..., 1:4, :, :] = d_point
@@ -70,9 +70,9 @@ class MeasurementPlanes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Linearization:
-    """Equation (2) at one pose or many, whitened by W with W S W^T = I: plain least squares is then maximum likelihood.
+    """Equation (2) at one pose or many, whitened by W with W S W^T = I, so that plain least squares is maximum likelihood.
 
-    The properties without "planes" in their name are of a single pose.
+    The properties without "planes" in their name require a single pose.
 
     Attributes:
         planes: (..., 10, 2, n) W e; W d pixel / d (dt, dtheta), 6 of them; W d pixel / d polar, 3.
@@ -112,7 +112,7 @@ class Linearization:
         return np.asarray(self.planes[..., 0, 0, :] ** 2 + self.planes[..., 0, 1, :] ** 2)
 
     def rows(self, rows: Indices) -> "Linearization":
-        """Take rows (..., n) of the last axis, for each pose its own."""
+        """Take rows (..., n) of the last axis, separately for each pose."""
         return Linearization(
             np.take_along_axis(self.planes, rows[..., None, None, :], axis=-1),
             np.take_along_axis(self.whitening_planes, rows[..., None, :], axis=-1),
@@ -130,7 +130,7 @@ def linearize(
     sigma_polar: Points3,
     at_polar: Points3 | None = None,
 ) -> Linearization:
-    """Linearise and whiten the projection of measured positions about a pose.
+    """Linearize and whiten the projection of measured positions about a pose.
 
     Args:
         camera_from_radar: the pose.

@@ -1,4 +1,4 @@
-"""What the pairs say, as arrays."""
+"""Measurement model: the measured pairs and the camera prior as arrays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,13 +20,13 @@ _FLAT_SIGMA_RAD = np.deg2rad(10.0)  # elevation of a radar that always reports 0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraPrior:
-    """What is known of the camera centre before any pair.
+    """The prior of the camera centre, known before any pair.
 
     Attributes:
         position_m: (3,) in the radar frame.
         sigma_m: per axis.
-        measured: a tape measure said so, and the estimate leans on it; otherwise it only chooses between poses,
-            and what it adds to the estimate fades with the distance.
+        measured: whether it was measured with a tape and is fully used by the estimate; otherwise it only selects between
+            poses, and its weight in the estimate decreases with the distance.
     """
 
     position_m: Vector3
@@ -50,7 +50,7 @@ class CameraPrior:
     def information(self, rotations: np.ndarray, translations_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return J^T J (..., 6, 6) and J^T residual (..., 6) of `rows` at poses (..., 3, 3) and (..., 3).
 
-        In camera axes the residual is -(R c0 + t) and its Jacobian (I, [t]x): the same up to a rotation, which both forget.
+        In camera axes the residual is -(R c0 + t) and its Jacobian (I, [t]x): the same up to a rotation, which cancels.
         """
         missed = -(rotations @ self.position_m + translations_m)
         variance = self.sigma_m**2
@@ -66,7 +66,7 @@ class CameraPrior:
         return (turned @ jacobian) / np.asarray(variance)[..., None], gradient
 
     def weakened(self) -> "CameraPrior":
-        """Return the same position as a guess only, a metre or more wide."""
+        """Return the same position as a weak prior, with a sigma of at least 1 m."""
         return replace(self, sigma_m=max(self.sigma_m, 1.0), measured=False)
 
     def costs(self, rotations: np.ndarray, translations_m: np.ndarray) -> Values:
@@ -82,12 +82,12 @@ class PairMeasurements:
         camera: the intrinsics.
         pixels_px: (n, 2) clicks.
         sigma_px: (n,) their standard deviation per axis.
-        rays: (n, 3) unit directions in the camera frame that the clicks see; NaN where the lens model has none.
+        rays: (n, 3) unit directions of the clicks in the camera frame; NaN where the lens model has none.
         first: (n + 1,).
         polar: (m, 3) measured range [m], azimuth, elevation [rad] of the candidates.
         sigma_polar: (m, 3) their standard deviations.
         log_score: (m,) logarithm of each candidate's plausibility before any pose.
-        prior: what is known of the camera centre.
+        prior: of the camera centre.
     """
 
     camera: Camera
@@ -110,7 +110,7 @@ class PairMeasurements:
 
     @property
     def one_to_one(self) -> bool:
-        """Every pair has a single candidate: there is nothing to associate."""
+        """Whether every pair has a single candidate, so that there is nothing to associate."""
         return len(self.polar) == len(self)
 
     def some(self, pairs: Indices) -> "PairMeasurements":
@@ -145,7 +145,7 @@ class PairMeasurements:
         )
 
     def mirrored(self) -> "PairMeasurements":
-        """Return what the pairs would be if the radar's y axis pointed the other way."""
+        """Return the pairs with the radar's y axis mirrored."""
         left_right = np.array([1.0, -1.0, 1.0])
         prior = replace(self.prior, position_m=self.prior.position_m * left_right)
         return replace(self, polar=self.polar * left_right, prior=prior)
@@ -157,7 +157,7 @@ class PairMeasurements:
 
 
 def pair_measurements(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions) -> PairMeasurements:
-    """Stack pairs into arrays; a missing click sigma becomes the assumed one."""
+    """Stack pairs into arrays; a missing click sigma is replaced by the assumed one."""
     candidates = [candidate for pair in pairs for candidate in pair.candidates]
     points = np.array([candidate.position_radar_m for candidate in candidates]).reshape(-1, 3)
     sigma_polar = np.array([candidate.sigma_polar for candidate in candidates]).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Is one radar axis mirrored? Residuals alone cannot tell; residuals and what is known of the camera can."""
+"""Mirror test: is one radar axis mirrored? Residuals alone do not show it; together with the camera prior they do."""
 
 import numpy as np
 
@@ -10,15 +10,15 @@ from calib_core.estimation.measurement_model import PairMeasurements
 __all__ = ["MIRRORED_GAIN", "NOT_MIRRORED_GAIN", "mirror_gain"]
 
 MIRRORED_GAIN = 10.6
-"""From how large a gain in twice the log-likelihood on mirrored axes are the likelier ones: right axes lose by a likelihood
-ratio of 200 in less than one set of 200."""
+"""Gain in twice the log-likelihood above which the axes are taken as mirrored: right axes lose by a likelihood ratio of 200
+in less than one set of 200."""
 
 NOT_MIRRORED_GAIN = -3.0
-"""Up to how large a gain the axes are taken to be right; between the two, the question stays open."""
+"""Gain up to which the axes are taken as right; between the two limits, the question stays open."""
 
 _STARTS = 2
-_BEYOND_DOUBT = 30.0  # a difference that noise levels cannot turn
-_COARSE_ERROR = 0.5  # of a gain from coarse fits, a little more than the largest seen
+_DECISIVE_DIFFERENCE = 30.0  # of costs, too large for other noise levels to reverse
+_COARSE_ERROR = 0.5  # of a gain from coarse fits, slightly above the largest observed
 
 
 def mirror_gain(
@@ -29,27 +29,27 @@ def mirror_gain(
     estimate_scale: bool,
     seed: int,
 ) -> float:
-    """Return by how much twice the log-likelihood rises when the radar's y axis is mirrored.
+    """Return the gain in twice the log-likelihood when the radar's y axis is mirrored.
 
-    A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be told by its residuals:
-    placements on the ground fit a camera mirrored below the ground just as well. Only what is known of the camera
-    position, or placements at varied heights, tell the two apart. The 24 right-handed conventions need no test: they are
-    rotations, and the pose absorbs them. Each hand is fitted with its own noise level, coarsely
-    at first: the gain is then good to a few tenths, and only next to what it is judged by more is asked of it.
+    A radar with one axis mirrored (left-handed axes, or elevation with the wrong sign) cannot be recognised by its
+    residuals: placements on the ground fit a camera mirrored below the ground just as well. Only the camera prior, or
+    placements at varied heights, distinguish the two. The 24 right-handed conventions need no test: they are rotations,
+    and the pose absorbs them. Each handedness is fitted with its own noise level, first coarsely: the gain is then
+    accurate to a few tenths, and it is refined only if it is close to a limit.
 
     Args:
         measurements: the pairs.
-        best: what they agree on, axes as they are.
-        plain: the fit that starts there, where it has been made already.
+        best: their GNC solution with the axes as given.
+        plain: the fit that starts from it, if already computed.
         estimate_scale: estimate the noise level of either fit.
-        seed: of the draws.
+        seed: of the random draws.
     """
     mirrored = measurements.mirrored()
     starts = initial_poses(mirrored, most=_STARTS, rng=np.random.default_rng(seed))
     found = solve_gnc(mirrored, starts, estimate_scale=estimate_scale)
     if not found:
         return -np.inf
-    if abs(best.cost - found[0].cost) > _BEYOND_DOUBT:
+    if abs(best.cost - found[0].cost) > _DECISIVE_DIFFERENCE:
         return best.cost - found[0].cost
     gain = -np.inf
     for coarse in (True, False):

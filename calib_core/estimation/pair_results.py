@@ -1,4 +1,4 @@
-"""What a fit says about each pair, and its figures over the inliers."""
+"""Pair results: the residual and influence of each pair under a fit, and the metrics over the inliers."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ __all__ = ["excluded_pair_results", "fit_metrics", "used_pair_results"]
 
 
 def fit_metrics(measurements: PairMeasurements, refined: ErrorsInVariablesFit, left_out: LeaveOneOut) -> Metrics:
-    """Measure the inlier pairs; chi2 is by the noise as assumed, so that a wrong assumption shows."""
+    """Compute the metrics of the inlier pairs; chi2 uses the assumed noise, so that a wrong assumption shows."""
     inliers = refined.inliers
     points = cartesian_from_polar(measurements.polar[refined.rows])
     projected = measurements.camera.project(refined.camera_from_radar @ points)
@@ -76,15 +76,15 @@ def excluded_pair_results(
     camera: Camera,
     options: CalibrationOptions,
 ) -> dict[str, PairResult]:
-    """Show the pairs left out by a person under the pose, each with the candidate that suits it best."""
-    aside = [pair for pair in shown if pair.id in excluded]
-    if not aside:
+    """Return the results of the excluded pairs under the pose, each with its best candidate."""
+    omitted = [pair for pair in shown if pair.id in excluded]
+    if not omitted:
         return {}
-    measurements = pair_measurements(aside, camera, options).scaled(refined.noise_scale)
+    measurements = pair_measurements(omitted, camera, options).scaled(refined.noise_scale)
     rows, model = associate(measurements, refined.camera_from_radar)
     expected = _residual_covariances(model)
     results = {}
-    for i, pair in enumerate(aside):
+    for i, pair in enumerate(omitted):
         chosen = int(rows[i] - measurements.first[i])
         point = pair.candidates[chosen].position_radar_m
         results[pair.id] = PairResult(

@@ -1,13 +1,13 @@
-"""A radar that measures no elevation: what the pairs then fix, and what rests on where the reflector is thought to stand.
+"""Unmeasured elevation: what a radar without elevation adds to the covariance of the pose.
 
-Such a radar reports elevation 0 whatever the reflector's height. The true elevations are not noise about 0: the radar looks up
-or down by an angle of its own, and the reflector stands above or below it at every placement alike. With g_tilt = 1 and
-g_height = 1 / range the elevation errors of all pairs have the covariance
+Such a radar reports elevation 0 whatever the reflector's height. The true elevations are not noise about 0: the radar is
+tilted up or down by a constant angle, and the reflector is above or below it by the same height at every placement. With
+g_tilt = 1 and g_height = 1 / range the elevation errors of all pairs have the covariance
 
     V = V_own + sigma_tilt^2 g_tilt g_tilt^T + sigma_height^2 g_height g_height^T,                              (6)
 
-whose shared parts no number of pairs averages away. The least-squares pose moves by B = H^-1 J^T W d pixel / d elevation times
-such an error; its covariance grows by the outer products.
+whose shared parts do not average out, however many pairs there are. Such an error moves the least-squares pose by B = H^-1
+J^T W d pixel / d elevation times the error; the covariance grows by the outer products.
 """
 
 import numpy as np
@@ -19,14 +19,14 @@ from calib_core.estimation.measurement_model import PairMeasurements
 __all__ = ["TILT_SIGMA_RAD", "is_flat", "shared_elevation_spread"]
 
 TILT_SIGMA_RAD = np.deg2rad(10.0)
-"""By how much the radar may look up or down."""
+"""Standard deviation of the radar's tilt up or down."""
 
 HEIGHT_SIGMA_M = 1.0
-"""By how much the reflector may stand above or below the radar, at every placement alike."""
+"""Standard deviation of the reflector's height above or below the radar, the same at every placement."""
 
 
 def is_flat(measurements: PairMeasurements) -> bool:
-    """Tell whether every radar position has elevation 0."""
+    """Return whether every radar position has elevation 0."""
     return bool(len(measurements)) and not measurements.polar[:, 2].any()
 
 

@@ -1,7 +1,7 @@
 """Algorithm 1 of the paper as printed, one public function per line (docs/paper.md has the table).
 
-Cheng, Sengupta, Cao: "3D Radar and Camera Co-Calibration". It is here to compare with: the default method does not use it.
-What the paper leaves open is in PaperOptions.
+Cheng, Sengupta, Cao: "3D Radar and Camera Co-Calibration". It serves for comparison; the default method does not use it.
+Choices that the paper leaves open are in PaperOptions.
 """
 
 from collections.abc import Iterable, Sequence
@@ -46,7 +46,7 @@ __all__ = [
     "z_score_inliers",
 ]
 
-_ROUNDING = 1e-9  # two returns have z-scores of exactly 1, up to rounding
+_ROUNDING = 1e-9  # the z-scores of two returns are exactly 1, up to rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ class ScoredPose:
     Attributes:
         camera_from_radar: the pose.
         inliers: (n,) RANSAC's.
-        mean_error_px: over all n pairs; NaN when the pose puts one of them behind the camera.
+        mean_error_px: over all n pairs; NaN if the pose puts one of them behind the camera.
     """
 
     camera_from_radar: RigidTransform
@@ -68,7 +68,7 @@ class ScoredPose:
 
 
 def clicks_by_time(clicks: Iterable[ReflectorClick]) -> tuple[ReflectorClick, ...]:
-    """Algorithm 1, line 1: list the clicked pixels with the recorded stamps of their frames, by time.
+    """Algorithm 1, line 1: list the clicked pixels with the recorded stamps of their frames, sorted by time.
 
     The stamp is the frame's own, never "frame number over frame rate" of a video made from the recording.
     """
@@ -76,10 +76,10 @@ def clicks_by_time(clicks: Iterable[ReflectorClick]) -> tuple[ReflectorClick, ..
 
 
 def static_returns_as_printed(scans: RadarScans, options: PaperOptions) -> RadarScans:
-    """Algorithm 1, line 2: keep the returns with velocity = 0 and range < 20 m; scans left empty go too.
+    """Algorithm 1, line 2: keep the returns with velocity = 0 and range < 20 m; drop the scans left empty.
 
-    The range is computed from x, y, z, for common drivers leave the message's own range at 0. A return without position or
-    velocity (NaN) is dropped here, whole: its click stays with the returns that remain.
+    The range is computed from x, y, z, because common drivers leave the message's own range at 0. A return without position
+    or velocity (NaN) is dropped entirely; its click keeps the remaining returns.
     """
     range_m = np.linalg.norm(scans.points_radar_m, axis=1)
     with np.errstate(invalid="ignore"):
@@ -133,7 +133,7 @@ def z_score_inliers(points_radar_m: Points3, options: PaperOptions) -> Flags:
 def mean_position(points_radar_m: Points3, inliers: Flags) -> Vector3:
     """Algorithm 1, line 6: average the inliers: the click's radar position (3,) [m].
 
-    The mean of a window that holds two things lies between them. That is what the paper prints, and what is done here.
+    The mean of a window that contains two objects lies between them. This is kept as the paper prints it.
     """
     return np.asarray(points_radar_m[inliers].mean(axis=0), dtype=np.float64)
 
@@ -141,14 +141,14 @@ def mean_position(points_radar_m: Points3, inliers: Flags) -> Vector3:
 def pose_by_iterative_ransac(
     points_radar_m: Points3, pixels_px: Points2, camera: Camera, options: PaperOptions
 ) -> ScoredPose | None:
-    """Algorithm 1, line 7: solve PnP by RANSAC with the iterative solver; None where RANSAC finds nothing."""
+    """Algorithm 1, line 7: solve PnP by RANSAC with the iterative solver; None if RANSAC finds nothing."""
     return _pose_by_ransac(points_radar_m, pixels_px, camera, options, "iterative")
 
 
 def pose_by_sqpnp_ransac(
     points_radar_m: Points3, pixels_px: Points2, camera: Camera, options: PaperOptions
 ) -> ScoredPose | None:
-    """Algorithm 1, line 8: solve PnP by RANSAC with SQPnP; None where RANSAC finds nothing."""
+    """Algorithm 1, line 8: solve PnP by RANSAC with SQPnP; None if RANSAC finds nothing."""
     return _pose_by_ransac(points_radar_m, pixels_px, camera, options, "sqpnp")
 
 
@@ -168,11 +168,11 @@ def refined_on_all_pairs(
 
 
 def pair_as_printed(click: ReflectorClick, static: RadarScans, options: CalibrationOptions) -> Pair | Unpaired:
-    """Algorithm 1, lines 3 to 6 for one click: its pair, or why it has none.
+    """Algorithm 1, lines 3 to 6 for one click: return its pair, or why it has none.
 
     Args:
         click: one click.
-        static: what line 2 kept.
+        static: the returns kept by line 2.
         options: the paper's, and the largest time gap to a scan, which the paper does not give.
     """
     if not len(static):
@@ -216,10 +216,10 @@ def calibrate_as_printed(
     """Run Algorithm 1, lines 1 to 10. The order of the clicks does not matter.
 
     Args:
-        clicks: excluded ones take no part, but appear in the result.
+        clicks: excluded ones are not used, but appear in the result.
         scans: of the radar, as recorded.
         camera: intrinsics.
-        options: `paper` holds what the paper leaves open.
+        options: `paper` contains the choices that the paper leaves open.
     """
     ordered = clicks_by_time(clicks)
     static = static_returns_as_printed(scans, options.paper)
@@ -238,13 +238,13 @@ def calibrate_as_printed(
 def solve_pairs_as_printed(
     pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, excluded: frozenset[str] = frozenset()
 ) -> Calibration | Unsolvable:
-    """Run Algorithm 1, lines 7 to 10, on pairs made elsewhere; of a pair's radar positions, the first one counts.
+    """Run Algorithm 1, lines 7 to 10, on existing pairs, using the first radar position of each.
 
     Args:
         pairs: in any order; results come by image time, pairs without a time in the order given.
         camera: intrinsics.
-        options: `paper` holds what the paper leaves open.
-        excluded: ids of pairs that take no part, but appear in the result.
+        options: `paper` contains the choices that the paper leaves open.
+        excluded: ids of pairs that are not used, but appear in the result.
     """
     return _solved(pairs, camera, options, excluded=excluded, unpaired=())
 
@@ -260,7 +260,7 @@ def _solved(
     ordered = sorted(pairs, key=lambda pair: pair.image_time or 0)  # stable: pairs without a time stay as given
     used = sorted(
         (pair for pair in pairs if pair.id not in excluded), key=lambda pair: (pair.image_time or 0, pair.id)
-    )  # whatever order they come in, RANSAC draws the same samples
+    )  # RANSAC draws the same samples whatever the order of the input
     if len(used) < MIN_PAIRS:
         return _too_few(len(used), len(ordered) - len(used), len(unpaired))
     points_radar_m = np.stack([pair.candidates[0].position_radar_m for pair in used])
@@ -276,7 +276,7 @@ def _solved(
     if camera_from_radar is None:
         return Unsolvable(
             "refinement-diverged",
-            "Levenberg-Marquardt on all pairs left the finite numbers",
+            "Levenberg-Marquardt on all pairs diverged",
             "exclude the pairs with the largest residuals, or use the default method",
         )
     inliers = frozenset(pair.id for pair, inlier in zip(used, better.inliers, strict=True) if inlier)
@@ -357,21 +357,21 @@ def _unpaired(click: ReflectorClick, code: str, reason: str, options: Calibratio
 
 
 def _too_few(used: int, excluded: int, unpaired: int) -> Unsolvable:
-    aside = [text for count, text in ((excluded, "excluded"), (unpaired, "without a radar position")) if count]
+    texts = [text for count, text in ((excluded, "excluded"), (unpaired, "without a radar position")) if count]
     counts = [count for count in (excluded, unpaired) if count]
-    rest = "".join(f", {count} more {text}" for count, text in zip(counts, aside, strict=True))
+    rest = "".join(f", {count} more {text}" for count, text in zip(counts, texts, strict=True))
     return Unsolvable(
         "too-few-pairs",
-        f"{used} of {MIN_PAIRS} pairs{rest}",
-        f"click the reflector at {MIN_PAIRS - used} more placements at least; 10 to 20 spread over the picture are better",
+        f"{used} of at least {MIN_PAIRS} required pairs{rest}",
+        f"click the reflector at {MIN_PAIRS - used} or more further placements; 10 to 20, spread over the picture, are better",
     )
 
 
 def _in_one_line(used: int) -> Unsolvable:
     return Unsolvable(
         "points-in-one-line",
-        f"the radar positions of all {used} pairs lie at one place or on one line",
-        "place the reflector to the left and to the right, near and far",
+        f"the radar positions of all {used} pairs are at one place or on one line",
+        "place the reflector left and right, near and far",
     )
 
 

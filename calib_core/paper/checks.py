@@ -1,7 +1,7 @@
-"""What a person must know before using a pose of Algorithm 1: it refines on all pairs, the wrong ones included.
+"""Warnings about a pose of Algorithm 1, which refines on all pairs, the wrong ones included.
 
-The algorithm has no noise model and no doubts of its own. Its residuals are held against the noise that the default method
-assumes; the pose stays as printed.
+The algorithm has no noise model and gives no warnings itself. Its residuals are compared with the noise that the default
+method assumes; the pose stays as printed.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ def warnings_as_printed(
     agreeing: Flags,
     options: CalibrationOptions,
 ) -> tuple[DataWarning, ...]:
-    """Doubt a pose of Algorithm 1.
+    """Return the warnings about a pose of Algorithm 1.
 
     Args:
         ids: of the n pairs that took part.
@@ -58,7 +58,7 @@ def _disagreeing(ids: Sequence[str], agreeing: Flags, options: CalibrationOption
     return [
         DataWarning(
             "many-outliers",
-            f"only {int(agreeing.sum())} of {len(ids)} pairs agree within {options.paper.ransac_threshold_px:g} px, and "
+            f"only {int(agreeing.sum())} of {len(ids)} pairs agree within {options.paper.ransac_threshold_px:g} px, but "
             "Algorithm 1 fits the pose to all of them",
             "use the default method, which leaves wrong pairs out; or exclude the pairs with the largest residuals",
         )
@@ -71,8 +71,8 @@ def _behind(ids: Sequence[str], hidden: Flags) -> list[DataWarning]:
     return [
         DataWarning(
             "behind-camera",
-            f"under this pose the camera cannot see {int(hidden.sum())} of {len(ids)} radar positions "
-            f"({', '.join(np.asarray(ids)[hidden][:6])}); the figures leave them out",
+            f"with this pose the camera cannot see {int(hidden.sum())} of {len(ids)} radar positions "
+            f"({', '.join(np.asarray(ids)[hidden][:6])}); the metrics exclude them",
             "do not use this pose; use the default method",
         )
     ]
@@ -106,7 +106,7 @@ def _excess(
             "residuals-too-large",
             f"residuals are {np.sqrt(excess):.1f} times what the assumed noise explains "
             f"(chi2 / degrees of freedom {excess:.1f})",
-            "some radar positions or clicks are wrong: use the default method, and look at the pairs it names",
+            "some radar positions or clicks are wrong: use the default method, and check the pairs it names",
         )
     ]
 
@@ -121,7 +121,7 @@ def _far_camera(camera_from_radar: RigidTransform, options: CalibrationOptions) 
     return [
         DataWarning(
             "camera-far-away",
-            f"the camera comes out {away_m:.1f} m from where it was expected, give or take {reach_m:.1g} m",
-            "if the sensors are really that far apart, say so (nominal distance); otherwise do not use this pose",
+            f"the solved camera position is {away_m:.1f} m from the expected one (± {reach_m:.1g} m)",
+            "if the sensors really are that far apart, set the nominal distance; otherwise do not use this pose",
         )
     ]

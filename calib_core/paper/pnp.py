@@ -1,8 +1,8 @@
-"""OpenCV's perspective-n-point solvers for every lens model. The only geometry that imports cv2, and only when called.
+"""Perspective-n-point (PnP) by OpenCV for every lens model. The only geometry module that imports cv2, and only when called.
 
-OpenCV knows the pinhole and the Brown-Conrady lenses itself. For any other lens (and for a camera matrix with skew, which
-OpenCV drops silently) the pixels become points of the plane z = 1 first, and the refinement is our own Levenberg-Marquardt,
-so that what is minimised stays in pixels.
+OpenCV supports the pinhole and the Brown-Conrady lenses itself. For any other lens (and for a camera matrix with skew,
+which OpenCV drops silently) the pixels are first converted to points of the plane z = 1, and the refinement is our own
+Levenberg-Marquardt, so that the minimised error stays in pixels.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ PnPSolver = Literal["iterative", "sqpnp"]
 _MINIMUM_POINTS = 4
 _MINIMUM_POINTS_FOR_DLT = 6
 _MINIMUM_POINTS_FOR_REFINEMENT = 3
-_FLATTEST = 1e-6  # second over first singular value of points that are more than a line
+_FLATTEST = 1e-6  # smallest ratio of second to first singular value of points that are not on one line
 _LM_STEPS = 100
 _LM_FIRST_DAMPING = 1e-3
 _LM_LARGEST_DAMPING = 1e12
@@ -38,7 +38,7 @@ _LM_TOLERANCE = 1e-12
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RansacSolution:
-    """What RANSAC found.
+    """The result of RANSAC.
 
     Attributes:
         camera_from_radar: the pose fitted to the inliers.
@@ -58,7 +58,7 @@ def project_points(points_radar_m: Points3, camera_from_radar: RigidTransform, c
     Args:
         points_radar_m: (n, 3).
         camera_from_radar: the pose.
-        camera: any model that OpenCV has a function for; skew is not known to OpenCV and is refused.
+        camera: any model that OpenCV has a function for; OpenCV does not support skew.
 
     Raises:
         ValueError: the camera matrix has skew, or OpenCV does not have the lens model.
@@ -86,7 +86,7 @@ def project_points(points_radar_m: Points3, camera_from_radar: RigidTransform, c
 
 
 def spans_a_plane(points_radar_m: Points3) -> bool:
-    """Tell whether points (n, 3) are more than one point or one line: else a turn about that line goes unseen."""
+    """Return whether points (n, 3) span more than a point or a line; a rotation about a line cannot be observed."""
     points = np.asarray(points_radar_m, dtype=np.float64).reshape(-1, 3)
     if len(points) < 3 or not np.all(np.isfinite(points)):
         return False
@@ -97,7 +97,7 @@ def spans_a_plane(points_radar_m: Points3) -> bool:
 def solve_pnp(
     points_radar_m: Points3, pixels_px: Points2, camera: Camera, solver: PnPSolver = "iterative"
 ) -> RigidTransform | None:
-    """Solve camera_from_radar from all points, none of them doubted.
+    """Solve camera_from_radar from all points, without outlier rejection.
 
     Args:
         points_radar_m: (n, 3), n >= 4.
@@ -106,7 +106,7 @@ def solve_pnp(
         solver: OpenCV's iterative solver (DLT or homography, then Levenberg-Marquardt) or SQPnP.
 
     Returns:
-        The pose, or None where the points are too few or in one line, or OpenCV finds no finite pose.
+        The pose, or None if the points are too few or on one line, or OpenCV finds no finite pose.
     """
     view = _view(points_radar_m, pixels_px, camera)
     if len(view.points) < _MINIMUM_POINTS or not spans_a_plane(view.points):
@@ -135,14 +135,15 @@ def solve_pnp_ransac(
     Args:
         points_radar_m: (n, 3), n >= 4.
         pixels_px: (n, 2) where each is seen.
-        camera: any model; for one cv2.solvePnP does not know, the mean focal length carries the threshold to the plane z = 1.
-        solver: what fits the samples' consensus.
+        camera: any model; for one that cv2.solvePnP does not support, the threshold is converted to the plane z = 1 by the mean
+            focal length.
+        solver: the solver for the samples and their consensus sets.
         threshold_px: largest reprojection error of an inlier [px].
-        iterations: at most so many samples.
+        iterations: largest number of samples.
         confidence: stop early when an all-inlier sample has been drawn with this probability.
 
     Returns:
-        The pose and its inliers, or None where RANSAC finds none, or the points are too few or in one line.
+        The pose and its inliers, or None if RANSAC finds none, or the points are too few or on one line.
     """
     import cv2
 
@@ -160,7 +161,7 @@ def solve_pnp_ransac(
             iterationsCount=iterations,
             confidence=confidence,
         )
-    except cv2.error:  # OpenCV asserts where its sample is degenerate
+    except cv2.error:  # OpenCV asserts if its sample is degenerate
         return None
     if not found or rows is None or not len(rows):
         return None
@@ -181,10 +182,10 @@ def refine_lm(
         points_radar_m: (n, 3), n >= 3.
         pixels_px: (n, 2).
         camera: any model.
-        camera_from_radar: where to start.
+        camera_from_radar: the initial pose.
 
     Returns:
-        The refined pose, or None where there are too few points or the refinement leaves the finite numbers.
+        The refined pose, or None if there are too few points or the refinement diverges.
     """
     import cv2
 
@@ -206,7 +207,7 @@ def refine_lm(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _View:
-    """Points and pixels as OpenCV is to see them."""
+    """Points and pixels in the form passed to OpenCV."""
 
     points: Points3
     pixels: Points2
@@ -280,7 +281,7 @@ def _refined(
 ) -> RigidTransform | None:
     """Run Levenberg-Marquardt on (dt, dtheta) with the analytic Jacobian of Camera.project_with_jacobian."""
     best = camera_from_radar
-    residuals, jacobian = _linearised(points, pixels, camera, best)
+    residuals, jacobian = _linearized(points, pixels, camera, best)
     cost = float(residuals @ residuals)
     if not np.isfinite(cost):
         return None
@@ -289,9 +290,9 @@ def _refined(
         normal, gradient = jacobian.T @ jacobian, jacobian.T @ residuals
         step = -np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), gradient, rcond=None)[0]
         trial = best.perturbed(step)
-        trial_residuals, trial_jacobian = _linearised(points, pixels, camera, trial)
+        trial_residuals, trial_jacobian = _linearized(points, pixels, camera, trial)
         trial_cost = float(trial_residuals @ trial_residuals)
-        if not trial_cost <= cost:  # also when a point has left the lens and the cost is NaN
+        if not trial_cost <= cost:  # also if a point has left the lens and the cost is NaN
             damping *= 10.0
             if damping > _LM_LARGEST_DAMPING:
                 break
@@ -304,7 +305,7 @@ def _refined(
     return best
 
 
-def _linearised(
+def _linearized(
     points: Points3, pixels: Points2, camera: Camera, camera_from_radar: RigidTransform
 ) -> tuple[Values, np.ndarray]:
     """Return the stacked residuals (2n,) [px] and their derivative (2n, 6) by (dt, dtheta)."""

@@ -1,4 +1,4 @@
-"""Truth to test with: scenes, sensors and recordings whose camera_from_radar is known."""
+"""Simulation: scenes, sensors and recordings with a known camera_from_radar, for tests and benchmarks."""
 
 from calib_core.synthetic.files import write_recording
 from calib_core.synthetic.options import Clutter, Container, RadarMessage, RadarName, SceneName, SimulationOptions

@@ -1,4 +1,4 @@
-"""Write a simulated recording to a folder, in the containers people use."""
+"""Write a simulated recording to a folder, in common containers."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -14,7 +14,7 @@ from calib_core.synthetic.truth import clicks_text, truth_text
 __all__ = ["Progress", "write_recording"]
 
 Progress: TypeAlias = Callable[[int, int], None]
-"""Called with how much is done, and of how much."""
+"""Called with the number done and the total."""
 
 
 def write_recording(
@@ -28,13 +28,13 @@ def write_recording(
 
     Args:
         recording: what to write.
-        folder: made if it does not exist; files of the same name in it are not overwritten.
-        containers: "ros1" writes radar.bag and camera.bag; "mcap" and "db3" write a ROS 2 bag each, a folder with
-            metadata.yaml whose data file can also be opened alone.
-        progress: told after each frame how many are written, of how many in all containers.
+        folder: created if it does not exist; existing files are not overwritten.
+        containers: "ros1" writes radar.bag and camera.bag; "mcap" and "db3" write a ROS 2 bag each: a folder with
+            metadata.yaml, whose data file can also be opened alone.
+        progress: called after each frame with the number written and the total over all containers.
 
     Raises:
-        RecordingError: a file exists already.
+        RecordingError: a file already exists.
         InputError: ROS has no name for the camera's lens model.
     """
     camera = recording.camera

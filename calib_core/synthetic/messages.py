@@ -1,4 +1,4 @@
-"""Simulated measurements as the messages real drivers send."""
+"""Simulated measurements as the messages that real drivers send."""
 
 import heapq
 from collections.abc import Iterable, Iterator
@@ -39,17 +39,17 @@ RADAR_FRAME = "ti_mmwave_0"
 CAMERA_FRAME = "camera_optical_frame"
 
 _PARSE_NS = 6_000
-"""The driver stamps each return when it parses it; one takes about this long."""
+"""The driver stamps each return as it parses it; parsing one takes about this long."""
 
 
 def camera_messages(
     recording: SimulatedRecording, frames: Iterable[SimulatedFrame] | None = None
 ) -> Iterator[RecordedMessage]:
-    """Turn frames into image and camera-info messages, in the order they arrive.
+    """Convert frames to image and camera-info messages, in order of arrival.
 
     Args:
-        recording: whose camera.
-        frames: other than all of the recording's.
+        recording: the recording.
+        frames: to use instead of all frames of the recording.
     """
     options = recording.options
     for frame in recording.frames() if frames is None else frames:
@@ -66,11 +66,11 @@ def camera_messages(
 
 
 def radar_messages(recording: SimulatedRecording, generation: Literal[1, 2]) -> Iterator[RecordedMessage]:
-    """Turn scans into messages, in the order they arrive.
+    """Convert scans to messages, in order of arrival.
 
     Args:
-        recording: whose radar.
-        generation: of ROS; 1 gives what options.radar_message says, 2 gives clouds.
+        recording: the recording.
+        generation: of ROS; 1 writes the messages of options.radar_message, 2 writes clouds.
     """
     options = recording.options
     cloud = generation == 2 or options.radar_message == "cloud" or options.radar == "imaging"
@@ -84,12 +84,12 @@ def radar_messages(recording: SimulatedRecording, generation: Literal[1, 2]) -> 
 def all_messages(
     recording: SimulatedRecording, generation: Literal[1, 2], frames: Iterable[SimulatedFrame] | None = None
 ) -> Iterator[RecordedMessage]:
-    """Merge both sensors' messages as one recorder would get them.
+    """Merge both sensors' messages as one recorder would receive them.
 
     Args:
-        recording: whose sensors.
+        recording: the recording.
         generation: of ROS.
-        frames: other than all of the recording's.
+        frames: to use instead of all frames of the recording.
     """
     return heapq.merge(
         camera_messages(recording, frames),
@@ -105,7 +105,7 @@ def _cloud(scan: RadarScan, receive: TimeNs) -> RecordedMessage:
 
 
 def _returns(recording: SimulatedRecording, scan: RadarScan, receive: int) -> Iterator[RecordedMessage]:
-    """Yield one message per return, each stamped a moment later, as the TI driver does."""
+    """Yield one message per return, each stamped slightly later, as the TI driver does."""
     filled = recording.options.radar_message == "filled"
     profile = recording.stage.profile
     ranges = np.linalg.norm(scan.points_radar_m, axis=1)

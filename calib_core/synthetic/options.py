@@ -19,7 +19,7 @@ Container = Literal["ros1", "mcap", "db3"]
 
 @dataclass(frozen=True, slots=True)
 class SimulationOptions:
-    """What is simulated; the same options give the same bytes."""
+    """The options of a simulated recording; the same options give the same bytes."""
 
     scene: SceneName = option(
         "rooftop",
@@ -64,7 +64,7 @@ class SimulationOptions:
 
     def __post_init__(self) -> None:
         _require(self.placements >= 1, "placements", self.placements, "at least 1")
-        _require(self.dwell_s >= 3.5, "dwell_s", self.dwell_s, "at least 3.5 s: the person has to step away and return")
+        _require(self.dwell_s >= 3.5, "dwell_s", self.dwell_s, "at least 3.5 s, for the person to step away and return")
         _require(min(self.camera_rate_hz, self.radar_rate_hz) > 0, "rates", self.camera_rate_hz, "more than 0 Hz")
         _require(1 <= self.jpeg_quality <= 100, "jpeg_quality", self.jpeg_quality, "1 to 100")
         _require(0.0 <= self.dropped_share < 0.9, "dropped_share", self.dropped_share, "0 to 0.9")

@@ -1,4 +1,4 @@
-"""Pairs with known truth and no recording around them: what the estimators are tested and measured on."""
+"""Simulated pairs with known truth, without a recording, to test and benchmark the estimators."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -55,12 +55,12 @@ NOISE_PROFILES: dict[NoiseName, NoiseProfile] = {
     "imaging": NoiseProfile(0.03, 0.12, 0.25),
     "none": NoiseProfile(0.0, 0.0, 0.0, 0.0),
 }
-"""Assumed levels for radar families; "none" is exact, its candidates carry the "ti_fine" sigmas."""
+"""Assumed noise of radar families; "none" is exact, and its candidates have the "ti_fine" sigmas."""
 
 
 @dataclass(frozen=True, slots=True)
 class OutlierMix:
-    """What a wrong pair looks like; the three shares add up to 1."""
+    """The kinds of outliers; the three shares add up to 1."""
 
     ghost: float = 0.5
     """Share whose radar position is a reflection: anywhere in the field of view."""
@@ -87,7 +87,7 @@ class PairsLayout:
     roughness_m: float = 0.01
     """Standard deviation of the ground's height [m]."""
     max_height_m: float = 0.0
-    """With more than 0: heights are uniform from height_m up to this, as on a tripod [m]."""
+    """If above 0, heights are uniform from height_m up to this, as on a tripod [m]."""
     separation_m: float = 0.35
     """Smallest distance between two placements [m]."""
 
@@ -98,15 +98,15 @@ AISLE = PairsLayout(max_range_m=15.0, max_lateral_m=1.2)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedPairs:
-    """Pairs, and what is true about them.
+    """Pairs and their truth.
 
     Attributes:
         rig: the sensors; rig.camera_from_radar is the truth.
-        pairs: what an estimator gets; ids "p1", "p2", ...
+        pairs: the input of an estimator; ids "p1", "p2", ...
         points_radar_m: (n, 3) true reflector positions.
         pixels_px: (n, 2) their true pixels.
-        outlier: (n,) pairs that are wrong.
-        true_candidate: for each pair, which of its candidates is the reflector; -1 in an outlier.
+        outlier: (n,) whether the pair is wrong.
+        true_candidate: for each pair, which of its candidates is the reflector; -1 for an outlier.
     """
 
     rig: Rig
@@ -148,19 +148,19 @@ def simulate_pairs(
 ) -> SimulatedPairs:
     """Draw a rig and pairs of clicks and radar positions.
 
-    The number of outliers is round(outlier_share * count); which pairs they are is drawn.
+    The number of outliers is round(outlier_share * count); which pairs they are is random.
 
     Args:
         count: pairs.
-        rng: the only source of chance.
-        noise: standard deviations, or the name of some.
+        rng: the only source of randomness.
+        noise: standard deviations, or the name of a noise profile.
         outlier_share: 0 to 1.
-        outlier_mix: what outliers are; None takes half ghosts, a quarter each of misclicks and wrong pairings.
-        decoys: further, wrong candidates per pair. The right one is the most plausible in two pairs out of three.
+        outlier_mix: kinds of outliers; None takes half ghosts, a quarter each of misclicks and wrong pairings.
+        decoys: additional, wrong candidates per pair. The right one is the most plausible in two pairs out of three.
         layout: where the reflector is put.
         camera: the intrinsics; None takes 1920 x 1080 with 75 deg and slight barrel distortion.
         rig_options: how the sensors are mounted; None takes the defaults.
-        rig: sensors to use as they are instead of drawing some.
+        rig: sensors to use instead of random ones.
     """
     profile = NOISE_PROFILES[noise] if isinstance(noise, str) else noise
     rig = rig or random_rig(rng, camera=camera or study_camera(), options=rig_options)
@@ -172,7 +172,7 @@ def simulate_pairs(
     outlier[rng.permutation(count)[: round(outlier_share * count)]] = True
     mix = outlier_mix or OutlierMix()
     for i in np.flatnonzero(outlier).tolist():
-        _spoil(rng, i, measured, clicks, rig=rig, layout=layout, mix=mix, true=points)
+        _make_outlier(rng, i, measured, clicks, rig=rig, layout=layout, mix=mix, true=points)
     sigma_polar = (profile if profile.sigma_range_m > 0 else NOISE_PROFILES["ti_fine"]).sigma_polar
     pairs, true_candidate = [], []
     for i in range(count):
@@ -183,7 +183,7 @@ def simulate_pairs(
 
 
 def study_camera() -> Camera:
-    """Return the camera the noise study used: 1920 x 1080, 75 deg, slight barrel distortion."""
+    """Return the camera of the noise study: 1920 x 1080, 75 deg, slight barrel distortion."""
     plain = typical_camera("plumb_bob", width_px=1920, height_px=1080)
     matrix = plain.matrix_px.copy()
     matrix[:2, 2] = [959.5, 539.5]
@@ -195,7 +195,7 @@ def draw_positions(rng: np.random.Generator, *, count: int, rig: Rig, layout: Pa
     """Draw reflector positions (count, 3) in the radar frame that the camera sees, apart from one another.
 
     Raises:
-        ValueError: so many do not fit in the layout.
+        ValueError: they do not all fit in the layout.
     """
     found: list[np.ndarray] = []
     for _ in range(2000 * count):
@@ -203,7 +203,7 @@ def draw_positions(rng: np.random.Generator, *, count: int, rig: Rig, layout: Pa
             break
         range_m = rng.uniform(layout.min_range_m, layout.max_range_m)
         azimuth_rad = np.deg2rad(rng.uniform(-layout.max_azimuth_deg, layout.max_azimuth_deg))
-        if layout.max_lateral_m < 50.0:  # narrow: spread over the width instead of over the angle
+        if layout.max_lateral_m < 50.0:  # narrow: spread over the width instead of the angle
             azimuth_rad = np.arcsin(min(1.0, layout.max_lateral_m / range_m)) * rng.uniform(-1.0, 1.0)
         height_m = layout.height_m + layout.roughness_m * rng.standard_normal()
         height_m += rng.uniform(0.0, 1.0) * max(0.0, layout.max_height_m - layout.height_m)
@@ -235,7 +235,7 @@ def _anywhere(rng: np.random.Generator, rig: Rig, layout: PairsLayout) -> Vector
     return (rig.radar_from_world @ world[None])[0]
 
 
-def _spoil(
+def _make_outlier(
     rng: np.random.Generator,
     i: int,
     measured: Points3,
@@ -246,7 +246,7 @@ def _spoil(
     mix: OutlierMix,
     true: Points3,
 ) -> None:
-    """Make pair i wrong, in place."""
+    """Turn pair i into an outlier, in place."""
     kind = rng.uniform(0.0, mix.ghost + mix.misclick + mix.wrong_pairing)
     if kind < mix.ghost:
         measured[i] = _anywhere(rng, rig, layout)
@@ -260,7 +260,7 @@ def _spoil(
 def _candidates(
     rng: np.random.Generator, measured: Vector3, decoys: int, rig: Rig, layout: PairsLayout, sigma_polar: Vector3
 ) -> tuple[tuple[Candidate, ...], int]:
-    """Build the candidates of a pair, the most plausible first, and tell which is the measured one."""
+    """Build the candidates of a pair, the most plausible first, and return which is the measured one."""
     positions = [_anywhere(rng, rig, layout) for _ in range(decoys)]
     place = 0 if decoys == 0 or rng.uniform() < 2.0 / 3.0 else int(rng.integers(1, decoys + 1))
     positions.insert(place, measured)

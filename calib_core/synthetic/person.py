@@ -1,4 +1,4 @@
-"""A person of capsules: what the camera sees walking and the radar sees moving."""
+"""A person made of capsules, as seen by the camera and by the radar."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -46,7 +46,7 @@ class PersonState:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Capsule:
-    """A rounded limb from one joint to another, in the world [m]; rcs_dbsm is what the radar sees of it."""
+    """A rounded limb from one joint to another, in the world [m]; rcs_dbsm is its radar cross-section."""
 
     start_m: Vector3
     end_m: Vector3
@@ -57,17 +57,17 @@ class Capsule:
 
 
 def _joint(hip: Vector3, target: Vector3, upper_m: float, lower_m: float, towards: Vector3) -> tuple[Vector3, Vector3]:
-    """Solve a two-bone limb: return its middle joint, and its end (the target, or as near as the bones reach)."""
+    """Solve a two-bone limb: return its middle joint and its end (the target, or as close as the bones reach)."""
     reach = target - hip
     length = float(np.linalg.norm(reach))
     full = 0.999 * (upper_m + lower_m)
     along = reach / max(length, 1e-9)
     length = min(length, full)
     near = (length**2 + upper_m**2 - lower_m**2) / (2.0 * max(length, 1e-9))
-    aside = np.sqrt(max(upper_m**2 - near**2, 0.0))
+    sideways = np.sqrt(max(upper_m**2 - near**2, 0.0))
     pole = towards - along * float(towards @ along)
     pole = pole / max(float(np.linalg.norm(pole)), 1e-9)
-    return hip + near * along + aside * pole, hip + length * along
+    return hip + near * along + sideways * pole, hip + length * along
 
 
 def _axes(state: PersonState) -> tuple[Vector3, Vector3, Vector3]:
@@ -76,7 +76,7 @@ def _axes(state: PersonState) -> tuple[Vector3, Vector3, Vector3]:
 
 
 def hand_position(state: PersonState) -> Vector3:
-    """Return where the hands hold something carried: (3,) in the world [m]."""
+    """Return the position (3,) of a carried object in the world [m]."""
     forward, _, up = _axes(state)
     base = np.array([state.x_m, state.y_m, 0.0])
     return base + (0.40 + 0.12 * state.crouch) * forward + (1.02 - 0.80 * state.crouch) * up

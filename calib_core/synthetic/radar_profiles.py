@@ -1,6 +1,6 @@
-"""What two kinds of radar can tell apart, and how wrong they are.
+"""Resolution and noise of two kinds of radar.
 
-The levels are assumptions in line with vendors' figures and with an array simulation; no real radar was measured.
+The values are assumptions in line with vendors' figures and with an array simulation; no real radar was measured.
 """
 
 from dataclasses import dataclass
@@ -12,44 +12,44 @@ __all__ = ["RADAR_PROFILES", "RadarProfile"]
 
 @dataclass(frozen=True, slots=True)
 class RadarProfile:
-    """A radar, in the coordinates it measures in: range, sines of the angles, Doppler."""
+    """A radar in its measurement coordinates: range, sines of the angles, Doppler."""
 
     range_bin_m: float
     """Width of a range bin [m]; positions lie on bins."""
     angle_bins: int
     """Bins over the sine of the azimuth from -1 to 1 (64 gives a lattice of 1/32); 0 interpolates."""
     doppler_bin_mps: float
-    """Width of a Doppler bin [m/s]; whatever is slower than half of it has Doppler exactly 0."""
+    """Width of a Doppler bin [m/s]; a speed below half of it has Doppler exactly 0."""
     doppler_bins: int
-    """Bins from the fastest approaching to the fastest receding; beyond, speeds wrap round."""
+    """Bins from the fastest approaching to the fastest receding; beyond these, speeds wrap around."""
     range_sigma_m: float
-    """Of one scan's range, before binning [m]."""
+    """Noise of one scan's range, before binning [m]."""
     azimuth_sigma: float
-    """Of one scan's sine of azimuth."""
+    """Noise of one scan's sine of azimuth."""
     elevation_sigma: float
-    """Of one scan's sine of elevation."""
+    """Noise of one scan's sine of elevation."""
     azimuth_bias_sigma: float
-    """Of the part of the azimuth error that stays as long as the object does (multipath, clutter beneath)."""
+    """Standard deviation of the part of the azimuth error that is constant for each object (multipath, clutter below it)."""
     elevation_bias_sigma: float
-    """The same of the elevation."""
+    """The same for the elevation."""
     calibration_azimuth: float
     """Amplitude of the smooth azimuth error over the field of view."""
     calibration_elevation: float
-    """The same of the elevation."""
+    """The same for the elevation."""
     snr_at_10_m_db: float
-    """Of a 0 dBsm object at 10 m on the axis [dB]."""
+    """SNR of a 0 dBsm object at 10 m on the axis [dB]."""
     threshold_db: float
     """Least SNR of a return [dB]."""
     beam_azimuth_deg: float
     """Half-power half-width of the antenna in azimuth [deg], two-way."""
     beam_elevation_deg: float
-    """The same in elevation [deg]."""
+    """The same for the elevation [deg]."""
     resolution_azimuth: float
-    """Two objects in one range bin closer than this in sine of azimuth show as one return."""
+    """Two objects in one range bin closer than this in sine of azimuth give one return."""
     false_alarms: float
-    """Mean number of returns from nothing per scan."""
+    """Mean number of false returns per scan."""
     latency_s: float
-    """From the measurement to its stamp [s]."""
+    """Delay from the measurement to its stamp [s]."""
 
 
 RADAR_PROFILES: dict[RadarName, RadarProfile] = {

@@ -1,4 +1,4 @@
-"""A simulated recording: frames are rendered as they are asked for, so memory stays bounded."""
+"""A simulated recording: frames are rendered on demand, so memory stays bounded."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -43,10 +43,10 @@ class SimulatedFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedRecording:
-    """What two recorders would have written down, and the truth behind it.
+    """The data that two recorders would have written, and the truth.
 
     Attributes:
-        stage: what was decided before a sensor measured.
+        stage: everything decided before the sensors measure.
         placements: the truth about each placement, in order of time.
         clicks: one example click per placement, with click noise.
     """
@@ -57,7 +57,7 @@ class SimulatedRecording:
 
     @property
     def options(self) -> SimulationOptions:
-        """What was asked for."""
+        """The options it was made with."""
         return self.stage.options
 
     @property
@@ -71,14 +71,14 @@ class SimulatedRecording:
         return self.stage.rig.camera_from_radar
 
     def scans(self) -> Iterator[RadarScan]:
-        """Measure scan by scan, by header stamps; the same scans every time."""
+        """Yield scans in order of header stamps; the same scans every time."""
         return radar_scans(self.stage)
 
     def frames(self, limit: int | None = None) -> Iterator[SimulatedFrame]:
-        """Render frame by frame; the same frames every time.
+        """Render and yield frames; the same frames every time.
 
         Args:
-            limit: how many from the start; None for all.
+            limit: number of frames from the start; None for all.
         """
         stage, options = self.stage, self.options
         renderer = FrameRenderer.of(stage.scene, stage.rig)
@@ -91,7 +91,7 @@ class SimulatedRecording:
 
 
 def simulate(options: SimulationOptions | None = None) -> SimulatedRecording:
-    """Decide on a recording; nothing is measured or rendered before it is asked for.
+    """Set up a recording; nothing is measured or rendered until requested.
 
     Args:
         options: what to simulate; None takes the defaults.

@@ -1,4 +1,4 @@
-"""From objects to radar returns: the radar equation, bins, biases that stay, misses and ghosts."""
+"""Radar returns from objects: the radar equation, bins, constant biases, misses and ghosts."""
 
 from dataclasses import dataclass
 
@@ -18,15 +18,15 @@ _SIDE_LOBE_DB = 11.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
-    """What is in front of the radar at one time.
+    """The objects in front of the radar at one time.
 
     Attributes:
         points_radar_m: (n, 3) true positions.
         velocity_mps: (n,) true radial speeds, positive moving away.
         rcs_dbsm: (n,) radar cross-sections.
         fading_db: (n,) standard deviation of the echo's level from scan to scan.
-        bias: (n, 3) errors that stay as long as the object does: range [m], sines of azimuth and elevation.
-        hidden: (n,) somebody stands in the way.
+        bias: (n, 3) constant errors of each object: range [m], sines of azimuth and elevation.
+        hidden: (n,) whether a person stands in the way.
     """
 
     points_radar_m: Points3
@@ -61,18 +61,18 @@ def measure(
     angle_bins: bool = True,
     calibration_phase: float = 0.0,
 ) -> RadarScan:
-    """Measure everything once.
+    """Measure all targets once.
 
-    Positions come out as the sensor sends them: on bins, in single precision. The stock demo computes
+    Positions are as the sensor sends them: on bins, in single precision. The stock demo computes
     y = -R Wx, z = R Wz, x = sqrt(R^2 - y^2 - z^2) with Wx on its lattice.
 
     Args:
-        rng: the only source of chance.
-        targets: what there is.
+        rng: the only source of randomness.
+        targets: the objects.
         profile: the radar.
         time: the stamp.
         angle_bins: whether azimuths lie on the profile's lattice.
-        calibration_phase: where the smooth angle error has its zero; belongs to one radar.
+        calibration_phase: where the smooth angle error is zero; a property of one radar.
     """
     cosines, velocity, snr = _echoes(rng, targets, profile, calibration_phase)
     cosines, velocity, snr = _with_side_lobes(rng, cosines, velocity, snr, profile)
@@ -108,7 +108,7 @@ def _echoes(rng: np.random.Generator, targets: Targets, profile: RadarProfile, p
     snr = profile.snr_at_10_m_db + targets.rcs_dbsm + path_db + gain_db
     snr = snr + targets.fading_db * rng.standard_normal(n)
     noise = rng.standard_normal((n, 3)) * [profile.range_sigma_m, profile.azimuth_sigma, profile.elevation_sigma]
-    weak = np.sqrt(1.0 + 10.0 ** ((14.0 - np.minimum(snr, 60.0)) / 10.0))  # thermal noise shows near the threshold
+    weak = np.sqrt(1.0 + 10.0 ** ((14.0 - np.minimum(snr, 60.0)) / 10.0))  # thermal noise matters near the threshold
     cosines = true + targets.bias + noise * weak[:, None]
     cosines[:, 1] += profile.calibration_azimuth * np.sin(5.0 * true[:, 1] + phase)
     cosines[:, 2] += profile.calibration_elevation * np.cos(4.0 * true[:, 1] + 6.0 * true[:, 2] + phase)
@@ -120,7 +120,7 @@ def _echoes(rng: np.random.Generator, targets: Targets, profile: RadarProfile, p
 def _with_side_lobes(
     rng: np.random.Generator, cosines: Points3, velocity: Values, snr: Values, profile: RadarProfile
 ) -> _Echoes:
-    """Let strong echoes now and then spill into a neighbouring range bin."""
+    """Let strong echoes occasionally appear in a neighbouring range bin too."""
     spill = (snr > profile.threshold_db + _SIDE_LOBE_DB + 3.0) & (rng.uniform(size=len(snr)) < _SIDE_LOBE_SHARE)
     extra = cosines[spill].copy()
     extra[:, 0] += rng.choice([-2.0, 2.0], size=len(extra)) * profile.range_bin_m
@@ -135,7 +135,7 @@ def _with_side_lobes(
 def _with_false_alarms(
     rng: np.random.Generator, cosines: Points3, velocity: Values, snr: Values, profile: RadarProfile
 ) -> _Echoes:
-    """Add returns from nothing."""
+    """Add false returns."""
     n = int(rng.poisson(profile.false_alarms))
     fastest = 0.5 * profile.doppler_bins * profile.doppler_bin_mps
     anywhere = np.stack(
@@ -149,7 +149,7 @@ def _with_false_alarms(
 
 
 def _on_bins(cosines: Points3, velocity: Values, profile: RadarProfile, angle_bins: bool) -> tuple[Points3, Values]:
-    """Put range, azimuth and speed on the radar's bins."""
+    """Round range, azimuth and speed to the radar's bins."""
     cosines = cosines.copy()
     cosines[:, 0] = np.round(cosines[:, 0] / profile.range_bin_m) * profile.range_bin_m
     if angle_bins and profile.angle_bins:
@@ -163,7 +163,7 @@ def _on_bins(cosines: Points3, velocity: Values, profile: RadarProfile, angle_bi
 
 
 def _resolved(cosines: Points3, velocity: Values, snr: Values, profile: RadarProfile) -> np.ndarray:
-    """Return the rows that show as returns of their own: of close ones only the strongest."""
+    """Return the rows that give separate returns: of close ones only the strongest."""
     kept: list[int] = []
     for i in np.argsort(-snr, kind="stable").tolist():
         near = [

@@ -1,4 +1,4 @@
-"""The sensor mast: a camera screwed on beside a radar, and where the two stand in the world.
+"""The sensor mast: a camera mounted next to a radar, and the pose of both in the world.
 
 World frame: x forward along the ground, y left, z up; the origin on the ground below the radar.
 """
@@ -16,12 +16,12 @@ from calib_core.options import option
 __all__ = ["NOMINAL_ROTATION", "Rig", "RigOptions", "nominal_rotation", "radar_stand", "random_rig", "typical_camera"]
 
 NOMINAL_ROTATION = ((0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
-"""Optical axes (right, down, forward) in terms of radar axes (forward, left, up): a camera looking where the radar looks."""
+"""Optical axes (right, down, forward) in radar axes (forward, left, up): a camera that looks in the radar's direction."""
 
 
 @dataclass(frozen=True, slots=True)
 class RigOptions:
-    """How the sensors are mounted; the truth is drawn around these values."""
+    """How the sensors are mounted; the true values are random around these."""
 
     radar_height_m: float = option(1.2, "Height of the radar above the ground [m].")
     radar_tilt_deg: float = option(10.0, "How far the radar looks down [deg].")
@@ -40,8 +40,8 @@ class Rig:
 
     Attributes:
         camera: the intrinsics.
-        camera_from_radar: the truth a calibration is after.
-        radar_from_world: where the mast stands.
+        camera_from_radar: the true pose that a calibration estimates.
+        radar_from_world: the pose of the mast.
     """
 
     camera: Camera
@@ -50,12 +50,12 @@ class Rig:
 
     @property
     def camera_from_world(self) -> RigidTransform:
-        """Where the camera stands."""
+        """The camera's pose in the world."""
         return self.camera_from_radar @ self.radar_from_world
 
     @property
     def camera_position_radar_m(self) -> Vector3:
-        """The camera centre in the radar frame: (3,) [m]; what a tape measure would find."""
+        """The camera centre in the radar frame: (3,) [m]; what a tape measure would give."""
         return self.camera_from_radar.inverse().translation_m
 
     @property
@@ -76,10 +76,10 @@ def typical_camera(
     height_px: int = 720,
     field_of_view_deg: float | None = None,
 ) -> Camera:
-    """Make a plausible camera of a lens model.
+    """Make a plausible camera with a lens model.
 
     Args:
-        model: the lens model; each has distortion a person can see.
+        model: the lens model; each has visible distortion.
         width_px: columns.
         height_px: rows.
         field_of_view_deg: horizontal field of view before distortion [deg]; None takes the lens model's typical one.
@@ -98,17 +98,17 @@ def typical_camera(
 
 
 def radar_stand(options: RigOptions) -> RigidTransform:
-    """Return radar_from_world of a radar at a height, tilted down."""
+    """Return radar_from_world of a radar at the given height, tilted down."""
     tilt = rotation_exp(np.array([0.0, np.deg2rad(options.radar_tilt_deg), 0.0]))  # world_from_radar: nose down
     world_from_radar = RigidTransform(tilt, np.array([0.0, 0.0, options.radar_height_m]))
     return world_from_radar.inverse()
 
 
 def random_rig(rng: np.random.Generator, *, camera: Camera, options: RigOptions | None = None) -> Rig:
-    """Draw where the camera really sits and looks.
+    """Draw the true pose of the camera.
 
     Args:
-        rng: the only source of chance.
+        rng: the only source of randomness.
         camera: the intrinsics.
         options: how the sensors are mounted; None takes the defaults.
     """

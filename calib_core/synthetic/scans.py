@@ -1,4 +1,4 @@
-"""A simulated session without pictures: the radar's scans, the truth and example clicks."""
+"""A simulated session without pictures: radar scans, truth and example clicks."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ _CARRIED_DBSM = 0.0
 _SHOULDER_M = 0.24
 _STEP_S = 0.01
 _CLEARANCE_M = 0.16
-"""How far from the line of sight to the reflector a limb must be so that all of the reflector shows."""
+"""How far a limb must be from the line of sight for all of the reflector to be visible."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +43,7 @@ class SimulatedPlacement:
         end: when it is picked up again.
         position_radar_m: (3,) its apex, which is its phase centre.
         pixel_px: (2,) where the camera sees that apex.
-        best_image_time: stamp of a frame at rest with nobody in front, nearest to the middle.
+        best_image_time: stamp of the frame nearest to the middle of the dwell with nobody in front.
     """
 
     id: str
@@ -60,11 +60,11 @@ class SimulatedPlacement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedScans:
-    """Scans and example clicks with the truth behind them.
+    """Scans and example clicks with their truth.
 
     Attributes:
-        stage: what was decided before measuring.
-        scans: what the radar reports, by its header stamps.
+        stage: everything decided before the sensors measure.
+        scans: the radar's scans, by header stamps.
         clicks: one per placement at its best frame, with click noise; ids "c1", "c2", ...
         placements: the truth, in order of time.
     """
@@ -96,7 +96,7 @@ class SimulatedScans:
 
 
 def simulate_scans(options: SimulationOptions | None = None) -> SimulatedScans:
-    """Simulate a session without rendering a picture: tenths of a second instead of a minute.
+    """Simulate a session without rendering pictures: tenths of a second instead of a minute.
 
     Args:
         options: what to simulate; None takes the defaults.
@@ -119,7 +119,7 @@ def clicks_of(stage: Stage, placements: tuple[SimulatedPlacement, ...]) -> tuple
 
 
 def placements_of(stage: Stage) -> tuple[SimulatedPlacement, ...]:
-    """State the truth about every placement."""
+    """Return the truth about every placement."""
     start_ns = stage.options.start_s * NS_PER_S
     found = []
     for resting in stage.story.restings:
@@ -139,10 +139,10 @@ def placements_of(stage: Stage) -> tuple[SimulatedPlacement, ...]:
 
 
 def _best_frame(stage: Stage, resting: Resting) -> TimeNs:
-    """Find the frame nearest to the middle of a placement in which the whole reflector shows.
+    """Find the frame nearest to the middle of a placement in which the whole reflector is visible.
 
     Raises:
-        ValueError: no frame shows it; the camera is too slow for the dwell.
+        ValueError: no frame shows it; the frame rate is too low for the dwell.
     """
     moments = stage.frame_times.moment_s
     inside = np.flatnonzero((moments > resting.start_s) & (moments < resting.end_s))
@@ -151,11 +151,11 @@ def _best_frame(stage: Stage, resting: Resting) -> TimeNs:
         person = stage.story.at(float(moments[i])).person
         if not stage.options.person or _shows(stage, person, resting.position_m):
             return TimeNs(int(stage.frame_times.header_ns[i]))
-    raise ValueError(f"no frame shows placement {resting.index + 1}: raise the camera's rate or the dwell")
+    raise ValueError(f"no frame shows placement {resting.index + 1}: raise the frame rate or the dwell time")
 
 
 def _shows(stage: Stage, person: PersonState, position_m: Vector3) -> bool:
-    """Tell whether no limb is near the line of sight from the camera to the reflector."""
+    """Return whether no limb is near the line of sight from the camera to the reflector."""
     eye = stage.rig.camera_position_world_m
     sight = np.linspace(0.02, 0.98, 60)[:, None] * (position_m - eye) + eye
     for limb in capsules(person):
@@ -167,7 +167,7 @@ def _shows(stage: Stage, person: PersonState, position_m: Vector3) -> bool:
 
 
 def radar_scans(stage: Stage) -> Iterator[RadarScan]:
-    """Measure scan by scan."""
+    """Yield the radar's scans."""
     rng = child_rng(stage.options, 9)
     phase = float(child_rng(stage.options, 10).uniform(0.0, 2.0 * np.pi))
     for moment_s, stamp in zip(stage.scan_times.moment_s, stage.scan_times.header_ns, strict=True):
@@ -183,7 +183,7 @@ def radar_scans(stage: Stage) -> Iterator[RadarScan]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Echo:
-    """Positions of some objects just before and just after a moment, and how they echo."""
+    """Positions of objects just before and just after a moment, and their echo."""
 
     before_m: Points3
     after_m: Points3
@@ -193,7 +193,7 @@ class _Echo:
 
 
 def targets_at(stage: Stage, time_s: float) -> Targets:
-    """List what the radar has in front of it at a time: clutter, reflector and its ghost, the person's limbs."""
+    """List the objects in front of the radar at a time: clutter, reflector and its ghost, the person's limbs."""
     before, now, after = (stage.story.at(time_s + step) for step in (-_STEP_S, 0.0, _STEP_S))
     echoes = [_clutter_echo(stage), *_reflector_echoes(stage, before, now, after)]
     if stage.options.person:
@@ -244,9 +244,9 @@ def _person_echo(before: PersonState, after: PersonState) -> _Echo:
 
 
 def _behind(person: PersonState, world_m: Points3) -> Flags:
-    """Tell which points the person's body hides from a radar above the origin."""
+    """Return which points the person's body hides from a radar above the origin."""
     far = np.linalg.norm(world_m[:, :2], axis=1)
     along = world_m[:, :2] / np.maximum(far, 1e-9)[:, None]
     depth = along @ person.place_m
-    aside = np.abs(along[:, 0] * person.y_m - along[:, 1] * person.x_m)
-    return (aside < _SHOULDER_M) & (depth > 0.0) & (depth < far - 0.45)
+    sideways = np.abs(along[:, 0] * person.y_m - along[:, 1] * person.x_m)
+    return (sideways < _SHOULDER_M) & (depth > 0.0) & (depth < far - 0.45)

@@ -1,4 +1,4 @@
-"""The places: what stands in them for the camera, what reflects in them for the radar, where the reflector may be put.
+"""The scenes: what the camera sees, what the radar sees, and where the reflector may be put.
 
 World frame: x forward, y left, z up; the radar stands above the origin.
 """
@@ -35,7 +35,7 @@ Backdrop = Literal["city", "trees", "hall"]
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """An upright block: centre of its base, sizes along x, y, z [m], turned about z."""
+    """An upright block: centre of its base, sizes along x, y, z [m], rotated about z."""
 
     x_m: float
     y_m: float
@@ -61,7 +61,7 @@ class Cylinder:
 
 @dataclass(frozen=True, slots=True)
 class Scatterer:
-    """Something static the radar sees, in the world [m], with its radar cross-section."""
+    """A static object that the radar sees, in the world [m], with its radar cross-section."""
 
     x_m: float
     y_m: float
@@ -71,17 +71,17 @@ class Scatterer:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A place.
+    """A scene.
 
     Attributes:
         name: its name.
         ground: what the ground looks like.
-        backdrop: what lies beyond.
-        solids: what stands there.
-        scatterers: what the radar sees of it.
+        backdrop: what is in the distance.
+        solids: the objects in it.
+        scatterers: what the radar sees of them.
         layout: where the reflector may be put.
-        sun_azimuth_deg: where the light comes from, as a heading in the world; over the camera's shoulder lights facets.
-        sun_elevation_deg: how high it stands.
+        sun_azimuth_deg: direction of the light, as a heading in the world; light from behind the camera lights the facets.
+        sun_elevation_deg: elevation of the light.
         ceiling_m: height of a ceiling; 0 for none.
     """
 
@@ -97,11 +97,11 @@ class Scene:
 
     @property
     def narrow(self) -> bool:
-        """Whether a person has no room beside the reflector."""
+        """Whether there is no room for a person at the reflector's side."""
         return self.layout.max_lateral_m < 2.0
 
     def free(self, place_m: np.ndarray, clearance_m: float) -> bool:
-        """Tell whether a place on the ground (2,) is clear of what stands there."""
+        """Return whether a place on the ground (2,) is clear of the solids."""
         for solid in self.solids:
             if solid.base_m > 2.0:
                 continue
@@ -120,7 +120,7 @@ def scene_named(name: SceneName) -> Scene:
 
 
 def _corners(box: Box, z_m: float, rcs_dbsm: float) -> list[Scatterer]:
-    """Two scatterers at the edges a box turns to the radar."""
+    """Return two scatterers at the edges of a box that face the radar."""
     near_m = box.x_m - box.length_m / 2
     inner_m = box.y_m - np.sign(box.y_m) * box.width_m / 2
     outer_m = box.y_m + np.sign(box.y_m) * box.width_m / 2

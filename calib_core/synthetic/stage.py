@@ -1,4 +1,4 @@
-"""What is decided before a sensor measures: the place, the sensors, the choreography, the clocks."""
+"""Everything decided before the sensors measure: scene, sensors, story, stamps."""
 
 from dataclasses import dataclass, replace
 
@@ -19,23 +19,23 @@ __all__ = ["Stage", "child_rng", "set_stage"]
 _GHOST_SHARE = 0.25
 _TRIPOD_M = 1.4
 _RIM_SHARE = 0.03
-"""Share of the image's width at its rim where no reflector is put: all of it is to show."""
+"""Share of the image's width at its border where no reflector is put, so that all of it is visible."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
-    """Everything that is decided before a sensor measures.
+    """Everything decided before the sensors measure.
 
     Attributes:
-        options: what was asked for.
-        scene: the place.
+        options: the options it was made with.
+        scene: the scene.
         rig: the sensors.
-        story: who is where when.
+        story: where person and reflector are at any time.
         frame_times: of the camera.
         scan_times: of the radar.
-        clutter: static things the radar sees, in the world.
-        clutter_bias: (k, 3) the error of each that stays: range [m], sines of azimuth and elevation.
-        reflector_bias: (n, 3) the error that stays during each placement: range [m], sines of azimuth and elevation.
+        clutter: static objects that the radar sees, in the world.
+        clutter_bias: (k, 3) the constant error of each of them: range [m], sines of azimuth and elevation.
+        reflector_bias: (n, 3) the constant error of each placement: range [m], sines of azimuth and elevation.
         ghosts: for each placement the static reflection that comes and goes with it, or None.
     """
 
@@ -57,12 +57,12 @@ class Stage:
 
 
 def child_rng(options: SimulationOptions, number: int) -> np.random.Generator:
-    """Return a generator of its own for each concern, so that changing one leaves the draws of the others alone."""
+    """Return a separate generator for each purpose, so that changing one does not change the draws of the others."""
     return np.random.default_rng([options.seed, number])
 
 
 def set_stage(options: SimulationOptions) -> Stage:
-    """Decide where everything is and when, from the options alone."""
+    """Decide where everything is at any time, from the options alone."""
     scene = scene_named(options.scene)
     camera = typical_camera(
         options.camera_model,
@@ -105,7 +105,7 @@ def set_stage(options: SimulationOptions) -> Stage:
 
 
 def _positions(rng: np.random.Generator, scene: Scene, rig: Rig, options: SimulationOptions) -> Points3:
-    """Draw apex positions in the world, clear of what stands there."""
+    """Draw apex positions in the world, clear of the solids."""
     layout = scene.layout
     if options.heights:
         layout = replace(layout, max_height_m=_TRIPOD_M)
@@ -126,7 +126,7 @@ def _positions(rng: np.random.Generator, scene: Scene, rig: Rig, options: Simula
 
 
 def _clutter(rng: np.random.Generator, scene: Scene, options: SimulationOptions) -> tuple[Scatterer, ...]:
-    """Choose the static things the radar sees; heavy clutter adds strong ones that stand among the placements."""
+    """Return the static objects that the radar sees; heavy clutter adds strong ones among the placements."""
     if options.clutter == "none":
         return ()
     if options.clutter == "scene":
@@ -145,7 +145,7 @@ def _clutter(rng: np.random.Generator, scene: Scene, options: SimulationOptions)
 
 
 def _ghost(rng: np.random.Generator, position_m: Vector3) -> Scatterer | None:
-    """Draw the static reflection that comes and goes with a placement: farther away, a little aside, weaker."""
+    """Draw the static reflection that comes and goes with a placement: farther away, slightly to the side, weaker."""
     share, extra_m, aside_rad, rcs_dbsm = rng.uniform([0.0, 0.8, -0.08, -4.0], [1.0, 3.5, 0.08, 3.0])
     if share > _GHOST_SHARE:
         return None

@@ -1,4 +1,4 @@
-"""What happens: a person carries the reflector from placement to placement and steps away each time.
+"""The story: a person carries the reflector from placement to placement and steps away each time.
 
 Times here are seconds from the start of the recording.
 """
@@ -33,7 +33,7 @@ class Resting:
         start_s: when it is released.
         end_s: when it is picked up again.
         position_m: (3,) the apex in the world.
-        facing_rad: where the reflector looks, as a heading in the world.
+        facing_rad: where the reflector faces, as a heading in the world.
     """
 
     index: int
@@ -45,14 +45,14 @@ class Resting:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """Where everybody is at one time.
+    """The person and the reflector at one time.
 
     Attributes:
-        person: where the person is and what they do.
+        person: the state of the person.
         reflector_m: (3,) its apex in the world.
-        facing_rad: where it looks, as a heading in the world.
-        resting: the placement it rests at; None while a person's hands are on it.
-        next_height_m: height of the apex at the placement it rests at, comes from or goes to.
+        facing_rad: where it faces, as a heading in the world.
+        resting: the placement it rests at; None while the person holds it.
+        next_height_m: height of the apex at the present, previous or next placement.
     """
 
     person: PersonState
@@ -77,7 +77,7 @@ class _Leg:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Story:
-    """The whole recording as one piece of choreography."""
+    """The movements of person and reflector during the whole recording."""
 
     restings: tuple[Resting, ...]
     duration_s: float
@@ -85,7 +85,7 @@ class Story:
     _ends_s: Values
 
     def at(self, time_s: float) -> Moment:
-        """Return where everybody is."""
+        """Return the person and the reflector at a time."""
         number = min(int(np.searchsorted(self._ends_s, time_s, side="right")), len(self._legs) - 1)
         leg = self._legs[number]
         person = _person(leg, self._legs[number - 1] if number else leg, time_s)
@@ -104,7 +104,7 @@ class Story:
 
 
 def _turn(angle_rad: float) -> float:
-    """Bring an angle into -pi to pi: the short way round."""
+    """Wrap an angle to -pi to pi."""
     return float((angle_rad + np.pi) % (2.0 * np.pi) - np.pi)
 
 
@@ -129,7 +129,7 @@ def _person(leg: _Leg, before: _Leg, time_s: float) -> PersonState:
     holding = leg.carrying or leg.action in ("put", "pick")
     turned = _eased((time_s - leg.start_s) / _TURNING_S)
     heading = before.heading_rad + turned * _turn(leg.heading_rad - before.heading_rad)
-    if leg.action == "stand":  # nobody stands like a post: sway by a centimetre
+    if leg.action == "stand":  # people do not stand still: sway by a centimetre
         place = place + 0.008 * np.array([np.sin(1.9 * time_s), np.cos(1.3 * time_s)])
     return PersonState(
         float(place[0]), float(place[1]), heading, leg.walked_m + eased * length_m, pace, crouch, holding
@@ -178,7 +178,7 @@ class _Script:
 
 
 def _in_order(positions: np.ndarray, start_m: Vector2) -> list[int]:
-    """Return a short walk through all positions: always on to the nearest one left."""
+    """Return a short walk through all positions: always to the nearest one left."""
     left, here, order = set(range(len(positions))), start_m, []
     while left:
         nearest = min(left, key=lambda i: (float(np.linalg.norm(positions[i, :2] - here)), i))
@@ -196,13 +196,13 @@ def tell_story(
     narrow: bool = False,
     start_m: tuple[float, float] = (2.6, -1.2),
 ) -> Story:
-    """Let a person carry the reflector to each position, nearest next.
+    """Let a person carry the reflector to each position, always to the nearest one next.
 
     Args:
-        rng: the only source of chance.
+        rng: the only source of randomness.
         positions_m: (n, 3) apex positions in the world, in any order.
         dwell_s: from releasing the reflector to picking it up.
-        narrow: the person steps back, not aside.
+        narrow: the person steps back, not to the side.
         start_m: where the person comes from.
     """
     script = _Script(np.array(start_m))
@@ -228,7 +228,7 @@ def tell_story(
 
 
 def _aside(rng: np.random.Generator, behind: Vector2, away: Vector2, narrow: bool) -> Vector2:
-    """Choose where the person waits: to one side and a little behind, or in a narrow place straight behind."""
+    """Choose where the person waits: to one side and slightly behind, or in a narrow place straight behind."""
     if narrow:
         return behind + rng.uniform(1.3, 1.7) * away + np.array([0.0, rng.uniform(-0.3, 0.3)])
     side = 1.0 if rng.uniform() < 0.5 else -1.0

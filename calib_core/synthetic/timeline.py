@@ -1,4 +1,4 @@
-"""Stamps: two sensors that are not synchronised, jitter, and drop a message now and then."""
+"""Stamps of two sensors that are not synchronised, with jitter and an occasional dropped message."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ __all__ = ["SensorTimes", "draw_times"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SensorTimes:
-    """When a sensor measured, what it stamped, and when the recorder got it.
+    """When a sensor measured, its stamps, and when the recorder received them.
 
     Attributes:
         moment_s: (m,) true times of measurement from the start [s].
@@ -48,13 +48,13 @@ def draw_times(
     """Draw one sensor's times.
 
     Args:
-        rng: the only source of chance.
+        rng: the only source of randomness.
         duration_s: length of the recording [s].
         rate_hz: measurements per second.
         jitter_s: standard deviation of each measurement's time [s].
-        dropped_share: share of measurements that never arrive.
+        dropped_share: share of measurements that are lost.
         latency_s: from the measurement to its stamp, clock offset included [s].
-        transfer_s: mean from the stamp to the recorder [s].
+        transfer_s: mean delay from the stamp to the recorder [s].
         start_ns: the recording's start.
     """
     first_s = rng.uniform(0.05, 0.05 + 1.0 / rate_hz)

@@ -1,4 +1,4 @@
-"""The two small files beside a simulated recording: truth.json for tests, clicks.json as an example."""
+"""The two small files written with a simulated recording: truth.json for tests, clicks.json as an example."""
 
 import json
 from typing import Any
@@ -15,7 +15,7 @@ _PIXEL_DECIMALS = 6
 
 
 def truth_text(recording: SimulatedRecording) -> str:
-    """Write down what is true about a recording (schema cocalib/truth-1). Nothing that estimates may read it."""
+    """Return the truth about a recording (schema cocalib/truth-1). No estimator may read it."""
     pose = recording.camera_from_radar
     document = {
         "schema": "cocalib/truth-1",
@@ -39,7 +39,7 @@ def truth_text(recording: SimulatedRecording) -> str:
 
 
 def clicks_text(recording: SimulatedRecording) -> str:
-    """Write the example clicks (schema cocalib/clicks-1)."""
+    """Return the example clicks (schema cocalib/clicks-1)."""
     return write_clicks(recording.clicks)
 
 

@@ -1,6 +1,6 @@
-"""A short version of `make bench-accuracy`: few trials, wide bounds, and still no room for an estimator that is off.
+"""A short version of `make bench-accuracy`: few trials and wide bounds, but tight enough to catch a wrong estimator.
 
-With 32 trials two standard errors of an RMSE are about 14 %: the limits below are the aims plus two of them.
+With 32 trials, two standard errors of an RMSE are about 14 %: the limits below are the aims plus two standard errors.
 """
 
 from functools import cache
@@ -36,7 +36,7 @@ def inside(case: Case) -> np.ndarray:
 
 
 def binomial_limits(trials: int) -> tuple[int, int]:
-    """Return between which counts 99.9 % of all runs lie when the truth is 95 %."""
+    """Return the two counts between which 99.9 % of all runs lie if the true coverage is 95 %."""
     chances = [comb(trials, count) * 0.95**count * 0.05 ** (trials - count) for count in range(trials + 1)]
     up_to = np.cumsum(chances)
     return int(np.argmax(up_to > 0.0005)), int(np.argmax(up_to >= 0.9995))
@@ -51,7 +51,7 @@ def test_the_error_is_near_the_bound_and_nothing_fails(case: Case) -> None:
     assert ratio(column(trials, "position_m"), column(trials, "bound_m")).value < aim + 0.2
 
 
-def test_the_ellipsoid_holds_the_truth_as_often_as_it_says() -> None:
+def test_the_ellipsoid_contains_the_truth_as_often_as_stated() -> None:
     together = np.concatenate([inside(case) for case in KNOWN])
     low, high = binomial_limits(len(together))
     assert low <= together.sum() <= high
@@ -59,7 +59,7 @@ def test_the_ellipsoid_holds_the_truth_as_often_as_it_says() -> None:
 
 
 @pytest.mark.parametrize("case", NOT_TOLD, ids=["not told", "told too small"])
-def test_the_ellipsoid_holds_the_truth_whatever_noise_is_told(case: Case) -> None:
+def test_the_ellipsoid_contains_the_truth_whatever_noise_is_assumed(case: Case) -> None:
     assert inside(case).sum() >= binomial_limits(TRIALS)[0]
     assert failed(measured(case)).sum() == 0
 
@@ -69,7 +69,7 @@ def under_smooth_error() -> list[Figures]:
     return [measure_smooth(20, trial) for trial in range(16)]
 
 
-def test_the_ellipsoid_holds_the_truth_under_a_smooth_angle_error(under_smooth_error: list[Figures]) -> None:
+def test_the_ellipsoid_contains_the_truth_under_a_smooth_angle_error(under_smooth_error: list[Figures]) -> None:
     assert column(under_smooth_error, "inside").sum() >= binomial_limits(16)[0]
 
 

@@ -1,4 +1,4 @@
-"""The benchmark itself: it goes on where it stopped, does not depend on processes, and writes what it found."""
+"""The benchmark itself: it resumes where it stopped, does not depend on processes, and writes its results."""
 
 from functools import partial
 from pathlib import Path
@@ -26,7 +26,7 @@ def never(trial: int) -> Figures:
     raise AssertionError(f"trial {trial} has been measured already")
 
 
-def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
+def test_an_interrupted_run_resumes_where_it_stopped(tmp_path: Path) -> None:
     keeper = Keeper(tmp_path)
     run([row()], keeper, jobs=1, most=3)
     path = tmp_path / f"{row().key}.jsonl"

@@ -263,7 +263,7 @@ def test_algorithm_1_line_6_pairs_the_click_with_that_mean() -> None:
 
 
 def test_algorithm_1_line_6_follows_the_paper_between_two_objects() -> None:
-    # This is the weakness of the printed algorithm, kept on purpose: half of the returns are clutter 4 m behind.
+    # This weakness of the printed algorithm is kept on purpose: half of the returns are clutter 4 m behind.
     scans = scans_of(*(scan_of(0.1 * i, [[5.0, 0.0, 0.0], [9.0, 0.0, 0.0]]) for i in range(20)))
     pair = pair_as_printed(ReflectorClick(at(1.0), "c1", 1.0, 2.0), scans, OPTIONS)
     assert isinstance(pair, Pair)
@@ -373,7 +373,7 @@ def test_algorithm_1_line_10_is_what_the_calibration_holds() -> None:
     assert not all(inliers.values())
 
 
-# The whole of it
+# The whole algorithm
 
 
 def test_algorithm_1_finds_the_true_pose_from_clicks_and_scans() -> None:
@@ -454,18 +454,18 @@ def test_three_pairs_are_too_few_and_the_reason_counts_them() -> None:
     clicks, scans = recording_of(simulated)
     outcome = unsolvable(calibrate_as_printed(clicks[:3], scans, simulated.camera, OPTIONS))
     assert outcome.code == "too-few-pairs"
-    assert outcome.reason == "3 of 4 pairs"
+    assert outcome.reason == "3 of at least 4 required pairs"
     lost = replace(clicks[3], image_time=at(9999.0))
-    aside = replace(clicks[4], excluded=True)
-    outcome = unsolvable(calibrate_as_printed([*clicks[:3], lost, aside], scans, simulated.camera, OPTIONS))
-    assert outcome.reason == "3 of 4 pairs, 1 more excluded, 1 more without a radar position"
+    excluded = replace(clicks[4], excluded=True)
+    outcome = unsolvable(calibrate_as_printed([*clicks[:3], lost, excluded], scans, simulated.camera, OPTIONS))
+    assert outcome.reason == "3 of at least 4 required pairs, 1 more excluded, 1 more without a radar position"
 
 
 def test_without_any_radar_return_the_reason_is_too_few_pairs() -> None:
     clicks = [ReflectorClick(at(float(i)), f"c{i}", 1.0, 2.0) for i in range(5)]
     outcome = unsolvable(calibrate_as_printed(clicks, RadarScans(), study_camera(), OPTIONS))
     assert outcome.code == "too-few-pairs"
-    assert "0 of 4" in outcome.reason
+    assert "0 of at least 4" in outcome.reason
 
 
 def test_when_ransac_finds_nothing_the_hint_names_the_threshold_and_the_default_method() -> None:

@@ -1,4 +1,4 @@
-"""The paper's equations, each in a test named after it, against the sum written out."""
+"""The paper's equations, each in a test named after it, compared with the sum written out."""
 
 import math
 

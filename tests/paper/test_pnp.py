@@ -1,4 +1,4 @@
-"""OpenCV's solvers behind one face, for every lens."""
+"""OpenCV's solvers behind one interface, for every lens."""
 
 import numpy as np
 import pytest
@@ -64,7 +64,7 @@ def test_refinement_reaches_the_least_squares_of_the_pixels(model: CameraModel) 
 
 
 def test_our_own_refinement_agrees_with_opencvs() -> None:
-    # a trace of skew sends the same problem down our own path
+    # a tiny skew selects our own refinement for the same problem
     rng = np.random.default_rng(6)
     simulated = pairs_without_noise(study_camera())
     pixels = simulated.pixels_px + 3.0 * rng.standard_normal(simulated.pixels_px.shape)
@@ -141,9 +141,9 @@ def test_no_pose_where_no_pairs_agree() -> None:
 def test_a_fisheye_click_at_ninety_degrees_is_no_inlier_but_does_no_harm() -> None:
     simulated = pairs_without_noise(typical_camera("equidistant"))
     camera = simulated.camera
-    aside_px = camera.project(np.array([[1.0, 0.0, -0.05]]))  # seen a little behind the image plane
+    sideways_px = camera.project(np.array([[1.0, 0.0, -0.05]]))  # seen a little behind the image plane
     points = np.concatenate([simulated.points_radar_m, [[0.0, -3.0, 0.0]]])
-    pixels = np.concatenate([simulated.pixels_px, aside_px])
+    pixels = np.concatenate([simulated.pixels_px, sideways_px])
     solution = solve_pnp_ransac(points, pixels, camera, "sqpnp")
     assert solution is not None
     assert solution.inliers.tolist() == [True] * 20 + [False]

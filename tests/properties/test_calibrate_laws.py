@@ -40,7 +40,7 @@ def test_shuffling_pairs_changes_no_bit(seed: int, order: object) -> None:
 @FEW
 @given(seed=SEEDS, turn=st.floats(-0.3, 0.3))
 def test_turning_the_radar_about_its_vertical_axis_turns_the_answer(seed: int, turn: float) -> None:
-    """A yaw of the radar only shifts azimuths, in which its noise is the same: the fit must turn with it."""
+    """A yaw of the radar only shifts azimuths, and the noise is the same in all of them: the fit must rotate with it."""
     simulated = simulate_pairs(12, rng=np.random.default_rng(seed))
     turned_from_radar = RigidTransform(rotation_exp(np.array([0.0, 0.0, turn])), np.zeros(3))
     turned = [

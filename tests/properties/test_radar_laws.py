@@ -1,4 +1,4 @@
-"""Round trips between the radar's coordinates, and their derivative."""
+"""Round trips between the radar's coordinates, and their derivatives."""
 
 import math
 

@@ -77,12 +77,12 @@ def bare_history(history: History) -> History:
 
 
 def answer_to(clicks: Sequence[ReflectorClick], options: CalibrationOptions) -> Unsolvable:
-    """An answer that says what it was asked."""
+    """Return an answer that states its clicks and options."""
     return Unsolvable("test", repr((tuple(clicks), options)), "")
 
 
 class HeldSolver:
-    """Keeps every request, and answers when it is told to, however late."""
+    """Keeps every request and answers on demand, however late."""
 
     def __init__(self) -> None:
         self.requests: list[tuple[int, Unsolvable, Callable[[Solved], None]]] = []

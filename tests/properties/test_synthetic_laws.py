@@ -1,4 +1,4 @@
-"""Laws of the simulation that hold for any seed and any target."""
+"""Laws of the simulation, valid for any seed and any target."""
 
 import numpy as np
 import pytest

@@ -31,14 +31,14 @@ def test_exact_pairs_give_the_exact_pose() -> None:
     simulated = simulate_pairs(12, rng=np.random.default_rng(1), noise="none")
     free = solved(simulated, CalibrationOptions())
     error = simulated.camera_from_radar.error_from(free.camera_from_radar)
-    # the wide prior about the camera position still pulls by a whisker
+    # the wide prior of the camera position still has a tiny effect
     assert np.linalg.norm(error[3:]) < 1e-4
     assert np.linalg.norm(error[:3]) < 2e-3
     assert free.metrics.aed_px < 0.05
 
 
 @pytest.mark.parametrize("noise", ["ti", "ti_fine", "imaging"])
-def test_a_third_of_wrong_pairs_is_named_and_does_not_move_the_pose(noise: str) -> None:
+def test_a_third_of_wrong_pairs_is_detected_and_does_not_move_the_pose(noise: str) -> None:
     simulated = simulate_pairs(24, rng=np.random.default_rng(5), noise=noise, outlier_share=0.33)  # type: ignore[arg-type]
     calibration = solved(simulated)
     named = np.array([pair.outlier_probability > 0.5 for pair in calibration.pairs])
@@ -46,7 +46,7 @@ def test_a_third_of_wrong_pairs_is_named_and_does_not_move_the_pose(noise: str) 
     assert error_in_sigmas(simulated, calibration) < np.sqrt(calibration.covariance_quantile) * 1.3
 
 
-def test_decoy_candidates_do_not_take_the_place_of_the_reflector() -> None:
+def test_decoy_candidates_are_not_chosen_instead_of_the_reflector() -> None:
     simulated = simulate_pairs(16, rng=np.random.default_rng(3), noise="ti_fine", decoys=4)
     calibration = solved(simulated)
     chosen = tuple(pair.candidate for pair in calibration.pairs)
@@ -76,14 +76,14 @@ def test_fewer_than_four_pairs_are_unsolvable_with_the_count() -> None:
 def test_an_excluded_pair_is_shown_but_changes_nothing() -> None:
     simulated = simulate_pairs(12, rng=np.random.default_rng(4))
     without = calibrate_pairs(simulated.pairs[:-1], simulated.camera, MEASURED)
-    aside = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED, frozenset({"p12"}))
+    shown = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED, frozenset({"p12"}))
     assert isinstance(without, Calibration)
-    assert isinstance(aside, Calibration)
-    assert aside.camera_from_radar.as_matrix().tobytes() == without.camera_from_radar.as_matrix().tobytes()
-    assert aside.pairs[-1].excluded
-    assert not aside.pairs[-1].inlier
-    assert np.isfinite(aside.pairs[-1].distance_px)
-    assert aside.metrics == without.metrics
+    assert isinstance(shown, Calibration)
+    assert shown.camera_from_radar.as_matrix().tobytes() == without.camera_from_radar.as_matrix().tobytes()
+    assert shown.pairs[-1].excluded
+    assert not shown.pairs[-1].inlier
+    assert np.isfinite(shown.pairs[-1].distance_px)
+    assert shown.metrics == without.metrics
 
 
 def test_the_paper_method_is_dispatched() -> None:
@@ -93,7 +93,7 @@ def test_the_paper_method_is_dispatched() -> None:
     assert np.isnan(outcome.covariance).all()
 
 
-def test_figures_are_over_the_inliers_and_held_out_is_larger() -> None:
+def test_metrics_are_over_the_inliers_and_held_out_is_larger() -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(8), outlier_share=0.2)
     calibration = solved(simulated)
     inliers = [pair for pair in calibration.pairs if pair.inlier]
@@ -102,7 +102,7 @@ def test_figures_are_over_the_inliers_and_held_out_is_larger() -> None:
     assert calibration.metrics.held_out_aed_px > calibration.metrics.aed_px
 
 
-def test_one_place_clicked_over_and_over_is_unsolvable() -> None:
+def test_repeated_clicks_at_one_place_are_unsolvable() -> None:
     simulated = simulate_pairs(4, rng=np.random.default_rng(9))
     repeated = [replace(simulated.pairs[0], id=f"again-{k}") for k in range(6)]
     outcome = calibrate_pairs(repeated, simulated.camera, CalibrationOptions())
@@ -126,7 +126,7 @@ def test_placements_along_one_line_are_unsolvable_without_a_camera_position() ->
     assert outcome.code == "degenerate-placements"
 
 
-def test_clicks_that_have_nothing_to_do_with_the_radar_are_unsolvable() -> None:
+def test_clicks_unrelated_to_the_radar_are_unsolvable() -> None:
     rng = np.random.default_rng(10)
     simulated = simulate_pairs(8, rng=rng)
     random = [replace(pair, pixel_px=rng.uniform(0.0, 1000.0, 2)) for pair in simulated.pairs]
@@ -136,7 +136,7 @@ def test_clicks_that_have_nothing_to_do_with_the_radar_are_unsolvable() -> None:
 
 
 @pytest.mark.slow
-def test_a_whole_simulated_session_comes_out_within_its_uncertainty() -> None:
+def test_a_whole_simulated_session_is_solved_within_its_uncertainty() -> None:
     session = simulate_scans(SimulationOptions(placements=12, seed=4))
     options = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.015)))
     outcome = calibrate(session.clicks, session.scans, session.camera, options)

@@ -19,7 +19,7 @@ def test_a_pinhole_projects_by_similar_triangles() -> None:
 
 
 @pytest.mark.parametrize("model", ["pinhole", "plumb_bob", "rational_polynomial"])
-def test_points_behind_or_beside_the_camera_have_no_pixel(model: CameraModel) -> None:
+def test_points_behind_or_next_to_the_camera_have_no_pixel(model: CameraModel) -> None:
     pixels = typical_camera(model).project(np.array([[0.0, 0.0, -4.0], [1.0, 0.0, 0.0], [0.0, 0.0, 2.0]]))
     assert np.isnan(pixels).all(axis=1).tolist() == [True, True, False]
 
@@ -60,7 +60,7 @@ def test_the_image_ends_half_a_pixel_outside_the_outermost_centres() -> None:
 
 
 @pytest.mark.parametrize("model", CAMERA_MODELS)
-def test_a_camera_sees_what_is_ahead_and_not_what_is_behind_or_aside(model: CameraModel) -> None:
+def test_a_camera_sees_points_ahead_and_not_behind_or_to_the_side(model: CameraModel) -> None:
     points = np.array([[0.1, -0.1, 5.0], [0.0, 0.0, -5.0], [50.0, 0.0, 1.0]])
     assert typical_camera(model).sees(points).tolist() == [True, False, False]
 
@@ -101,6 +101,6 @@ def test_half_the_picture_keeps_the_centres_of_pixels_in_place() -> None:
         (("pinhole", 640, 480, np.eye(4)), "3 x 3"),
     ],
 )
-def test_what_is_no_camera_is_refused_with_a_reason(arguments: tuple[object, ...], reason: str) -> None:
+def test_an_invalid_camera_is_refused_with_a_reason(arguments: tuple[object, ...], reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         Camera(*arguments)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Rigid motion by example; its laws are in tests/properties."""
+"""Rigid transforms by example; their laws are in tests/properties."""
 
 import math
 
@@ -62,7 +62,7 @@ def test_a_mirrored_rotation_is_refused_and_the_message_says_so() -> None:
         (np.eye(3), np.zeros(2), "expected an array of 3"),
     ],
 )
-def test_what_is_no_rigid_motion_is_refused(rotation: np.ndarray, translation: np.ndarray, reason: str) -> None:
+def test_an_invalid_transform_is_refused(rotation: np.ndarray, translation: np.ndarray, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         RigidTransform(rotation, translation)
 
@@ -98,7 +98,7 @@ def test_skew_is_the_cross_product() -> None:
 
 @pytest.mark.parametrize("axis", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, -0.8, 0.0]])
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-7, 1e-3, 1.0, math.pi - 1e-9, math.pi])
-def test_exp_and_log_keep_their_digits_next_to_zero_and_to_pi(axis: list[float], angle: float) -> None:
+def test_exp_and_log_keep_full_precision_near_zero_and_near_pi(axis: list[float], angle: float) -> None:
     rotation = rotation_exp(angle * np.array(axis))
     assert rotation_angle_rad(rotation) == pytest.approx(angle, rel=1e-9, abs=1e-15)
     np.testing.assert_allclose(rotation_exp(rotation_log(rotation)), rotation, atol=1e-14)
@@ -111,7 +111,7 @@ def test_a_perturbation_shifts_the_translation_and_turns_from_the_left() -> None
     np.testing.assert_allclose(moved.rotation, rotation_exp(np.array([0.01, 0.0, 0.0])) @ QUARTER_ABOUT_Z, atol=1e-15)
 
 
-def test_the_adjoint_carries_a_small_motion_into_the_target_frame() -> None:
+def test_the_adjoint_maps_a_small_motion_to_the_target_frame() -> None:
     camera_from_radar = RigidTransform(QUARTER_ABOUT_Z, np.array([1.0, 2.0, 3.0]))
     error = 1e-6 * np.array([1.0, -2.0, 0.5, 0.3, 0.7, -0.4])
     motion = RigidTransform(rotation_exp(error[3:]), error[:3])

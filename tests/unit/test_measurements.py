@@ -1,4 +1,4 @@
-"""What was measured: stamps, clicks, scans, pairs."""
+"""Measurements: stamps, clicks, scans, pairs."""
 
 from dataclasses import FrozenInstanceError
 
@@ -39,7 +39,7 @@ def test_a_stamp_survives_being_split_into_seconds_and_nanoseconds(time_ns: int)
     assert time_from_parts(sec, nanosec) == time_ns
 
 
-def test_a_stamp_of_today_keeps_its_last_nanosecond() -> None:
+def test_a_present_stamp_keeps_its_last_nanosecond() -> None:
     assert time_parts(TimeNs(NOW_NS)) == (1_700_000_000, 123_456_789)
     assert time_from_parts(1_700_000_000, 123_456_789) == NOW_NS
 
@@ -57,7 +57,7 @@ def test_scans_are_stacked_in_order_of_time_with_their_returns() -> None:
     assert scans.scan_of_return().tolist() == [0, 0, 2]
 
 
-def test_one_scan_comes_out_as_it_went_in() -> None:
+def test_one_scan_is_returned_unchanged() -> None:
     scan = scan_at(20, 2.0, 2.5)
     again = RadarScans.from_scans([scan_at(10, 1.0), scan, scan_at(30)]).scan(1)
     assert again.time == 20
@@ -85,7 +85,7 @@ def test_of_two_scans_equally_near_the_earlier_is_taken() -> None:
     assert scans_at(10, 20).nearest(TimeNs(15)) == 0
 
 
-def test_nothing_is_nearest_among_no_scans() -> None:
+def test_no_scans_have_no_nearest_scan() -> None:
     with pytest.raises(ValueError, match="no scans"):
         RadarScans().nearest(TimeNs(5))
 
@@ -131,7 +131,7 @@ def test_measurements_cannot_be_changed() -> None:
         scan.time = TimeNs(3)  # type: ignore[misc]
 
 
-def test_a_pair_without_a_radar_position_is_no_pair() -> None:
+def test_a_pair_without_a_radar_position_is_refused() -> None:
     with pytest.raises(ValueError, match="c1 has no radar position"):
         Pair("c1", np.array([1.0, 2.0]), ())
 

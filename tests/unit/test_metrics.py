@@ -1,4 +1,4 @@
-"""Figures beside the paper's; its equations themselves are in tests/paper."""
+"""Metrics in addition to the paper's; the paper's equations are in tests/paper."""
 
 import math
 
@@ -19,7 +19,7 @@ def test_rms_aed_and_cdsd_belong_together() -> None:
     assert n * rms(LENGTHS) ** 2 == pytest.approx(n * aed(LENGTHS) ** 2 + (n - 1) * cdsd(LENGTHS) ** 2)
 
 
-def test_without_pairs_there_is_no_figure() -> None:
+def test_without_pairs_there_are_no_metrics() -> None:
     nothing = np.zeros(0)
     assert math.isnan(aed(nothing))
     assert math.isnan(rms(nothing))
@@ -32,7 +32,7 @@ def test_one_pair_has_no_spread() -> None:
     assert math.isnan(cdsd(np.array([3.0])))
 
 
-def test_the_metrics_carry_the_held_out_figure_beside_the_training_one() -> None:
+def test_the_metrics_contain_the_held_out_figure_and_the_training_one() -> None:
     metrics = metrics_of(LENGTHS, held_out_distances_px=LENGTHS + 1.0, acc=0.5, chi2=4.0, degrees_of_freedom=3)
     assert metrics.aed_px == pytest.approx(3.0)
     assert metrics.held_out_aed_px == pytest.approx(4.0)
@@ -57,7 +57,7 @@ def test_a_pixel_on_a_box_edge_is_inside_and_one_past_it_is_not() -> None:
     assert inside_boxes(pixels, boxes).tolist() == [True, False, True, False, False]
 
 
-def test_no_boxes_hold_no_pixel() -> None:
+def test_no_boxes_contain_no_pixel() -> None:
     assert inside_boxes(np.array([[1.0, 2.0]]), np.zeros((0, 4))).tolist() == [False]
     assert inside_boxes(np.zeros((0, 2)), np.array([[0.0, 0.0, 1.0, 1.0]])).tolist() == []
 

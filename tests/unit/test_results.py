@@ -1,4 +1,4 @@
-"""What a result can be asked: itself or an error, a summary, and how sure it is in pixels."""
+"""The methods of a result: unwrap, the summary, and the uncertainty in pixels."""
 
 import numpy as np
 import pytest
@@ -70,7 +70,7 @@ def test_the_pose_jacobian_is_that_of_finite_differences(simulated: SimulatedPai
         assert jacobian[:, k] == pytest.approx(slope, rel=1e-5, abs=1e-4)
 
 
-def test_the_advice_of_a_calibration_is_worked_out_once_and_carried_along(simulated: SimulatedPairs) -> None:
+def test_the_advice_of_a_calibration_is_computed_once_and_kept(simulated: SimulatedPairs) -> None:
     calibration = solved(simulated)
     assert calibration.next_placement is not None
     assert solved(simulated, CalibrationOptions(method="paper")).next_placement is None
@@ -96,13 +96,13 @@ def test_arrays_become_pairs_that_give_the_same_pose(simulated: SimulatedPairs) 
         (np.ones((2, 3)), np.zeros((3, 2)), {}, "2 radar positions, 3 pixels and 2 ids"),
         (np.full((1, 3), np.nan), np.zeros((1, 2)), {}, r"points_radar_m\[0\]: .* is not finite"),
         (np.ones((1, 3)), np.full((1, 2), np.inf), {}, r"pixels_px\[0\]: .* is not finite"),
-        (np.zeros((1, 3)), np.zeros((1, 2)), {}, "lies at the radar itself"),
-        (np.ones((2, 3)), np.zeros((2, 2)), {"ids": ["a", "a"]}, "ids: some are given twice"),
+        (np.zeros((1, 3)), np.zeros((1, 2)), {}, "is at the radar's origin"),
+        (np.ones((2, 3)), np.zeros((2, 2)), {"ids": ["a", "a"]}, "ids: there are duplicates"),
         (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.1, 0.2]}, "sigma_polar: expected an array of 3"),
         (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.1, 0.2, 0.0]}, "sigma_polar: every standard deviation"),
     ],
 )
-def test_arrays_that_make_no_pairs_are_refused_in_words(
+def test_arrays_that_make_no_pairs_are_refused_with_a_clear_error(
     points: np.ndarray, pixels: np.ndarray, more: dict[str, object], words: str
 ) -> None:
     with pytest.raises(InputError, match=words):

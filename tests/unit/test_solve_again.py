@@ -1,4 +1,4 @@
-"""A calibration keeps what it was solved from: solved again, from memory or from its file, it is the same to the last bit."""
+"""A calibration keeps its input: solved again, from memory or from its file, it is the same bit for bit."""
 
 import json
 from dataclasses import replace
@@ -33,22 +33,22 @@ def without_provenance(text: str) -> dict[str, object]:
 def solved(request: pytest.FixtureRequest, project_root: Path) -> Calibration:
     options = OPTIONS[request.param]
     clicks, scans, camera = read_rooftop(project_root, 4.0)
-    aside = [replace(click, excluded=i in (2, 7), sigma_px=1.5 if i == 4 else None) for i, click in enumerate(clicks)]
-    lost = replace(aside[0], id="lost", image_time=aside[0].image_time + 10**12)
-    outcome = calibrate([*aside, lost], scans, camera, options)
+    marked = [replace(click, excluded=i in (2, 7), sigma_px=1.5 if i == 4 else None) for i, click in enumerate(clicks)]
+    lost = replace(marked[0], id="lost", image_time=marked[0].image_time + 10**12)
+    outcome = calibrate([*marked, lost], scans, camera, options)
     assert isinstance(outcome, Calibration)
     assert [one.id for one in outcome.unpaired] == ["lost"]
     return outcome
 
 
-def test_the_file_solved_again_differs_in_its_provenance_only(solved: Calibration) -> None:
+def test_the_file_solved_again_differs_only_in_its_provenance(solved: Calibration) -> None:
     text = calibration_text(solved)
     again = solve_pairs(text, "calibration.json", CalibrationOptions())
     assert isinstance(again, Calibration)
     assert without_provenance(calibration_text_of_pairs(again, text, "calibration.json")) == without_provenance(text)
 
 
-def test_what_is_solved_again_from_memory_has_the_same_bits(solved: Calibration) -> None:
+def test_a_calibration_solved_again_from_memory_has_the_same_bits(solved: Calibration) -> None:
     again = solve_again(solved)
     assert isinstance(again, Calibration)
     assert calibration_text(again) == calibration_text(solved)
@@ -56,12 +56,12 @@ def test_what_is_solved_again_from_memory_has_the_same_bits(solved: Calibration)
     assert again.covariance.tobytes() == solved.covariance.tobytes()
 
 
-def test_a_file_that_was_written_from_a_file_can_be_solved_again(solved: Calibration) -> None:
+def test_a_file_written_from_a_file_can_be_solved_again(solved: Calibration) -> None:
     text = calibration_text(read_calibration(calibration_text(solved)).calibration)
     assert text == calibration_text(solved)
 
 
-def test_clock_warnings_of_the_recording_are_taken_over(project_root: Path) -> None:
+def test_clock_warnings_of_the_recording_are_copied(project_root: Path) -> None:
     clicks, scans, camera = read_rooftop(project_root, 8.0)
     late = RadarScans(
         scans.times_ns + 3_500_000_000,
@@ -79,7 +79,7 @@ def test_clock_warnings_of_the_recording_are_taken_over(project_root: Path) -> N
     assert again.warnings == outcome.warnings
 
 
-def test_options_that_were_typed_win_over_those_of_the_file(solved: Calibration) -> None:
+def test_given_options_override_those_of_the_file(solved: Calibration) -> None:
     text = calibration_text(solved)
     other = "paper" if solved.options.method == "default" else "default"
     again = solve_pairs(text, "calibration.json", CalibrationOptions(noise=NoiseOptions(sigma_px=7.0)))
@@ -93,14 +93,14 @@ def test_options_that_were_typed_win_over_those_of_the_file(solved: Calibration)
         solve_pairs(text, "calibration.json", CalibrationOptions(noise=NoiseOptions(sigma_px=-1.0)))
 
 
-def test_pairs_without_candidates_cannot_be_solved_again_and_it_is_said(project_root: Path) -> None:
+def test_pairs_without_candidates_cannot_be_solved_again_and_the_error_says_so(project_root: Path) -> None:
     earlier = (project_root / "tests" / "golden" / "calibration-1-earlier.json").read_text(encoding="utf-8")
-    with pytest.raises(InputError, match=r"^earlier\.json: .* pairs come without their candidates") as refusal:
+    with pytest.raises(InputError, match=r"^earlier\.json: .* pairs have no candidates") as refusal:
         solve_pairs(earlier, "earlier.json", CalibrationOptions())
     assert "\n" not in str(refusal.value)
 
 
-def test_too_few_pairs_left_are_an_answer_that_keeps_the_unpaired(solved: Calibration) -> None:
+def test_too_few_pairs_left_give_an_unsolvable_that_keeps_the_unpaired(solved: Calibration) -> None:
     few = replace(solved, pairs=solved.pairs[:3])
     outcome = solve_again(few)
     assert isinstance(outcome, Unsolvable)

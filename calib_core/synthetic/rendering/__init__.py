@@ -1,1 +1,1 @@
-"""Pictures: a traced backdrop that never moves, and in front of it the reflector and the person that carries it."""
+"""Rendering: a static ray-traced backdrop with the reflector and the person in front of it."""

@@ -1,4 +1,4 @@
-"""Frames: the still backdrop with reflector and person in front of it, and the camera's own noise."""
+"""Frames: the still backdrop with reflector and person in front of it, plus camera noise."""
 
 from dataclasses import dataclass
 
@@ -38,7 +38,7 @@ class FrameRenderer:
 
     @classmethod
     def of(cls, scene: Scene, rig: Rig) -> "FrameRenderer":
-        """Trace the backdrop, which takes some seconds, and be ready to render."""
+        """Trace the backdrop, which takes some seconds, and return a renderer."""
         return cls(scene, rig, trace_still(scene, rig), sun_direction(scene))
 
     def render(
@@ -47,10 +47,10 @@ class FrameRenderer:
         """Render one frame: (h, w, 3) uint8, blue first.
 
         Args:
-            moment: who is where.
+            moment: where person and reflector are.
             person: whether to draw the person.
             noise_grey: standard deviation of the sensor's noise [grey levels].
-            rng: of that noise.
+            rng: random generator of that noise.
         """
         levels = self.still.levels.copy()
         limbs = capsules(moment.person) if person else ()
@@ -112,7 +112,7 @@ class FrameRenderer:
         self._draw_facets(levels, facets, float(np.linalg.norm(moment.reflector_m - self.still.eye_m)))
 
     def _draw_facets(self, levels: np.ndarray, facets: list[Facet], distance_m: float) -> None:
-        """Fill polygons on an eight times finer window, and bring that down: edges come out smooth and unshifted."""
+        """Fill polygons on an eight times finer window and downsample, which keeps edges smooth and unshifted."""
         import cv2
 
         camera = self.rig.camera

@@ -1,4 +1,4 @@
-"""What lies beyond: sky, clouds, a city's skyline, trees."""
+"""The distant backdrop: sky, clouds, a city's skyline, trees."""
 
 from collections.abc import Callable
 
@@ -14,10 +14,10 @@ _ZENITH = np.array([0.085, 0.22, 0.60], dtype=np.float32)
 
 
 def backdrop_colour(backdrop: Backdrop, directions: np.ndarray, footprint_rad: float) -> np.ndarray:
-    """Return colours (n, 3) of what is far away.
+    """Return colours (n, 3) of the distant backdrop.
 
     Args:
-        backdrop: which place it is.
+        backdrop: which backdrop.
         directions: (n, 3) unit vectors in the world.
         footprint_rad: size of a pixel.
     """
@@ -27,7 +27,7 @@ def backdrop_colour(backdrop: Backdrop, directions: np.ndarray, footprint_rad: f
 def _sky(directions: np.ndarray, footprint_rad: float) -> np.ndarray:
     height = np.clip(directions[:, 2], 0.0, 1.0)
     colour = _ZENITH + (HAZE - _ZENITH) * np.exp(-height / 0.20)[:, None]
-    level = 420.0 / (height + 0.12)  # clouds lie on a level sheet, seen ever flatter towards the horizon
+    level = 420.0 / (height + 0.12)  # clouds lie on a level sheet, seen at a flatter angle towards the horizon
     u, v = directions[:, 0] * level, directions[:, 1] * level
     footprint = (footprint_rad * level / (height + 0.12)).astype(np.float32)
     billow = fractal_noise(u, v, size_m=620.0, octaves=3, footprint_m=footprint, seed=17, fall=0.5)
@@ -40,7 +40,7 @@ def _sky(directions: np.ndarray, footprint_rad: float) -> np.ndarray:
 def _skyline(
     azimuth: np.ndarray, elevation: np.ndarray, *, width_rad: float, tallest_rad: float, seed: int, footprint_rad: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return one row of houses: how much of each pixel they cover (n,), and their colour before haze (n, 3)."""
+    """Return one row of houses: their coverage of each pixel (n,), and their colour before haze (n, 3)."""
     cell = np.floor(azimuth / width_rad).astype(np.int32)
     inside = azimuth / width_rad - cell
     top = tallest_rad * (0.35 + 0.65 * hash_random(cell, cell * 0, seed) ** 1.5)

@@ -1,4 +1,4 @@
-"""Light and exposure: the sun, the sky, and how linear light becomes grey levels."""
+"""Light and exposure: the sun, the sky, and the conversion of linear light to grey levels."""
 
 import numpy as np
 
@@ -23,9 +23,9 @@ def lit(scene: Scene, normals: np.ndarray, direct: np.ndarray) -> np.ndarray:
     """Return the light (n, 3) that falls on surfaces.
 
     Args:
-        scene: its light; under a ceiling it is lamps and what the walls give back.
+        scene: its light; under a ceiling, lamps and reflections from the walls.
         normals: (n, 3) unit vectors in the world.
-        direct: (n,) share of the sun that gets there, cosine included.
+        direct: (n,) share of the sun that reaches them, cosine included.
     """
     indoors = scene.ceiling_m > 0.0
     ambient, source = (_BOUNCE, _LAMPS) if indoors else (SKY, SUN)
@@ -34,7 +34,7 @@ def lit(scene: Scene, normals: np.ndarray, direct: np.ndarray) -> np.ndarray:
 
 
 def display(linear: np.ndarray) -> np.ndarray:
-    """Turn linear light into grey levels 0 to 255 (float), with a soft shoulder at the bright end."""
+    """Convert linear light to grey levels 0 to 255 (float), with a soft shoulder at the bright end."""
     x = np.maximum(linear, 0.0) * np.float32(0.92)
     x = np.where(x > 0.6, 0.6 + 0.4 * np.tanh((x - 0.6) / 0.4), x)
     return np.float32(255.0) * np.power(x, np.float32(1.0 / 2.2))

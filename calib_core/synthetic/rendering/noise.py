@@ -1,4 +1,4 @@
-"""Seeded noise and filtered patterns on surfaces: nothing finer than a pixel's footprint, so nothing shimmers."""
+"""Seeded noise and filtered patterns on surfaces, with nothing finer than a pixel's footprint, to avoid shimmering."""
 
 import numpy as np
 
@@ -45,10 +45,10 @@ def fractal_noise(
     Args:
         u_m, v_m: where on the surface [m].
         size_m: feature size of the coarsest octave [m].
-        octaves: how many, each half the size of the last.
+        octaves: how many, each half the size of the previous one.
         footprint_m: size of a pixel on the surface [m].
         seed: of the pattern.
-        fall: amplitude of an octave relative to the last.
+        fall: amplitude of an octave relative to the previous one.
     """
     total = np.zeros(np.shape(u_m), dtype=np.float32)
     for octave in range(octaves):
@@ -61,7 +61,7 @@ def fractal_noise(
 
 
 def line_coverage(position_m: np.ndarray, *, period_m: float, width_m: float, footprint_m: np.ndarray) -> np.ndarray:
-    """Return how much of a pixel is covered by lines that repeat: 0 to 1, box-filtered.
+    """Return the share of a pixel covered by repeating lines: 0 to 1, box-filtered.
 
     Args:
         position_m: across the lines; one is centred on 0 [m].

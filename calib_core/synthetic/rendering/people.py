@@ -1,4 +1,4 @@
-"""The person in the picture: capsules traced analytically, one ray a pixel, with smooth outlines and a soft shadow."""
+"""The person in the picture: capsules traced analytically, one ray per pixel, with smooth outlines and a soft shadow."""
 
 import numpy as np
 
@@ -23,11 +23,11 @@ _ALBEDO: dict[Surface, tuple[float, float, float]] = {
     "stripe": (0.85, 0.85, 0.80),
 }
 _PENUMBRA = 0.035
-"""How fast a shadow's edge softens with the distance to what throws it."""
+"""How fast a shadow's edge softens with the distance to the object that casts it."""
 
 
 class Window:
-    """A rectangle of the picture: its slices, and the smallest one that holds some pixels."""
+    """A rectangle of the picture, given by its row and column slices."""
 
     __slots__ = ("columns", "rows")
 
@@ -36,7 +36,7 @@ class Window:
 
     @classmethod
     def around(cls, pixels_px: np.ndarray, camera: Camera, margin_px: float = 2.0) -> "Window | None":
-        """Return the window around pixels (n, 2); None if it is off the picture or they are not in front."""
+        """Return the window around pixels (n, 2); None if it is outside the picture or they are not in front."""
         if not np.all(np.isfinite(pixels_px)):
             return None
         low = np.floor(pixels_px.min(axis=0) - margin_px).astype(int)
@@ -48,7 +48,7 @@ class Window:
 
 
 def _outline(limb: Capsule, inflate_m: float = 0.0) -> np.ndarray:
-    """Return points (16, 3) around a limb whose pixels bound it."""
+    """Return points (16, 3) around a limb; their pixels bound it."""
     corners = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
     return np.concatenate(
         [
@@ -61,10 +61,10 @@ def _outline(limb: Capsule, inflate_m: float = 0.0) -> np.ndarray:
 def _nearest(
     origins: np.ndarray, rays: np.ndarray, limb: Capsule
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Bring rays and a limb's axis closest to each other.
+    """Find the closest points of rays and a limb's axis.
 
     Returns:
-        the gap's vector from axis to ray (..., 3), its length, how far along the ray, and how far along the axis (0 to 1).
+        the vector from axis to ray (..., 3), its length, the distance along the ray, and the share along the axis (0 to 1).
     """
     axis = (limb.end_m - limb.start_m).astype(np.float32)
     to_start = limb.start_m.astype(np.float32) - origins
@@ -89,15 +89,15 @@ def draw_limbs(
     camera_from_world: RigidTransform,
     towards: Vector3,
 ) -> None:
-    """Draw limbs into the picture, farthest first, hidden by what the backdrop has in front of them.
+    """Draw limbs into the picture, farthest first, hidden by nearer parts of the backdrop.
 
     Args:
         levels: (h, w, 3) grey levels, changed in place.
         limbs: in the world.
-        scene: whose light it is.
+        scene: for its light.
         still: the backdrop.
-        camera: the lens.
-        camera_from_world: where it stands.
+        camera: the intrinsics.
+        camera_from_world: the camera's pose.
         towards: (3,) direction of the sun.
     """
     pixel_rad = 1.0 / float(camera.matrix_px[0, 0])
@@ -132,14 +132,14 @@ def _limb_colour(limb: Capsule, normal: np.ndarray, share: np.ndarray, scene: Sc
 
 
 def _feet(ends: np.ndarray, towards: Vector3) -> np.ndarray:
-    """Throw points (n, 3) onto the ground along the light."""
+    """Project points (n, 3) onto the ground along the light."""
     feet = ends - (np.maximum(ends[:, 2:3], 0.0) / towards[2]) * towards
     feet[:, 2] = 0.0
     return feet
 
 
 def _near_shadow(points: np.ndarray, limb: Capsule, towards: Vector3) -> np.ndarray:
-    """Return the rows of ground points that a limb's shadow, its soft edge included, can reach."""
+    """Return the rows of ground points that a limb's shadow, including its soft edge, can reach."""
     feet = _feet(_outline(limb, 0.22), towards)
     low, high = feet.min(axis=0), feet.max(axis=0)
     x, y = points[:, 0], points[:, 1]
@@ -156,7 +156,7 @@ def shade_ground(
     towards: Vector3,
     strength: float = 0.62,
 ) -> None:
-    """Darken the ground where limbs keep the sun off it, softer the farther they are; changed in place."""
+    """Darken the ground, in place, where limbs cast a shadow; the farther they are, the softer it is."""
     if not limbs:
         return
     ends = np.concatenate([_outline(limb, 0.05) for limb in limbs])

@@ -1,7 +1,7 @@
 """The trihedral corner reflector in the picture.
 
-Three square-cut facets meet at the apex. The apex is the phase centre: every path by three bounces is as long as the
-path to the apex and back. It is what a person clicks, and what truth.json calls the reflector's position.
+Three square-cut facets meet at the apex. The apex is the phase centre: every path with three bounces is as long as the
+path to the apex and back. It is the point to click, and the reflector's position in truth.json.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Facet:
     """A flat polygon with one colour.
 
     Attributes:
-        corners_m: (n, 3) in the world, outline subdivided so that the lens may bend it.
+        corners_m: (n, 3) in the world, outline subdivided so that lens distortion can bend it.
         colour: (3,) linear.
     """
 
@@ -42,19 +42,19 @@ class Facet:
 
 
 def apex_edges(facing_rad: float, elevation_rad: float) -> np.ndarray:
-    """Return the edges from the apex as unit rows (3, 3): up, lower left, lower right, as seen by who it faces."""
+    """Return the edges from the apex as unit rows (3, 3): up, lower left, lower right, as seen by a viewer in front."""
     c, s = np.cos(facing_rad), np.sin(facing_rad)
     ce, se = np.cos(elevation_rad), np.sin(elevation_rad)
     axis = np.array([ce * c, ce * s, se])
     up = np.array([-se * c, -se * s, ce])
-    right = np.array([-s, c, 0.0])  # of the viewer, who looks against the axis
+    right = np.array([-s, c, 0.0])  # of that viewer, who looks against the axis
     turns = np.deg2rad([0.0, 120.0, 240.0])
     around = np.cos(turns)[:, None] * up - np.sin(turns)[:, None] * right
     return axis / np.sqrt(3.0) + np.sqrt(2.0 / 3.0) * around
 
 
 def _subdivided(corners: np.ndarray) -> np.ndarray:
-    """Put points between the corners of an outline."""
+    """Insert points between the corners of an outline."""
     shares = np.arange(_STEPS)[:, None] / _STEPS
     following = np.roll(corners, -1, axis=0)
     return np.concatenate([a + shares * (b - a) for a, b in zip(corners, following, strict=True)])
@@ -67,8 +67,8 @@ def reflector_facets(
 
     Args:
         apex_m: (3,) in the world.
-        facing_rad: heading it looks along.
-        scene: whose light it is.
+        facing_rad: heading it faces.
+        scene: for its light.
         towards: (3,) direction of the sun.
         eye_m: (3,) the camera.
         ground_stand: whether it sits on its block (else on a tripod).
@@ -122,7 +122,7 @@ def _base(
             continue
         light = lit(scene, normal[None], np.array([max(0.0, float(normal @ towards))]))[0]
         facets.append(Facet(_subdivided(corners), _ORANGE * light))
-        if abs(normal[2]) < 0.5:  # a white band for the eye
+        if abs(normal[2]) < 0.5:  # a white band for visibility
             band = corners.copy()
             band[:, 2] = [bottom + 0.045, bottom + 0.045, bottom + 0.075, bottom + 0.075]
             facets.append(Facet(_subdivided(band), np.array([0.85, 0.85, 0.83]) * light))
@@ -142,12 +142,12 @@ def stand_limbs(apex_m: Vector3, *, at_rest: bool) -> tuple[Capsule, ...]:
 
 
 def on_block(height_m: float) -> bool:
-    """Tell whether a reflector whose apex rests at this height sits on its block (else on a tripod)."""
+    """Return whether a reflector whose apex rests at this height sits on its block (else on a tripod)."""
     return height_m < _GROUND_STAND_M
 
 
 def shadow_limbs(apex_m: Vector3, facing_rad: float) -> tuple[Capsule, ...]:
-    """Return rounded stand-ins for sheets and block that throw about the same shadow."""
+    """Return capsules that cast about the same shadow as sheets and block."""
     edges = EDGE_M * apex_edges(facing_rad, np.deg2rad(9.0))
     tips = apex_m + edges
     centre = np.array([apex_m[0] + 0.055 * np.cos(facing_rad), apex_m[1] + 0.055 * np.sin(facing_rad), 0.0])

@@ -1,4 +1,4 @@
-"""Rays against blocks and pipes: what is hit first, and what lies in shadow."""
+"""Ray tracing of blocks and pipes: what is hit first, and what lies in shadow."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ _FAR = np.float32(np.inf)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hits:
-    """What rays hit.
+    """The hits of rays.
 
     Attributes:
         depth_m: (n,) distance; infinite where nothing is hit.
@@ -31,7 +31,7 @@ class Hits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """A block or a pipe in the form rays are tested against."""
+    """A block or a pipe in the form used for ray tests."""
 
     low_m: np.ndarray
     high_m: np.ndarray
@@ -45,11 +45,11 @@ class Solid:
 
     @property
     def height_m(self) -> float:
-        """From underside to top."""
+        """Height from underside to top."""
         return float(self.high_m[2] - self.low_m[2])
 
     def distance(self, places_m: np.ndarray) -> np.ndarray:
-        """Return how far places on the ground (n, 2) are from it."""
+        """Return the distance (n,) of places on the ground (n, 2) from it."""
         if self.round:
             middle = 0.5 * (self.low_m[:2] + self.high_m[:2])
             radius = 0.5 * (self.high_m[0] - self.low_m[0])
@@ -124,7 +124,7 @@ class Solid:
 
 
 def block(item: Box | Cylinder) -> Solid:
-    """Turn a thing of a scene into a solid."""
+    """Convert an object of a scene to a solid."""
     half = (
         np.array([item.radius_m, item.radius_m])
         if isinstance(item, Cylinder)
@@ -164,7 +164,7 @@ def trace(solids: list[Solid], eye: Vector3, rays: np.ndarray, rig: Rig, *, far_
 
 
 def _rows_near(solid: Solid, rig: Rig) -> np.ndarray:
-    """Return the flat indices of the pixels inside a solid's rectangle on the image; all of them if it is beside the camera."""
+    """Return the flat indices of the pixels in a solid's image rectangle; all of them if part of it is far off the axis."""
     camera = rig.camera
     steps = np.linspace(0.0, 1.0, 5)
     corners = np.array([[x, y, z] for x in steps for y in steps for z in steps])
@@ -184,7 +184,7 @@ def _rows_near(solid: Solid, rig: Rig) -> np.ndarray:
 def shadowed(
     scene: Scene, solids: list[Solid], points: np.ndarray, normals: np.ndarray, towards: Vector3
 ) -> np.ndarray:
-    """Return 1 where a solid stands between points (n, 3) and the sun, else 0; indoors lamps leave no hard shadow."""
+    """Return 1 where a solid stands between points (n, 3) and the sun, else 0; indoors, lamps cast no hard shadow."""
     dark = np.zeros(len(points), dtype=np.float32)
     if scene.ceiling_m > 0.0 or len(points) == 0:
         return dark

@@ -1,4 +1,4 @@
-"""The picture without anybody in it: traced once, ray by ray through the real lens."""
+"""The backdrop without person and reflector: traced once, ray by ray through the lens model."""
 
 from dataclasses import dataclass
 
@@ -18,13 +18,13 @@ _GRID_PX = 4
 _SAMPLES = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))
 _SUN_RADIUS = 0.012
 _LENS_BLUR_PX = 0.5
-"""Standard deviation of the lens blur of what is far away."""
+"""Standard deviation of the lens blur of the backdrop."""
 _FAR_M = {"tiles": 22.3, "grass": 400.0, "floor": 22.0, "asphalt": 12.0}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Still:
-    """The backdrop, and what a moving object in front of it needs to know.
+    """The backdrop, with the data needed to draw moving objects in front of it.
 
     Attributes:
         levels: (h, w, 3) float32 grey levels, red first.
@@ -42,7 +42,7 @@ class Still:
 
 
 def pixel_rays(rig: Rig, du_px: float = 0.0, dv_px: float = 0.0) -> np.ndarray:
-    """Return what each pixel looks at: (h, w, 3) unit directions in the world, exact on a grid of 4 px and smooth between."""
+    """Return the rays of the pixels: (h, w, 3) unit directions in the world, exact on a 4 px grid, interpolated in between."""
     camera = rig.camera
     columns, rows = camera.width_px // _GRID_PX + 3, camera.height_px // _GRID_PX + 3
     u, v = np.meshgrid(np.arange(columns) * _GRID_PX + du_px, np.arange(rows) * _GRID_PX + dv_px)
@@ -59,7 +59,7 @@ def pixel_rays(rig: Rig, du_px: float = 0.0, dv_px: float = 0.0) -> np.ndarray:
 
 
 def trace_still(scene: Scene, rig: Rig) -> Still:
-    """Trace a scene's backdrop, four samples a pixel, each with the sun at another spot of its disc."""
+    """Trace a scene's backdrop, four samples per pixel, each with the sun at another point of its disc."""
     import cv2
 
     eye = rig.camera_position_world_m
@@ -120,7 +120,7 @@ def _albedo(
 
 
 def _openness(scene: Scene, solids: list[Solid], number: int, points: np.ndarray) -> np.ndarray:
-    """Darken the ground where something stands on it, and the feet of things: what a wide sky does to corners."""
+    """Darken the ground around objects, and the foot of objects: ambient occlusion under a wide sky."""
     if number >= 0:
         return 1.0 - 0.30 * np.exp(-np.maximum(points[:, 2], 0.0) / 0.22)
     open_share = np.ones(len(points), dtype=np.float32)

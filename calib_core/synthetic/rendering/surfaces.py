@@ -1,4 +1,4 @@
-"""What surfaces look like: a colour (linear red, green, blue) for each point of a face."""
+"""Surface colours: linear red, green, blue for each point of a face."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ __all__ = ["Patch", "ground_colour", "material_colour"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patch:
-    """Points of one face: where on it, how big the face is, how big a pixel is there.
+    """Points of one face: their position on it, the size of the face, the size of a pixel there.
 
     Attributes:
         u_m: (n,) across.
@@ -47,7 +47,7 @@ class Patch:
         return np.broadcast_to(np.array(rgb, dtype=np.float32), (len(self.u_m), 3)).copy()
 
     def border(self, width_m: float) -> np.ndarray:
-        """Return 1 within a width of the face's rim, else 0."""
+        """Return 1 within a width of the face's border, else 0."""
         inset = np.minimum(
             np.minimum(self.u_m, self.width_m - self.u_m), np.minimum(self.v_m, self.height_m - self.v_m)
         )

@@ -19,7 +19,7 @@ UNSEEN = 60
 
 
 def bent(points: Points3) -> Points3:
-    """Bend the radar's angles smoothly by up to a degree, in a way that no rotation does."""
+    """Distort the radar's angles smoothly by up to a degree, in a way that no rotation can."""
     polar = polar_from_cartesian(points)
     polar[:, 2] += np.deg2rad(1.0) * np.cos(9.0 * polar[:, 1])
     return cartesian_from_polar(polar)
@@ -63,10 +63,10 @@ def test_a_smooth_error_is_learnt_and_new_placements_come_out_closer() -> None:
     assert angle_map.pays
     before, after = (unseen_aed_px(simulated, 40, calibration, known) for known in (None, angle_map))
     assert after < 0.75 * before
-    assert angle_map.corrected_aed_px == pytest.approx(after, rel=0.35), "what it says of itself is no boast"
+    assert angle_map.corrected_aed_px == pytest.approx(after, rel=0.35), "the map's own figure is not too optimistic"
 
 
-def test_the_map_is_all_but_flat_where_errors_are_independent() -> None:
+def test_the_map_is_almost_flat_if_errors_are_independent() -> None:
     simulated = drawn(40, bend=False)
     calibration = solved(simulated, 40)
     angle_map = learn_angle_map(calibration)
@@ -123,7 +123,7 @@ def test_a_radar_without_elevation_gets_no_elevation_correction() -> None:
     assert angle_map is None or not angle_map.correction_rad[:, :, 1].any()
 
 
-def test_many_pairs_are_thinned_out_and_the_map_is_the_same_again() -> None:
+def test_many_pairs_are_thinned_out_and_the_map_is_reproducible() -> None:
     simulated = drawn(200, bend=True)
     calibration = solved(simulated, 200)
     first, second = learn_angle_map(calibration), learn_angle_map(calibration)

@@ -1,4 +1,4 @@
-"""Advice that pays: following it beats walking about."""
+"""Following the advice reduces the uncertainty more than random placements."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def rotation_sigma(calibration: Calibration) -> float:
 
 
 def measured_at(position: np.ndarray, name: str, simulated: SimulatedPairs, rng: np.random.Generator) -> Pair:
-    """Put the reflector where the advice says and measure it as the simulation does."""
+    """Put the reflector at the advised place and measure it as the simulation does."""
     sigma = NOISE_PROFILES["ti"].sigma_polar
     point = cartesian_from_polar(polar_from_cartesian(position) + sigma * rng.standard_normal(3))
     pixel = simulated.camera.project(simulated.camera_from_radar @ position[None])[0] + 2.0 * rng.standard_normal(2)
@@ -61,7 +61,7 @@ def test_the_advised_place_is_in_view_and_new() -> None:
     assert advice.gain > 1.0
 
 
-def test_after_many_placements_one_may_stop_and_after_few_not() -> None:
+def test_the_advice_is_to_stop_after_many_placements_and_not_after_few() -> None:
     simulated = simulate_pairs(60, rng=np.random.default_rng(4))
     few, many = (next_placement(solved(list(simulated.pairs[:n]), simulated)) for n in (6, 60))
     assert few is not None

@@ -1,4 +1,4 @@
-"""Clusters of a window, and what makes one of them the reflector."""
+"""Clusters of a window, and the scores that select the reflector."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_two_objects_are_two_clusters_and_never_one_mean() -> None:
     assert ranges == pytest.approx(sorted(np.linalg.norm([POST, REFLECTOR], axis=1)), abs=0.01)
 
 
-def test_a_cluster_knows_in_how_many_scans_it_was_seen() -> None:
+def test_a_cluster_counts_the_scans_it_was_seen_in() -> None:
     (cluster,) = clusters_of(window({REFLECTOR: 30.0}, scans=20), most=6)
     assert (cluster.scans, cluster.returns, cluster.persistence) == (20, 20, 1.0)
     assert cluster.snr_db == pytest.approx(30.0, abs=1.0)
@@ -50,7 +50,7 @@ def test_an_empty_window_has_no_cluster() -> None:
     assert clusters_of(RadarScans(), most=6) == ()
 
 
-def test_what_is_always_there_loses_to_what_is_new_even_when_it_is_stronger() -> None:
+def test_a_new_cluster_scores_above_a_permanent_stronger_one() -> None:
     places = [(8.0, 1.0, -1.0), (6.0, 0.5, -1.0), (10.0, -1.5, -1.0), (4.0, 0.0, -1.0)]
     windows = [window({place: 20.0, POST: 35.0}, start_s=100.0 * i, seed=i) for i, place in enumerate(places)]
     clusters = [clusters_of(one, most=6) for one in windows]
@@ -60,7 +60,7 @@ def test_what_is_always_there_loses_to_what_is_new_even_when_it_is_stronger() ->
         assert scores.sum() == pytest.approx(1.0)
 
 
-def test_windows_of_the_same_placement_are_no_witnesses_against_it() -> None:
+def test_windows_of_the_same_placement_do_not_lower_its_novelty() -> None:
     windows = [window({REFLECTOR: 20.0, POST: 21.0}, start_s=0.5 * i) for i in range(5)]
     clusters = [clusters_of(one, most=6) for one in windows]
     for scores in scores_of(windows, clusters):
@@ -77,7 +77,7 @@ def test_sigma_keeps_its_floor_however_many_returns_are_averaged() -> None:
 
 def test_sigmas_in_the_message_replace_the_assumed_ones() -> None:
     plain = window({REFLECTOR: 30.0})
-    told = RadarScans(
+    with_sigmas = RadarScans(
         plain.times_ns,
         plain.first_return,
         plain.points_radar_m,
@@ -85,15 +85,15 @@ def test_sigmas_in_the_message_replace_the_assumed_ones() -> None:
         plain.snr_db,
         np.tile([0.1, 0.02, 0.04], (len(plain.points_radar_m), 1)),
     )
-    (candidate,) = candidates_of(clusters_of(told, most=6), np.ones(1), LocatingOptions(), NoiseOptions())
+    (candidate,) = candidates_of(clusters_of(with_sigmas, most=6), np.ones(1), LocatingOptions(), NoiseOptions())
     assert candidate.sigma_polar == pytest.approx([0.1, 0.02, 0.04], rel=0.02)
 
 
 def test_the_assumed_angle_noise_grows_to_the_side() -> None:
     ahead = candidate_at(np.array([10.0, 0.0, 0.0]), NoiseOptions())
     assert ahead.sigma_polar == pytest.approx(floor_sigma_polar(np.array([10.0, 0.0, 0.0]), NoiseOptions()))
-    aside = floor_sigma_polar(np.array([5.0, 5.0, 0.0]), NoiseOptions())
-    assert aside[1] == pytest.approx(np.sqrt(2.0) * ahead.sigma_polar[1])
+    sideways = floor_sigma_polar(np.array([5.0, 5.0, 0.0]), NoiseOptions())
+    assert sideways[1] == pytest.approx(np.sqrt(2.0) * ahead.sigma_polar[1])
 
 
 def test_the_window_is_centred_on_the_nearest_scan() -> None:

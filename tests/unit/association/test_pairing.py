@@ -1,4 +1,4 @@
-"""Clicks meet radar positions, or say why not."""
+"""Every click gets radar positions, or a reason why it has none."""
 
 import numpy as np
 
@@ -43,7 +43,7 @@ def test_a_click_far_from_every_scan_stays_unpaired_with_the_gap() -> None:
     assert "11.00 s" in pairing.unpaired[0].reason
 
 
-def test_a_click_amid_moving_returns_stays_unpaired() -> None:
+def test_a_click_among_moving_returns_stays_unpaired() -> None:
     pairing = pair_clicks([click("a", 0.5)], scans_at([0.0, 0.5, 1.0], doppler_mps=1.0), CalibrationOptions())
     assert [one.code for one in pairing.unpaired] == ["no-static-return"]
 

@@ -1,4 +1,4 @@
-"""Placements from the radar alone."""
+"""Placement detection from the radar alone."""
 
 import json
 from pathlib import Path
@@ -20,7 +20,7 @@ RATE_HZ = 10.0
 def scans_with(
     dwells: list[tuple[float, float, tuple[float, float, float], float]], *, length_s: float = 60.0, seed: int = 0
 ) -> RadarScans:
-    """Build scans in which things (start [s], end [s], position [m], SNR [dB]) are seen nine times out of ten."""
+    """Build scans that show objects (start [s], end [s], position [m], SNR [dB]) nine times out of ten."""
     rng = np.random.default_rng(seed)
     scans = []
     for time_s in np.arange(0.0, length_s, 1.0 / RATE_HZ):
@@ -96,22 +96,22 @@ def test_what_is_always_there_is_clutter() -> None:
     assert found_in((0.0, 60.0, REFLECTOR, 40.0)) == ()
 
 
-def test_a_blinking_return_is_no_placement() -> None:
+def test_a_blinking_return_is_not_a_placement() -> None:
     blinks = [(float(start), start + 2.5, REFLECTOR, 25.0) for start in range(0, 60, 5)]
     assert found_in(*blinks) == ()
 
 
-def test_a_short_stop_is_no_placement() -> None:
+def test_a_short_stop_is_not_a_placement() -> None:
     assert found_in((20.0, 21.5, REFLECTOR, 25.0)) == ()
 
 
-def test_of_two_things_at_the_same_time_the_stronger_is_the_reflector() -> None:
+def test_of_two_simultaneous_objects_the_stronger_is_the_reflector() -> None:
     person = (21.0, 26.0, (6.5, -0.5, 0.2), 12.0)
     (placement,) = found_in((20.0, 27.0, REFLECTOR, 25.0), person)
     np.testing.assert_allclose(placement.position_radar_m, REFLECTOR, atol=0.02)
 
 
-def test_strength_is_judged_free_of_range_so_that_a_far_reflector_counts() -> None:
+def test_strength_is_corrected_for_range_so_that_a_far_reflector_counts() -> None:
     near = (5.0, 10.0, (3.0, 0.0, -0.8), 40.0)
     far = (20.0, 25.0, (12.0, 1.0, -0.8), 40.0 - 40.0 * float(np.log10(12.0 / 3.0)))
     assert len(found_in(near, far)) == 2
@@ -130,7 +130,7 @@ def test_a_return_between_two_cells_is_one_placement() -> None:
     assert (placement.end - placement.start) / NS_PER_S > 6.0
 
 
-def test_moving_returns_and_returns_without_position_are_not_looked_at() -> None:
+def test_moving_returns_and_returns_without_position_are_ignored() -> None:
     scans = scans_with([(20.0, 27.0, REFLECTOR, 25.0)])
     columns = {
         "times_ns": scans.times_ns,
@@ -159,5 +159,5 @@ def test_a_radar_without_snr_and_doppler_still_shows_placements() -> None:
     assert placement.score > 0.5
 
 
-def test_no_scans_hold_no_placements() -> None:
+def test_no_scans_contain_no_placements() -> None:
     assert find_placements(RadarScans(), GatingOptions()) == ()

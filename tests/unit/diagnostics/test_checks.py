@@ -1,4 +1,4 @@
-"""Each doubt is raised when there is reason, and good data stay silent."""
+"""Each warning is raised when there is a reason, and good data give none."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -47,7 +47,7 @@ def warnings(pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions)
 
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
-def test_good_data_with_a_tape_measure_raise_no_doubt(noise: str) -> None:
+def test_good_data_with_a_tape_measure_give_no_warning(noise: str) -> None:
     for seed in range(4):
         simulated = simulate_pairs(20, rng=np.random.default_rng(seed), noise=noise)  # type: ignore[arg-type]
         assert codes(simulated.pairs, simulated.camera, measured()) == set()
@@ -87,12 +87,12 @@ def test_flat_ground_is_never_called_good_without_a_camera_position(noise: Noise
         assert not codes(tripod.pairs, tripod.camera, FREE) & HANDEDNESS
 
 
-def test_two_mirrored_axes_are_a_rotation_and_raise_no_doubt() -> None:
+def test_two_mirrored_axes_are_a_rotation_and_give_no_warning() -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(2))
     assert codes(moved(simulated.pairs, (1, -1, -1)), simulated.camera, measured(0.05)) == set()
 
 
-def test_a_flat_radar_is_named() -> None:
+def test_a_flat_radar_is_reported() -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(3))
     assert "flat-radar" in codes(moved(simulated.pairs, (1, 1, 0)), simulated.camera, measured())
 
@@ -114,13 +114,13 @@ def test_a_wrong_tape_measure_is_contradicted() -> None:
     assert "camera-position-contradicted" in codes(simulated.pairs, simulated.camera, measured(0.02, (0.0, 0.4, 0.0)))
 
 
-def test_a_camera_farther_away_than_expected_is_named() -> None:
-    aside = RigOptions(camera_offset_m=(0.0, 4.0, 1.0))
-    simulated = simulate_pairs(40, rng=np.random.default_rng(6), noise="imaging", rig_options=aside)
+def test_a_camera_farther_away_than_expected_is_reported() -> None:
+    far_camera = RigOptions(camera_offset_m=(0.0, 4.0, 1.0))
+    simulated = simulate_pairs(40, rng=np.random.default_rng(6), noise="imaging", rig_options=far_camera)
     assert "camera-far-away" in codes(simulated.pairs, simulated.camera, FREE)
 
 
-def test_placements_in_one_corner_leave_a_weak_geometry() -> None:
+def test_placements_in_one_corner_give_a_weak_geometry() -> None:
     corner = replace(FIELD, min_range_m=9.0, max_range_m=10.0, max_azimuth_deg=10.0, separation_m=0.05)
     simulated = simulate_pairs(16, rng=np.random.default_rng(7), layout=corner)
     (weak,) = (one for one in warnings(simulated.pairs, simulated.camera, FREE) if one.code == "weak-geometry")
@@ -133,12 +133,12 @@ def test_many_outliers_are_counted_and_named() -> None:
     assert "of 20 pairs" in many.message
 
 
-def test_few_pairs_are_called_few() -> None:
+def test_few_pairs_are_reported() -> None:
     simulated = simulate_pairs(6, rng=np.random.default_rng(9))
     assert "few-pairs" in codes(simulated.pairs, simulated.camera, measured())
 
 
-def test_many_clicks_of_few_places_are_noticed() -> None:
+def test_many_clicks_of_few_places_are_reported() -> None:
     simulated = simulate_pairs(5, rng=np.random.default_rng(10), noise="imaging")
     rng = np.random.default_rng(1)
     repeated = [
@@ -149,15 +149,15 @@ def test_many_clicks_of_few_places_are_noticed() -> None:
     assert "repeated-placements" in codes(repeated, simulated.camera, measured())
 
 
-def test_two_radar_positions_that_suit_one_click_are_named() -> None:
+def test_two_radar_positions_that_fit_one_click_are_reported() -> None:
     simulated = simulate_pairs(12, rng=np.random.default_rng(11))
     first = simulated.pairs[0]
     chosen = first.candidates[0]
     farther = replace(chosen, position_radar_m=1.1 * chosen.position_radar_m, score=0.5)
-    doubtful = replace(first, candidates=(replace(chosen, score=0.5), farther))
+    ambiguous = replace(first, candidates=(replace(chosen, score=0.5), farther))
     (warning,) = (
         one
-        for one in warnings([doubtful, *simulated.pairs[1:]], simulated.camera, measured())
+        for one in warnings([ambiguous, *simulated.pairs[1:]], simulated.camera, measured())
         if one.code == "uncertain-association"
     )
     assert "p1" in warning.message

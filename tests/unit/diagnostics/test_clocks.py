@@ -1,4 +1,4 @@
-"""Clicks that miss their dwells, all to one side, speak of the clocks; hasty single ones and clicks inside a dwell do not."""
+"""Clicks that miss their dwells to one side indicate a clock offset; single hasty clicks and clicks inside a dwell do not."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +23,7 @@ def rooftop(project_root: Path) -> ClickedSample:
     return read_rooftop(project_root, 8.0)
 
 
-def said(rooftop: ClickedSample, ahead_s: float) -> list[str]:
+def clock_warnings(rooftop: ClickedSample, ahead_s: float) -> list[str]:
     clicks, scans, camera = rooftop
     shifted = replace(scans, times_ns=scans.times_ns + round(ahead_s * NS_PER_S))
     outcome = calibrate(clicks, shifted, camera, CalibrationOptions())
@@ -32,22 +32,22 @@ def said(rooftop: ClickedSample, ahead_s: float) -> list[str]:
 
 
 @pytest.mark.parametrize("ahead_s", [0.0, 1.0, -1.0])
-def test_an_offset_that_leaves_the_clicks_in_their_dwells_does_no_harm_and_is_not_spoken_of(
+def test_an_offset_that_leaves_the_clicks_in_their_dwells_gives_no_warning(
     rooftop: ClickedSample, ahead_s: float
 ) -> None:
-    assert said(rooftop, ahead_s) == []
+    assert clock_warnings(rooftop, ahead_s) == []
 
 
 @pytest.mark.parametrize(("ahead_s", "words"), [(AHEAD_S, "ahead of"), (-AHEAD_S, "behind")])
 def test_stamps_that_take_the_clicks_out_of_their_dwells_are_suspected(
     rooftop: ClickedSample, ahead_s: float, words: str
 ) -> None:
-    (text,) = said(rooftop, ahead_s)
+    (text,) = clock_warnings(rooftop, ahead_s)
     assert words in text
 
 
 def placed(offsets_s: list[float]) -> tuple[list[PairResult], RadarScans]:
-    """Make one dwell per click, and clicks so many seconds from its middle."""
+    """Make one dwell per click, and place each click at an offset from its middle."""
     rng = np.random.default_rng(1)
     scans, pairs = [], []
     for i, offset_s in enumerate(offsets_s):
@@ -74,19 +74,19 @@ def test_the_offset_lies_between_what_all_clicks_allow() -> None:
     assert offset.clicks == len(clicked_s)
 
 
-def test_clicks_anywhere_inside_their_dwells_say_nothing() -> None:
+def test_clicks_anywhere_inside_their_dwells_give_no_warning() -> None:
     assert clock_offset(*placed([-1.9, 1.8, 0.0, -1.0, 1.5]), GatingOptions()) is None
 
 
-def test_clicks_that_miss_to_both_sides_are_no_clock() -> None:
+def test_clicks_that_miss_to_both_sides_are_not_a_clock_offset() -> None:
     assert clock_offset(*placed([-2.9, 2.8, -3.1, 3.0, -2.7, 2.9]), GatingOptions()) is None
 
 
-def test_two_hasty_clicks_are_no_clock() -> None:
+def test_two_hasty_clicks_are_not_a_clock_offset() -> None:
     assert clock_offset(*placed([-2.9, -2.8, 0.0, 0.1, -0.2, 0.3]), GatingOptions()) is None
 
 
-def test_without_scans_or_stamps_there_is_nothing_to_say() -> None:
+def test_without_scans_or_stamps_there_is_no_warning() -> None:
     pairs, scans = placed([-2.9, -3.0, -2.8])
     assert clock_offset(pairs, RadarScans(), GatingOptions()) is None
     assert clock_offset([replace(pair, image_time=None) for pair in pairs], scans, GatingOptions()) is None

@@ -1,4 +1,4 @@
-"""Wrong intrinsics are suspected by name, with the right amount; right ones are left in peace."""
+"""Wrong intrinsics are reported with the right amount; right ones are not reported."""
 
 import re
 from dataclasses import replace
@@ -21,10 +21,10 @@ MEASURED = CalibrationOptions(
 def suspected(seed: int, noise: str, options: CalibrationOptions, *, focal: float = 1.0, count: int = 20) -> str | None:
     simulated = simulate_pairs(count, rng=np.random.default_rng([7, seed]), noise=noise)  # type: ignore[arg-type]
     matrix_px = simulated.camera.matrix_px * np.array([[focal, 1, 1], [1, focal, 1], [1, 1, 1]])
-    return suspicion_under(replace(simulated.camera, matrix_px=matrix_px), simulated.pairs, options)
+    return warning_with(replace(simulated.camera, matrix_px=matrix_px), simulated.pairs, options)
 
 
-def suspicion_under(camera: Camera, pairs: object, options: CalibrationOptions) -> str | None:
+def warning_with(camera: Camera, pairs: object, options: CalibrationOptions) -> str | None:
     outcome = calibrate_pairs(pairs, camera, options)  # type: ignore[arg-type]
     assert isinstance(outcome, Calibration)
     return text_of(outcome.warnings)
@@ -36,7 +36,7 @@ def text_of(warnings: tuple[DataWarning, ...]) -> str | None:
 
 
 @pytest.mark.parametrize(("focal", "word"), [(1.03, "too long"), (0.97, "too short")])
-def test_a_focal_length_that_is_three_percent_off_is_suspected_by_amount_and_sign(focal: float, word: str) -> None:
+def test_a_focal_length_that_is_three_percent_off_is_reported_with_amount_and_sign(focal: float, word: str) -> None:
     for seed in range(3):
         text = suspected(seed, "imaging", MEASURED, focal=focal)
         assert text is not None
@@ -50,7 +50,7 @@ def test_a_distortion_that_was_forgotten_is_suspected() -> None:
     for seed in range(3):
         simulated = simulate_pairs(30, rng=np.random.default_rng([8, seed]), noise="imaging")
         straight = replace(simulated.camera, distortion=np.zeros(4))
-        text = suspicion_under(straight, simulated.pairs, MEASURED)
+        text = warning_with(straight, simulated.pairs, MEASURED)
         assert text is not None
         assert "grow with" in text
 
@@ -61,5 +61,5 @@ def test_right_intrinsics_are_not_suspected(noise: str, options: CalibrationOpti
     assert [suspected(seed, noise, options) for seed in range(6)] == [None] * 6
 
 
-def test_a_few_pairs_do_not_speak_of_the_lens() -> None:
+def test_a_few_pairs_are_not_tested() -> None:
     assert suspected(0, "imaging", MEASURED, focal=1.03, count=8) is None

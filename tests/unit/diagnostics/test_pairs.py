@@ -1,4 +1,4 @@
-"""A pair that part of the pose hangs on is named; well-spread placements name none."""
+"""A pair that alone determines part of the pose is reported; well-spread placements report none."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def test_one_near_placement_among_far_ones_decides(noise: str, seed: int) -> Non
     far = simulate_pairs(19, rng=rng, noise=noise, layout=FAR)  # type: ignore[arg-type]
     near = simulate_pairs(1, rng=rng, noise=noise, layout=NEAR, rig=far.rig)  # type: ignore[arg-type]
     (text,) = decisive(far, near)
-    assert "hangs on near alone" in text
+    assert "depends on near alone" in text
 
 
 @pytest.mark.parametrize("noise", ["ti", "imaging"])

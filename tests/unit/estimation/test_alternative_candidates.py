@@ -1,4 +1,4 @@
-"""Radar positions that a radar cannot tell apart by itself: the pose and all pairs together tell which is meant."""
+"""Ambiguous radar positions: the pose and all pairs together determine which alternative is right."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ OTHER_LOBE_RAD = np.deg2rad(25.0)
 
 
 def with_alternatives(simulated: SimulatedPairs, kind: str, rng: np.random.Generator) -> list[Pair]:
-    """Give every pair the position it has and one that it may have as well, in random order, neither more plausible."""
+    """Give every pair a second, equally plausible position, in random order."""
     pairs = []
     for pair in simulated.pairs:
         (candidate,) = pair.candidates
@@ -57,7 +57,7 @@ def test_the_right_one_of_two_positions_is_chosen_for_every_pair(kind: str, opti
         assert len(named) >= bool(wrong)
 
 
-def test_where_all_elevations_may_be_mirrored_and_the_camera_is_not_measured_the_question_is_said_to_be_open() -> None:
+def test_if_all_elevations_may_be_mirrored_and_the_camera_is_not_measured_a_warning_says_so() -> None:
     for seed in range(3):
         rng = np.random.default_rng([62, seed])
         simulated = simulate_pairs(20, rng=rng, noise="imaging")

@@ -1,4 +1,4 @@
-"""Errors that neighbours share are noticed, and the stated uncertainty allows for them."""
+"""Angle errors that neighbouring placements share are detected and included in the stated uncertainty."""
 
 from dataclasses import replace
 
@@ -44,8 +44,8 @@ def solved(simulated: SimulatedPairs) -> Calibration:
 
 
 @pytest.mark.slow
-def test_the_ellipsoid_holds_the_truth_despite_smooth_errors() -> None:
-    """With errors taken for independent it would hold it in fewer than 3 of 24."""
+def test_the_ellipsoid_contains_the_truth_despite_smooth_errors() -> None:
+    """If the errors were taken as independent, it would contain the truth in fewer than 3 of 24 sets."""
     inside = 0
     for seed in range(24):
         simulated = with_smooth_errors(seed, 80)
@@ -55,13 +55,13 @@ def test_the_ellipsoid_holds_the_truth_despite_smooth_errors() -> None:
     assert inside >= 20
 
 
-def test_smooth_errors_are_named_and_independent_ones_are_not() -> None:
+def test_smooth_errors_raise_a_warning_and_independent_ones_do_not() -> None:
     smooth_one = solved(with_smooth_errors(1, 60))
     plain = solved(simulate_pairs(60, rng=np.random.default_rng(1), layout=CROWDED))
     assert "smooth-angle-errors" in {warning.code for warning in smooth_one.warnings}
     assert "smooth-angle-errors" not in {warning.code for warning in plain.warnings}
 
 
-def test_more_pairs_do_not_average_smooth_errors_away() -> None:
+def test_more_pairs_do_not_average_smooth_errors_out() -> None:
     few, many = (np.trace(solved(with_smooth_errors(2, count)).covariance[3:, 3:]) for count in (40, 160))
     assert many > 0.4 * few

@@ -1,4 +1,4 @@
-"""The stated uncertainty is the real one."""
+"""The stated uncertainty matches the actual errors."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ def solved(simulated: SimulatedPairs, options: CalibrationOptions = MEASURED) ->
 
 
 @pytest.mark.slow
-def test_the_ellipsoid_holds_the_truth_about_as_often_as_it_says() -> None:
+def test_the_ellipsoid_contains_the_truth_about_as_often_as_stated() -> None:
     inside, squared = 0, []
     for seed in range(60):
         simulated = simulate_pairs(14, rng=np.random.default_rng(seed), outlier_share=0.2)
@@ -55,7 +55,7 @@ def test_a_measured_camera_position_shrinks_rotation_and_position_uncertainty() 
     assert measured[3:].sum() < 0.8 * free[3:].sum()
 
 
-def test_leaving_one_out_in_one_step_agrees_with_solving_without_it() -> None:
+def test_leave_one_out_by_one_step_agrees_with_solving_without_the_pair() -> None:
     simulated = simulate_pairs(16, rng=np.random.default_rng(5), noise="imaging")
     fixed = replace(MEASURED, noise=replace(MEASURED.noise, estimate_scale=False))
     whole = solved(simulated, fixed)

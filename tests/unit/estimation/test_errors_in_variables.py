@@ -1,4 +1,4 @@
-"""The final fit is a maximum-likelihood one: SciPy finds the same optimum, and it does not lean towards the camera."""
+"""The final fit is a maximum-likelihood one: SciPy finds the same optimum, and it is not biased towards the camera."""
 
 from dataclasses import replace
 
@@ -34,13 +34,13 @@ def test_scipy_finds_the_same_optimum_over_pose_and_true_positions() -> None:
 
     joint = least_squares(residuals, np.zeros(6 + 30), x_scale="jac", xtol=1e-13, ftol=1e-13, gtol=1e-13)
     apart = truth.perturbed(joint.x[:6]).error_from(refined.camera_from_radar)
-    # eliminating the true positions and fitting them are the same, but for the curvature of the lens model
+    # eliminating the true positions and fitting them are the same, except for the curvature of the lens model
     assert np.linalg.norm(apart[3:]) < 2e-4
     assert np.linalg.norm(apart[:3]) < 2e-4
 
 
 def test_the_camera_is_not_pulled_backwards_by_many_noisy_pairs() -> None:
-    """PnP on noisy points leans by centimetres however many pairs there are; errors in variables does not."""
+    """PnP on noisy points is biased by centimetres however many pairs there are; errors in variables is not."""
     crowded = replace(FIELD, separation_m=0.0)
     backwards_m = []
     for seed in range(4):
@@ -58,13 +58,13 @@ def test_the_camera_is_not_pulled_backwards_by_many_noisy_pairs() -> None:
 def test_the_noise_level_is_found_from_either_side(factor: float) -> None:
     simulated = simulate_pairs(60, rng=np.random.default_rng(2))
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED)
-    told = measurements.scaled([1.0, factor, factor, factor])
-    refined = fit_errors_in_variables(told, GncSolution(simulated.camera_from_radar, 0.0, 1.0), estimate_scale=True)
+    assumed = measurements.scaled([1.0, factor, factor, factor])
+    refined = fit_errors_in_variables(assumed, GncSolution(simulated.camera_from_radar, 0.0, 1.0), estimate_scale=True)
     assert refined.noise_scale[2] == pytest.approx(1.0 / factor, rel=0.3)
     assert refined.noise_scale[3] == pytest.approx(1.0 / factor, rel=0.3)
 
 
-def test_with_the_scale_fixed_the_noise_stays_as_told() -> None:
+def test_with_the_scale_fixed_the_noise_stays_as_assumed() -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(3))
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED)
     refined = fit_errors_in_variables(

@@ -1,4 +1,4 @@
-"""What pairs agree on."""
+"""Graduated non-convexity: the pose that most pairs agree on."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def test_candidates_are_associated_with_their_clicks_at_the_true_pose() -> None:
     assert tuple(rows - measurements.first[:-1]) == simulated.true_candidate
 
 
-def test_half_wrong_pairs_do_not_carry_the_vote() -> None:
+def test_the_true_pose_is_found_with_half_of_the_pairs_wrong() -> None:
     simulated = simulate_pairs(24, rng=np.random.default_rng(2), outlier_share=0.5)
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED)
     starts = initial_poses(measurements, most=3, rng=np.random.default_rng(1))
@@ -34,14 +34,14 @@ def test_starts_that_end_in_the_same_pose_count_once() -> None:
     assert len(solve_gnc(measurements, starts, estimate_scale=False)) == 1
 
 
-def test_noise_three_times_larger_than_told_is_noticed() -> None:
+def test_noise_three_times_larger_than_assumed_is_detected() -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(4))
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED).scaled([1.0, 0.3, 0.3, 0.3])
     starts = initial_poses(measurements, most=3, rng=np.random.default_rng(1))
     assert solve_gnc(measurements, starts, estimate_scale=True)[0].noise_scale > 1.5
 
 
-def test_the_true_pose_is_likelier_than_a_wrong_one() -> None:
+def test_the_true_pose_is_more_likely_than_a_wrong_one() -> None:
     simulated = simulate_pairs(12, rng=np.random.default_rng(5), outlier_share=0.25)
     measurements = pair_measurements(simulated.pairs, simulated.camera, MEASURED)
     wrong = simulated.camera_from_radar.perturbed(np.array([0, 0, 0, 0, 0.1, 0]))

@@ -1,4 +1,4 @@
-"""Poses to start from."""
+"""Initialization: poses to start from."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_one_start_is_near_the_truth_despite_wrong_pairs(options: CalibrationOpt
     assert min(angles) < np.deg2rad(5.0)
 
 
-def test_a_camera_three_metres_aside_is_found_by_three_points() -> None:
+def test_a_camera_three_metres_away_is_found_by_three_points() -> None:
     rig_options = RigOptions(camera_offset_m=(0.0, 3.0, 0.5))
     simulated = simulate_pairs(20, rng=np.random.default_rng(4), noise="ti_fine", rig_options=rig_options)
     measurements = pair_measurements(simulated.pairs, simulated.camera, CalibrationOptions())

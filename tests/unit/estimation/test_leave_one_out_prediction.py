@@ -1,4 +1,4 @@
-"""What the others predict by one step is what they predict when a pair is really left out."""
+"""The leave-one-out prediction by one step agrees with a fit without the pair."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_one_step_predicts_what_a_fit_without_the_pair_predicts(estimate_scale: 
         assert np.linalg.norm(predicted - missed) < 0.15 * np.linalg.norm(missed) + 0.5  # pixels
 
 
-def test_the_noise_of_each_pair_adds_up_to_what_whitens_it() -> None:
+def test_the_noise_components_of_each_pair_add_up_to_its_whitened_covariance() -> None:
     simulated = simulate_pairs(12, rng=np.random.default_rng(4))
     measurements = pair_measurements(simulated.pairs, simulated.camera, CalibrationOptions())
     fit = fit_errors_in_variables(measurements, GncSolution(simulated.camera_from_radar, 0.0, 1.0), estimate_scale=True)
@@ -39,7 +39,7 @@ def test_the_noise_of_each_pair_adds_up_to_what_whitens_it() -> None:
     np.testing.assert_allclose(columns @ np.swapaxes(columns, 1, 2), np.tile(np.eye(2), (12, 1, 1)), atol=1e-9)
 
 
-def test_chances_are_those_of_chi_square_and_of_f() -> None:
+def test_tail_probabilities_are_those_of_chi_square_and_of_f() -> None:
     squared = np.array([0.5, 9.0, 20.0])
     np.testing.assert_allclose(tail_chance(squared, np.full(3, np.inf)), chi2.sf(squared, 2), rtol=1e-6)
     np.testing.assert_allclose(tail_chance(squared, np.full(3, 30.0)), f.sf(squared / 2, 2, 30), rtol=1e-9)

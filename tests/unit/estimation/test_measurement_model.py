@@ -1,4 +1,4 @@
-"""The arrays behind the pairs, and the linear model every stage shares."""
+"""The arrays of the measurement model, and the linear model shared by every stage."""
 
 import numpy as np
 import pytest
@@ -60,7 +60,7 @@ def test_whitening_undoes_the_covariance_of_click_and_radar_noise() -> None:
     assert covariance == pytest.approx(np.tile(np.eye(2), (len(measurements), 1, 1)), abs=0.12)
 
 
-def test_a_position_behind_the_camera_pulls_at_nothing() -> None:
+def test_a_position_behind_the_camera_has_no_influence() -> None:
     pairs, measurements = simulated()
     backwards = RigidTransform(rotation_exp(np.array([0.0, np.pi, 0.0])), np.zeros(3)) @ pairs.camera_from_radar
     model = linearize(
@@ -86,7 +86,7 @@ def test_the_prior_rows_are_the_derivative_of_the_camera_centre() -> None:
         assert -slope == pytest.approx(jacobian[:, k], abs=1e-3)
 
 
-def test_a_guessed_camera_position_pulls_less_the_farther_it_is_off() -> None:
+def test_a_weak_camera_prior_has_less_weight_the_farther_it_is_off() -> None:
     prior = CameraPrior(np.zeros(3), 1.0, measured=False)
     pulls = []
     for distance_m in (1.0, 10.0):
@@ -95,7 +95,7 @@ def test_a_guessed_camera_position_pulls_less_the_farther_it_is_off() -> None:
     assert pulls[1] < 0.25 * pulls[0]
 
 
-def test_a_radar_that_always_says_elevation_zero_is_not_believed() -> None:
+def test_a_radar_that_always_reports_elevation_zero_gets_a_large_elevation_sigma() -> None:
     pairs, _ = simulated()
     flat = [
         type(pair)(

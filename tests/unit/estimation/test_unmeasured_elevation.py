@@ -1,4 +1,4 @@
-"""A radar without elevation: the stated uncertainty allows for what it cannot know, and the warning says what fixes what."""
+"""A radar without elevation: the uncertainty covers the unknown elevation, and the warning says what determines what."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPosit
 
 
 def flattened(pair: Pair) -> Pair:
-    """Report range and azimuth of the pair as a radar without elevation does."""
+    """Reduce a pair to range and azimuth, as reported by a radar without elevation."""
     (candidate,) = pair.candidates
     x, y, _ = candidate.position_radar_m
     range_m, azimuth_rad = np.linalg.norm(candidate.position_radar_m), np.arctan2(y, x)
@@ -47,16 +47,16 @@ def test_the_truth_lies_inside_whether_the_reflector_stood_on_the_ground_or_at_t
     assert inside >= 8
 
 
-def test_the_warning_says_what_the_pairs_fix_and_what_rests_on_a_guess() -> None:
+def test_the_warning_says_what_the_pairs_determine_and_what_is_assumed() -> None:
     calibration, _ = solved(1, 1.2, FREE)
     (warning,) = (one for one in calibration.warnings if one.code == "flat-radar")
-    fixed, guessed = warning.message.split("; up ")
-    assert "up axis ± 0." in fixed
-    assert "about left" in guessed
+    determined, assumed = warning.message.split("; up ")
+    assert "up axis ± 0." in determined
+    assert "about left" in assumed
     assert "radar's height" in warning.hint
 
 
-def test_a_radar_that_measures_elevation_is_not_widened() -> None:
+def test_the_covariance_of_a_radar_with_elevation_is_not_widened() -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(2))
     outcome = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED)
     assert isinstance(outcome, Calibration)

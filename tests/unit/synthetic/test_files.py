@@ -56,7 +56,7 @@ def _cloud(message: Any) -> np.ndarray:
     return np.frombuffer(message.data.tobytes(), dtype="<f4").reshape(message.width, len(message.fields))
 
 
-def test_a_ros_1_radar_bag_has_one_message_per_return_and_point_ids_that_begin_anew_in_each_scan(
+def test_a_ros_1_radar_bag_has_one_message_per_return_and_point_ids_that_restart_in_each_scan(
     scans: tuple[RadarScan, ...], folder: Path
 ) -> None:
     messages = [message for _, message in _messages([folder / "radar.bag"], "/ti_mmwave/radar_scan")]
@@ -110,7 +110,7 @@ def test_camera_info_carries_the_intrinsics(recording: SimulatedRecording, folde
     assert (infos[0].distortion_model, infos[0].width, infos[0].height) == ("plumb_bob", 128, 80)
 
 
-def test_raw_images_hold_the_very_pixels(tmp_path: Path) -> None:
+def test_raw_images_contain_the_exact_pixels(tmp_path: Path) -> None:
     recording = simulate(replace(OPTIONS, placements=1, raw_images=True, camera_rate_hz=1.0))
     write_recording(recording, tmp_path)
     images = [message for _, message in _messages([tmp_path / "camera.bag"], "/camera/image_raw")]
@@ -134,7 +134,7 @@ def test_an_imaging_radar_writes_clouds_to_ros_1_too(tmp_path: Path) -> None:
     assert len(clouds) == len(list(recording.scans()))
 
 
-def test_truth_and_clicks_say_what_the_simulation_knows(recording: SimulatedRecording, folder: Path) -> None:
+def test_truth_and_clicks_agree_with_the_simulation(recording: SimulatedRecording, folder: Path) -> None:
     truth = json.loads((folder / "truth.json").read_text())
     clicks = json.loads((folder / "clicks.json").read_text())
     assert truth["schema"] == "cocalib/truth-1"

@@ -1,4 +1,4 @@
-"""Simulated pairs: what is called true is true, and the noise is as large as it is said to be."""
+"""Simulated pairs: the stated truth is right, and the noise is as large as stated."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_clicks_and_radar_errors_have_the_profiles_standard_deviations() -> None
     assert polar_errors.std(axis=0) == pytest.approx(profile.sigma_polar, rel=0.1)
 
 
-def test_as_many_pairs_are_wrong_as_was_asked_and_they_are_far_off() -> None:
+def test_as_many_pairs_are_wrong_as_requested_and_they_are_far_off() -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(2), noise="imaging", outlier_share=0.3)
     projected = simulated.camera.project(simulated.camera_from_radar @ _radar_points(simulated))
     distance = np.linalg.norm(projected - _clicks(simulated), axis=1)

@@ -1,4 +1,4 @@
-"""Rendered frames: the reflector's apex is at the truth pixel, people are where the story says, nothing drifts."""
+"""Rendered frames: the reflector's apex is at the true pixel, people are where the story puts them, nothing drifts."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -48,9 +48,9 @@ def _border(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def _apex_from_picture(picture: np.ndarray) -> np.ndarray:
-    """Find where the three sheets meet, from grey levels alone: sort the sheets' pixels by brightness, cross the borders.
+    """Find where the three sheets meet from grey levels alone: sort pixels by brightness, intersect the borders.
 
-    The picture shows nothing but the reflector on its orange block, before pure green.
+    The picture shows only the reflector on its orange block, in front of pure green.
     """
     levels = picture.astype(float)
     grey = (levels.max(axis=2) - levels.min(axis=2)) < 16.0
@@ -128,7 +128,7 @@ def test_a_person_is_drawn_where_the_story_has_them(renderer: FrameRenderer, sta
     assert v.min() < middle[1] < v.max()
 
 
-def test_the_reflector_is_carried_by_its_person_between_placements(stage: Stage) -> None:
+def test_the_person_carries_the_reflector_between_placements(stage: Stage) -> None:
     for first, second in pairwise(stage.story.restings):
         moment = stage.story.at(0.5 * (first.end_s + second.start_s))
         hands = moment.reflector_m[:2] - moment.person.place_m
@@ -167,7 +167,7 @@ def test_what_stands_in_front_of_a_person_hides_them(renderer: FrameRenderer, st
     assert hidden.sum() > 100
 
 
-def test_sensor_noise_is_as_strong_as_asked_and_seeded() -> None:
+def test_sensor_noise_is_as_strong_as_requested_and_seeded() -> None:
     noisy = replace(OPTIONS, width_px=160, height_px=96, sensor_noise_grey=4.0)
     first, again = (next(simulate(noisy).frames(1)).pixels for _ in range(2))
     clean = next(simulate(replace(noisy, sensor_noise_grey=0.0)).frames(1)).pixels

@@ -1,4 +1,4 @@
-"""The sample recording in sample_data/ comes out of its command bit for bit, and stays small."""
+"""The command reproduces the sample recording in sample_data/ bit for bit, and the sample stays small."""
 
 import importlib.metadata
 import re
@@ -18,7 +18,7 @@ def sample(project_root: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def locked(project_root: Path) -> None:
-    """Skip where other versions than the locked ones are installed: their last bits may differ."""
+    """Skip if versions other than the locked ones are installed: the last bits may differ."""
     text = (project_root / "requirements" / "runtime.txt").read_text()
     for package in ("numpy", "opencv-python-headless", "rosbags"):
         pinned = re.findall(rf"^{package}==([^\s;\\]+)", text, flags=re.MULTILINE)
@@ -34,6 +34,6 @@ def test_the_sample_is_small_enough_to_ship(sample: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("locked")
-def test_the_whole_sample_comes_out_the_same_again(sample: Path, tmp_path: Path) -> None:
+def test_the_whole_sample_is_reproduced(sample: Path, tmp_path: Path) -> None:
     for path in write_sample(tmp_path):
         assert path.read_bytes() == (sample / path.name).read_bytes(), path.name

@@ -1,4 +1,4 @@
-"""Simulated radar sessions: bins, static and moving returns, stamps, and the truth beside them."""
+"""Simulated radar sessions: bins, static and moving returns, stamps, and their truth."""
 
 from dataclasses import replace
 
@@ -112,7 +112,7 @@ def test_stamps_rise_and_the_two_sensors_are_not_synchronised(session: Simulated
     assert not set(frames.header_ns.tolist()) & set(scans.header_ns.tolist())
 
 
-def test_a_clock_offset_moves_the_radars_stamps_by_just_that() -> None:
+def test_a_clock_offset_moves_the_radars_stamps_by_that_amount() -> None:
     plain, ahead = simulate_scans(SHORT), simulate_scans(replace(SHORT, clock_offset_s=0.25))
     assert set((ahead.scans.times_ns - plain.scans.times_ns).tolist()) <= {
         NS_PER_S // 4 - 1,
@@ -123,7 +123,7 @@ def test_a_clock_offset_moves_the_radars_stamps_by_just_that() -> None:
     assert np.array_equal(plain.scans.points_radar_m, ahead.scans.points_radar_m)
 
 
-def test_frames_and_scans_are_dropped_at_the_share_that_was_asked_for() -> None:
+def test_frames_and_scans_are_dropped_at_the_requested_share() -> None:
     whole, holed = simulate_scans(replace(SHORT, dropped_share=0.0)), simulate_scans(replace(SHORT, dropped_share=0.3))
     assert len(holed.scans) / len(whole.scans) == pytest.approx(0.7, abs=0.08)
 
@@ -149,7 +149,7 @@ def test_on_a_tripod_the_heights_vary() -> None:
     assert heights.max() - heights.min() > 0.8
 
 
-def test_in_heavy_clutter_something_returns_louder_than_the_reflector() -> None:
+def test_in_heavy_clutter_something_is_stronger_than_the_reflector() -> None:
     session = simulate_scans(replace(SHORT, clutter="heavy", person=False, placements=8))
     placement = session.placements[-1]
     window = session.scans.between(placement.start, placement.end)

@@ -134,7 +134,11 @@ def azimuth(xyz: np.ndarray) -> np.ndarray:
         ({"azimuth": lambda p: -azimuth(p)}, "radar-azimuth-mirrored", "have opposite signs"),
         ({"azimuth": lambda p: -np.degrees(azimuth(p))}, "radar-azimuth-mirrored", "have opposite signs"),
         ({"azimuth": lambda p: 0.4 + 0.3 * length(p)}, "radar-azimuth-contradicts", "disagree in every unit and sign"),
-        ({"elevation": lambda p: 0 * length(p)}, "radar-elevation-zero", "is always 0, but the heights of the positions are not"),
+        (
+            {"elevation": lambda p: 0 * length(p)},
+            "radar-elevation-zero",
+            "is always 0, but the heights of the positions are not",
+        ),
     ],
 )
 def test_columns_that_contradict_the_positions_are_said(columns, code, words, ros1, write, cloud_points) -> None:
