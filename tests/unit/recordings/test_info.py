@@ -1,4 +1,4 @@
-"""What `cocalib info` says."""
+"""The text that `cocalib info` prints."""
 
 import json
 
@@ -29,18 +29,18 @@ files     recording.bag  {size}  ROS 1 bag, lz4
 time      2023-11-14 22:13:20.030 UTC to 2023-11-14 22:13:21.950 UTC, 1.9 s
           1700000000.030 to 1700000001.950 s since 1970
           61 messages in 4 topics
-          radar and camera share 1.9 s
+          radar and camera overlap for 1.9 s
 
-used as     topic                     type                         messages     rate  longest gap  jitter  stamps
-intrinsics  /camera/camera_info       sensor_msgs/CameraInfo             20  10.0 Hz      0.100 s  0.0 ms  received
-camera      /camera/image/compressed  sensor_msgs/CompressedImage        20  10.0 Hz      0.100 s  0.0 ms  measured
-            /odd                      std_msgs/String                     1                                received
-radar       /radar/points             sensor_msgs/PointCloud2            20  10.0 Hz      0.100 s  0.0 ms  measured
+used as     topic                     type                         messages     rate  longest gap  jitter  clock
+intrinsics  /camera/camera_info       sensor_msgs/CameraInfo             20  10.0 Hz      0.100 s  0.0 ms  receive
+camera      /camera/image/compressed  sensor_msgs/CompressedImage        20  10.0 Hz      0.100 s  0.0 ms  header
+            /odd                      std_msgs/String                     1                                receive
+radar       /radar/points             sensor_msgs/PointCloud2            20  10.0 Hz      0.100 s  0.0 ms  header
 
-clocks    /camera/image/compressed: stamps of measurement, because the stamps are sound
+clocks    /camera/image/compressed: header stamps, because the stamps are sound
             received 30.0 ms after the stamp (± 0.0 ms)
-          /radar/points: stamps of measurement, because the stamps are sound
-            the times of receiving are the same
+          /radar/points: header stamps, because the stamps are sound
+            receive times are identical
 radar     /radar/points, frame 'radar': 20 scans at 10.0 Hz, longest gap 0.100 s
           returns per scan: 4 (4 to 4)
           position from x, y, z (forward, left, up); speed from velocity; amplitude from snr
@@ -49,19 +49,19 @@ camera    /camera/image/compressed, frame 'camera': 20 images at 10.0 Hz, longes
           plumb_bob from /camera/camera_info: fx 500.00 fy 510.00 cx 319.50 cy 239.50 px; \
 distortion -0.1, 0.02, 0.001, -0.002, 0.003
 
-warning   /radar/points gives every return the same height (0 m): it measures no elevation.
+warning   /radar/points has the same height (0 m) for every return: it measures no elevation.
           put the reflector's centre at the radar's height at every placement, and measure the camera position. [flat-radar]"""
     )
 
 
 @pytest.mark.parametrize("part", ["radar", "camera", "nothing"])
-def test_a_recording_that_lacks_something_is_described_all_the_same(part, ros, write, plain, jpeg):
+def test_an_incomplete_recording_is_described(part, ros, write, plain, jpeg):
     rows = [row for row in plain(ros, jpeg) if part in row[0]]
     with inspect_recording(write(ros, rows)) as recording:
         text = describe(recording)
         summary = recording_summary(recording)
-    assert ("radar     none that can be read" in text) == (part != "radar")
-    assert ("camera    none that can be read" in text) == (part != "camera")
+    assert ("radar     no readable topic" in text) == (part != "radar")
+    assert ("camera    no readable topic" in text) == (part != "camera")
     assert (summary.radar is None, summary.camera is None) == (part != "radar", part != "camera")
     assert summary.overlap_s is None
     assert ("no messages" in text) == (part == "nothing")
@@ -79,14 +79,14 @@ def test_the_summary_survives_json(ros, write, plain, jpeg):
 
 
 @pytest.mark.parametrize("encoding", ["bgr8", "bayer_rggb8", "mono8"])
-def test_raw_pixels_are_called_by_their_encoding(ros, write, encoding):
+def test_raw_pixels_are_described_by_their_encoding(ros, write, encoding):
     pixels = np.zeros((48, 64 * (3 if encoding == "bgr8" else 1)), dtype=np.uint8)
     message = ros.image(START_NS, pixels, encoding, width=64)
     with inspect_recording(write(ros, [("/camera/image_raw", START_NS, message)])) as recording:
         assert f"64 x 48 px, raw {encoding}" in describe(recording)
 
 
-def test_a_png_is_called_one_whatever_its_message_says(ros, write):
+def test_a_png_is_described_as_png_whatever_its_message_says(ros, write):
     png = cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes()
     with inspect_recording(write(ros, [("/camera/image", START_NS, ros.compressed(START_NS, png))])) as recording:
         assert "64 x 48 px, png" in describe(recording)

@@ -1,4 +1,4 @@
-"""What is said about the two clocks of a topic."""
+"""The diagnosis of the two clocks of a topic."""
 
 import numpy as np
 import pytest
@@ -17,11 +17,11 @@ RECEIVE_NS = START_NS + 100 * MS * np.arange(2000)
 SOUND_NS = RECEIVE_NS - 20 * MS
 
 
-def look(header_ns, receive_ns=RECEIVE_NS, *, chosen="header", wish="auto", times_ns=None, one_per_return=False):
+def look(header_ns, receive_ns=RECEIVE_NS, *, chosen="header", requested="auto", times_ns=None, one_per_return=False):
     header = None if header_ns is None else np.asarray(header_ns, dtype=np.int64)
     times = np.sort(header if chosen == "header" else receive_ns) if times_ns is None else times_ns
     stamps = Stamps("/radar", np.asarray(receive_ns, dtype=np.int64), header)
-    return diagnose(stamps, times_ns=times, chosen=chosen, wish=wish, one_per_return=one_per_return)
+    return diagnose(stamps, times_ns=times, chosen=chosen, requested=requested, one_per_return=one_per_return)
 
 
 def changed(where, by_ns):
@@ -30,7 +30,7 @@ def changed(where, by_ns):
     return header
 
 
-def test_sound_clocks_leave_nothing_to_remark():
+def test_sound_clocks_give_no_remarks():
     found = look(SOUND_NS)
     assert (found.remarks, about_clocks([found])) == ((), [])
     assert (found.reason, found.messages, found.islands, found.gaps) == ("the stamps are sound", 2000, 1, 0)
@@ -43,15 +43,15 @@ def test_sound_clocks_leave_nothing_to_remark():
     ("header_ns", "remark", "code"),
     [
         (np.where(np.arange(2000) % 500 == 7, 0, SOUND_NS), "4 of 2000 stamps are zero", None),
-        (changed(np.s_[100:103], -300 * MS), "1 stamp goes back, by up to 0.200 s", None),
-        (changed([50], -100 * MS), "1 stamp repeats the one before", None),
-        (changed(np.s_[1000:], 5 * NS_PER_S), "the delay jumps 1 time, by up to 5.000 s", "clock-jumps"),
+        (changed(np.s_[100:103], -300 * MS), "1 stamp goes backwards, by up to 0.200 s", None),
+        (changed([50], -100 * MS), "1 stamp repeats the previous one", None),
+        (changed(np.s_[1000:], 5 * NS_PER_S), "the delay jumps 1 time by up to 5.000 s", "clock-jumps"),
         (SOUND_NS + np.arange(2000) * 10_000, "the stamps drift by 20 ms (100 ppm)", None),
         (SOUND_NS + np.arange(2000) * 50_000, "the stamps drift by 99 ms (500 ppm)", "clock-drift"),
         (SOUND_NS - START_NS + 60 * NS_PER_S, "the stamps count from the start of a device, not from 1970", None),
     ],
 )
-def test_what_is_odd_about_stamps_is_remarked(header_ns, remark, code):
+def test_irregular_stamps_give_remarks(header_ns, remark, code):
     found = look(header_ns, times_ns=np.sort(header_ns[header_ns != 0]))
     small = "20 ms" in remark
     assert (remark in found.remarks) != small
@@ -64,30 +64,30 @@ def test_islands_and_gaps_of_data_are_counted():
     assert found.islands == 3
     assert found.covered_s == pytest.approx(199.7, abs=0.01)
     assert Rhythm.of(times).rate_hz == pytest.approx(10.0), "nothing happens between islands, which is no slower rate"
-    assert "3 stretches of data, 3.3 minutes in all" in found.remarks
+    assert "3 separate stretches of data, 3.3 minutes in total" in found.remarks
     (warning,) = about_clocks([found])
     assert warning.code == "islands"
-    assert "with up to 56.7 minutes of nothing between them" in warning.message
+    assert "separated by up to 56.7 minutes" in warning.message
     dropped = look(np.delete(SOUND_NS, np.s_[700:720]), np.delete(RECEIVE_NS, np.s_[700:720]))
     assert dropped.remarks == ("1 gap, the longest 2.100 s",)
 
 
 def test_the_reason_for_the_clock_is_given():
-    assert look(np.zeros(2000), chosen="receive").reason == "it has stamps that are all zero (2000 messages)"
-    assert look(None, chosen="receive", times_ns=RECEIVE_NS).reason == "it carries no stamps"
-    assert look(SOUND_NS, chosen="receive", wish="receive").reason == "it was asked for with --clock receive"
+    assert look(np.zeros(2000), chosen="receive").reason == "it has only zero stamps (2000 messages)"
+    assert look(None, chosen="receive", times_ns=RECEIVE_NS).reason == "it has no stamps"
+    assert look(SOUND_NS, chosen="receive", requested="receive").reason == "--clock receive was given"
     assert "cannot be compared" in look(SOUND_NS, chosen="receive").reason
-    assert "both sensors have the same clock" in look(SOUND_NS - START_NS).reason
-    assert "do not keep step with receiving" in look(changed(np.s_[1000:], 5 * NS_PER_S)).reason
+    assert "both sensors use the same clock" in look(SOUND_NS - START_NS).reason
+    assert "jump or drift relative to the receive times" in look(changed(np.s_[1000:], 5 * NS_PER_S)).reason
 
 
-def test_a_driver_that_stamps_every_return_is_named_so():
+def test_a_driver_that_stamps_every_return_is_recognised():
     found = look(SOUND_NS, one_per_return=True)
-    assert found.remarks == ("one message per return: the stamps within a scan differ",)
+    assert found.remarks == ("one message per return: stamps differ within a scan",)
 
 
 @given(st.lists(st.integers(-(2**62), 2**62), max_size=80), st.sampled_from(["header", "receive"]))
-def test_no_stamps_are_too_strange_to_look_at(header, chosen):
+def test_any_stamps_can_be_diagnosed(header, chosen):
     receive = START_NS + 100 * MS * np.arange(len(header))
     found = look(header, receive, chosen=chosen)
     assert found.messages == len(header)
@@ -99,7 +99,7 @@ def test_the_diagnosis_is_in_the_text_and_the_summary(ros, write, plain, jpeg):
     with inspect_recording(path) as recording:
         text = describe(recording)
         reports = {topic.name: topic.clocks for topic in recording_summary(recording).topics}
-    assert "/radar/points: stamps of measurement, because the stamps are sound" in text
+    assert "/radar/points: header stamps, because the stamps are sound" in text
     assert "received 30.0 ms after the stamp (± 0.0 ms)" in text
     assert reports["/camera/camera_info"] is None
     radar = reports["/radar/points"]
@@ -115,7 +115,7 @@ def test_clocks_of_sensors_that_are_not_in_use_are_shown_too(ros, write, plain, 
         (rear,) = [topic for topic in recording_summary(recording).topics if topic.name == "/rear/points"]
     assert rear.clocks is not None
     assert (rear.chosen, rear.clocks.chosen, rear.clocks.zero_stamps) == (False, "receive", 10)
-    assert "/rear/points: not in use; times of receiving, because it has stamps that are all zero (10 messages)" in text
+    assert "/rear/points: not in use; receive times, because it has only zero stamps (10 messages)" in text
 
 
 def test_the_warnings_of_the_clocks_reach_the_recording(ros1, write, plain, jpeg):
