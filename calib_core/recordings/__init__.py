@@ -1,4 +1,4 @@
-"""Recordings: ROS 1 and ROS 2 files in, radar scans, images and intrinsics out. Only here are containers known."""
+"""Read recordings: ROS 1 and ROS 2 files in; radar scans, images and intrinsics out. No other package knows containers."""
 
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.description import clock_lines, describe

@@ -1,4 +1,4 @@
-"""Put a recording together: topics chosen, clocks chosen, streams built, warnings gathered."""
+"""Assemble a recording: choose topics and clocks, build the streams, collect the warnings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ __all__ = ["Assembly", "assemble"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assembly:
-    """Everything a Recording serves; the attributes are its own."""
+    """Everything a Recording provides, under the same attribute names."""
 
     topics: tuple[TopicSummary, ...]
     radar_topic: str | None
@@ -56,10 +56,10 @@ def assemble(
     """Choose topics and clocks and build the streams.
 
     Args:
-        paths: as a person gave them, for messages.
+        paths: as the user gave them, for messages.
         sources: the open files.
         options: topics and clock asked for.
-        require: what the recording must have; with both, also a time in common.
+        require: what the recording must have; if both, they must also overlap in time.
 
     Raises:
         RecordingError: the recording lacks what the options ask for.
@@ -68,7 +68,9 @@ def assemble(
     topics, repeated = join_topics(sources)
     warnings = [warning for source in sources for warning in source.warnings] + list(repeated)
     if not any(len(topic) for topic in topics) and require:
-        raise RecordingError(f"{name}: holds no messages; was the recorder told which topics to record?")
+        raise RecordingError(
+            f"{name}: contains no messages; check that the recorder was set to record the right topics"
+        )
     axes = None if options.radar_axes is None else parse_radar_axes(options.radar_axes)
     inventory = Inventory(name, topics, {topic.name: usage_of(topic).read_as(axes) for topic in topics})
     selection = select(inventory, options, require)
@@ -102,7 +104,7 @@ def assemble(
 def _stamped(
     selection: Selection, inventory: Inventory
 ) -> tuple[Selection, Mapping[str, StampedTopic], list[DataWarning]]:
-    """Read the stamps of the topics in use; leave out messages that cannot be read, and say so."""
+    """Read the stamps of the topics in use; skip unreadable messages, with a warning."""
     used = [topic for topic in (selection.radar, selection.image) if topic is not None]
     stamped = read_stamps([(topic, _head_bytes(inventory.usages[topic.name])) for topic in used])
     by_name = {topic.name: both for topic, both in zip(used, stamped, strict=True)}
@@ -119,12 +121,12 @@ def _head_bytes(usage: Usage) -> int:
 def _clocks(
     stamped: Mapping[str, StampedTopic], options: RecordingOptions
 ) -> tuple[Mapping[str, Literal["header", "receive"]], Mapping[str, TimesNs], tuple[DataWarning, ...]]:
-    """Choose the clock of the topics in use, the radar first; return clock and times by topic."""
+    """Choose the clock of each topic in use, the radar first; return clocks and times by topic, and warnings."""
     read = [Stamps(name, both.topic.receive_ns, both.header_ns) for name, both in stamped.items()]
     if options.clock == "header":
         for both in read:
             if both.header_ns is None:
-                raise RecordingError(f"topic {both.topic} carries no stamps; use the receive times: --clock receive")
+                raise RecordingError(f"topic {both.topic} has no stamps; use the receive times: --clock receive")
     if len(read) == 2:
         choice = choose_clocks(read[0], read[1], options.clock)
     else:
@@ -140,7 +142,7 @@ def _diagnoses(
     clocks: Mapping[str, Literal["header", "receive"]],
     options: RecordingOptions,
 ) -> Mapping[str, ClockDiagnosis]:
-    """Look at the clocks of the topics in use."""
+    """Diagnose the clocks of the topics in use."""
     found = {}
     for stream in streams:
         if stream is not None:
@@ -149,14 +151,14 @@ def _diagnoses(
                 Stamps(name, stamped[name].topic.receive_ns, stamped[name].header_ns),
                 times_ns=stream.times_ns,
                 chosen=clocks[name],
-                wish=options.clock,
+                requested=options.clock,
                 one_per_return=isinstance(stream, RadarStream) and isinstance(stream.layout, PointLayout),
             )
     return found
 
 
 def _times(both: Stamps, clock: str) -> TimesNs:
-    """Return the times of a topic; a rare stamp of zero is filled in from the receive time and the usual delay."""
+    """Return the times of a topic; isolated zero stamps are replaced by the receive time less the median delay."""
     if clock == "receive" or both.header_ns is None:
         return both.receive_ns
     missing = both.header_ns == 0
@@ -184,7 +186,7 @@ def _image_stream(topic: Topic | None, inventory: Inventory, stamps: Mapping[str
 
 
 def _frame(topic: Topic | None) -> str:
-    """Read the frame_id a topic's messages begin with."""
+    """Read the frame_id of a topic's first message."""
     if topic is None or not len(topic):
         return ""
     try:

@@ -1,4 +1,4 @@
-"""What is odd about a recording, in words: overlap, lost messages, radars that are none or flat, repeated stamps."""
+"""Warnings about a recording: no overlap, lost messages, lidars, radars without elevation, repeated stamps."""
 
 import numpy as np
 
@@ -17,10 +17,10 @@ _SAMPLED_SCANS = 12
 
 
 def about_lost(name: str, count: int, stamped: StampedTopic) -> list[DataWarning]:
-    """Say how many messages of a topic are lost.
+    """Warn about the unreadable messages of a topic.
 
     Raises:
-        MessageError: all of them.
+        MessageError: none of them can be read.
     """
     if not stamped.lost:
         return []
@@ -29,8 +29,8 @@ def about_lost(name: str, count: int, stamped: StampedTopic) -> list[DataWarning
     return [
         DataWarning(
             "unreadable-messages",
-            f"{stamped.lost} of {count} messages of {name} cannot be read and are left out: {stamped.fault}",
-            "if they are many, copy the file again from its source",
+            f"{stamped.lost} of {count} messages of {name} cannot be read and are skipped: {stamped.fault}",
+            "if there are many, copy the file again from its source",
         )
     ]
 
@@ -38,16 +38,16 @@ def about_lost(name: str, count: int, stamped: StampedTopic) -> list[DataWarning
 def check_overlap(
     name: str, radar: RadarStream | None, images: ImageStream | None, *, required: bool
 ) -> list[DataWarning]:
-    """Compare the intervals of both sensors.
+    """Check that the time intervals of both sensors overlap.
 
     Args:
         name: of the recording.
-        radar: None where there is none.
-        images: likewise.
-        required: no overlap is an error.
+        radar: the radar stream, if any.
+        images: the image stream, if any.
+        required: raise an error if they do not overlap, instead of returning a warning.
 
     Raises:
-        RecordingError: they have no time in common, and that is required.
+        RecordingError: they do not overlap, but are required to.
     """
     if radar is None or images is None:
         return []
@@ -56,10 +56,10 @@ def check_overlap(
         return []
     gap_s = max(int(a[0] - b[-1]), int(b[0] - a[-1])) / NS_PER_S
     what = (
-        f"{radar.topic.name} ({_interval(a)}) and {images.topic.name} ({_interval(b)}) have no time in common: "
+        f"{radar.topic.name} ({_interval(a)}) and {images.topic.name} ({_interval(b)}) do not overlap in time: "
         f"{gap_s:.1f} s apart"
     )
-    hint = "give recordings made together; if only the clocks differ, try --clock receive or --clock header"
+    hint = "open recordings made at the same time; if only the clocks differ, try --clock receive or --clock header"
     if required:
         raise RecordingError(f"{name}: {what}; {hint}")
     return [DataWarning("no-overlap", what, hint)]
@@ -70,7 +70,7 @@ def _interval(times_ns: TimesNs) -> str:
 
 
 def about_radar(radar: RadarStream | None) -> list[DataWarning]:
-    """Say what is odd about the radar, from a dozen of its scans."""
+    """Warn if the radar looks like a lidar or measures no elevation, judging by a dozen scans."""
     if radar is None:
         return []
     name, layout = radar.topic.name, radar.layout
@@ -80,7 +80,7 @@ def about_radar(radar: RadarStream | None) -> list[DataWarning]:
             DataWarning(
                 "looks-like-lidar",
                 f"{name} looks like a lidar: {layout.description}",
-                "choose the radar with --radar-topic, or give the file that has it",
+                "choose the radar with --radar-topic, or add the file that contains it",
             )
         )
     height = radar.sample(_SAMPLED_SCANS).points_radar_m[:, 2]
@@ -89,7 +89,7 @@ def about_radar(radar: RadarStream | None) -> list[DataWarning]:
         warnings.append(
             DataWarning(
                 "flat-radar",
-                f"{name} gives every return the same height ({height[0]:g} m): it measures no elevation",
+                f"{name} has the same height ({height[0]:g} m) for every return: it measures no elevation",
                 "put the reflector's centre at the radar's height at every placement, and measure the camera position",
             )
         )
@@ -97,13 +97,13 @@ def about_radar(radar: RadarStream | None) -> list[DataWarning]:
 
 
 def about_images(images: ImageStream | None) -> list[DataWarning]:
-    """Say how many images were left out because of their stamps."""
+    """Warn about images skipped because of repeated stamps."""
     if images is None or not images.repeated:
         return []
     return [
         DataWarning(
             "repeated-stamps",
-            f"{images.repeated} images of {images.topic.name} have the stamp of another; the first of each is shown",
-            "nothing to do, unless they are many: then the camera driver stamps wrongly; try --clock receive",
+            f"{images.repeated} images of {images.topic.name} have the stamp of another image; only the first of each is shown",
+            "no action needed for a few; if there are many, the camera driver writes wrong stamps: try --clock receive",
         )
     ]

@@ -1,4 +1,4 @@
-"""A recording in words and columns: what `cocalib info` prints."""
+"""The text that `cocalib info` prints."""
 
 from collections.abc import Iterable, Sequence
 
@@ -20,12 +20,12 @@ _USE = {"radar": "radar", "image": "camera", "camera-info": "intrinsics"}
 
 
 def describe(recording: Recording) -> str:
-    """Describe an open recording for people."""
+    """Describe an open recording as text."""
     return summary_text(recording_summary(recording))
 
 
 def summary_text(summary: RecordingSummary) -> str:
-    """Write a summary as text: one fact per line, figures with units, warnings last."""
+    """Format a summary as text: one fact per line, numbers with units, warnings last."""
     lines = [
         *_labelled(
             "files", _columns([(f.name, size_text(f.size_bytes), f.container) for f in summary.files], right={1})
@@ -63,7 +63,7 @@ def _times(summary: RecordingSummary) -> list[str]:
     counts = [topic.count for topic in summary.topics]
     lines.append(f"{_counted(sum(counts), 'message')} in {_counted(len(counts), 'topic')}")
     if summary.overlap_s is not None:
-        lines.append(f"radar and camera share {duration_text(summary.overlap_s)}")
+        lines.append(f"radar and camera overlap for {duration_text(summary.overlap_s)}")
     return _labelled("time", lines)
 
 
@@ -74,7 +74,7 @@ def _seconds(stamp: Stamp) -> str:
 def _topic_table(topics: Sequence[TopicSummary]) -> list[str]:
     if not topics:
         return _labelled("topics", ["none"])
-    rows = [("used as", "topic", "type", "messages", "rate", "longest gap", "jitter", "stamps")]
+    rows = [("used as", "topic", "type", "messages", "rate", "longest gap", "jitter", "clock")]
     for topic in topics:
         rows.append(
             (
@@ -85,7 +85,7 @@ def _topic_table(topics: Sequence[TopicSummary]) -> list[str]:
                 "" if topic.rate_hz is None else f"{topic.rate_hz:.1f} Hz",
                 "" if topic.longest_gap_s is None else f"{topic.longest_gap_s:.3f} s",
                 "" if topic.jitter_s is None else f"{topic.jitter_s * 1e3:.1f} ms",
-                {"header": "measured", "receive": "received"}[topic.clock] if topic.count else "",
+                topic.clock if topic.count else "",
             )
         )
     lines = list(_columns(rows, right={3, 4, 5, 6}))
@@ -96,7 +96,7 @@ def _topic_table(topics: Sequence[TopicSummary]) -> list[str]:
 
 
 def _clocks(topics: Sequence[TopicSummary]) -> list[str]:
-    """Say, topic by topic, which clock is used, why, and what is known about both."""
+    """List for each topic which clock is used and why, and what is known about both clocks."""
     lines = []
     for topic in topics:
         if topic.clocks is not None:
@@ -107,11 +107,11 @@ def _clocks(topics: Sequence[TopicSummary]) -> list[str]:
 
 
 def clock_lines(found: ClockDiagnosis) -> tuple[str, ...]:
-    """Say which clock a topic goes by and why; in a second line, where there is something, what is known about both."""
-    used = {"header": "stamps of measurement", "receive": "times of receiving"}[found.chosen]
+    """Describe which clock a topic uses and why, and in a second line, if needed, what is known about both clocks."""
+    used = {"header": "header stamps", "receive": "receive times"}[found.chosen]
     about = []
     if found.delay_s == 0 and found.delay_jitter_s == 0:
-        about.append("the times of receiving are the same")
+        about.append("receive times are identical")
     elif found.delay_s is not None:
         about.append(f"received {_delay_text(found.delay_s)} the stamp (± {(found.delay_jitter_s or 0) * 1e3:.1f} ms)")
     about.extend(found.remarks)
@@ -126,7 +126,7 @@ def _delay_text(delay_s: float) -> str:
 
 def _radar(radar: RadarSummary | None) -> list[str]:
     if radar is None:
-        return ["none that can be read"]
+        return ["no readable topic"]
     low, middle, high = radar.returns_per_scan
     rate = "" if radar.rate_hz is None else f" at {radar.rate_hz:.1f} Hz"
     gap = "" if radar.longest_gap_s is None else f", longest gap {radar.longest_gap_s:.3f} s"
@@ -140,10 +140,10 @@ def _radar(radar: RadarSummary | None) -> list[str]:
 
 def _camera(camera: CameraSummary | None) -> list[str]:
     if camera is None:
-        return ["none that can be read"]
+        return ["no readable topic"]
     rate = "" if camera.rate_hz is None else f" at {camera.rate_hz:.1f} Hz"
     gap = "" if camera.longest_gap_s is None else f", longest gap {camera.longest_gap_s:.3f} s"
-    size = "the first cannot be read"
+    size = "the first image cannot be read"
     if camera.width_px is not None:
         size = f"{camera.width_px} x {camera.height_px} px, {camera.format}"
     return [
@@ -165,7 +165,7 @@ def _intrinsics(camera: CameraSummary) -> str:
 
 
 def _columns(rows: Sequence[Sequence[str]], *, right: frozenset[int] | set[int] = frozenset()) -> Iterable[str]:
-    """Pad cells so that columns stand under one another."""
+    """Pad cells to align the columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)] if rows else []
     for row in rows:
         cells = [
@@ -176,7 +176,7 @@ def _columns(rows: Sequence[Sequence[str]], *, right: frozenset[int] | set[int] 
 
 
 def size_text(size_bytes: int) -> str:
-    """Write a size with a unit that keeps it short."""
+    """Format a size in B, kB, MB or GB."""
     size = float(size_bytes)
     for unit in ("B", "kB", "MB", "GB"):
         if size < 1000 or unit == "GB":
@@ -186,7 +186,7 @@ def size_text(size_bytes: int) -> str:
 
 
 def duration_text(seconds: float) -> str:
-    """Write a duration: seconds, from two minutes on with minutes before them."""
+    """Format a duration in seconds, or in minutes and seconds from two minutes on."""
     if seconds < 1:
         return f"{seconds:.3f} s"
     if seconds < 120:

@@ -1,7 +1,7 @@
-"""The first picture of a recording, long before all of its stamps are read.
+"""The first picture of a recording, available before all stamps are read.
 
-Which picture is first, the stamps in all messages say, and of a large file on a cold disk those take a second or more.
-One that was received at the beginning can be shown at once. It has no time, so that nothing can be clicked in it.
+Finding the picture with the earliest stamp means reading all stamps, which takes a second or more for a large file on a
+cold disk. A picture received near the beginning can be shown immediately. It has no time and cannot be clicked in.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,17 +21,17 @@ __all__ = ["first_picture"]
 
 
 def first_picture(paths: Sequence[Path], options: RecordingOptions | None = None) -> EncodedImage | None:
-    """Return a picture from the beginning of a recording, reading next to nothing of it.
+    """Return a picture from the beginning of a recording, reading very little of it.
 
-    It is of the camera that opening the recording will most likely choose, and not always the frame that its timeline
-    begins with.
+    It comes from the camera that opening the recording will most likely choose, and is not always the first frame of the
+    timeline.
 
     Args:
         paths: as for open_recording.
-        options: likewise.
+        options: as for open_recording.
 
     Returns:
-        None where the recording has to be read as a whole first: it is damaged, packed, a video, or no recording.
+        None if the whole recording must be read first: it is damaged, compressed, a video, or not a recording.
     """
     options = options or RecordingOptions()
     try:
@@ -43,7 +43,7 @@ def first_picture(paths: Sequence[Path], options: RecordingOptions | None = None
             if picture is not None:
                 return picture
     except (RecordingError, OSError):
-        return None  # opening the recording tells what is wrong
+        return None  # opening the recording reports what is wrong
     return None
 
 
@@ -66,7 +66,7 @@ def _picture(source: Source, options: RecordingOptions) -> EncodedImage | None:
 
 
 def _usage(topic: Topic) -> Usage:
-    """Look into the topics of pictures; of the others only into what they declare."""
+    """Inspect the messages of image topics; of other topics, only the declaration."""
     channel = topic.parts[0][1]
     if _is_picture(channel):
         return usage_of(topic)

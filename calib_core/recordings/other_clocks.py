@@ -1,4 +1,4 @@
-"""The clocks of topics that are not in use but could be: other radars and cameras."""
+"""Clock diagnoses of usable topics that are not in use: other radars and cameras."""
 
 from collections.abc import Mapping
 
@@ -20,9 +20,9 @@ _KINDS = ("radar", "image")
 
 
 def spare_clocks(recording: Recording) -> Mapping[str, ClockDiagnosis]:
-    """Look at the clocks of what could be used; reads the stamps of those topics in one pass.
+    """Diagnose the clocks of all other usable topics, reading their stamps in one pass.
 
-    Topics whose messages cannot be read are left out.
+    Topics whose messages cannot be read are skipped.
     """
     spare = {
         topic.name
@@ -43,4 +43,4 @@ def _diagnosis(both: StampedTopic) -> ClockDiagnosis:
     times = both.header_ns if clock == "header" and both.header_ns is not None else both.topic.receive_ns
     one_per_return = isinstance(usage_of(both.topic).radar, PointLayout)
     times = np.sort(times[first_of_scans(times)] if one_per_return else times)
-    return diagnose(stamps, times_ns=times, chosen=clock, wish="auto", one_per_return=one_per_return)
+    return diagnose(stamps, times_ns=times, chosen=clock, requested="auto", one_per_return=one_per_return)

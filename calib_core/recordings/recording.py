@@ -1,4 +1,4 @@
-"""A recording: one or more files seen as a radar, a camera, and the time both share."""
+"""A recording: one or more files, presented as one radar and one camera on a common timeline."""
 
 import hashlib
 import threading
@@ -29,19 +29,19 @@ _HASH_BYTES = 1 << 22
 
 
 class Recording:
-    """An open recording. Made by open_recording; use it in a with statement.
+    """An open recording. Created by open_recording; use it in a with statement.
 
-    Reading is safe from several threads. Memory stays bounded whatever the file's size: frames are read one at a time,
-    radar scans in blocks; unpacked chunks and decoded blocks are kept in small caches.
+    Reading is thread-safe. Memory use is bounded whatever the file size: frames are read one at a time, radar scans in
+    blocks, and uncompressed chunks and decoded blocks are kept in small caches.
 
     Attributes:
-        paths: as they were given.
+        paths: as given.
         sources: the files behind them.
-        topics: every topic, those in use marked as chosen.
-        radar_topic: in use; None where there is none.
-        image_topic: likewise.
-        camera_info_topic: likewise.
-        radar_frame: frame_id of the radar, without a leading slash; "" where unknown.
+        topics: every topic; those in use are marked as chosen.
+        radar_topic: the radar topic in use, if any.
+        image_topic: the image topic in use, if any.
+        camera_info_topic: the camera-info topic in use, if any.
+        radar_frame: frame_id of the radar, without a leading slash; "" if unknown.
         camera_frame: frame_id of the images.
         image_times: (m,) stamps of the frames, ascending and unique.
         radar_times: (k,) stamps of the scans, ascending.
@@ -82,28 +82,28 @@ class Recording:
 
     @property
     def name(self) -> str:
-        """Name the recording for people."""
+        """The name of the recording for messages."""
         return " + ".join(path.name for path in self.paths)
 
     @property
     def radar_clock(self) -> str | None:
-        """The clock that radar_times are by: "header" or "receive"; None without radar."""
+        """The clock of radar_times: "header" or "receive"; None without a radar."""
         return self._clock_of(self.radar_topic)
 
     @property
     def image_clock(self) -> str | None:
-        """The clock that image_times are by: "header" or "receive"; None without images."""
+        """The clock of image_times: "header" or "receive"; None without images."""
         return self._clock_of(self.image_topic)
 
     @property
     def radar_axes(self) -> str | None:
-        """What a person said about the radar's axes and units, as --radar-axes has it; None for nothing."""
+        """The user's --radar-axes (axes and units of the radar); None if not given."""
         axes = self._assembly.radar.layout.plan.axes if self._assembly.radar else None
         return axes.words if axes else None
 
     @property
     def video_start(self) -> str | None:
-        """When a video's first frame was taken, as --video-start has it; None where the images are from no video."""
+        """The user's --video-start (time of a video's first frame); None if the images do not come from a video."""
         videos = [source for source in self.sources if source.path.suffix.lower() in VIDEO_SUFFIXES]
         used = any(channel.topic == self.image_topic for source in videos for channel in source.channels)
         return self._video_start if used else None
@@ -113,7 +113,7 @@ class Recording:
 
     @property
     def warnings(self) -> tuple[DataWarning, ...]:
-        """What a person must know; messages found unreadable and damage found so far are counted in."""
+        """What the user must know, including unreadable messages and damage found so far."""
         found = (*self._assembly.warnings, *(late for source in self.sources for late in source.later_warnings))
         radar = self._assembly.radar
         if radar is None or not radar.unreadable:
@@ -122,12 +122,12 @@ class Recording:
         unreadable = DataWarning(
             "unreadable-messages",
             f"{len(radar.unreadable)} radar messages could not be read and count as empty; the first is number {row}: {why}",
-            "if they are many, copy the file again from its source",
+            "if there are many, copy the file again from its source",
         )
         return (*found, unreadable)
 
     def image_bytes(self, index: int) -> EncodedImage:
-        """Return a frame as a file: the recorded JPEG or PNG, or raw pixels encoded as JPEG.
+        """Return a frame as an image file: the recorded JPEG or PNG, or raw pixels encoded as JPEG.
 
         Args:
             index: into image_times.
@@ -141,7 +141,7 @@ class Recording:
         return self._assembly.images.encoded(index)
 
     def image(self, index: int) -> np.ndarray:
-        """Return a frame's pixels: uint8 (h, w, 3), blue first as OpenCV has it.
+        """Return a frame's pixels: uint8 (h, w, 3), blue first as in OpenCV.
 
         Args:
             index: into image_times.
@@ -155,7 +155,7 @@ class Recording:
         return self._assembly.images.picture(index)
 
     def recorded_format(self, index: int) -> str:
-        """Return what a frame was recorded as, for people: "jpeg", "png", "raw bgr8", "h264 video", "video file".
+        """Return the format a frame was recorded in: "jpeg", "png", "raw bgr8", "h264 video" or "video file".
 
         Args:
             index: into image_times.
@@ -178,34 +178,34 @@ class Recording:
             raise RecordingError(f"{self.name}: the recording is closed")
 
     def camera(self) -> Camera | None:
-        """Return the intrinsics the recording carries; None where it has none that can be used (see warnings)."""
+        """Return the recorded intrinsics; None if there are no usable ones (see warnings)."""
         return self._assembly.camera
 
     def radar_scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
-        """Decode the scans with start <= stamp <= end; all of them by default, which takes memory without bounds.
+        """Decode the scans with start <= stamp <= end; by default all of them, which uses unbounded memory.
 
         Args:
-            start: None for the beginning.
-            end: None for the end.
+            start: first stamp; None for the beginning.
+            end: last stamp; None for the end.
         """
         self._check_open()
         return self._assembly.radar.scans(start, end) if self._assembly.radar else RadarScans()
 
     def radar_windows(self) -> Iterator[RadarScans]:
-        """Decode all scans, a bounded number of returns at a time, in order of time: for looking at a whole recording."""
+        """Decode all scans in time order, a bounded number of returns at a time: for processing a whole recording."""
         self._check_open()
         return self._assembly.radar.windows() if self._assembly.radar else iter(())
 
     def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float) -> RadarScans:
-        """Decode the scans within half_window_s [s] of any of the times, each scan once, in order of time."""
+        """Decode the scans within half_window_s [s] of any of the times, each scan once, in time order."""
         self._check_open()
         return self._assembly.radar.around(times, half_window_s) if self._assembly.radar else RadarScans()
 
     def fingerprint(self, progress: Callable[[int, int], None] | None = None) -> tuple[InputFile, ...]:
-        """Hash all files; once, since it takes about a second per gigabyte.
+        """Hash all files. The result is cached, since hashing takes about a second per gigabyte.
 
         Args:
-            progress: called with bytes done and bytes in all.
+            progress: called with the bytes done and the total bytes.
         """
         if self._fingerprint:
             return self._fingerprint
@@ -223,7 +223,7 @@ class Recording:
                             if progress:
                                 progress(min(done, total), total)
             except OSError as error:
-                raise RecordingError(f"{source.path}: cannot be read any more: {error.strerror}") from error
+                raise RecordingError(f"{source.path}: can no longer be read: {error.strerror}") from error
             files.append(InputFile(source.path.name, source.size_bytes, digest.hexdigest()))
         self._fingerprint = tuple(files)
         return self._fingerprint
@@ -237,14 +237,14 @@ def open_recording(
 ) -> Recording:
     """Open files and folders, in any mix of formats, as one recording.
 
-    Opening reads the indexes, and of the radar's and the camera's messages the stamps: of chunks stored as they are a
-    few bytes per message, of packed chunks that hold such messages everything, once.
+    Opening reads the indexes and the stamps of the radar and camera messages: a few bytes per message in uncompressed
+    chunks; compressed chunks that contain such messages are read once in full.
 
     Args:
         paths: ROS 1 .bag, ROS 2 .mcap and .db3 files, and folders of them; folders of pictures or of radar .pcd and .bin
             files; radar CSV; videos.
         options: topics and clock.
-        require: what it must have; intrinsics need only "image".
+        require: what it must contain; to read intrinsics, "image" is enough.
 
     Raises:
         RecordingError: it cannot be opened, or lacks what is required.
@@ -263,10 +263,10 @@ def open_recording(
 
 
 def inspect_recording(paths: "str | Path | Sequence[str | Path]", options: RecordingOptions | None = None) -> Recording:
-    """Open files and folders to look into them; a radar, a camera or messages may be missing.
+    """Open files and folders for inspection; they need not contain a radar, a camera or any messages.
 
     Raises:
-        RecordingError: a file cannot be opened, or a topic asked for is not there.
+        RecordingError: a file cannot be opened, or a requested topic does not exist.
     """
     return open_recording(paths, options, require=())
 
@@ -275,7 +275,7 @@ def require_files(paths: Sequence[Path]) -> tuple[Path, ...]:
     """Return the paths if all of them exist.
 
     Raises:
-        RecordingError: one does not, or none was given.
+        RecordingError: one does not exist, or none was given.
     """
     if not paths:
         raise RecordingError("no recording given; name one or more .bag, .mcap, .db3 files or bag folders")

@@ -1,4 +1,4 @@
-"""Which topics to use: asked for by name, or guessed; wrong choices are answered with what there is."""
+"""Choose the topics to use, by name or automatically; errors list the available topics."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -48,10 +48,10 @@ def _no_counts() -> dict[str, int]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inventory:
-    """All topics with what each can be used for, and the name of the whole for messages.
+    """All topics with what each can be used for, and the recording's name for messages.
 
     Attributes:
-        counts: how many messages there are of topics that were read in part.
+        counts: the total number of messages of topics that were only partly read.
     """
 
     name: str
@@ -64,17 +64,17 @@ class Inventory:
         return max(len(topic), self.counts.get(topic.name, 0))
 
     def of_kind(self, kind: TopicKind) -> list[Topic]:
-        """Return the topics of a kind that can be read."""
+        """Return the readable topics of a kind."""
         return [t for t in self.topics if self.usages[t.name].kind == kind and self.usages[t.name].problem is None]
 
     def list_topics(self) -> str:
-        """Name all topics with their types, for a message."""
+        """List all topics with their types, for a message."""
         return ", ".join(f"{topic.name} ({topic.type})" for topic in self.topics) or "none"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Selection:
-    """The topics in use; None where there is none."""
+    """The topics in use, None for each that is missing."""
 
     radar: Topic | None
     image: Topic | None
@@ -85,12 +85,12 @@ def select(inventory: Inventory, options: RecordingOptions, require: Sequence[Ne
     """Choose the topics.
 
     Args:
-        inventory: what there is.
-        options: what a person asked for.
-        require: what there must be.
+        inventory: the available topics.
+        options: what the user asked for.
+        require: the kinds that must be present.
 
     Raises:
-        RecordingError: a topic asked for is not there or cannot be used, or one that is required is missing.
+        RecordingError: a requested topic does not exist or cannot be used, or a required one is missing.
     """
     radar = _chosen(inventory, "radar", options.radar_topic) or _best(
         inventory.of_kind("radar"), inventory, _radar_rank
@@ -100,30 +100,30 @@ def select(inventory: Inventory, options: RecordingOptions, require: Sequence[Ne
         if topic is None and kind in require:
             raise _missing(inventory, "radar" if kind == "radar" else "image")
     info = _chosen(inventory, "camera-info", options.camera_info_topic)
-    return Selection(radar, image, info or _info_beside(image, inventory))
+    return Selection(radar, image, info or _nearest_info(image, inventory))
 
 
-def select_image(inventory: Inventory, wish: str | None) -> Topic | None:
-    """Choose the camera's topic; None where there is none.
+def select_image(inventory: Inventory, requested: str | None) -> Topic | None:
+    """Choose the camera's topic; None if there is none.
 
     Args:
-        inventory: what there is.
-        wish: the topic asked for; None to choose.
+        inventory: the available topics.
+        requested: the topic the user asked for; None to choose automatically.
 
     Raises:
-        RecordingError: the topic asked for is not there or cannot be used.
+        RecordingError: the requested topic does not exist or cannot be used.
     """
-    return _chosen(inventory, "image", wish) or _best(inventory.of_kind("image"), inventory, _image_rank)
+    return _chosen(inventory, "image", requested) or _best(inventory.of_kind("image"), inventory, _image_rank)
 
 
 def _chosen(inventory: Inventory, kind: TopicKind, name: str | None) -> Topic | None:
-    """Return the topic a person named."""
+    """Return the topic the user named."""
     if name is None:
         return None
     topic = next((topic for topic in inventory.topics if topic.name == name), None)
     able = ", ".join(topic.name for topic in inventory.of_kind(kind)) or "none"
     if topic is None:
-        raise RecordingError(f"{inventory.name}: there is no topic {name}; {_WORDS[kind]} topics: {able}")
+        raise RecordingError(f"{inventory.name}: no topic {name}; {_WORDS[kind]} topics: {able}")
     usage = inventory.usages[name]
     if usage.problem is not None:
         raise MessageError(f"{inventory.name}: {_with_topic(name, usage.problem)}")
@@ -146,8 +146,8 @@ def _missing(inventory: Inventory, kind: TopicKind) -> RecordingError:
     ]
     why = f"; {'; '.join(problems[:3])}" if problems else ""
     return RecordingError(
-        f"{inventory.name}: no {_WORDS[kind]} topic that can be read{why}; topics: {inventory.list_topics()}; "
-        f"give the file that has it too, or choose one with {_FLAGS[kind]}"
+        f"{inventory.name}: no readable {_WORDS[kind]} topic{why}; topics: {inventory.list_topics()}; "
+        f"add the file that contains one, or choose one with {_FLAGS[kind]}"
     )
 
 
@@ -158,7 +158,7 @@ def _best(
 
 
 def _radar_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
-    """Prefer radars over lidars, then a speed, then returns over objects, then names, then the number of messages."""
+    """Rank radars above lidars, then by speed, radar-like name, returns above objects, and number of messages."""
     layout = inventory.usages[topic.name].radar
     assert layout is not None
     name = f"{topic.name} {topic.type}".lower()
@@ -175,15 +175,15 @@ def _radar_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
 
 
 def _image_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
-    """Prefer pictures over depth, calibrated cameras, many messages, then files over raw pixels."""
+    """Rank pictures above depth images, then by camera info, number of messages, and files above raw pixels."""
     layout = inventory.usages[topic.name].image
     assert layout is not None
     picture = not any(word in topic.name.lower() for word in _NOT_PICTURES)
-    return picture, _info_beside(topic, inventory) is not None, inventory.count(topic), layout.compressed
+    return picture, _nearest_info(topic, inventory) is not None, inventory.count(topic), layout.compressed
 
 
-def _info_beside(image: Topic | None, inventory: Inventory) -> Topic | None:
-    """Return the camera info in the nearest namespace above the image topic; else the only one there is."""
+def _nearest_info(image: Topic | None, inventory: Inventory) -> Topic | None:
+    """Return the camera info in the nearest enclosing namespace of the image topic, or else the only one."""
     infos = {topic.name: topic for topic in inventory.of_kind("camera-info") if inventory.count(topic)}
     if image is None:
         return None

@@ -13,11 +13,11 @@ __all__ = ["StampedTopic", "read_stamps"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StampedTopic:
-    """The messages of a topic that can be read, with their stamps.
+    """The readable messages of a topic, with their stamps.
 
     Attributes:
-        topic: without the messages that cannot be read.
-        header_ns: (n,) None where the type begins with no stamp.
+        topic: without the unreadable messages.
+        header_ns: (n,) None if the type does not begin with a stamp.
         heads: (n, size) uint8, the first bytes of the messages.
         lost: how many messages cannot be read.
         fault: why the first of them cannot.
@@ -31,12 +31,12 @@ class StampedTopic:
 
 
 def read_stamps(topics: Sequence[tuple[Topic, int]]) -> tuple[StampedTopic, ...]:
-    """Read the stamps of several topics; messages that cannot be read are left out, and why is told.
+    """Read the stamps of several topics; unreadable messages are skipped, and the reason is kept.
 
-    All topics are read in one pass, so that a packed chunk with messages of all of them is unpacked once.
+    All topics are read in one pass, so a compressed chunk with messages of several of them is decompressed once.
 
     Args:
-        topics: each with how many bytes of its messages to keep; 12 hold the stamp.
+        topics: each with the number of bytes to keep of each message; the stamp takes 12.
     """
     size = max((wanted for _, wanted in topics), default=0)
     found = read_heads([(topic, np.arange(len(topic))) for topic, _ in topics], size, keep=True)

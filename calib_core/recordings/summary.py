@@ -1,4 +1,4 @@
-"""What a recording holds, as plain values: for `cocalib info --json` and the text beside it."""
+"""The contents of a recording as plain values, for `cocalib info` and `cocalib info --json`."""
 
 from dataclasses import dataclass, replace
 
@@ -40,11 +40,11 @@ class RadarSummary:
         topic: its topic.
         frame: its frame_id.
         layout: what is read from its messages.
-        scans: how many.
+        scans: number of scans.
         rate_hz: scans per second; None with fewer than two.
         longest_gap_s: longest time between scans [s].
         returns_per_scan: minimum, median and maximum over at most 200 scans spread over the recording.
-        sampled_scans: how many those were.
+        sampled_scans: number of scans used for returns_per_scan.
     """
 
     topic: str
@@ -64,15 +64,15 @@ class CameraSummary:
     Attributes:
         topic: its image topic.
         frame: frame_id of the images.
-        frames: how many images.
+        frames: number of images.
         rate_hz: images per second; None with fewer than two.
         longest_gap_s: longest time between images [s].
-        format: as recorded: "jpeg", "png", "raw bgr8", "h264 video"; None where the first cannot be read.
+        format: as recorded: "jpeg", "png", "raw bgr8", "h264 video"; None if the first cannot be read.
         width_px: of the first image.
-        height_px: likewise.
-        camera_info_topic: where the intrinsics are from; None where there are none.
-        model: of the lens; None where there are no usable intrinsics.
-        matrix_px: K in rows.
+        height_px: of the first image.
+        camera_info_topic: the source of the intrinsics; None if there are none.
+        model: lens model; None if there are no usable intrinsics.
+        matrix_px: rows of K.
         distortion: coefficients.
     """
 
@@ -91,18 +91,18 @@ class CameraSummary:
 
 
 class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "cautions"}):
-    """Everything `cocalib info` knows. In its JSON the warnings keep the key under which scripts read them: "cautions".
+    """Everything `cocalib info` shows. In the JSON, warnings keep the key that scripts already use, "cautions".
 
     Attributes:
         files: as opened.
-        start: first stamp of any topic; of the topics in use where there are any.
-        end: last stamp likewise.
-        duration_s: between them.
-        overlap_s: time the radar and the camera share [s]; None where one is missing.
+        start: first stamp of the topics in use, or of all topics if none is in use.
+        end: last stamp of the same topics.
+        duration_s: from start to end.
+        overlap_s: time covered by both radar and camera [s]; None if one is missing.
         topics: by name.
-        radar: None where there is none.
-        camera: None where there is none.
-        warnings: what a person must know.
+        radar: None if there is none.
+        camera: None if there is none.
+        warnings: what the user must know.
     """
 
     files: tuple[FileSummary, ...]
@@ -117,7 +117,7 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
 
 
 def recording_summary(recording: Recording) -> RecordingSummary:
-    """Sum up an open recording; a few radar scans, one image, and the stamps of other topics that could be used are read."""
+    """Summarize an open recording; reads a few radar scans, one image, and the stamps of other usable topics."""
     spare = spare_clocks(recording)
     used = [topic for topic in recording.topics if topic.chosen and topic.kind in ("radar", "image")]
     timed = used or recording.topics

@@ -1,4 +1,4 @@
-"""Topics: the same name joined over all files, and what each can be used for."""
+"""Topics: channels with the same name joined across files."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,23 +21,23 @@ TopicKind = Literal["radar", "image", "camera-info", "other"]
 
 @dataclass(frozen=True, slots=True)
 class TopicSummary:
-    """A topic, for people and programs; these are the keys of `cocalib info --json`.
+    """Summary of a topic; the attributes are the keys of `cocalib info --json`.
 
     Attributes:
         name: the topic.
         type: of its messages, as the recording spells it.
-        count: messages.
+        count: number of messages.
         kind: what it can be used for.
-        chosen: it is the radar, image or camera-info topic in use.
-        rate_hz: messages per second, pauses between islands left out; None with fewer than two.
+        chosen: whether it is the radar, image or camera-info topic in use.
+        rate_hz: messages per second, not counting long pauses; None with fewer than two.
         start: stamp of the first message by the topic's clock; None without messages.
-        end: of the last.
-        clock: "header" or "receive": what start and end are by.
-        longest_gap_s: longest time between neighbours [s]; None with fewer than two.
-        jitter_s: median deviation of that time from its median [s]; None with fewer than two.
-        layout: what is read from it, in a few words; "" for kinds that need none.
-        problem: why it cannot be used although its kind is right; None where all is well.
-        clocks: what is known about its two clocks; None where its messages were not looked into.
+        end: stamp of the last message.
+        clock: the clock of start and end, "header" or "receive".
+        longest_gap_s: longest time between consecutive messages [s]; None with fewer than two.
+        jitter_s: median absolute deviation of that time from its median [s]; None with fewer than two.
+        layout: short description of what is read from it; "" for kinds that need none.
+        problem: why it cannot be used although its kind is right; None if there is no problem.
+        clocks: what is known about its two clocks; None if its messages were not examined.
     """
 
     name: str
@@ -58,12 +58,12 @@ class TopicSummary:
 
 @dataclass(frozen=True, slots=True)
 class Rhythm:
-    """How regularly something comes; None each with fewer than two stamps.
+    """Rate and regularity of a series of stamps; all None with fewer than two.
 
     Attributes:
-        rate_hz: per second, pauses that part the data into islands left out.
-        longest_gap_s: longest time between neighbours [s].
-        jitter_s: median deviation of that time from its median [s].
+        rate_hz: stamps per second, not counting long pauses.
+        longest_gap_s: longest time between consecutive stamps [s].
+        jitter_s: median absolute deviation of that time from its median [s].
     """
 
     rate_hz: float | None = None
@@ -91,12 +91,12 @@ class Topic:
 
     Attributes:
         name: the topic.
-        parts: the channels it is made of, each with its file.
-        part: (n,) which part a message is of.
+        parts: the channels that make it up, each with its file.
+        part: (n,) the part each message belongs to.
         receive_ns: (n,) the recorder's clock.
         chunk: (n,) see MessageIndex.
         offset: (n,) see MessageIndex.
-        repeated: how many messages were left out because an earlier file has them too.
+        repeated: how many messages were skipped because an earlier file also contains them.
     """
 
     name: str
@@ -119,7 +119,7 @@ class Topic:
         """Return the definition of a part's messages.
 
         Raises:
-            MessageError: there is none, or it cannot be understood.
+            MessageError: there is none, or it cannot be parsed.
         """
         return definition_of(self.parts[part][1])
 
@@ -147,7 +147,7 @@ class Topic:
         )
 
     def stamps_in(self, heads: np.ndarray) -> TimesNs | None:
-        """Take the stamps out of the first 12 bytes of all messages; None where the type begins with none."""
+        """Extract the stamps from the first 12 bytes of all messages; None if the type does not begin with one."""
         offsets = [self.definition(number).stamp_offset for number in range(len(self.parts))]
         if any(offset is None for offset in offsets):
             return None
@@ -164,7 +164,7 @@ class Topic:
 
 
 def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int, *, keep: bool = False) -> list[Heads]:
-    """Read the first bytes of messages of several topics, file by file; for keep see Source.heads."""
+    """Read the first bytes of messages of several topics, file by file; see Source.heads for keep."""
     if len(wanted) == 1 and len(wanted[0][0].parts) == 1:
         topic, rows = wanted[0]
         index = MessageIndex(topic.receive_ns[rows], topic.chunk[rows], topic.offset[rows])
@@ -196,7 +196,7 @@ def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int, *, keep: b
 
 
 def join_topics(sources: tuple[Source, ...]) -> tuple[tuple[Topic, ...], tuple[DataWarning, ...]]:
-    """Join the channels of all files by topic, and say where files repeat one another."""
+    """Join the channels of all files by topic, and warn about files that repeat each other's messages."""
     found: dict[str, list[tuple[Source, Channel]]] = {}
     for source in sources:
         for channel in source.channels:
@@ -208,8 +208,8 @@ def join_topics(sources: tuple[Source, ...]) -> tuple[tuple[Topic, ...], tuple[D
     where = ", ".join(topic.name for topic in topics if topic.repeated)
     warning = DataWarning(
         "repeated-messages",
-        f"{repeated} messages of {where} are in several of the files; each is used once",
-        "give each recording once: a folder that also holds a converted copy counts twice",
+        f"{repeated} messages of {where} occur in several files; each is used once",
+        "give each recording only once: a folder that also contains a converted copy counts twice",
     )
     return topics, (warning,)
 
@@ -230,5 +230,5 @@ def _join(name: str, parts: tuple[tuple[Source, Channel], ...]) -> Topic:
         kept = index.take(np.flatnonzero(keep))
         columns.append(np.stack([np.full(len(kept), number), kept.receive_ns, kept.chunk, kept.offset]))
     part, receive_ns, chunk, offset = np.concatenate(columns, axis=1).astype(np.int64)
-    order = np.lexsort((part, receive_ns))  # stable: messages of one instant stay in the order of their file
+    order = np.lexsort((part, receive_ns))  # stable: messages with equal times keep the order of their file
     return Topic(name, parts, part[order], receive_ns[order], chunk[order], offset[order], repeated)

@@ -1,4 +1,4 @@
-"""What each topic can be used for, by its definition and its messages."""
+"""Determine what each topic can be used for, from its definition and its messages."""
 
 import re
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ __all__ = ["Usage", "usage_of"]
 
 _PACKETS = re.compile(r"/(?!FFMPEG)\w*Packets?$")
 _RAW = (
-    "raw packets as a sensor sends them, which only its driver understands; play the recording to the driver, and record "
+    "raw sensor packets, which only the sensor's driver can decode; play the recording to the driver and record "
     "what it publishes"
 )
 
@@ -27,8 +27,8 @@ class Usage:
     Attributes:
         kind: see TopicSummary.
         problem: see TopicSummary.
-        radar: its layout where it is a radar.
-        image: its layout where it holds images.
+        radar: its layout, if it is a radar topic.
+        image: its layout, if it is an image topic.
     """
 
     kind: TopicKind
@@ -37,14 +37,14 @@ class Usage:
     image: ImageLayout | None = None
 
     def read_as(self, axes: RadarAxes | None) -> "Usage":
-        """Follow what a person says about the radar's axes."""
+        """Apply the user's --radar-axes."""
         if self.radar is None or axes is None:
             return self
         return replace(self, radar=self.radar.with_plan(self.radar.plan.read_as(axes)))
 
 
 def usage_of(topic: Topic) -> Usage:
-    """Find out what a topic can be used for, by its definition and its first message that can be read."""
+    """Determine what a topic can be used for, from its definition and its first readable message."""
     if _PACKETS.search(topic.type):
         return Usage("other", problem=_RAW)
     try:

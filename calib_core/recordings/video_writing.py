@@ -1,4 +1,4 @@
-"""The camera as a video, each frame at its recorded time: recorded JPEG is put into the file as it is."""
+"""Write the camera's frames as a video, each at its recorded time; recorded JPEG is copied unchanged."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -20,15 +20,15 @@ _JPEG_QUALITY = 95
 
 @dataclass(frozen=True, slots=True)
 class WrittenVideo:
-    """What was written.
+    """A summary of what was written.
 
     Attributes:
-        frames: in the video.
-        start: stamp of the first; its time in the video is 0.
-        duration_s: from the first to the last.
-        other_size: frames left out because they are of another size than the first.
-        unreadable: frames left out because they cannot be read.
-        fault: why the first of those cannot.
+        frames: number of frames in the video.
+        start: stamp of the first frame, which has time 0 in the video.
+        duration_s: from the first frame to the last.
+        other_size: number of frames skipped because their size differs from the first.
+        unreadable: number of frames skipped because they cannot be read.
+        fault: why the first of those cannot be read.
     """
 
     frames: int
@@ -49,20 +49,20 @@ class _LeftOut:
 def write_video(
     recording: Recording, path: Path, *, progress: Callable[[int, int], None] | None = None
 ) -> WrittenVideo:
-    """Write the camera's frames into a video file; JPEG is not decoded, other pictures are encoded once.
+    """Write the camera's frames to a video file; JPEG is not decoded, other pictures are encoded once.
 
     Args:
         recording: with a camera.
         path: of the video; .mp4 and .mov keep times to a microsecond, .mkv to a millisecond.
-        progress: called with frames done and frames in all.
+        progress: called with the frames done and the total frames.
 
     Raises:
-        InputError: PyAV is missing, the suffix is of another format, or the file cannot be written.
+        InputError: PyAV is missing, the suffix is not supported, or the file cannot be written.
         RecordingError: no frame can be read.
     """
     form = _FORMATS.get(path.suffix.lower())
     if form is None:
-        raise InputError(f"{path}: a video can be written as {', '.join(_FORMATS)}; name it so")
+        raise InputError(f"{path}: unsupported video format; use {', '.join(_FORMATS)}")
     if find_spec("av") is None:
         raise InputError("writing a video needs PyAV, which is not installed: pip install 'cocalib[video]'")
     part = path.with_name(f".{path.name}.part")
@@ -110,7 +110,7 @@ def _write(recording: Recording, path: Path, form: str, progress: Callable[[int,
 def _frames(
     recording: Recording, left_out: _LeftOut, progress: Callable[[int, int], None] | None
 ) -> Iterator[tuple[TimeNs, EncodedImage]]:
-    """Yield the frames that can be read and are of the first one's size, as JPEG."""
+    """Yield the readable frames that have the size of the first one, as JPEG."""
     size: tuple[int, int] | None = None
     total = len(recording.image_times)
     for index in range(total):

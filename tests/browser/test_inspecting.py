@@ -30,11 +30,11 @@ def test_clocks_axes_and_warnings_of_the_recording_are_on_the_page(
             facts = page.page.locator("#recording-topics .fact")
             assert "receive time" in facts.nth(0).inner_text()
             facts.nth(0).hover()
-            page.until("document.body.innerText.includes('because it was asked for with --clock receive')")
+            page.until("document.body.innerText.includes('because --clock receive was given')")
             page.until("document.body.innerText.includes('axes as given: x forward, y left, z up')")
             page.until("document.body.innerText.includes('after the stamp')")
             box = page.text('#warnings [data-code="not-closed"]')
-            assert "whole messages were found by reading all of it" in box
+            assert "complete messages were recovered by reading the whole file" in box
         finally:
             running.close()
             workspace.close()

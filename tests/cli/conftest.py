@@ -1,4 +1,4 @@
-"""Small recordings, made to be good or to be wrong in one way."""
+"""Small recordings that are either good or have one defect."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -55,7 +55,7 @@ class Made:
 
     @property
     def positions_radar_m(self) -> np.ndarray:
-        """Where the reflector stands: spread over the view, some of them raised."""
+        """The reflector's placements: spread over the view, some of them raised."""
         rng = np.random.default_rng(5)
         n = self.placements
         x = np.linspace(3.0, 11.0, n)
@@ -105,7 +105,7 @@ class Made:
 
 @dataclass(frozen=True)
 class Typed:
-    """What a command answered."""
+    """The output of a command."""
 
     code: int
     out: str
@@ -114,7 +114,7 @@ class Typed:
 
 @pytest.fixture
 def cocalib(capsys: pytest.CaptureFixture[str]) -> Callable[..., Typed]:
-    """Return the command as a function: arguments in, exit code and texts out."""
+    """Return a function that runs the command and returns its exit code and output."""
 
     def typed(*arguments: object) -> Typed:
         capsys.readouterr()
@@ -130,7 +130,7 @@ def cocalib(capsys: pytest.CaptureFixture[str]) -> Callable[..., Typed]:
 
 @pytest.fixture
 def made(tmp_path: Path) -> Callable[..., Path]:
-    """Return a function that writes a recording, changed in the ways named, and gives its path."""
+    """Return a function that writes a recording with the given changes, and returns its path."""
 
     def write(name: str = "made", **changes: object) -> Path:
         return write_ros2(tmp_path / f"{name}.mcap", replace(Made(), **changes).messages(), container="mcap")  # type: ignore[arg-type]
@@ -140,7 +140,7 @@ def made(tmp_path: Path) -> Callable[..., Path]:
 
 @pytest.fixture
 def clicks_file(tmp_path: Path) -> Path:
-    """Return a file of clicks that fit the recordings of `made`."""
+    """Return a file of clicks for the recordings of `made`."""
     path = tmp_path / "clicks.json"
     path.write_text(Made().clicks())
     return path
@@ -148,7 +148,7 @@ def clicks_file(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def pairs_file(tmp_path: Path) -> Callable[..., Path]:
-    """Return a function that writes a file of exact pairs, after a change to its document."""
+    """Return a function that writes a file of exact pairs after changing its document."""
 
     def write(count: int = 8, change: Callable[[dict[str, object]], None] = lambda document: None) -> Path:
         recording = Made()

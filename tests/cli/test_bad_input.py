@@ -1,4 +1,4 @@
-"""Bad input: one clear line, the right exit code, nothing written and nothing lost."""
+"""Bad input: one clear error line, the right exit code, nothing written and nothing lost."""
 
 import json
 from collections.abc import Callable
@@ -15,7 +15,7 @@ MadeRecording = Callable[..., Path]
 
 @pytest.fixture
 def refused(cocalib: Cocalib, tmp_path: Path, clicks_file: Path) -> Callable[..., str]:
-    """Return a function that solves, expects a refusal in one line, and gives that line."""
+    """Return a function that solves, expects an error of one line, and returns that line."""
 
     def refuse(*recording: object, clicks: Path = clicks_file, code: int = 2) -> str:
         out = tmp_path / "calibration.json"
@@ -39,7 +39,9 @@ def test_a_missing_file_is_named(refused: Callable[..., str], tmp_path: Path) ->
     assert "no such file" in line
 
 
-def test_a_file_that_is_no_recording_is_named_with_what_would_do(refused: Callable[..., str], tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_recording_is_named_with_the_supported_formats(
+    refused: Callable[..., str], tmp_path: Path
+) -> None:
     path = tmp_path / "holiday.bag"
     path.write_bytes(b"GIF89a" + bytes(500))
     line = refused(path)
@@ -62,13 +64,13 @@ def test_a_bag_without_messages_is_refused(refused: Callable[..., str], tmp_path
 
 def test_a_recording_without_radar_says_what_it_has(refused: Callable[..., str], made: MadeRecording) -> None:
     line = refused(made(with_radar=False))
-    assert "no radar topic" in line
+    assert "no readable radar topic" in line
     assert "/camera/image/compressed" in line
 
 
 def test_a_recording_without_camera_says_what_it_has(refused: Callable[..., str], made: MadeRecording) -> None:
     line = refused(made(with_images=False, with_camera_info=False))
-    assert "no camera image topic" in line
+    assert "no readable camera image topic" in line
     assert "/radar/points" in line
 
 
@@ -80,7 +82,7 @@ def test_a_topic_that_does_not_exist_gets_a_suggestion(
     assert "/radar/points" in answer.err
 
 
-def test_sensors_that_never_recorded_together_are_told_apart(refused: Callable[..., str], made: MadeRecording) -> None:
+def test_sensors_that_never_recorded_together_are_refused(refused: Callable[..., str], made: MadeRecording) -> None:
     line = refused(made(radar_late_s=3600))
     assert "3568.0 s apart" in line
     assert "/radar/points" in line
@@ -209,7 +211,7 @@ def test_an_unwritable_folder_is_named(cocalib: Cocalib, pairs_file: Callable[..
         (["solve", "a.bag", "--camera-position-m", "0", "1", "up"], "--camera-position-m takes X Y Z"),
     ],
 )
-def test_wrong_usage_is_answered_in_words(cocalib: Cocalib, arguments: list[str], expected: str) -> None:
+def test_wrong_usage_gives_a_clear_error(cocalib: Cocalib, arguments: list[str], expected: str) -> None:
     answer = cocalib(*arguments)
     assert answer.code == 2
     (line,) = answer.err.splitlines()

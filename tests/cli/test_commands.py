@@ -108,7 +108,7 @@ def test_info_describes_a_recording_that_cannot_be_calibrated(cocalib: Cocalib, 
     answer = cocalib("info", made(with_radar=False))
     assert answer.code == 0
     assert "/camera/image/compressed" in answer.out
-    assert re.search(r"^radar +none that can be read", answer.out, re.MULTILINE)
+    assert re.search(r"^radar +no readable topic", answer.out, re.MULTILINE)
 
 
 @pytest.mark.parametrize("name", ["tf2", "urdf", "json"])

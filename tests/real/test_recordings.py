@@ -83,7 +83,7 @@ def test_a_lidar_cloud_with_holes_and_mixed_types_is_read(shared_data):
         assert np.isfinite(scans.points_radar_m).all()
         assert np.abs(scans.points_radar_m).max() < 300
         assert recording.radar_frame == "luminar_lidar"
-        # stamps of March 2020 in a bag received in November: the stamps hold
+        # stamps of March 2020 in a bag received in November: the stamps are used
         assert int(scans.times_ns[0]) == 1_583_971_570_015_299_642
         assert [warning.code for warning in recording.warnings] == ["looks-like-lidar"]
         assert "looks like a lidar" in describe(recording)
@@ -105,7 +105,7 @@ def test_raw_camera_images_go_by_their_stamps_of_another_year(shared_data):
         ("compressedDepth.bag", "/spot/depth/frontleft/image/compressedDepth", "is a depth image, not a picture"),
     ],
 )
-def test_what_no_decoder_reads_is_refused_in_words(shared_data, name, topic, words):
+def test_unsupported_data_is_refused_with_a_clear_error(shared_data, name, topic, words):
     path = shared_data / "real_camera_formats" / name
     with pytest.raises(RecordingError, match=words) as caught:
         open_recording(path, RecordingOptions(image_topic=topic), require=("image",))

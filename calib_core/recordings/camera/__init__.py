@@ -1,1 +1,1 @@
-"""Camera messages: intrinsics, images and video."""
+"""Read camera messages: intrinsics, images and video."""

@@ -18,14 +18,14 @@ __all__ = ["CameraReading", "camera_from_info", "is_camera_info"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraReading:
-    """What a CameraInfo says: a camera, or why there is none, and what a person must know."""
+    """The result of reading a CameraInfo: a camera, or None, with warnings."""
 
     camera: Camera | None
     warnings: tuple[DataWarning, ...] = ()
 
 
 def is_camera_info(definition: Definition) -> bool:
-    """Tell whether a message is laid out as sensor_msgs/CameraInfo, of ROS 1 (D K R P) or ROS 2 (d k r p)."""
+    """Return whether a message is laid out as sensor_msgs/CameraInfo, of ROS 1 (D K R P) or ROS 2 (d k r p)."""
     return {"distortion_model", "height", "width"} <= definition.names and {"k", "d"} <= {
         name.lower() for name in definition.names
     }
@@ -34,13 +34,13 @@ def is_camera_info(definition: Definition) -> bool:
 def camera_from_info(message: Message, *, topic: str, rectified: bool = False) -> CameraReading:
     """Build the camera, for the pixels of the image as it was published.
 
-    Region of interest and binning are applied to K: a column u of the full sensor becomes
-    (u - x_offset + 1/2) / binning - 1/2, which keeps pixel centres at whole numbers.
+    Region of interest and binning are applied to K: column u of the full sensor becomes
+    (u - x_offset + 1/2) / binning - 1/2, which keeps pixel centres at integers.
 
     Args:
         message: a decoded CameraInfo.
         topic: its name, for the warnings.
-        rectified: the image topic is a rectified one, so P holds and nothing is distorted.
+        rectified: the image topic is rectified, so P applies and there is no distortion.
     """
     upper = "K" in message
     matrix = message.numbers("K" if upper else "k", 9).reshape(3, 3)
@@ -50,13 +50,13 @@ def camera_from_info(message: Message, *, topic: str, rectified: bool = False) -
     if rectified and projection[0, 0] > 0:
         matrix, distortion, model_name = projection[:, :3].copy(), np.zeros(0), ""
     if not (matrix[0, 0] > 0 and matrix[1, 1] > 0 and np.all(np.isfinite(matrix))):
-        return _none(topic, "camera-uncalibrated", "holds no focal length: the camera was never calibrated")
+        return _none(topic, "camera-uncalibrated", "has no focal length: the camera was never calibrated")
     model = _model(model_name, distortion)
     if isinstance(model, str):
         return _none(topic, "camera-model", model)
     matrix, width, height = _published(message, matrix)
     if width < 1 or height < 1:
-        return _none(topic, "camera-size", f"says the image is {width} x {height} pixels")
+        return _none(topic, "camera-size", f"gives an image size of {width} x {height} pixels")
     name, coefficients = model
     try:
         return CameraReading(Camera(name, width, height, matrix, coefficients))
@@ -70,23 +70,23 @@ def _none(topic: str, code: str, what: str) -> CameraReading:
 
 
 def _model(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np.ndarray] | str":
-    """Return the lens model and as many coefficients as it takes, or what is wrong."""
+    """Return the lens model and its coefficients, or a phrase saying what is wrong."""
     if not np.all(np.isfinite(distortion)):
         return "has distortion coefficients that are not numbers"
     lens = next((lens for lens in LENS_MODELS.values() if name in lens.names_in_messages), None)
     if lens is None:
-        return f"has the lens model '{name}'; {_listed(names_in('camera_info'), 'and')} are known"
+        return f"has unknown lens model '{name}'; {_listed(names_in('camera_info'), 'and')} are supported"
     if lens.opencv == "projectPoints":
         return _model_by_count(name, distortion)
     kept = next((count for count in reversed(lens.counts) if count <= len(distortion)), None)
     if kept is None or np.any(distortion[kept:]):
         expected = _listed([str(count) for count in lens.counts], "or")
-        return f"says '{name}' with {len(distortion)} coefficients; {expected} are expected"
+        return f"has lens model '{name}' with {len(distortion)} coefficients; {expected} are expected"
     return lens.name, distortion[:kept]
 
 
 def _model_by_count(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np.ndarray] | str":
-    """Go by the number of coefficients alone, as OpenCV does: drivers give these lens models one another's names."""
+    """Use the number of coefficients alone, as OpenCV does: drivers mix up the names of these lens models."""
     if not np.any(distortion):
         return opencv_lens(0).name, np.zeros(0)
     lenses = lenses_of_opencv()
@@ -96,7 +96,7 @@ def _model_by_count(name: str, distortion: np.ndarray) -> "tuple[CameraModel, np
     lens = next((lens for lens in lenses if len(distortion) in lens.counts), None)
     if lens is None:
         known = _listed([str(count) for lens in lenses for count in lens.counts if count], "or")
-        return f"says '{name or 'no model'}' with {len(distortion)} coefficients; {known} are known"
+        return f"has lens model '{name or 'none'}' with {len(distortion)} coefficients; {known} are supported"
     return lens.name, distortion
 
 
@@ -106,7 +106,7 @@ def _listed(words: Sequence[str], conjunction: str) -> str:
 
 
 def _published(message: Message, matrix: Matrix33) -> tuple[Matrix33, int, int]:
-    """Carry K and the size of the full sensor to those of the published image."""
+    """Convert K and size of the full sensor to those of the published image."""
     width, height = message.whole("width"), message.whole("height")
     binning = np.array([max(message.whole("binning_x"), 1), max(message.whole("binning_y"), 1)], dtype=np.float64)
     offset = np.zeros(2)

@@ -1,4 +1,4 @@
-"""The stream of images of a recording: by frame."""
+"""The stream of images of a recording, accessed by frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -25,7 +25,7 @@ class ImageStream:
         layouts: one per part of the topic.
         times_ns: (m,) stamps, ascending and unique.
         row: (m,) the message of each frame.
-        repeated: how many messages were left out because another frame has the same stamp.
+        repeated: how many messages were skipped because another frame has the same stamp.
     """
 
     topic: Topic
@@ -36,7 +36,7 @@ class ImageStream:
 
     @classmethod
     def build(cls, topic: Topic, layouts: Sequence[ImageLayout], stamps_ns: TimesNs) -> "ImageStream":
-        """Sort the frames by time; of several with one stamp keep the first received."""
+        """Sort the frames by time; of frames with the same stamp, keep the first received."""
         times_ns, row = np.unique(stamps_ns, return_index=True)
         return cls(
             topic,
@@ -47,7 +47,7 @@ class ImageStream:
         )
 
     def encoded(self, index: int) -> EncodedImage:
-        """Return a frame as a file."""
+        """Return a frame as an image file."""
         layout, payload = self._frame(index)
         return layout.encoded(payload)
 
@@ -62,11 +62,11 @@ class ImageStream:
         return layout.size_px(payload)
 
     def recorded_as(self, index: int) -> str:
-        """Return what a frame was recorded as, for people."""
+        """Return the format a frame was recorded in."""
         layout, payload = self._frame(index)
         return layout.recorded_as(payload)
 
     def _frame(self, index: int) -> tuple[ImageLayout, bytes]:
-        """Return a frame's message, and how to read it."""
+        """Return a frame's message and its layout."""
         row = int(self.row[index])
         return self.layouts[int(self.topic.part[row])], self.topic.payload(row)

@@ -1,4 +1,4 @@
-"""Camera images: recorded JPEG and PNG passed through, raw pixels converted and encoded once."""
+"""Read camera images: JPEG and PNG are passed through, raw pixels are converted and encoded once."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from calib_core.errors import MessageError
-from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, mended_jpeg, png_size
+from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC, png_size, repaired_jpeg
 from calib_core.recordings.camera.raw_pixels import READABLE, check_size, converted_pixels, raw_pixels, stretched
 from calib_core.recordings.camera.video_packets import Packet, packet_of, require_codec
 from calib_core.recordings.messages.decoding import Message, decode
@@ -30,7 +30,7 @@ _JPEG_QUALITY = 95
 
 @dataclass(frozen=True, slots=True)
 class EncodedImage:
-    """A frame as a file.
+    """A frame as an image file.
 
     Attributes:
         data: the bytes of the file.
@@ -46,42 +46,42 @@ class EncodedImage:
 
 
 def is_raw_image(definition: Definition) -> bool:
-    """Tell whether a message is laid out as sensor_msgs/Image."""
+    """Return whether a message is laid out as sensor_msgs/Image."""
     return definition.names >= _RAW_NAMES
 
 
 def is_compressed_image(definition: Definition) -> bool:
-    """Tell whether a message is laid out as sensor_msgs/CompressedImage."""
+    """Return whether a message is laid out as sensor_msgs/CompressedImage."""
     return definition.names >= _COMPRESSED_NAMES and not is_raw_image(definition)
 
 
 def is_packet(definition: Definition) -> bool:
-    """Tell whether a message is laid out as the packets of ffmpeg_image_transport: one frame of a video."""
+    """Return whether a message is laid out as the packets of ffmpeg_image_transport: one frame of a video."""
     return definition.names >= _PACKET_NAMES and not is_raw_image(definition)
 
 
 def is_picture(definition: Definition) -> bool:
-    """Tell whether a message is laid out as any of them."""
+    """Return whether a message is laid out as any of them."""
     return is_raw_image(definition) or is_compressed_image(definition) or is_packet(definition)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageLayout:
-    """Reads the images of one topic; errors begin with the topic's name."""
+    """Reads the images of one topic; error messages begin with the topic's name."""
 
     definition: Definition
     topic: str
 
     @property
     def compressed(self) -> bool:
-        """Tell whether messages hold files rather than pixels."""
+        """Return whether messages contain image files rather than pixels."""
         return not is_raw_image(self.definition)
 
     def check(self, payload: bytes) -> None:
-        """Refuse a topic by its first message, without decoding the picture.
+        """Check a topic's first message without decoding the picture.
 
         Raises:
-            MessageError: the encoding cannot be read; the text says which would.
+            MessageError: the encoding is not supported; the text lists those that are.
         """
         packet = self.packet(payload)
         if packet is None:
@@ -93,7 +93,7 @@ class ImageLayout:
             raise self._refused(str(error)) from error
 
     def packet(self, payload: bytes) -> Packet | None:
-        """Return the piece of video a message holds; None for one that holds a picture of its own.
+        """Return the video packet in a message; None if the message contains a complete picture.
 
         Raises:
             MessageError: the message cannot be read.
@@ -103,7 +103,7 @@ class ImageLayout:
         return packet_of(self._message(payload))
 
     def recorded_as(self, payload: bytes) -> str:
-        """Return what a message holds, for people: "jpeg", "png", "raw bgr8", "h264 video".
+        """Return the format of a message's image: "jpeg", "png", "raw bgr8" or "h264 video".
 
         Raises:
             MessageError: the message cannot be read.
@@ -131,7 +131,7 @@ class ImageLayout:
         return pixels.shape[1], pixels.shape[0]
 
     def encoded(self, payload: bytes) -> EncodedImage:
-        """Return the frame as a file: the recorded one, or raw pixels encoded as JPEG.
+        """Return the frame as an image file: the recorded one, or raw pixels encoded as JPEG.
 
         Raises:
             MessageError: the message cannot be read.
@@ -175,16 +175,16 @@ class ImageLayout:
             raise self._refused(str(error)) from error
 
     def _file(self, message: Message) -> EncodedImage:
-        """Take out the recorded file; what it is, its first bytes say and not the field 'format'."""
+        """Extract the recorded file; its type is recognized by its first bytes, not by the field 'format'."""
         data = message.octets("data").tobytes()
         said = message.text("format")
         if "compressedDepth" in said:
             raise self._refused(
-                f"'{said}' is a depth image, not a picture; choose a colour or grey image topic: {READABLE}"
+                f"'{said}' is a depth image, not a picture; choose a colour or grey image topic; {READABLE}"
             )
         try:
             if data.startswith(JPEG_MAGIC):
-                data, width, height = mended_jpeg(data)
+                data, width, height = repaired_jpeg(data)
                 check_size(width, height)
                 return EncodedImage(data, "jpeg", width, height)
             if data.startswith(PNG_MAGIC):
@@ -192,7 +192,9 @@ class ImageLayout:
         except MessageError as error:
             raise self._refused(str(error)) from error
         kind = "qoi" if data.startswith(b"qoif") else said or data[:4].hex() or "nothing"
-        raise self._refused(f"the encoding '{kind}' cannot be read; record or convert it to jpeg or png: {READABLE}")
+        raise self._refused(
+            f"the encoding '{kind}' cannot be read; record in jpeg or png, or convert to them; {READABLE}"
+        )
 
     def _png(self, data: bytes, said: str) -> EncodedImage:
         width, height, bits, colour = png_size(data)
@@ -201,8 +203,8 @@ class ImageLayout:
             return EncodedImage(data, "png", width, height)
         if "16UC1" in said or "mono16" not in said:
             raise MessageError(
-                f"'{said}' is a PNG of 16-bit grey, a depth or raw image without an agreed brightness; "
-                f"convert it to mono8: {READABLE}"
+                f"'{said}' is a 16-bit grey PNG, a depth or raw image without a defined brightness scale; "
+                f"convert it to mono8; {READABLE}"
             )
         import cv2
 
@@ -214,7 +216,7 @@ class ImageLayout:
 
 
 def encoded_pixels(picture: np.ndarray) -> EncodedImage:
-    """Encode pixels as JPEG, fine enough to click in."""
+    """Encode pixels as JPEG at a quality sufficient for clicking."""
     import cv2
 
     settings = [

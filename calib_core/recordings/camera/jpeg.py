@@ -1,11 +1,11 @@
-"""JPEG and PNG files from the outside: their size, and the repairs that leave every pixel as it was recorded."""
+"""Parse JPEG and PNG files without decoding: image size, and repairs that change no pixel."""
 
 import struct
 from collections.abc import Iterator
 
 from calib_core.errors import MessageError
 
-__all__ = ["JPEG_MAGIC", "PNG_MAGIC", "mended_jpeg", "png_size"]
+__all__ = ["JPEG_MAGIC", "PNG_MAGIC", "png_size", "repaired_jpeg"]
 
 JPEG_MAGIC = b"\xff\xd8\xff"
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
@@ -16,17 +16,17 @@ _ALONE = frozenset({0x01, *range(0xD0, 0xD9)})
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
-def mended_jpeg(data: bytes) -> tuple[bytes, int, int]:
+def repaired_jpeg(data: bytes) -> tuple[bytes, int, int]:
     """Return a JPEG ready for any decoder, with its width and height [px].
 
-    The bytes are the recorded ones but for two repairs: Exif blocks are taken out (a viewer would turn the picture by
-    their orientation, away from the camera's own pixels), and a missing end marker is added (browsers refuse without).
+    The recorded bytes are kept except for two repairs: Exif blocks are removed (a viewer would rotate the picture by
+    their orientation, away from the camera's pixels), and a missing end marker is added (browsers require it).
 
     Raises:
-        MessageError: not a JPEG, or cut off before its picture begins.
+        MessageError: not a JPEG, or cut off before the image data.
     """
     if not data.startswith(JPEG_MAGIC):
-        raise MessageError(f"begins with {data[:4].hex() or 'nothing'}, which is no JPEG")
+        raise MessageError(f"begins with {data[:4].hex() or 'nothing'}, which is not a JPEG")
     size, kept_from = None, 0
     kept: list[bytes] = []
     for marker, place, after in _segments(data):
@@ -36,7 +36,7 @@ def mended_jpeg(data: bytes) -> tuple[bytes, int, int]:
             kept.append(data[kept_from:place])
             kept_from = after
     if size is None:
-        raise MessageError("the JPEG ends before its picture begins")
+        raise MessageError("the JPEG ends before its image data")
     if kept:
         data = b"".join([*kept, data[kept_from:]])
     height, width = size
@@ -44,7 +44,7 @@ def mended_jpeg(data: bytes) -> tuple[bytes, int, int]:
 
 
 def _segments(data: bytes) -> Iterator[tuple[int, int, int]]:
-    """Walk over the segments in front of the picture: marker, where it begins, where the next does."""
+    """Yield the segments before the image data: marker, its offset, and the offset of the next."""
     place = 2
     while place + 4 <= len(data):
         marker = data[place + 1]
@@ -64,7 +64,7 @@ def png_size(data: bytes) -> tuple[int, int, int, int]:
     """Return width, height, bits per channel and colour type of a PNG.
 
     Raises:
-        MessageError: its first block is missing.
+        MessageError: the header block is missing.
     """
     if len(data) < 26 or data[12:16] != b"IHDR":
         raise MessageError("the PNG has no header")

@@ -1,4 +1,4 @@
-"""Raw pixels of sensor_msgs/Image: seen as an array without copying, and converted to blue, green, red."""
+"""View the raw pixels of sensor_msgs/Image as an array without copying, and convert them to blue, green, red."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ __all__ = ["READABLE", "check_size", "converted_pixels", "raw_pixels", "stretche
 _MAX_PIXELS = 200_000_000
 READABLE = (
     "jpeg, png, mono8, mono16, rgb8, bgr8, rgba8, bgra8, their 16-bit kinds, bayer_*8, bayer_*16, yuv422, yuv422_yuy2 and "
-    "H.264 can be read"
+    "H.264 are supported"
 )
 _DEPTH = ("16UC1", "32FC1", "16SC1")
 
 
 @dataclass(frozen=True, slots=True)
 class _Encoding:
-    """Channels and bytes of one pixel, and the name of OpenCV's conversion to blue, green, red ("" for none)."""
+    """Channels of a pixel, bytes per channel, and the name of OpenCV's conversion to blue, green, red ("" for none)."""
 
     channels: int
     conversion: str
@@ -48,27 +48,27 @@ _ENCODINGS: Mapping[str, _Encoding] = {
 
 
 def check_size(width: int, height: int) -> None:
-    """Refuse sizes that no camera has.
+    """Refuse implausible image sizes.
 
     Raises:
-        MessageError: nothing, or too many pixels.
+        MessageError: no pixels, or too many.
     """
     if not (width > 0 and height > 0 and width * height <= _MAX_PIXELS):
         raise MessageError(
-            f"an image of {width} x {height} pixels is refused; 1 to {_MAX_PIXELS // 10**6} million can be read"
+            f"an image of {width} x {height} pixels is refused; 1 to {_MAX_PIXELS // 10**6} million are supported"
         )
 
 
 def raw_pixels(message: Message) -> np.ndarray:
-    """View raw pixels as (h, w, channels), uint8 or uint16, padding of rows left out.
+    """View raw pixels as (h, w, channels), uint8 or uint16, without row padding.
 
     Raises:
-        MessageError: the encoding cannot be read, or the sizes contradict one another.
+        MessageError: the encoding is not supported, or the sizes contradict each other.
     """
     name = message.text("encoding")
     if name not in _ENCODINGS:
-        hint = "a depth image has no agreed brightness; convert it to mono8: " if name in _DEPTH else ""
-        raise MessageError(f"the encoding '{name}' cannot be read; {hint}{READABLE}")
+        hint = "a depth image has no defined brightness scale, convert it to mono8; " if name in _DEPTH else ""
+        raise MessageError(f"the encoding '{name}' is not supported; {hint}{READABLE}")
     encoding = _ENCODINGS[name]
     height, width, step = message.whole("height"), message.whole("width"), message.whole("step")
     check_size(width, height)
@@ -77,8 +77,8 @@ def raw_pixels(message: Message) -> np.ndarray:
     data = message.octets("data")
     if step < row or len(data) < step * (height - 1) + row:
         raise MessageError(
-            f"an image of {width} x {height} {name} pixels with rows of {step} bytes has {len(data)} bytes of data; "
-            f"{step * (height - 1) + row} are needed with rows of at least {row}: the message is damaged"
+            f"an image of {width} x {height} {name} pixels with rows of {step} bytes has {len(data)} bytes of data, but "
+            f"{step * (height - 1) + row} are required, with rows of at least {row}: the message is damaged"
         )
     rows = np.ndarray((height, row), np.uint8, np.ascontiguousarray(data), 0, (step, 1))
     if encoding.channel_bytes == 2:
@@ -88,7 +88,7 @@ def raw_pixels(message: Message) -> np.ndarray:
 
 
 def converted_pixels(message: Message) -> np.ndarray:
-    """Return raw pixels as uint8 (h, w, 3), blue first; those of 16 bits are stretched to 8.
+    """Return raw pixels as uint8 (h, w, 3), blue first; 16-bit pixels are stretched to 8.
 
     Raises:
         MessageError: as raw_pixels, or a width that the encoding does not allow.
@@ -107,7 +107,7 @@ def converted_pixels(message: Message) -> np.ndarray:
 
 
 def stretched(pixels: np.ndarray) -> np.ndarray:
-    """Bring 16-bit pixels to 8: cameras fill 10, 12 or 16 bits, so that the darkest and brightest 0.1 % become 0 and 255."""
+    """Reduce 16-bit pixels to 8: cameras fill 10, 12 or 16 bits, so the darkest and brightest 0.1 % become 0 and 255."""
     low, high = np.percentile(pixels, (0.1, 99.9))
     scale = 255.0 / max(float(high - low), 1.0)
     return np.clip((pixels.astype(np.float32) - np.float32(low)) * np.float32(scale) + 0.5, 0, 255).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""The intrinsics a recording carries, held against its images."""
+"""Read the recorded intrinsics and check them against the images."""
 
 import numpy as np
 
@@ -13,11 +13,11 @@ __all__ = ["recorded_camera"]
 
 
 def recorded_camera(topic: Topic | None, images: ImageStream | None) -> tuple[Camera | None, list[DataWarning]]:
-    """Read the intrinsics and hold them against the images.
+    """Read the intrinsics and check them against the images.
 
     Args:
-        topic: with camera info; None where there is none.
-        images: None where there are none.
+        topic: the camera-info topic, if any.
+        images: the image stream, if any.
     """
     if topic is None or not len(topic):
         return None, []
@@ -32,8 +32,8 @@ def recorded_camera(topic: Topic | None, images: ImageStream | None) -> tuple[Ca
         warnings.append(
             DataWarning(
                 "camera-changes",
-                f"{topic.name} begins and ends with different intrinsics; the first are used",
-                "turn off autofocus and zoom, or give the intrinsics with --camera FILE",
+                f"{topic.name} has different intrinsics at its beginning and end; the first are used",
+                "disable autofocus and zoom, or give the intrinsics with --camera FILE",
             )
         )
     if images is None or not len(images.times_ns):
@@ -49,7 +49,7 @@ def _reading(topic: Topic, row: int, images: ImageStream | None) -> CameraReadin
 def _fitted(
     camera: Camera, images: ImageStream, name: str, warnings: list[DataWarning]
 ) -> tuple[Camera | None, list[DataWarning]]:
-    """Scale the camera where its images are resized; refuse it where they are of another shape."""
+    """Scale the camera if its images are resized; refuse it if their aspect ratio differs."""
     try:
         width, height = images.size_px(0)
     except RecordingError:
@@ -60,7 +60,7 @@ def _fitted(
     if abs(camera.width_px * height - camera.height_px * width) <= 0.005 * camera.width_px * height:
         scaled = camera.scaled(width / camera.width_px)
         fitted = Camera(scaled.model, width, height, scaled.matrix_px, scaled.distortion)
-        hint = "right for resized images, wrong for cropped ones: then give the intrinsics with --camera FILE"
+        hint = "this is correct for resized images; for cropped images give the intrinsics with --camera FILE"
         return fitted, [*warnings, DataWarning("camera-scaled", f"{sizes}: the intrinsics were scaled", hint)]
     hint = "give the intrinsics of these images with --camera FILE"
     return None, [*warnings, DataWarning("camera-size", f"{sizes}: the intrinsics cannot be used", hint)]

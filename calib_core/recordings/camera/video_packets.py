@@ -1,4 +1,4 @@
-"""Video as messages: one coded frame each, of which only key frames stand for themselves."""
+"""Decode video topics: one encoded frame per message, of which only key frames can be decoded alone."""
 
 import re
 import threading
@@ -26,12 +26,12 @@ _INSTALL = "pip install 'cocalib[video]'"
 
 @dataclass(frozen=True, slots=True)
 class Packet:
-    """One coded frame.
+    """One encoded frame.
 
     Attributes:
-        codec: as FFmpeg names it.
+        codec: FFmpeg's name.
         data: the bytes, with start codes (Annex B).
-        key: decoding can begin here.
+        key: whether decoding can begin here.
     """
 
     codec: str
@@ -40,7 +40,7 @@ class Packet:
 
 
 def packet_of(message: Message) -> Packet | None:
-    """Take the coded frame out of foxglove CompressedVideo, CompressedImage or FFMPEGPacket; None where it is a picture."""
+    """Extract the encoded frame of a foxglove CompressedVideo, CompressedImage or FFMPEGPacket; None if it is a picture."""
     said = next((message.text(name) for name in ("format", "encoding") if name in message), "").lower()
     words = re.findall(r"[a-z0-9]+", said.replace(".", "").replace("libx", "h").replace("_", " "))
     codec = next((_CODECS[word] for word in words if word in _CODECS), None)
@@ -54,7 +54,7 @@ def packet_of(message: Message) -> Packet | None:
 
 
 def _begins_with_key(codec: str, data: bytes) -> bool:
-    """Tell by the first units of the stream whether decoding can begin here: parameter sets or a picture of its own."""
+    """Return whether decoding can begin here, from the first stream units: parameter sets or an independent picture."""
     for match in _START.finditer(data[:_LOOK_BYTES]):
         unit = match[1][0]
         kind = unit & 0x1F if codec == "h264" else unit >> 1 & 0x3F
@@ -64,26 +64,26 @@ def _begins_with_key(codec: str, data: bytes) -> bool:
 
 
 def require_codec(packet: Packet) -> None:
-    """Refuse video where the decoder is not installed.
+    """Check that the decoder is installed.
 
     Raises:
-        MessageError: the text says what to install.
+        MessageError: it is not, or the packet has no start codes; the text says what to do.
     """
     if find_spec("av") is None:
         raise MessageError(f"its images are {packet.codec} video, which needs PyAV; install it with: {_INSTALL}")
     if b"\0\0\1" not in packet.data[:_LOOK_BYTES]:
         raise MessageError(
-            f"its images say {packet.codec} but have no start codes (Annex B); record them as foxglove CompressedVideo or "
-            "ffmpeg_image_transport write them"
+            f"its images are declared as {packet.codec} but have no start codes (Annex B); record them as foxglove "
+            "CompressedVideo or with ffmpeg_image_transport"
         )
 
 
 class PacketDecoder:
-    """Decodes frames of a video topic in any order; forwards costs one frame, elsewhere the way from the last key frame.
+    """Decode frames of a video topic in any order: the next frame directly, others from the key frame before them.
 
     Args:
-        packet: gives the packet of a message by its number.
-        count: how many messages there are.
+        packet: returns the packet of a message by its number.
+        count: number of messages.
     """
 
     def __init__(self, packet: Callable[[int], Packet], count: int) -> None:
@@ -98,7 +98,7 @@ class PacketDecoder:
         """Return the pixels of a message's frame: uint8 (h, w, 3), blue first.
 
         Raises:
-            MessageError: no key frame is before it, or the video is damaged.
+            MessageError: there is no key frame before it, or the video is damaged.
         """
         with self._lock:
             if number in self._kept:
@@ -116,7 +116,7 @@ class PacketDecoder:
         place = number
         while place >= 0:
             if place == self._next and self._context is not None:
-                return place  # everything up to here is decoded already
+                return place  # everything up to here is already decoded
             if self._packet(place).key:
                 return place
             place -= 1
@@ -126,7 +126,7 @@ class PacketDecoder:
         import av
 
         self._context = av.CodecContext.create(self._packet(begin).codec, "r")
-        self._context.thread_count = 1  # several threads hold frames back
+        self._context.thread_count = 1  # several threads would delay the output of frames
         self._next = begin
 
     def _feed(self, number: int) -> None:

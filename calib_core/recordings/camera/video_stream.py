@@ -1,4 +1,4 @@
-"""The frames of a topic that carries video: coded frames which need those before them."""
+"""The frames of a video topic: encoded frames that depend on those before them."""
 
 import contextlib
 from collections.abc import Sequence
@@ -21,11 +21,11 @@ _SOUGHT_MESSAGES = 2000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VideoStream(ImageStream):
-    """Frames of a video, decoded when asked for.
+    """Frames of a video, decoded on demand.
 
     Attributes:
-        decoder: gives the pixels of a message's frame.
-        before_key: how many frames were left out at the beginning because no key frame is before them.
+        decoder: returns the pixels of a message's frame.
+        before_key: how many frames at the beginning were skipped because no key frame precedes them.
     """
 
     decoder: PacketDecoder | None = None
@@ -54,21 +54,21 @@ class VideoStream(ImageStream):
 
 
 def image_stream(topic: Topic, layouts: Sequence[ImageLayout], stamps_ns: TimesNs) -> ImageStream:
-    """Build the stream of an image topic, of pictures or of video."""
+    """Build the stream of an image topic with pictures or video."""
     stream = ImageStream.build(topic, layouts, stamps_ns)
 
     def packet(number: int) -> Packet | None:
         return layouts[int(topic.part[number])].packet(topic.payload(number))
 
-    def sure_packet(number: int) -> Packet:
+    def video_packet(number: int) -> Packet:
         found = packet(number)
         if found is None:
-            raise MessageError(f"frame {number} of the video is no video")
+            raise MessageError(f"frame {number} of the video is not a video packet")
         return found
 
     key = None
     for number in range(min(len(topic), _SOUGHT_MESSAGES)):
-        with contextlib.suppress(RecordingError):  # told when the frame itself is read
+        with contextlib.suppress(RecordingError):  # reported when the frame itself is read
             found = packet(number)
             if found is None:
                 return stream
@@ -79,19 +79,19 @@ def image_stream(topic: Topic, layouts: Sequence[ImageLayout], stamps_ns: TimesN
         return stream
     kept = stream.row >= key
     return VideoStream(
-        topic, layouts, stream.times_ns[kept], stream.row[kept], stream.repeated, PacketDecoder(sure_packet, len(topic)),
+        topic, layouts, stream.times_ns[kept], stream.row[kept], stream.repeated, PacketDecoder(video_packet, len(topic)),
         int((~kept).sum()),
     )  # fmt: skip
 
 
 def about_video(images: ImageStream | None) -> list[DataWarning]:
-    """Say how many frames of a video cannot be decoded because it was joined midway."""
+    """Warn about frames that cannot be decoded because the recording began between key frames."""
     if not isinstance(images, VideoStream) or not images.before_key:
         return []
     return [
         DataWarning(
             "video-before-key",
-            f"the first {images.before_key} frames of {images.topic.name} come before its first key frame and are left out",
-            "nothing to do, unless a placement is there: then let the encoder send key frames more often",
+            f"the first {images.before_key} frames of {images.topic.name} precede its first key frame and are skipped",
+            "no action needed unless a placement is there; in that case have the encoder send key frames more often",
         )
     ]

@@ -1,1 +1,1 @@
-"""Files that hold messages: ROS 1 bags, MCAP, SQLite; read by position, recovered where damaged, and written."""
+"""Message containers (ROS 1 bags, MCAP, SQLite): positioned reading, recovery of damaged files, and writing."""

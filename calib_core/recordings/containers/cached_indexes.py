@@ -1,4 +1,4 @@
-"""Indexes and heads of messages as arrays of the cache, and back."""
+"""Store indexes and message heads in the cache as arrays, and restore them."""
 
 import hashlib
 import json
@@ -17,12 +17,12 @@ _FEWEST_HEADS = 500
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptIndex:
-    """What opening a chunked file finds out.
+    """The result of opening a chunked file.
 
     Attributes:
         channels: the topics it declares.
-        chunks: (n, 3) position, stored bytes, bytes unpacked.
-        compressions: (n,) names.
+        chunks: (n, 3) position, stored bytes, uncompressed bytes.
+        compressions: (n,) compression names.
         indexes: by channel.
     """
 
@@ -33,7 +33,7 @@ class KeptIndex:
 
 
 def keep_index(cache: FileCache, kept: KeptIndex) -> None:
-    """Put an index into the cache."""
+    """Store an index in the cache."""
     names = sorted(set(kept.compressions))
     words = {"channels": [asdict(channel) for channel in kept.channels], "compressions": names}
     ids = list(kept.indexes)
@@ -52,7 +52,7 @@ def keep_index(cache: FileCache, kept: KeptIndex) -> None:
 
 
 def index_from(cache: FileCache) -> KeptIndex | None:
-    """Take an index out of the cache; None where there is none that makes sense."""
+    """Return the index from the cache; None if there is no valid one."""
     arrays = cache.get("index")
     if arrays is None:
         return None
@@ -77,13 +77,13 @@ def index_from(cache: FileCache) -> KeptIndex | None:
 
 
 def keep_heads(cache: FileCache | None, index: MessageIndex, size: int, heads: Heads) -> None:
-    """Put heads that were all read into the cache, where they are many."""
+    """Store heads in the cache if they are many and all were read."""
     if cache is not None and len(index) >= _FEWEST_HEADS and not heads.fault:
         cache.put(_heads_name(index, size), {"rows": heads.rows, "lengths": heads.lengths})
 
 
 def heads_from(cache: FileCache | None, index: MessageIndex, size: int) -> Heads | None:
-    """Take the heads of exactly these messages out of the cache; None where they are not there."""
+    """Return the heads of exactly these messages from the cache; None if they are not cached."""
     if cache is None or len(index) < _FEWEST_HEADS:
         return None
     arrays = cache.get(_heads_name(index, size))

@@ -1,7 +1,7 @@
-"""Chunked containers: what ROS 1 bags and MCAP files share.
+"""Chunked containers: the common part of ROS 1 bags and MCAP files.
 
-Messages lie one after another in chunks, packed or not. Unpacked chunks are kept in a cache bounded in bytes; of
-chunks stored as they are, only the bytes asked for are read.
+Messages are stored consecutively in chunks, compressed or not. Decompressed chunks are kept in a cache of bounded size;
+from uncompressed chunks, only the requested bytes are read.
 """
 
 import threading
@@ -29,23 +29,23 @@ __all__ = ["CACHE_BYTES", "FIRST_CHUNKS", "MAX_MESSAGE_BYTES", "ChannelFilter", 
 ChannelFilter: TypeAlias = Callable[[Channel], bool]
 CACHE_BYTES = 64 * 2**20
 FIRST_CHUNKS = 16
-"""Where the beginning of a file is enough, so many chunks are looked at, and as many more until all that is wanted is in them."""
+"""Number of chunks to read first if the beginning of a file is enough, and to add until everything wanted is found."""
 
 _FEW_MESSAGES = 64
 _FAR_BYTES = 4096
 _MAX_CHECKED_BYTES = 1 << 24
 MAX_MESSAGE_BYTES = 1 << 28
-"""No message of a sensor is larger; one that claims to be is damaged or made to harm."""
+"""Larger than any sensor message; one that claims to exceed it is damaged or malicious."""
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Where one chunk's bytes lie.
+    """The location of a chunk's bytes.
 
     Attributes:
         position: of its first byte in the file.
         stored_bytes: its size in the file.
-        size_bytes: its size unpacked.
+        size_bytes: its uncompressed size.
         compression: "none", "bz2", "lz4" or "zstd".
     """
 
@@ -56,21 +56,21 @@ class Chunk:
 
     @property
     def packed(self) -> bool:
-        """Tell whether it has to be unpacked."""
+        """Return whether it is compressed."""
         return self.compression not in ("", "none")
 
 
 class ChunkedSource:
-    """Read messages out of chunks. A subclass opens the file and knows how a message record begins.
+    """Read messages from chunks. Subclasses open the file and parse the beginning of a message record.
 
     Args:
         file: the file.
-        whole: all of it is looked into; what is found out about a part is not kept in the cache.
+        whole: whether all of it is read; the index of a part is not cached.
     """
 
     format_name = "chunked file"
     lead_bytes = 0
-    """How many bytes of a record come before the message, in the usual case."""
+    """Number of bytes of a record before the message, in the usual case."""
 
     def __init__(self, file: FileBytes, *, whole: bool = True) -> None:
         self.file = file
@@ -79,9 +79,9 @@ class ChunkedSource:
         self.warnings: tuple[DataWarning, ...] = file.warnings
         self.indexes: dict[int, MessageIndex] = {}
         self.counts: Mapping[int, int] = {}
-        """How many messages each channel has, as far as the file says so."""
+        """Number of messages of each channel, as far as the file states it."""
         self.recovered = False
-        """The file was not closed; its chunks may be cut off."""
+        """Whether the file was not closed; its chunks may be truncated."""
         self._cache: OrderedDict[int, bytes] = OrderedDict()
         self._cache_bytes = 0
         self._damaged_chunks: dict[int, str] = {}
@@ -90,7 +90,7 @@ class ChunkedSource:
         self._kept = cache_of(file) if whole else None
 
     def restore(self) -> bool:
-        """Take what opening finds out from the cache; False where it is not there."""
+        """Restore the index from the cache; False if it is not cached."""
         kept = index_from(self._kept) if self._kept is not None else None
         if kept is None:
             return False
@@ -106,7 +106,7 @@ class ChunkedSource:
         return True
 
     def keep(self) -> None:
-        """Put what opening found out into the cache, if the file is sound."""
+        """Store the index in the cache, if the file is intact."""
         if self._kept is None or self.recovered or self.warnings:
             return
         places = [(chunk.position, chunk.stored_bytes, chunk.size_bytes) for chunk in self.chunks]
@@ -116,30 +116,30 @@ class ChunkedSource:
 
     @property
     def path(self) -> Path:
-        """Where the file lies."""
+        """The path of the file."""
         return self.file.path
 
     @property
     def size_bytes(self) -> int:
-        """How large the file is."""
+        """The size of the file."""
         return self.file.size_bytes
 
     @property
     def container(self) -> str:
-        """Name the format and its compression."""
+        """The format and its compression."""
         kinds = sorted({chunk.compression for chunk in self.chunks if chunk.packed})
         return f"{self.format_name}, {' and '.join(kinds)}" if kinds else self.format_name
 
     def index(self, channel_id: int) -> MessageIndex:
-        """Tell where the messages of a channel lie."""
+        """Return the locations of a channel's messages."""
         empty = np.zeros(0, dtype=np.int64)
         return self.indexes.get(channel_id, MessageIndex(empty, empty, empty))
 
     def note_index(self, channel_id: int, index: MessageIndex) -> None:
-        """Keep the index of a channel.
+        """Store the index of a channel.
 
         Raises:
-            RecordingError: it points out of the chunks.
+            RecordingError: it points outside the chunks.
         """
         sizes = np.array([chunk.size_bytes for chunk in self.chunks], dtype=np.float64)
         wrong = (index.offset < 0) | (index.offset >= sizes[index.chunk])
@@ -159,7 +159,7 @@ class ChunkedSource:
 
     @property
     def later_warnings(self) -> tuple[DataWarning, ...]:
-        """Chunks found since that are not as they were written."""
+        """Checksum errors in the chunks read so far."""
         with self._lock:
             bad = sorted(chunk for chunk, sound in self._checked.items() if not sound)
         if not bad:
@@ -168,26 +168,25 @@ class ChunkedSource:
         return (
             DataWarning(
                 "checksum",
-                f"{self.path.name}: {len(bad)} of its chunks read so far, with {inside} messages, do not have the checksum "
-                f"they were written with; the first is at byte {self.chunks[bad[0]].position}. Their messages are used as "
-                "they are, and may be wrong",
+                f"{self.path.name}: wrong checksum in {len(bad)} of the chunks read so far, with {inside} messages; "
+                f"the first is at byte {self.chunks[bad[0]].position}. Their messages are used anyway, and may be wrong",
                 "copy the file again from its source; until then do not trust clicks and scans of that time",
             ),
         )
 
     def checksum(self, chunk: int) -> int:
-        """Return the CRC-32 that a chunk's unpacked bytes should have; 0 where the file has none."""
+        """Return the stored CRC-32 of a chunk's uncompressed bytes; 0 if the file has none."""
         return 0
 
     def _check(self, chunk: int, data: bytes) -> None:
-        """Compare a whole unpacked chunk with its checksum, and note how it came out."""
+        """Compare a whole decompressed chunk with its checksum, and record the result."""
         wanted = self.checksum(chunk)
         sound = wanted == 0 or zlib.crc32(data) == wanted
         with self._lock:
             self._checked[chunk] = sound
 
     def _check_stored(self, chunk: int) -> None:
-        """Check a chunk that is stored as it is, once; those too large to be read beside a message are passed over."""
+        """Check an uncompressed chunk once; chunks too large to read along with a message are skipped."""
         where = self.chunks[chunk]
         if where.packed or self.recovered or chunk in self._checked:
             return
@@ -198,44 +197,44 @@ class ChunkedSource:
         self._check(chunk, self.file.up_to(where.position, where.stored_bytes))
 
     def read(self, chunk: int, offset: int) -> bytes:
-        """Read one message whole."""
+        """Read one whole message."""
         self._check_stored(chunk)
         try:
             start, length = self.locate(chunk, offset)
         except RecordingError as error:
             raise RecordingError(self.fault_of(chunk) or str(error)) from error
         if length > MAX_MESSAGE_BYTES:
-            raise RecordingError(f"{self.path}: a message that claims {length} bytes is refused as damaged")
+            raise RecordingError(f"{self.path}: a message that claims a size of {length} bytes is refused as damaged")
         data = self.piece(chunk, start, length)
         if len(data) != length:
             raise RecordingError(
                 self.fault_of(chunk)
-                or f"{self.path}: a message of {length} bytes at byte {start} of chunk {chunk} runs past the chunk's end; "
+                or f"{self.path}: a message of {length} bytes at byte {start} of chunk {chunk} extends past the chunk's end; "
                 "the file is damaged: copy it again"
             )
         return data
 
     def room(self, chunk: int) -> int:
-        """Return how many bytes a chunk has; messages cannot reach past them."""
+        """Return the uncompressed size of a chunk, which bounds its messages."""
         return self.chunks[chunk].size_bytes
 
     def locate(self, chunk: int, offset: int) -> tuple[int, int]:
-        """Return where in the chunk the message itself begins, and its length."""
+        """Return the offset of the message itself in the chunk, and its length."""
         raise NotImplementedError
 
     def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tell which records (n, lead_bytes) have their message at lead_bytes, and how long the messages are."""
+        """Return which records (n, lead_bytes) have their message at lead_bytes, and how long the messages are."""
         raise NotImplementedError
 
     def piece(self, chunk: int, offset: int, size: int) -> bytes:
-        """Return at most size bytes from offset of the unpacked chunk."""
+        """Return at most size bytes from offset of the uncompressed chunk."""
         where = self.chunks[chunk]
         if not where.packed:
             return self.file.up_to(where.position + offset, min(size, where.size_bytes - offset))
         return self.unpacked(chunk)[offset : offset + size]
 
     def unpacked(self, chunk: int) -> bytes:
-        """Return a whole chunk, from the cache where it is still there."""
+        """Return a whole decompressed chunk, from the cache if possible."""
         with self._lock:
             if chunk in self._cache:
                 self._cache.move_to_end(chunk)
@@ -251,7 +250,7 @@ class ChunkedSource:
         return data
 
     def _unpack(self, chunk: int) -> bytes:
-        """Unpack a chunk; of a damaged one return what comes before the damage, and remember what is wrong."""
+        """Decompress a chunk; if it is damaged, return the bytes before the damage and record what is wrong."""
         where = self.chunks[chunk]
         place = f"{self.path}: chunk {chunk} at byte {where.position}"
         refuse_bomb(where.stored_bytes, where.size_bytes, where=place)
@@ -268,12 +267,12 @@ class ChunkedSource:
         return whole
 
     def fault_of(self, chunk: int) -> str:
-        """Say what is wrong with a chunk that was unpacked; "" where nothing is."""
+        """Return what is wrong with a decompressed chunk; "" if nothing."""
         with self._lock:
             return self._damaged_chunks.get(chunk, "")
 
     def in_memory(self, chunk: int, *, keep: bool) -> bytes | None:
-        """Return a packed chunk unpacked, and keep it in the cache if asked to; None for one stored as it is."""
+        """Return a compressed chunk decompressed, cached if keep is set; None for an uncompressed chunk."""
         if not self.chunks[chunk].packed:
             return None
         if keep:
@@ -297,7 +296,7 @@ class ChunkedSource:
         return found
 
     def _far_places(self, index: MessageIndex, size: int) -> Indices | None:
-        """Return where in the file messages lie that are stored as they are, far from one another; None for others."""
+        """Return the file positions of uncompressed messages that are far apart; None otherwise."""
         if len(index) < _FEW_MESSAGES:
             return None
         used = np.unique(index.chunk)

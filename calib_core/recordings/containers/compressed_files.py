@@ -1,4 +1,4 @@
-"""Recordings that are compressed as a whole (.db3.zstd, .mcap.zst, .bag.gz): unpacked beside, within limits."""
+"""Decompress recordings that are compressed as a whole (.db3.zstd, .mcap.zst, .bag.gz), within limits."""
 
 import bz2
 import gzip
@@ -24,21 +24,21 @@ _MAX_RATIO = 50
 
 
 def packing_of(head: bytes) -> str | None:
-    """Name the compression that a file begins with; None where it is none that can be unpacked."""
+    """Return the compression a file begins with; None if it is not a supported one."""
     return next((name for magic, name in _MAGIC.items() if head.startswith(magic)), None)
 
 
 def unpacked_file(file: FileBytes, kind: str) -> FileBytes:
-    """Unpack a file into a temporary folder; the folder goes when the file that is returned is closed.
+    """Decompress a file into a temporary folder, which is removed when the returned file is closed.
 
-    A file that is cut short or damaged gives what comes before, with a warning.
+    A truncated or damaged file yields the bytes before the damage, with a warning.
 
     Args:
-        file: the packed file; it is closed.
-        kind: as packing_of names it.
+        file: the compressed file; it is closed.
+        kind: the compression, as returned by packing_of.
 
     Raises:
-        RecordingError: nothing comes out, it grows beyond all measure, or the disk is full.
+        RecordingError: nothing can be decompressed, the result is implausibly large, or the disk is full.
     """
     file.close()
     folder = TemporaryDirectory(prefix="cocalib-", ignore_cleanup_errors=True)
@@ -47,35 +47,38 @@ def unpacked_file(file: FileBytes, kind: str) -> FileBytes:
         size, fault = _copy(file, kind, target)
         if not size:
             raise RecordingError(
-                f"{file.path}: compressed as a whole with {kind}, and nothing can be unpacked ({fault}); copy the file again"
+                f"{file.path}: the {kind}-compressed file cannot be decompressed ({fault}); copy the file again"
             )
         return FileBytes(
-            file.path, stored=target, folder=folder, warnings=(*file.warnings, *_said(file, kind, size, fault))
+            file.path,
+            stored=target,
+            folder=folder,
+            warnings=(*file.warnings, *_unpacking_warnings(file, kind, size, fault)),
         )
     except BaseException:
         folder.cleanup()
         raise
 
 
-def _said(file: FileBytes, kind: str, size: int, fault: str) -> list[DataWarning]:
+def _unpacking_warnings(file: FileBytes, kind: str, size: int, fault: str) -> list[DataWarning]:
     name = file.path.name
     once = DataWarning(
         "packed-file",
-        f"{name} is compressed as a whole with {kind}: it was unpacked to {size / 1e6:.1f} MB in a temporary folder",
-        f"this is done again at every opening; to do it once: {_COMMANDS[kind]} {name}",
+        f"{name} is compressed with {kind}: it was decompressed to {size / 1e6:.1f} MB in a temporary folder",
+        f"this is repeated every time it is opened; to do it once: {_COMMANDS[kind]} {name}",
     )
     if not fault:
         return [once]
     cut = DataWarning(
         "packed-file-damaged",
-        f"{name} is damaged or cut short ({fault}): what comes after the first {size} unpacked bytes is lost",
+        f"{name} is damaged or truncated ({fault}): everything after the first {size} decompressed bytes is lost",
         "copy the file again from its source",
     )
     return [once, cut]
 
 
 def _copy(file: FileBytes, kind: str, target: Path) -> tuple[int, str]:
-    """Unpack piece by piece; return how many bytes came out and what ended it early."""
+    """Decompress piece by piece; return the number of bytes written, and the error if it ended early."""
     free = shutil.disk_usage(target.parent).free
     limit = max(_ALWAYS_BYTES, _MAX_RATIO * file.size_bytes)
     size = 0
@@ -90,13 +93,13 @@ def _copy(file: FileBytes, kind: str, target: Path) -> tuple[int, str]:
             size += len(piece)
             if size > limit:
                 raise RecordingError(
-                    f"{file.path}: unpacks to over {limit / 2**20:.0f} MiB, more than {_MAX_RATIO} times its size; "
-                    f"it is refused as made to harm; if it is not, unpack it yourself: {_COMMANDS[kind]}"
+                    f"{file.path}: decompresses to over {limit / 2**20:.0f} MiB, more than {_MAX_RATIO} times its size; "
+                    f"it is refused as possibly malicious; if you trust it, decompress it yourself: {_COMMANDS[kind]}"
                 )
             if size > free // 2:
                 raise RecordingError(
-                    f"{file.path}: compressed as a whole with {kind}, and unpacking it would fill over half of the free "
-                    f"space in {target.parent.parent}; unpack it where there is room: {_COMMANDS[kind]}"
+                    f"{file.path}: decompressing this {kind} file would fill over half of the free "
+                    f"space in {target.parent.parent}; decompress it where there is enough space: {_COMMANDS[kind]}"
                 )
             out.write(piece)
 

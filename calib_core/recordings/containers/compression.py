@@ -1,4 +1,4 @@
-"""Unpack the chunks of a recording, never to more than they declare."""
+"""Decompress the chunks of a recording, never to more than their declared size."""
 
 import bz2
 import sys
@@ -9,7 +9,7 @@ from calib_core.errors import RecordingError
 __all__ = ["MAX_CHUNK_BYTES", "refuse_bomb", "unpack", "unpack_message", "unpack_what_is_there"]
 
 MAX_CHUNK_BYTES = 1 << 28
-"""Recorders write chunks of about 1 MB; a packed one that declares more than 256 MiB is damaged or made to harm."""
+"""Recorders write chunks of about 1 MB; a compressed one that declares more than 256 MiB is damaged or malicious."""
 
 _SUSPICIOUS_BYTES = 1 << 25
 _SUSPICIOUS_RATIO = 1000
@@ -33,11 +33,11 @@ def unpack(data: bytes, kind: str, size: int, *, where: str) -> bytes:
     Args:
         data: the compressed bytes.
         kind: "none", "", "bz2", "lz4" or "zstd".
-        size: how many bytes it declares to hold.
-        where: the file and place, for the error.
+        size: its declared uncompressed size.
+        where: file and position, for the error message.
 
     Raises:
-        RecordingError: an unknown compression, damaged bytes, another size than declared, or more than 256 MiB.
+        RecordingError: unknown compression, damaged bytes, a size other than declared, or more than 256 MiB.
     """
     if kind in ("", "none"):
         return data
@@ -49,42 +49,43 @@ def unpack(data: bytes, kind: str, size: int, *, where: str) -> bytes:
         try:
             part = unpacker.decompress(data, max_length=left)
         except (OSError, RuntimeError, ValueError, EOFError, _zstd_error()) as error:
-            raise RecordingError(f"{where}: a {kind} chunk is damaged ({error}); copy the file again") from error
+            raise RecordingError(f"{where}: the {kind} data is damaged ({error}); copy the file again") from error
         parts.append(part)
         left -= len(part)
         data = (unpacker.unused_data or b"") if unpacker.eof else b""
     if left:
         raise RecordingError(
-            f"{where}: a {kind} chunk holds {size - left} bytes, but declares {size}; the file is damaged: copy it again"
+            f"{where}: the {kind} data decompresses to {size - left} bytes, but {size} are declared; "
+            "the file is damaged: copy it again"
         )
     return parts[0] if len(parts) == 1 else b"".join(parts)
 
 
 def refuse_bomb(stored: int, size: int, *, where: str) -> None:
-    """Refuse a packed chunk before it is unpacked if it declares more than can be true.
+    """Refuse a compressed chunk that declares an implausible size, before decompressing it.
 
     Raises:
-        RecordingError: it declares over 256 MiB, or over 32 MiB and a thousand times what it takes in the file.
+        RecordingError: it declares over 256 MiB, or over 32 MiB and a thousand times its size in the file.
     """
     if size > MAX_CHUNK_BYTES:
         raise RecordingError(
-            f"{where}: a chunk declares {size / 2**20:.0f} MiB; packed chunks over {MAX_CHUNK_BYTES >> 20} MiB are "
+            f"{where}: a chunk declares {size / 2**20:.0f} MiB; compressed chunks over {MAX_CHUNK_BYTES >> 20} MiB are "
             "refused as damaged"
         )
     if size > _SUSPICIOUS_BYTES and size > _SUSPICIOUS_RATIO * stored:
         raise RecordingError(
-            f"{where}: a chunk of {stored} bytes declares {size / 2**20:.0f} MiB, over a thousand times as much; "
-            "it is refused as damaged or made to harm"
+            f"{where}: a chunk of {stored} bytes declares {size / 2**20:.0f} MiB, over a thousand times its size; "
+            "it is refused as damaged or malicious"
         )
 
 
 def unpack_what_is_there(data: bytes, kind: str, size: int) -> bytes:
-    """Decompress a chunk that may be cut off or damaged; return the bytes before the damage.
+    """Decompress a chunk that may be truncated or damaged; return the bytes before the damage.
 
     Args:
-        data: the compressed bytes there are.
-        kind: as for unpack; of an unknown kind nothing can be had.
-        size: how many bytes it declares to hold.
+        data: the available compressed bytes.
+        kind: as for unpack; an unknown kind yields nothing.
+        size: its declared uncompressed size.
     """
     if kind in ("", "none"):
         return data
@@ -100,12 +101,12 @@ def unpack_what_is_there(data: bytes, kind: str, size: int) -> bytes:
             parts.append(unpacker.decompress(data[place : place + _PIECE_BYTES], max_length=left))
             left -= len(parts[-1])
     except (OSError, RuntimeError, ValueError, EOFError, _zstd_error()):
-        pass  # what came out before is all there is
+        pass  # keep what was decompressed before the error
     return b"".join(parts)
 
 
 def unpack_message(data: bytes, *, where: str) -> bytes:
-    """Decompress one Zstandard frame that may not declare its size; refuse more than 256 MiB.
+    """Decompress one Zstandard frame, which need not declare its size; refuse more than 256 MiB.
 
     Raises:
         RecordingError: damaged, or too large.
@@ -116,7 +117,7 @@ def unpack_message(data: bytes, *, where: str) -> bytes:
     except _zstd_error() as error:
         raise RecordingError(f"{where}: a zstd message is damaged ({error}); copy the file again") from error
     if not unpacker.eof:
-        raise RecordingError(f"{where}: a zstd message is cut short or over 256 MiB; copy the file again")
+        raise RecordingError(f"{where}: a zstd message is truncated or over 256 MiB; copy the file again")
     return message
 
 
@@ -135,7 +136,7 @@ def _unpacker(kind: str, where: str) -> _Unpacker:
             from backports.zstd import ZstdDecompressor
 
         return ZstdDecompressor()
-    raise RecordingError(f"{where}: compression '{kind}' is unknown; none, bz2, lz4 and zstd can be read")
+    raise RecordingError(f"{where}: unknown compression '{kind}'; none, bz2, lz4 and zstd are supported")
 
 
 def _zstd_error() -> type[Exception]:

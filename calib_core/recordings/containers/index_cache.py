@@ -1,8 +1,8 @@
-"""What opening a large file found out, kept in the user's cache folder, so that opening it again is fast.
+"""Cache the indexes of large files in the user's cache folder, so that opening them again is fast.
 
-An entry belongs to one file as it was: its path, size, time of change, and a hash of its beginning and end. An entry
-that does not fit, or is damaged, is passed over; a cache that cannot be written is no error. COCALIB_CACHE=off
-switches it off, COCALIB_CACHE=FOLDER puts it elsewhere.
+An entry is valid for one state of one file: its path, size, modification time, and a hash of its beginning and end. An
+entry that does not match or is damaged is ignored, and a cache that cannot be written is not an error. COCALIB_CACHE=off
+disables the cache, COCALIB_CACHE=FOLDER moves it.
 """
 
 import hashlib
@@ -35,16 +35,16 @@ _DAMAGED = (
 )
 
 SMALLEST_FILE_BYTES = 16_000_000
-"""Smaller files open fast anyway."""
+"""Smaller files open quickly without a cache."""
 
 
 def cache_folder() -> Path | None:
-    """Return the folder of the cache; None where it is switched off."""
-    wish = os.environ.get("COCALIB_CACHE", "")
-    if wish.lower() in ("off", "0", "no"):
+    """Return the cache folder; None if the cache is disabled."""
+    requested = os.environ.get("COCALIB_CACHE", "")
+    if requested.lower() in ("off", "0", "no"):
         return None
-    if wish:
-        return Path(wish)
+    if requested:
+        return Path(requested)
     if sys.platform == "darwin":
         base = Path.home() / "Library" / "Caches"
     elif sys.platform == "win32":
@@ -55,10 +55,10 @@ def cache_folder() -> Path | None:
 
 
 def cache_of(file: FileBytes) -> "FileCache | None":
-    """Return the cache's part for a file; None for files that open fast anyway, and where the cache is off.
+    """Return the cache of a file; None for small files, and if the cache is disabled.
 
     Args:
-        file: an open file; a copy that was unpacked for this opening has none.
+        file: an open file; a copy in a temporary folder has no cache.
     """
     folder = cache_folder()
     if folder is None or file.size_bytes < SMALLEST_FILE_BYTES or file.stored != file.path:
@@ -76,18 +76,18 @@ def cache_of(file: FileBytes) -> "FileCache | None":
 
 @dataclass(frozen=True, slots=True)
 class FileCache:
-    """The entries of one file.
+    """The cache entries of one file.
 
     Attributes:
-        folder: where all entries are.
-        key: of this file.
+        folder: the cache folder.
+        key: identifies this file.
     """
 
     folder: Path
     key: str
 
     def get(self, name: str) -> Mapping[str, np.ndarray] | None:
-        """Return the arrays kept under a name; None where there are none that can be used."""
+        """Return the arrays stored under a name; None if there are no usable ones."""
         path = self._path(name)
         try:
             if path.stat().st_size > _MAX_ENTRY_BYTES:
@@ -100,7 +100,7 @@ class FileCache:
         return arrays
 
     def put(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
-        """Keep arrays under a name, and make room for them; nothing happens where the folder cannot be written."""
+        """Store arrays under a name, making room for them; does nothing if the folder is not writable."""
         if sum(array.nbytes for array in arrays.values()) > _MAX_ENTRY_BYTES - 10_000:
             return
         try:
@@ -116,7 +116,7 @@ class FileCache:
         return self.folder / f"{self.key}-{name}{_SUFFIX}"
 
     def _make_room(self) -> None:
-        """Remove what was not used for longest until the rest is small enough."""
+        """Remove the least recently used entries until the rest is small enough."""
         entries = [(path.stat().st_mtime_ns, path.stat().st_size, path) for path in self.folder.glob(f"*{_SUFFIX}")]
         total = sum(size for _, size, _ in entries)
         for _, size, path in sorted(entries):

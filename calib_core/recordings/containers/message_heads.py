@@ -1,4 +1,4 @@
-"""The first bytes of many messages at once: for stamps, and for drivers that send every return by itself."""
+"""Read the first bytes of many messages at once: for stamps, and for drivers that send one return per message."""
 
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -22,41 +22,41 @@ _AHEAD = 256
 
 
 class ChunkAccess(Protocol):
-    """What gathering needs of a chunked file."""
+    """The part of a chunked file that gathering heads needs."""
 
     lead_bytes: int
 
     def in_memory(self, chunk: int, *, keep: bool) -> bytes | None:
-        """Return a packed chunk unpacked, and keep it in the cache if asked to; None for one that is stored as it is."""
+        """Return a compressed chunk decompressed, cached if keep is set; None for an uncompressed chunk."""
         ...
 
     def piece(self, chunk: int, offset: int, size: int) -> bytes:
-        """Return at most size bytes from offset of the unpacked chunk."""
+        """Return at most size bytes from offset of the uncompressed chunk."""
         ...
 
     def locate(self, chunk: int, offset: int) -> tuple[int, int]:
-        """Return where in the chunk a message itself begins, and its length."""
+        """Return the offset of the message itself in the chunk, and its length."""
         ...
 
     def room(self, chunk: int) -> int:
-        """Return how many bytes a chunk has."""
+        """Return the uncompressed size of a chunk."""
         ...
 
     def fault_of(self, chunk: int) -> str:
-        """Say what is wrong with a chunk that was unpacked; "" where nothing is."""
+        """Return what is wrong with a decompressed chunk; "" if nothing."""
         ...
 
     def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tell which records (n, lead_bytes) have their message at lead_bytes, and how long the messages are."""
+        """Return which records (n, lead_bytes) have their message at lead_bytes, and how long the messages are."""
         ...
 
 
 def gather_heads(source: ChunkAccess, index: MessageIndex, size: int) -> Heads:
     """Read the first bytes of many messages.
 
-    Of chunks stored as they are only the records' heads are read, neighbours in one go; packed chunks are each unpacked
-    once. Many chunks are shared out to a few threads, which wait for the disk or unpack at the same time.
-    Messages of a chunk that cannot be read get the length -1.
+    From uncompressed chunks only the heads of records are read, adjacent ones together; each compressed chunk is
+    decompressed once. Many chunks are distributed over a few threads, so that disk access and decompression overlap.
+    Messages in an unreadable chunk get the length -1.
     """
     groups = _groups(index.chunk)
     gather = _Gather(source, index, size, keep=len(groups) <= _FEW_CHUNKS)
@@ -69,24 +69,24 @@ def gather_heads(source: ChunkAccess, index: MessageIndex, size: int) -> Heads:
 
 
 def gather_far(source: ChunkAccess, file: FileBytes, index: MessageIndex, places: Indices, size: int) -> Heads:
-    """Read the first bytes of messages that are stored as they are and lie far apart: one small read for each.
+    """Read the first bytes of uncompressed messages that are far apart: one small read each.
 
     Args:
         source: the chunked file.
         file: its bytes.
         index: the messages.
-        places: (n,) where their records begin in the file.
-        size: how many bytes of each message.
+        places: (n,) positions of their records in the file.
+        size: number of bytes of each message.
     """
     width = source.lead_bytes + size
     order = np.argsort(places)
     read: list[bytes] = []
     batches = [places[order[first : first + _AHEAD]].tolist() for first in range(0, len(order), _AHEAD)]
-    told = 0
+    announced = 0
     for number, batch in enumerate(batches):
-        for ahead in batches[told : number + 2]:  # the disk goes on with the next batch while this one is read
+        for ahead in batches[announced : number + 2]:  # prefetch the next batch while this one is read
             file.expect([(place, place + width) for place in ahead])
-        told = number + 2
+        announced = number + 2
         read.extend(file.up_to(place, width).ljust(width, b"\0") for place in batch)
     gathered = np.zeros((len(order), width), dtype=np.uint8)
     gathered[order] = np.frombuffer(b"".join(read), dtype=np.uint8).reshape(-1, width)
@@ -103,20 +103,20 @@ def gather_far(source: ChunkAccess, file: FileBytes, index: MessageIndex, places
 
 
 def _taken(data: bytes, places: np.ndarray, width: int) -> np.ndarray:
-    """Copy so many bytes from each place, as (n,) items of that size: NumPy moves each in one go."""
+    """Copy width bytes from each place, as (n,) items of that size, which NumPy moves as units."""
     windows: np.ndarray = np.ndarray((len(data) - width + 1,), np.dtype(f"V{width}"), data, 0, (1,))
     return windows[places]
 
 
 def _as_slice(rows: np.ndarray) -> "np.ndarray | slice":
-    """Return rows as a slice where they follow one another: writing to them is faster."""
+    """Return consecutive rows as a slice, which is faster to write to; other rows unchanged."""
     first, last = int(rows[0]), int(rows[-1])
     together = last - first + 1 == len(rows) and bool((np.diff(rows) == 1).all())
     return slice(first, last + 1) if together else rows
 
 
 def _groups(chunk: np.ndarray) -> list[np.ndarray]:
-    """Return, chunk by chunk, the rows of the index that lie in it."""
+    """Return the rows of the index grouped by chunk."""
     if not len(chunk):
         return []
     order = np.argsort(chunk, kind="stable")
@@ -125,7 +125,7 @@ def _groups(chunk: np.ndarray) -> list[np.ndarray]:
 
 
 class _Gather:
-    """The table that the threads fill; each fills rows of its own."""
+    """The table that the threads fill, each its own rows."""
 
     def __init__(self, source: ChunkAccess, index: MessageIndex, size: int, *, keep: bool) -> None:
         self.keep = keep
@@ -136,11 +136,11 @@ class _Gather:
         self.lengths = np.zeros(len(index), dtype=np.int64)
 
     def chunks(self, groups: Iterable[np.ndarray]) -> str:
-        """Fill the rows of several chunks; return what first went wrong."""
+        """Fill the rows of several chunks; return the first error."""
         return next(iter([fault for group in groups if (fault := self.chunk(group))]), "")
 
     def chunk(self, group: np.ndarray) -> str:
-        """Fill the rows of the messages that lie in one chunk; return what went wrong."""
+        """Fill the rows of the messages in one chunk; return the error, if any."""
         chunk = int(self.index.chunk[group[0]])
         order = group[np.argsort(self.index.offset[group], kind="stable")]
         try:
@@ -154,7 +154,7 @@ class _Gather:
         return fault and (self.source.fault_of(chunk) or fault)
 
     def _edges(self, order: np.ndarray) -> list[int]:
-        """Cut messages into runs of neighbours that are read in one go."""
+        """Split messages into runs of adjacent ones that are read together."""
         if len(order) == 1:
             return [0, 1]
         far = np.diff(self.index.offset[order]) > self.source.lead_bytes + self.size + _NEAR_BYTES
@@ -162,7 +162,7 @@ class _Gather:
         return [0, *sorted(cuts), len(order)]
 
     def _run(self, chunk: int, order: np.ndarray, whole: bytes | None, room: int) -> str:
-        """Fill the rows of neighbours; return why one of them cannot be read."""
+        """Fill the rows of adjacent messages; return why one of them cannot be read."""
         lead = self.source.lead_bytes
         offsets = self.index.offset[order]
         base, end = int(offsets[0]), int(offsets[-1]) + lead + self.size
@@ -179,7 +179,7 @@ class _Gather:
         return fault
 
     def single(self, chunk: int, offset: int, row: int) -> str:
-        """Read the head of a message whose record is laid out in another way; return why it cannot be read."""
+        """Read the head of a message whose record has an unusual layout; return why it cannot be read."""
         try:
             start, length = self.source.locate(chunk, offset)
         except RecordingError as error:

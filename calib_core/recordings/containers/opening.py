@@ -1,4 +1,4 @@
-"""From paths to open files: folders expanded, contents told by their first bytes."""
+"""Open the recording files of the given paths: expand folders, and detect formats by the first bytes."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -23,10 +23,10 @@ _MORE_SUFFIXES = (".active", ".zstd", ".zst", ".gz", ".bz2", ".lz4")
 _METADATA = "metadata.yaml"
 _MAX_METADATA_BYTES = 1 << 24
 _FIRST_ROWS = 500
-_FIRST_BYTES = 1 << 19  # where the first picture usually lies
-_LAST_BYTES = 1 << 16  # most of what a file says about itself
+_FIRST_BYTES = 1 << 19  # usually enough for the first picture
+_LAST_BYTES = 1 << 16  # most of a file's metadata
 _KINDS = (
-    "ROS 1 .bag, ROS 2 .mcap and .db3 files and their folders can be opened, and folders of pictures or radar files, "
+    "supported: ROS 1 .bag, ROS 2 .mcap and .db3 files and their folders, folders of pictures or radar files, "
     "radar CSV and videos"
 )
 _PACKED_MESSAGES = re.compile(r"^\s*compression_mode:\s*['\"]?message", re.IGNORECASE | re.MULTILINE)
@@ -38,11 +38,11 @@ class _Found:
     """A file to open.
 
     Attributes:
-        path: where it lies.
-        packed: each of its messages is compressed by itself.
-        expendable: it is one of several in a folder; the others are opened without it.
-        count: how many messages it should hold; None where its folder does not tell.
-        warnings: what its folder says about it.
+        path: its path.
+        packed: each of its messages is compressed separately.
+        expendable: it is one of several in a folder; the others can be opened without it.
+        count: expected number of messages; None if the folder's metadata does not give it.
+        warnings: found in its folder's metadata.
     """
 
     path: Path
@@ -56,10 +56,10 @@ _AnySource: TypeAlias = Rosbag1Source | mcap.McapSource | sqlite_bag.SqliteSourc
 
 
 def open_sources(paths: Sequence[Path]) -> tuple[Source, ...]:
-    """Open every recording file that the paths name or hold.
+    """Open every recording file named by the paths or contained in them.
 
     Raises:
-        RecordingError: a path holds nothing that can be read.
+        RecordingError: a path contains nothing readable.
     """
     files: dict[Path, _Found] = {}
     for path in paths:
@@ -85,13 +85,13 @@ def open_sources(paths: Sequence[Path]) -> tuple[Source, ...]:
 
 
 def open_beginnings(paths: Sequence[Path], first_of: ChannelFilter) -> Iterator[Source]:
-    """Open recording files one after another, each only as far as its beginning; the caller closes each.
+    """Open recording files one after another, reading only their beginnings; the caller closes each.
 
-    Files packed as a whole are passed over, and what is no recording of ROS.
+    Files that are compressed as a whole or are not ROS recordings are skipped.
 
     Args:
         paths: as for open_sources.
-        first_of: the channels whose beginnings are wanted.
+        first_of: the channels whose first messages are wanted.
 
     Raises:
         RecordingError: a file is damaged, or has no index.
@@ -123,7 +123,7 @@ def _beginning(file: FileBytes, first_of: ChannelFilter, *, packed: bool) -> "_A
 
 
 def _open_or_refusal(found: _Found) -> "_AnySource | RecordingError":
-    """Open a file; of an expendable one return why it cannot be opened."""
+    """Open a file; if an expendable one cannot be opened, return the error."""
     try:
         return _open(found)
     except RecordingError as error:
@@ -135,13 +135,13 @@ def _open_or_refusal(found: _Found) -> "_AnySource | RecordingError":
 def _left_out(error: RecordingError) -> DataWarning:
     return DataWarning(
         "file-left-out",
-        f"one file of the folder cannot be opened and is left out: {error}",
-        "the other files of the folder are used; copy this one again if you need its time",
+        f"one file of the folder cannot be opened and is skipped: {error}",
+        "the other files of the folder are used; copy this one again if you need that part of the recording",
     )
 
 
 def _files(path: Path) -> list[_Found]:
-    """Return the files a path stands for."""
+    """Return the recording files of a path."""
     if not path.is_dir():
         return [_Found(path, _packed_messages(path.parent / _METADATA, path))]
     if (path / _METADATA).is_file():
@@ -151,18 +151,18 @@ def _files(path: Path) -> list[_Found]:
         if folder.is_dir() and (folder / _METADATA).is_file():
             found.extend(_from_metadata(folder))
     if not found:
-        raise RecordingError(f"{path}: the folder holds no recording (.bag, .mcap, .db3 or metadata.yaml); {_KINDS}")
+        raise RecordingError(f"{path}: the folder contains no recording (.bag, .mcap, .db3 or metadata.yaml); {_KINDS}")
     return [replace(file, expendable=True) for file in found] if len(found) > 1 else found
 
 
 def _is_recording(file: Path) -> bool:
-    """Tell by its name whether a file is a recording: x.bag, x.bag.active, x_0.db3.zstd."""
+    """Return whether a file is a recording, judging by its name: x.bag, x.bag.active, x_0.db3.zstd."""
     *_, inner, last = ("", "", *file.suffixes)
     return file.is_file() and (last in _SUFFIXES or (last in _MORE_SUFFIXES and inner in _SUFFIXES))
 
 
 def _metadata(path: Path) -> dict[str, object]:
-    """Read the part of a metadata.yaml that matters; empty where it is damaged or something else."""
+    """Read the relevant part of a metadata.yaml; empty if it is damaged or another kind of file."""
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
 
@@ -175,7 +175,7 @@ def _metadata(path: Path) -> dict[str, object]:
 
 
 def _from_metadata(folder: Path) -> list[_Found]:
-    """Return the files that a folder's metadata.yaml lists, and those that it should list."""
+    """Return the files that a folder's metadata.yaml lists, or all recordings in it if it lists none."""
     information = _metadata(folder / _METADATA)
     listed = information.get("relative_file_paths")
     names = [Path(str(name)).name for name in listed] if isinstance(listed, list) else []
@@ -183,11 +183,13 @@ def _from_metadata(folder: Path) -> list[_Found]:
     missing = [name for name in names if name not in there]
     if missing and not there:
         raise RecordingError(
-            f"{folder}: metadata.yaml lists {missing[0]}, which is not there; copy the whole folder, or give the files that are"
+            f"{folder}: metadata.yaml lists {missing[0]}, which does not exist; copy the whole folder, or open the files you have"
         )
     paths = list(there.values()) or sorted(file for file in folder.iterdir() if _is_recording(file))
     if not paths:
-        raise RecordingError(f"{folder}: metadata.yaml lists no files and there are none; copy the whole folder")
+        raise RecordingError(
+            f"{folder}: metadata.yaml lists no files, and the folder contains none; copy the whole folder"
+        )
     packed = str(information.get("compression_mode", "")).upper() == "MESSAGE"
     found = [_Found(path, packed, expendable=len(paths) > 1) for path in paths]
     counts = _counts(information, names)
@@ -201,20 +203,20 @@ def _missing(folder: Path, missing: list[str], counts: dict[str, int]) -> DataWa
     lost = sum(counts.get(name, 0) for name in missing)
     return DataWarning(
         "missing-file",
-        f"{folder.name}: metadata.yaml lists {', '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} not there"
+        f"{folder.name}: metadata.yaml lists {', '.join(missing)}, which {'does' if len(missing) == 1 else 'do'} not exist"
         + (f": {lost} messages are missing" if lost else ""),
-        "copy the whole folder if you need that time",
+        "copy the whole folder if you need that part of the recording",
     )
 
 
 def _under_any_name(folder: Path, name: str) -> Path | None:
-    """Find a listed file, also if it was unpacked or packed since."""
+    """Find a listed file, even if it has been decompressed or compressed since."""
     names = [name, *(name.removesuffix(suffix) for suffix in _MORE_SUFFIXES), *(name + s for s in _MORE_SUFFIXES)]
     return next((folder / other for other in names if (folder / other).is_file()), None)
 
 
 def _counts(information: dict[str, object], names: list[str]) -> dict[str, int]:
-    """Return how many messages each file should hold, as far as the metadata tells."""
+    """Return the expected number of messages of each file, as far as the metadata gives it."""
     files = information.get("files")
     counts = {}
     for file in files if isinstance(files, list) else []:
@@ -262,17 +264,17 @@ def _source(file: FileBytes, head: bytes, *, packed: bool) -> "_AnySource":
 def _too_few(found: _Found, count: int) -> DataWarning:
     return DataWarning(
         "messages-missing",
-        f"metadata.yaml counts {found.count} messages in {found.path.name}, but {count} are in it",
-        "check that what you need is there; copy the file again from its source",
+        f"metadata.yaml lists {found.count} messages in {found.path.name}, but it contains {count}",
+        "check that the data you need is there, or copy the file again from its source",
     )
 
 
 def _what_is_it(head: bytes) -> str:
     if not head:
         return (
-            "the file is empty (0 bytes): the recorder was killed or the disk was full; record again or copy it again"
+            "the file is empty (0 bytes): the recorder was killed or the disk was full; copy it again or record again"
         )
     for magic, (name, command) in _PACKED.items():
         if head.startswith(magic):
-            return f"the file is compressed as a whole with {name}; unpack it first: {command}"
+            return f"the file is compressed with {name}; decompress it first: {command}"
     return f"not a recording (it begins with {head[:8]!r}); {_KINDS}"

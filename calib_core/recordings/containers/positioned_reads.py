@@ -1,4 +1,4 @@
-"""Positioned reads of one file, safe from many threads, and its first bytes."""
+"""Thread-safe positioned reads of a file."""
 
 import os
 import re
@@ -19,15 +19,15 @@ _MAX_SEARCH_BYTES = 1 << 30
 
 
 class FileBytes:
-    """One open file that is read by position; no two readers share a cursor.
+    """One open file, read by position, without a shared cursor.
 
-    Memory maps are avoided on purpose: a recording cut short under a map kills the process.
+    Memory maps are avoided on purpose: truncating a mapped recording would kill the process.
 
     Args:
-        path: the file as a person knows it.
-        stored: where its bytes really lie, such as an unpacked copy.
+        path: the file as named by the user.
+        stored: the file that holds its bytes, such as a decompressed copy.
         folder: the temporary folder of that copy, removed on closing.
-        warnings: what was found out about the file before it was opened.
+        warnings: what was found about the file before it was opened.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class FileBytes:
         self._folder = folder
         try:
             self._file = self.stored.open("rb", buffering=0)
-            if hasattr(os, "posix_fadvise"):  # what is read next is told by expect, not guessed
+            if hasattr(os, "posix_fadvise"):  # prefetching is controlled by expect, not guessed
                 os.posix_fadvise(self._file.fileno(), 0, 0, os.POSIX_FADV_RANDOM)
             self.size_bytes = os.fstat(self._file.fileno()).st_size
         except OSError as error:
@@ -56,11 +56,11 @@ class FileBytes:
     def up_to(self, offset: int, size: int) -> bytes:
         """Read at most size bytes from offset; fewer where the file ends."""
         size = max(0, min(size, self.size_bytes - offset))
-        offset = min(offset, self.size_bytes)  # one out of a damaged index may be more than the system takes
+        offset = min(offset, self.size_bytes)  # an offset from a damaged index may exceed the system's limit
         try:
             if hasattr(os, "pread"):
                 data = os.pread(self._file.fileno(), size, offset)
-                while 0 < len(data) < size:  # one call gives 2 GiB at most
+                while 0 < len(data) < size:  # one call returns at most 2 GiB
                     more = os.pread(self._file.fileno(), size - len(data), offset + len(data))
                     if not more:
                         break
@@ -75,7 +75,7 @@ class FileBytes:
             ) from error
 
     def expect(self, places: Sequence[tuple[int, int]]) -> None:
-        """Tell the system which small pieces, from here to there, are read next: a slow disk gets them all at once."""
+        """Announce the next small reads (begin, end) to the system, so that a slow disk can fetch them together."""
         if hasattr(os, "posix_fadvise"):
             for begin, end in places:
                 if 0 <= begin < end <= self.size_bytes:
@@ -85,25 +85,25 @@ class FileBytes:
         """Read exactly size bytes from offset.
 
         Raises:
-            RecordingError: the file ends before.
+            RecordingError: the file is too short.
         """
         data = self.up_to(offset, size)
         if len(data) != size:
             raise RecordingError(
                 f"{self.path}: ends at byte {self.size_bytes}, but {size} bytes are expected at byte {offset}; "
-                "the file is cut short: copy it again from its source"
+                "the file is truncated: copy it again from its source"
             )
         return data
 
     def close(self) -> None:
-        """Close the file; reading afterwards is an error."""
+        """Close the file; it cannot be read afterwards."""
         self._file.close()
         if self._folder is not None:
             self._folder.cleanup()
 
 
 class Stretch(Protocol):
-    """Bytes that are walked over from front to back."""
+    """Bytes that are scanned from front to back."""
 
     size: int
 
@@ -138,8 +138,8 @@ class FileStretch:
 
     Args:
         file: the file.
-        start: where the part begins; offsets count from there.
-        size: how long it is; cut where the file ends.
+        start: position of the part; offsets count from there.
+        size: its length, limited by the end of the file.
     """
 
     def __init__(self, file: FileBytes, start: int, size: int) -> None:
@@ -159,7 +159,7 @@ class FileStretch:
         return self._buffer[offset - self._place : offset - self._place + size]
 
     def find(self, pattern: "re.Pattern[bytes]", start: int) -> int:
-        """Return where the pattern is found next; -1 where it is not within 1 GiB, or before the end."""
+        """Return the offset of the next match of the pattern; -1 if there is none within 1 GiB or before the end."""
         for place in range(start, min(self.size, start + _MAX_SEARCH_BYTES), _BUFFER_BYTES):
             block = self._file.up_to(self._start + place, min(_BUFFER_BYTES + _OVERLAP_BYTES, self.size - place))
             if found := pattern.search(block):

@@ -1,4 +1,4 @@
-"""What is said about a file whose index is missing or damaged, in the same words for every format."""
+"""The warning about a file whose index is missing or damaged, worded the same for every format."""
 
 from pathlib import Path
 
@@ -17,32 +17,32 @@ def about_recovery(
     fault: str = "",
     unknown: int = 0,
 ) -> DataWarning:
-    """Say what was found by reading a whole file, and what was lost.
+    """Describe what was recovered by reading the whole file, and what was lost.
 
     Args:
         path: the file.
-        messages: how many were found.
-        lost_bytes: that could not be understood.
+        messages: number of messages recovered.
+        lost_bytes: number of bytes that could not be parsed.
         tool: the command that repairs such a file.
-        damaged_chunks: packed chunks that could not be unpacked whole.
+        damaged_chunks: number of compressed chunks that could not be fully decompressed.
         fault: why the first of those could not.
-        unknown: messages of connections or channels that nothing in the file describes.
+        unknown: number of messages of connections or channels that the file does not describe.
     """
     parts = [
-        f"{path.name} has no usable index (it was not closed properly, was cut short, or is damaged): {messages} whole messages "
-        "were found by reading all of it"
+        f"{path.name} has no usable index (it was not closed properly, or is truncated or damaged): {messages} complete messages "
+        "were recovered by reading the whole file"
     ]
     if damaged_chunks:
         parts.append(
-            f"{damaged_chunks} chunk{'s are' if damaged_chunks > 1 else ' is'} damaged, and what follows the damage in "
+            f"{damaged_chunks} chunk{'s are' if damaged_chunks > 1 else ' is'} damaged, and everything after the damage in "
             f"{'them' if damaged_chunks > 1 else 'it'} is lost ({fault})"
         )
     if unknown:
-        parts.append(f"{unknown} of the messages belong to topics that nothing in the file describes, and are left out")
+        parts.append(f"{unknown} of the messages belong to topics that the file does not describe, and are skipped")
     if lost_bytes:
-        parts.append(f"{lost_bytes} bytes could not be understood and are lost")
+        parts.append(f"{lost_bytes} bytes could not be parsed and are lost")
     return DataWarning(
         "not-closed",
         "; ".join(parts),
-        f"check that what you need is there; {tool} {path.name} makes opening fast again",
+        f"check that the data you need is there; repair the file to open it quickly again: {tool} {path.name}",
     )

@@ -1,4 +1,4 @@
-"""What every container offers: channels, an index of messages, and their bytes."""
+"""The interface of every container: channels, an index of messages, and their bytes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,11 +20,11 @@ class Channel:
     """One topic as one file declares it.
 
     Attributes:
-        id: the file's own number for it.
+        id: its number in the file.
         topic: its name.
-        type: the message type as the file spells it.
-        encoding: how messages are laid out: "ros1" or "cdr"; another word (such as "protobuf") cannot be read.
-        definition: the embedded definition; empty where the file has none.
+        type: the message type as spelled in the file.
+        encoding: serialisation of the messages: "ros1" or "cdr"; others (such as "protobuf") are not supported.
+        definition: the embedded definition; empty if the file has none.
         definition_format: "msg", "idl" or "" for none.
     """
 
@@ -38,12 +38,12 @@ class Channel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MessageIndex:
-    """Where the messages of one channel lie, in order of receive time.
+    """The locations of one channel's messages, in order of receive time.
 
     Attributes:
-        receive_ns: (n,) when the recorder got them.
-        chunk: (n,) which chunk (or, in a database, row) holds them.
-        offset: (n,) where they begin in the unpacked chunk; 0 in a database.
+        receive_ns: (n,) when the recorder received them.
+        chunk: (n,) the chunk (in a database, the row) that contains them.
+        offset: (n,) their offsets in the uncompressed chunk; 0 in a database.
     """
 
     receive_ns: TimesNs
@@ -55,7 +55,7 @@ class MessageIndex:
 
     @classmethod
     def sorted_from(cls, receive_ns: TimesNs, chunk: Indices, offset: Indices) -> "MessageIndex":
-        """Sort by receive time; messages of one instant keep the order of the file."""
+        """Sort by receive time; messages with equal times keep the order of the file."""
         order = np.lexsort((offset, chunk, receive_ns))
         return cls(receive_ns[order], chunk[order], offset[order])
 
@@ -69,9 +69,9 @@ class Heads:
     """The first bytes of many messages.
 
     Attributes:
-        rows: (n, size) uint8; bytes past a message's end mean nothing.
-        lengths: (n,) how long each message is; -1 for one that cannot be read.
-        fault: why the first of those cannot be read; "" without any.
+        rows: (n, size) uint8; bytes past a message's end are undefined.
+        lengths: (n,) length of each message; -1 for an unreadable one.
+        fault: why the first of those cannot be read; "" if there are none.
     """
 
     rows: np.ndarray
@@ -84,17 +84,17 @@ class Source(Protocol):
 
     @property
     def path(self) -> Path:
-        """Where it lies."""
+        """The path of the file."""
         ...
 
     @property
     def size_bytes(self) -> int:
-        """How large it is."""
+        """The size of the file."""
         ...
 
     @property
     def container(self) -> str:
-        """Name the format for people, with its compression, such as "ROS 1 bag, lz4"."""
+        """The format and its compression, such as "ROS 1 bag, lz4"."""
         ...
 
     @property
@@ -104,25 +104,25 @@ class Source(Protocol):
 
     @property
     def counts(self) -> Mapping[int, int]:
-        """How many messages each channel has, as far as the file says so by itself."""
+        """Number of messages of each channel, as far as the file states it."""
         ...
 
     @property
     def warnings(self) -> tuple[DataWarning, ...]:
-        """What opening it brought to light."""
+        """Warnings found on opening the file."""
         ...
 
     @property
     def later_warnings(self) -> tuple[DataWarning, ...]:
-        """What reading it has brought to light since."""
+        """Warnings found since, while reading it."""
         ...
 
     def index(self, channel_id: int) -> MessageIndex:
-        """Tell where the messages of a channel lie."""
+        """Return the locations of a channel's messages."""
         ...
 
     def read(self, chunk: int, offset: int) -> bytes:
-        """Read one message whole."""
+        """Read one whole message."""
         ...
 
     def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
@@ -130,8 +130,8 @@ class Source(Protocol):
 
         Args:
             index: the messages.
-            size: how many bytes of each.
-            keep: opening the file again will ask for the same; keep them in the user's cache.
+            size: number of bytes of each message.
+            keep: store them in the user's cache, because the next opening will need the same ones.
         """
         ...
 

@@ -78,7 +78,7 @@ class CameraInfoMessage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CloudMessage:
-    """A sensor_msgs/PointCloud2 of little-endian float32 fields without holes: values are (n, k) for k names."""
+    """A sensor_msgs/PointCloud2 of little-endian float32 fields without padding: values are (n, k) for k names."""
 
     stamp: TimeNs
     frame_id: str
@@ -96,13 +96,13 @@ class RadarReturnMessage:
     Attributes:
         stamp: when the driver parsed the return.
         frame_id: of the radar.
-        point_id: place in its scan.
+        point_id: index in its scan.
         x_m: forward.
         y_m: left.
         z_m: up.
-        range_m: 0 in the stock driver, which never fills it; so are doppler_bin, bearing and intensity.
+        range_m: 0 in the stock driver, which never sets it; likewise doppler_bin, bearing and intensity.
         velocity_mps: positive moving away.
-        doppler_bin: 0 to the number of bins less one; half of them is standing still.
+        doppler_bin: 0 to the number of bins minus 1; zero speed is at half the number of bins.
         bearing_deg: positive to the left.
         intensity_db: SNR.
     """
@@ -125,7 +125,7 @@ MessageBody: TypeAlias = CompressedImageMessage | ImageMessage | CameraInfoMessa
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedMessage:
-    """A message as the recorder got it."""
+    """A message as received by the recorder."""
 
     topic: str
     receive_time: TimeNs
@@ -146,8 +146,8 @@ def write_ros1_bag(path: Path, messages: Iterable[RecordedMessage], *, compressi
 
     Args:
         path: of a file that does not exist yet.
-        messages: in the order they are to be written, by receive time as a recorder would.
-        compression: "lz4" comes out in a form that ROS itself cannot read; "none" and "bz2" are for everybody.
+        messages: in the order to write them; recorders write by receive time.
+        compression: "lz4" is written in a form that ROS itself cannot read; "none" and "bz2" are readable everywhere.
 
     Raises:
         RecordingError: the file exists.
@@ -169,11 +169,11 @@ def write_ros1_bag(path: Path, messages: Iterable[RecordedMessage], *, compressi
 
 
 def write_ros2(path: Path, messages: Iterable[RecordedMessage], *, container: Ros2Container = "mcap") -> Path:
-    """Write a ROS 2 bag, a folder with metadata.yaml, and return the data file in it, which can also be read alone.
+    """Write a ROS 2 bag, a folder with metadata.yaml, and return its data file, which can also be read on its own.
 
     Args:
         path: of a folder that does not exist yet.
-        messages: in the order they are to be written.
+        messages: in the order to write them.
         container: "mcap" or "sqlite3".
 
     Raises:
@@ -196,7 +196,7 @@ def write_ros2(path: Path, messages: Iterable[RecordedMessage], *, container: Ro
 def _refuse_existing(path: Path) -> None:
     if path.exists():
         raise RecordingError(
-            f"{path} exists already; recordings are never overwritten, choose another name or delete it"
+            f"{path} already exists; recordings are never overwritten: choose another name or delete it"
         )
 
 
@@ -205,7 +205,7 @@ def _write_all(
     connect: Callable[[str, str], Any],
     write: Callable[[Any, RecordedMessage], None],
 ) -> None:
-    """Write messages one by one, opening a connection at the first of each topic."""
+    """Write messages one by one, adding a connection at the first message of each topic."""
     connections: dict[str, Any] = {}
     for message in messages:
         if message.topic not in connections:
@@ -214,7 +214,7 @@ def _write_all(
 
 
 class _Builder:
-    """Turns our message values into serialised ROS messages of one ROS generation."""
+    """Convert message values to serialised messages of one ROS generation."""
 
     def __init__(self, generation: Literal[1, 2]) -> None:
         from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -236,7 +236,7 @@ class _Builder:
         return bytes(self.typestore.serialize_cdr(self.message(body), _TYPES[type(body)]))
 
     def message(self, body: MessageBody) -> Any:
-        """Build the ROS message of a value."""
+        """Build the ROS message for a value."""
         if isinstance(body, RadarReturnMessage):
             return self._radar_return(body)
         if isinstance(body, CloudMessage):

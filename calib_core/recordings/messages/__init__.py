@@ -1,1 +1,1 @@
-"""ROS messages: definitions parsed, values read from bytes."""
+"""Parse ROS message definitions and decode messages."""

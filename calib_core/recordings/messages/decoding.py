@@ -1,7 +1,7 @@
-"""Messages from bytes: ROS 1 serialisation and CDR, read by walking over the definition.
+"""Decode messages in ROS 1 serialisation or CDR by walking through the definition.
 
-A run of values whose places are fixed is read by NumPy in one go, so a list of a thousand radar returns costs no more
-Python than a list of one.
+NumPy reads a run of values at fixed offsets in a single call, so decoding a list of a thousand radar returns takes no
+more Python code than a list of one.
 """
 
 import struct
@@ -61,7 +61,7 @@ class Message:
         return value.view(np.uint8) if value.dtype.itemsize == 1 or not len(value) else self._refuse(name, "bytes")
 
     def numbers(self, name: str, count: int) -> Values:
-        """Return an array of so many numbers."""
+        """Return an array of the given number of numbers."""
         value = self.array(name)
         if len(value) != count or value.dtype.names is not None:
             self._refuse(name, f"{count} numbers")
@@ -69,7 +69,7 @@ class Message:
             return value.astype(np.float64)
 
     def messages(self, name: str) -> "list[Message]":
-        """Return a list of messages that are not of fixed size; empty for an empty list of any."""
+        """Return a list of messages of variable size; empty for any empty list."""
         value = self._field(name)
         fits = isinstance(value, list) and all(isinstance(element, Message) for element in value)
         return value if isinstance(value, list) and fits else self._refuse(name, "a list of messages")
@@ -83,17 +83,17 @@ class Message:
         return self.values[name] if name in self.values else self._refuse(name, "a field of it")
 
     def _refuse(self, name: str, what: str) -> NoReturn:
-        raise MessageError(f"a {self.type} message has a layout of its own: {name} is not {what}; it cannot be used")
+        raise MessageError(f"a {self.type} message has a non-standard layout: {name} is not {what}; it cannot be used")
 
     def number(self, path: str) -> float:
-        """Return a single number; path is dotted."""
+        """Return a single number; path is a dotted name."""
         try:
             return float(_at(self, path.split(".")))
         except (KeyError, TypeError, ValueError):
             return self._refuse(path, "a number")
 
     def column(self, name: str, path: str) -> np.ndarray:
-        """Return one number, or one fixed array, of each message in a list: (n,) or (n, k); path is dotted."""
+        """Return one number, or one fixed array, of each message in a list: (n,) or (n, k); path is a dotted name."""
         value = self._field(name)
         if isinstance(value, np.ndarray) and path in (value.dtype.names or ()):
             with np.errstate(invalid="ignore"):  # damaged bytes may hold signalling NaN
@@ -110,17 +110,17 @@ def _at(element: Any, parts: list[str]) -> Any:
 
 
 def payload_byte_order(payload: bytes, definition: Definition) -> str:
-    """Return "<" or ">" as the message itself says.
+    """Return the byte order that the message declares, "<" or ">".
 
     Raises:
-        MessageError: an encapsulation that is not plain CDR.
+        MessageError: the encapsulation is not plain CDR.
     """
     if definition.encoding == "ros1":
         return "<"
     if len(payload) < 4 or payload[0] != 0 or payload[1] not in (0, 1):
         raise MessageError(
             f"a {definition.type} message begins with {payload[:4].hex() or 'nothing'}, which is not plain CDR (0000 or 0001); "
-            "record it with the default serialisation of ROS 2"
+            "record it with ROS 2's default serialisation"
         )
     return "<" if payload[1] else ">"
 
@@ -141,7 +141,7 @@ def decode(definition: Definition, payload: bytes) -> Message:
 def _misfit(definition: Definition, payload: bytes, error: Exception) -> MessageError:
     return MessageError(
         f"a {definition.type} message of {len(payload)} bytes does not fit its definition ({error}); "
-        "it is damaged, or the recording carries another version's definition"
+        "it is damaged, or the recording contains the definition of another version"
     )
 
 
@@ -216,16 +216,16 @@ class _Reader:
 
 @dataclass(frozen=True, slots=True)
 class Pin:
-    """Where a string's length lies in a message, and what it is: with all of them equal, all numbers lie where they did."""
+    """Offset and value of a string's length; messages in which all of these are equal have the same layout."""
 
     offset: int
     length: bytes
 
 
 def fixed_part(definition: Definition, payload: bytes) -> tuple[np.dtype[Any], tuple[Pin, ...]]:
-    """Lay out the numbers after the header, up to the first array of varying length, as they lie in this message.
+    """Return the layout of the numbers after the header in this message, up to the first array of variable length.
 
-    Messages whose strings are as long as the pins say all have this layout.
+    All messages whose string lengths match the pins have this layout.
 
     Raises:
         MessageError: the bytes do not fit the definition.

@@ -1,4 +1,4 @@
-"""Message definitions: the text a recording carries, parsed into fields. Nothing of it is ever executed."""
+"""Parse the message definitions in a recording into fields. Nothing in them is ever executed."""
 
 import re
 from collections.abc import Mapping
@@ -44,12 +44,12 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """A message type and all types it is made of.
+    """A message type and all types it contains.
 
     Attributes:
         type: short name, "package/Type".
         types: the fields of each type by short name.
-        encoding: how messages of it are laid out.
+        encoding: the serialisation of its messages.
     """
 
     type: str
@@ -72,7 +72,7 @@ class Definition:
 
     @property
     def stamp_offset(self) -> int | None:
-        """Where the first 8 bytes of time lie in a message, None where it begins with none."""
+        """Byte offset of the 8-byte stamp that a message begins with; None if it does not begin with one."""
         first = self.fields[0].type if self.fields else ""
         if first == "std_msgs/Header" or (first in ("time", "builtin_interfaces/Time") and self.encoding == "cdr"):
             return 4  # after the sequence number (ROS 1), or after the encapsulation (CDR)
@@ -80,20 +80,20 @@ class Definition:
 
 
 def short_type(name: str) -> str:
-    """Return "package/Type" for "package/msg/Type" and for what is short already."""
+    """Return "package/Type" for "package/msg/Type"; short names are returned unchanged."""
     return name.replace("/msg/", "/")
 
 
 def definition_of(channel: Channel) -> Definition:
-    """Parse a channel's definition, or take the well-known one of that name where the recording has none.
+    """Parse a channel's definition; if the recording has none, use the well-known one of that name.
 
     Raises:
-        MessageError: there is none, it cannot be understood, or the encoding is not one of ROS.
+        MessageError: there is none, it cannot be parsed, or the encoding is not a ROS encoding.
     """
     if channel.encoding not in ("ros1", "cdr"):
         raise MessageError(
-            f"topic {channel.topic}: messages are encoded as '{channel.encoding}'; only ros1 and cdr can be read: "
-            "record it through ROS, or convert it"
+            f"topic {channel.topic}: messages are encoded as '{channel.encoding}', but only ros1 and cdr are supported; "
+            "record the topic through ROS, or convert it"
         )
     encoding: Encoding = "ros1" if channel.encoding == "ros1" else "cdr"
     name = short_type(channel.type)
@@ -101,7 +101,7 @@ def definition_of(channel: Channel) -> Definition:
     if form == "":
         if name not in KNOWN_DEFINITIONS:
             raise MessageError(
-                f"topic {channel.topic}: the recording has no definition of {channel.type}, and it is not one we know; "
+                f"topic {channel.topic}: the recording has no definition of {channel.type}, and the type is unknown; "
                 "convert the recording where that package is installed (ros2 bag convert to mcap writes definitions)"
             )
         text, form = KNOWN_DEFINITIONS[name], "msg"
@@ -113,7 +113,7 @@ def definition_of(channel: Channel) -> Definition:
 
 @cache
 def parse_definition(name: str, text: str, encoding: Encoding, *, form: str = "msg") -> Definition:
-    """Parse a definition with the definitions it depends on below it.
+    """Parse a definition followed by the definitions it depends on.
 
     Args:
         name: short name of the message.
@@ -125,7 +125,7 @@ def parse_definition(name: str, text: str, encoding: Encoding, *, form: str = "m
         MessageError: the text is not such a definition.
     """
     if len(text) > _MAX_TEXT:
-        raise MessageError(f"the definition of {name} is {len(text)} characters long; over {_MAX_TEXT} is refused")
+        raise MessageError(f"the definition of {name} is {len(text)} characters long; at most {_MAX_TEXT} are allowed")
     types: dict[str, tuple[Field, ...]] = dict(_built_in(encoding))
     types.update(_parse_idl(name, text) if form == "idl" else _parse_sections(name, text))
     types = {owner: _resolve(owner, fields, types) for owner, fields in types.items()}
@@ -156,7 +156,9 @@ def _parse_sections(name: str, text: str) -> dict[str, tuple[Field, ...]]:
         if number:
             head, _, body = section.strip().partition("\n")
             if not head.startswith("MSG:"):
-                raise MessageError(f"the definition of {name} has a section that begins with {head[:40]!r}, not MSG:")
+                raise MessageError(
+                    f"the definition of {name} has a section that begins with {head[:40]!r} instead of MSG:"
+                )
             owner = short_type(head[4:].strip())
         types[owner] = tuple(_parse_fields(owner, body))
     return types
@@ -170,19 +172,19 @@ def _parse_fields(owner: str, body: str) -> list[Field]:
             continue
         match = _FIELD.match(text)
         if not match:
-            raise MessageError(f"the definition of {owner} has a line that is no field: {text[:60]!r}")
+            raise MessageError(f"the definition of {owner} has a line that is not a field: {text[:60]!r}")
         rest = match["rest"].strip()
         if rest.startswith("=") and not rest.startswith("=="):
-            continue  # a constant takes no room in a message
+            continue  # a constant takes no space in a message
         count = None if match["array"] is None else 0 if "<=" in match["array"] else int(match["count"] or 0)
         if match["array"] is not None and match["count"] and "<=" not in match["array"] and count == 0:
-            continue  # a fixed array of nothing takes no room either
+            continue  # neither does a fixed array of length 0
         fields.append(Field(match["name"], short_type(match["type"]), count))
     return fields
 
 
 def _parse_idl(name: str, text: str) -> dict[str, tuple[Field, ...]]:
-    """Parse OMG IDL through rosbags' grammar, which yields plain tuples."""
+    """Parse OMG IDL with rosbags' grammar, which yields plain tuples."""
     from rosbags.typesys import get_types_from_idl
     from rosbags.typesys.base import TypesysError
 
@@ -212,7 +214,7 @@ def _field_from_rosbags(name: str, description: tuple[int, object]) -> Field:
 
 
 def _resolve(owner: str, fields: tuple[Field, ...], types: Mapping[str, tuple[Field, ...]]) -> tuple[Field, ...]:
-    """Give every nested type its short name: a bare name is of the same package, Header of std_msgs."""
+    """Replace every nested type by its short name: a bare name is in the same package, Header in std_msgs."""
     resolved = []
     for field in fields:
         kind = field.type
@@ -226,15 +228,17 @@ def _resolve(owner: str, fields: tuple[Field, ...], types: Mapping[str, tuple[Fi
 
 
 def _known(kind: str, owner: str) -> str:
-    raise MessageError(f"the definition of {owner} uses {kind}, which the recording does not define")
+    raise MessageError(f"the definition of {owner} uses {kind}, which is not defined in the recording")
 
 
 def _check(definition: Definition, name: str, above: tuple[str, ...]) -> None:
-    """Refuse types that contain themselves and arrays too long to be true."""
+    """Refuse types that contain themselves and implausibly long arrays."""
     if name in above or len(above) > 32:
         raise MessageError(f"the definition of {definition.type} contains itself at {name}")
     for field in definition.types[name]:
         if (field.count or 0) > _MAX_FIXED:
-            raise MessageError(f"the definition of {name} has a fixed array of {field.count} elements; it is refused")
+            raise MessageError(
+                f"the definition of {name} has a fixed array of {field.count} elements; at most {_MAX_FIXED} are allowed"
+            )
         if field.type in definition.types:
             _check(definition, field.type, (*above, name))

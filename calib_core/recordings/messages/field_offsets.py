@@ -1,4 +1,4 @@
-"""Where the numbers of a message lie: runs of fixed places that NumPy reads in one go."""
+"""Offsets of the numbers in a message: runs at fixed offsets, which NumPy reads in a single call."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ __all__ = ["ElementLayout", "Place", "TypesKey", "element_layout", "structure", 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ElementLayout:
-    """How equal elements follow one another: padding before the first, one element, distance of neighbours."""
+    """Layout of an array of equal elements: padding before the first, one element, and the stride."""
 
     lead_bytes: int
     element: np.dtype[Any]
@@ -42,7 +42,7 @@ Place: TypeAlias = tuple[str, str, int]
 
 @lru_cache(maxsize=512)
 def element_layout(kind: str, phase: int, order: str, aligned: bool, types: TypesKey) -> ElementLayout | None:
-    """Lay out an array of a type whose first element may begin at phase (modulo 8); None where elements differ."""
+    """Return the layout of an array whose first element may begin at phase (modulo 8); None if elements differ in size."""
     single = (Field("", kind),) if kind in PRIMITIVES else types.types.get(kind)
     if single is None:
         return None
@@ -69,7 +69,7 @@ def element_layout(kind: str, phase: int, order: str, aligned: bool, types: Type
 def walk(
     types: Mapping[str, tuple[Field, ...]], fields: tuple[Field, ...], place: int, aligned: bool, prefix: str = ""
 ) -> tuple[list[Place], int, bool]:
-    """Note the place of every number until one varies; return the places, where they end, and whether that is all."""
+    """Record the offset of each number up to the first variable-size field; return offsets, end, and whether all were fixed."""
     places: list[Place] = []
     for field in fields:
         name = f"{prefix}{field.name}"

@@ -1,6 +1,6 @@
-"""Definitions of standard and well-known messages, for recordings that carry none (ROS 2 before Iron wrote SQLite bags without).
+"""Definitions of standard and well-known messages, for recordings without any (as SQLite bags before ROS 2 Iron).
 
-The field lists are those of ROS 2; only types whose layout has not changed since Foxy are here.
+The field lists are those of ROS 2, and only of types whose layout has not changed since Foxy.
 """
 
 from collections.abc import Mapping

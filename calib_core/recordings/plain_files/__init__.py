@@ -1,1 +1,1 @@
-"""Recordings that are no ROS container: pictures, CSV, radar files and videos."""
+"""Recordings outside ROS containers: pictures, CSV, radar files and videos."""

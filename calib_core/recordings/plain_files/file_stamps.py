@@ -1,4 +1,4 @@
-"""Times for the files of a folder: from their names, from a CSV beside them, or, failing both, from their numbers."""
+"""Stamps for the files of a folder: from a CSV or text file, from the file names, or from consecutive file numbers."""
 
 import csv
 import re
@@ -29,7 +29,7 @@ class StampedFiles:
     Attributes:
         files: paths.
         times_ns: (n,) ascending.
-        warnings: what a person must know about the times.
+        warnings: what the user must know about the times.
     """
 
     files: tuple[Path, ...]
@@ -38,10 +38,10 @@ class StampedFiles:
 
 
 def stamp_files(folder: Path, files: Sequence[Path]) -> StampedFiles:
-    """Give every file its time; files without one are left out, and that is said.
+    """Assign a time to every file; files without one are skipped, with a warning.
 
-    A CSV with a column of file names and one of times decides; else a text with one time per line, as many as files;
-    else the names; else, where all names are numbers, these, a tenth of a second apart.
+    Sources, in this order: a CSV with a column of file names and one of times; a text file with one time per line and as
+    many lines as files; times in the file names; numbers in all file names, taken as 0.1 s apart.
 
     Raises:
         RecordingError: no file has a time.
@@ -59,14 +59,15 @@ def stamp_files(folder: Path, files: Sequence[Path]) -> StampedFiles:
     numbers = {file: int(match[0]) for file in files if (match := re.search(r"\d{1,9}$", file.stem))}
     if len(numbers) < len(files) or len(set(numbers.values())) < len(files):
         raise RecordingError(
-            f"{folder}: the names carry no times ({files[0].name}); name the files by their time since 1970 "
-            "(19 digits for ns, 16 us, 13 ms, 10 s), or put a CSV with the columns file,time_ns beside them"
+            f"{folder}: no times in the file names ({files[0].name}); name the files by their time since 1970 "
+            "(19 digits for ns, 16 us, 13 ms, 10 s), or add a CSV with the columns file,time_ns to the folder"
         )
     counted = {file: TimeNs((number + 10) * _STEP_NS) for file, number in numbers.items()}
     warning = DataWarning(
         "numbered-files",
-        f"{folder.name}: the files are numbered, not stamped; they are taken as 0.1 s apart",
-        "right only if radar and camera files of one number belong together; else put a CSV with the columns file,time_ns beside",
+        f"{folder.name}: the files are numbered and have no times; an interval of 0.1 s is assumed",
+        "correct only if radar and camera files with the same number belong together; otherwise add a CSV with the columns "
+        "file,time_ns to the folder",
     )
     return _stamped(folder, files, counted, warning)
 
@@ -76,19 +77,19 @@ def _stamped(folder: Path, files: Sequence[Path], times: dict[Path, TimeNs], *wa
     left_out = [file for file in files if file not in times]
     if left_out:
         count = f"{len(left_out)} of {len(files)} files"
-        what = f"{folder.name}: {count} have no time and are left out; the first is {left_out[0].name}"
+        what = f"{folder.name}: {count} have no time and are skipped; the first is {left_out[0].name}"
         warnings = (
             *warnings,
-            DataWarning("unstamped-files", what, "name them by their time, or list them in the CSV beside"),
+            DataWarning("unstamped-files", what, "name them by their time, or list them in the folder's CSV"),
         )
     return StampedFiles(tuple(ordered), np.array([times[file] for file in ordered], dtype=np.int64), tuple(warnings))
 
 
 def _from_table(table: Path, files: Sequence[Path]) -> dict[Path, TimeNs]:
-    """Read the times of files from a table; empty where the table is about something else.
+    """Read the times of files from a table; empty if the table is about something else.
 
     Raises:
-        RecordingError: it is such a table, and a time in it cannot be read.
+        RecordingError: it is such a table, but a time in it cannot be read.
     """
     if table.stat().st_size > _MAX_TABLE_BYTES:
         return {}

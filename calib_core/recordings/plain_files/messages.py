@@ -1,4 +1,4 @@
-"""Pictures and radar returns from plain files, as the messages everything else reads: ROS 1 serialisation."""
+"""Build ROS 1 messages from the pictures and radar returns of plain files, so the same readers apply."""
 
 import struct
 
@@ -13,23 +13,23 @@ _CODES = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8
 
 
 def picture_channel(topic: str) -> Channel:
-    """Return a channel of pictures."""
+    """Return the channel of a picture topic."""
     return Channel(0, topic, "sensor_msgs/CompressedImage", "ros1", "", "")
 
 
 def cloud_channel(topic: str) -> Channel:
-    """Return a channel of radar returns."""
+    """Return the channel of a point-cloud topic."""
     return Channel(0, topic, "sensor_msgs/PointCloud2", "ros1", "", "")
 
 
 def header_bytes(time: TimeNs, frame: str) -> bytes:
-    """Return a header."""
+    """Return a serialised header."""
     sec, nanosec = divmod(int(time), NS_PER_S)
     return struct.pack("<III", 0, sec, nanosec) + _string(frame)
 
 
 def picture_message(time: TimeNs, frame: str, data: bytes) -> bytes:
-    """Return a CompressedImage; what its bytes are, they say themselves."""
+    """Return a CompressedImage; its format is recognized from the first bytes of the data."""
     return header_bytes(time, frame) + _string("") + struct.pack("<I", len(data)) + data
 
 
@@ -39,7 +39,7 @@ def cloud_message(time: TimeNs, frame: str, points: np.ndarray) -> bytes:
     Args:
         time: its stamp.
         frame: its frame_id.
-        points: (n,) structured, little endian; fields of types that a cloud has not are left out of the description.
+        points: (n,) structured, little endian; fields of types that PointCloud2 does not support are not described.
     """
     described = [
         _string(name) + struct.pack("<IBI", place[1], _CODES[place[0].str[1:]], 1)

@@ -1,4 +1,4 @@
-"""Folders of pictures and radar files, CSV and video files: opened beside the recordings of ROS, or without any."""
+"""Open folders of pictures and radar files, CSV and video files, with or without ROS recordings."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -23,14 +23,14 @@ _FOLDERS: Mapping[str, Callable[[Path, Sequence[Path]], PlainSource]] = {
 def open_plain_sources(
     paths: Sequence[Path], video_start: str | None = None
 ) -> tuple[tuple[PlainSource, ...], tuple[Path, ...]]:
-    """Open what is no ROS recording; return it with the paths that are left.
+    """Open the paths that are not ROS recordings; return their sources and the remaining paths.
 
     Args:
-        paths: as a person gave them.
+        paths: as the user gave them.
         video_start: the time of a video's first frame.
 
     Raises:
-        RecordingError: a file or folder of these kinds cannot be used.
+        RecordingError: such a file or folder cannot be used.
     """
     opened: list[PlainSource] = []
     left: list[Path] = []
@@ -43,8 +43,8 @@ def open_plain_sources(
                 opened.append(_with_own_topic(source, [other.channel.topic for other in opened]))
         if video_start is not None and not any(source.path.suffix.lower() in VIDEO_SUFFIXES for source in opened):
             raise RecordingError(
-                f"--video-start {video_start}: there is no video among {', '.join(path.name for path in paths)}; "
-                "leave it away, or give the video too"
+                f"--video-start {video_start}: no video among {', '.join(path.name for path in paths)}; "
+                "remove the option, or add the video"
             )
     except RecordingError:
         for source in opened:
@@ -54,9 +54,9 @@ def open_plain_sources(
 
 
 def _expanded(path: Path) -> list[Path]:
-    """Return what a data set's folder holds one level down: folders of pictures or radar files, CSV files, videos.
+    """Return the contents of a data-set folder: folders of pictures or radar files, CSV files and videos one level down.
 
-    Any other path stands for itself, so does a folder that holds a ROS recording or is one of pictures or radar files.
+    Any other path is returned as it is, and so is a folder that contains a ROS recording, pictures or radar files.
     """
     if not path.is_dir():
         return [path]
@@ -71,8 +71,8 @@ def _expanded(path: Path) -> list[Path]:
         for inner in inside
         if inner.is_dir() and any(below.suffix.lower() in _FOLDERS for below in inner.iterdir())
     ]
-    beside = {folder.with_suffix(".csv") for folder in folders}  # times of a folder's files, not returns
-    return [*folders, *(file for file in files if file not in beside)] or [path]
+    time_tables = {folder.with_suffix(".csv") for folder in folders}  # file times, not radar returns
+    return [*folders, *(file for file in files if file not in time_tables)] or [path]
 
 
 def _is_ros(path: Path) -> bool:
@@ -89,13 +89,13 @@ def _open(path: Path, video_start: str | None) -> PlainSource | None:
         return open_video(path, video_start)
     if suffix in _FOLDERS:
         raise RecordingError(
-            f"{path}: a single file of its kind is no recording; give the folder that holds them all: {path.parent}"
+            f"{path}: a single {suffix} file is not a recording; open the folder with all such files: {path.parent}"
         )
     return None
 
 
 def _open_folder(folder: Path) -> PlainSource | None:
-    """Open a folder of pictures or radar files; None where it holds neither, or a ROS recording."""
+    """Open a folder of pictures or radar files; None if it contains neither, or contains a ROS recording."""
     kinds: dict[Callable[[Path, Sequence[Path]], PlainSource], list[Path]] = {}
     for file in sorted(folder.iterdir()):
         if _is_ros(file):
@@ -106,7 +106,7 @@ def _open_folder(folder: Path) -> PlainSource | None:
     if len(kinds) > 1:
         what = " and ".join(f"{len(files)} {files[0].suffix}" for files in kinds.values())
         raise RecordingError(
-            f"{folder}: the folder holds {what} files; put pictures and radar files into folders of their own"
+            f"{folder}: the folder contains {what} files; put pictures and radar files into separate folders"
         )
     for opener, files in kinds.items():
         return opener(folder, files)
@@ -114,7 +114,7 @@ def _open_folder(folder: Path) -> PlainSource | None:
 
 
 def _with_own_topic(source: PlainSource, taken: Sequence[str]) -> PlainSource:
-    """Tell folders of the same name apart by the folder above."""
+    """Distinguish folders of the same name by their parent folder."""
     topic = source.channel.topic
     if topic not in taken:
         return source
@@ -123,5 +123,5 @@ def _with_own_topic(source: PlainSource, taken: Sequence[str]) -> PlainSource:
 
 
 def files_behind(path: Path) -> tuple[Path, ...]:
-    """Return the files of a source's path: itself, or those of a folder in order of their names."""
+    """Return the files of a source: the path itself, or the files of a folder sorted by name."""
     return tuple(sorted(file for file in path.iterdir() if file.is_file())) if path.is_dir() else (path,)

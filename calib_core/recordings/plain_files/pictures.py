@@ -1,4 +1,4 @@
-"""Camera frames from a folder of pictures."""
+"""Read camera frames from a folder of pictures."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -42,10 +42,10 @@ def open_picture_folder(folder: Path, files: Sequence[Path]) -> PlainSource:
 
 
 def _picture(path: Path) -> bytes:
-    """Return a JPEG or PNG as it is, any other picture as PNG, pixel for pixel."""
+    """Return a JPEG or PNG unchanged, and any other picture losslessly as PNG."""
     try:
         if path.stat().st_size > _MAX_BYTES:
-            raise MessageError(f"{path.name} has {path.stat().st_size} bytes, too many for one picture")
+            raise MessageError(f"{path.name} has {path.stat().st_size} bytes, which is too large for a picture")
         data = path.read_bytes()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}; is it still there?") from error
@@ -59,5 +59,5 @@ def _picture(path: Path) -> bytes:
         else None
     )
     if pixels is None:
-        raise MessageError(f"{path.name} is no picture that can be read (it begins with {data[:4].hex() or 'nothing'})")
+        raise MessageError(f"{path.name} is not a readable picture (it begins with {data[:4].hex() or 'nothing'})")
     return bytes(cv2.imencode(".png", pixels)[1].tobytes())

@@ -1,4 +1,4 @@
-"""Radar returns from a CSV file whose header names columns and units: time_ns,x_m,y_m,z_m,doppler_mps,snr_db."""
+"""Read radar returns from a CSV file whose header names columns and units: time_ns,x_m,y_m,z_m,doppler_mps,snr_db."""
 
 import csv
 import math
@@ -42,7 +42,7 @@ _QUANTITIES = {
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """One column that is used: where it stands, what it becomes and by which factor."""
+    """One used column: its index, the quantity it holds, and the factor to apply."""
 
     place: int
     name: str
@@ -51,7 +51,7 @@ class _Column:
 
 @dataclass(frozen=True, slots=True)
 class _Header:
-    """What a header says."""
+    """A parsed header."""
 
     time_place: int
     time_unit: TimeUnit
@@ -60,7 +60,7 @@ class _Header:
 
 
 def csv_columns() -> tuple[str, ...]:
-    """Return the rows of the table of columns and units, for the documentation."""
+    """Return the table rows of columns and units for the documentation."""
     rows = [f"| {', '.join(f'`{name}`' for name in _TIME_NAMES)} | {', '.join(_TIMES)} |"]
     for becomes, units in dict(_QUANTITIES.values()).items():
         names = ", ".join(f"`{name}`" for name, (quantity, _) in _QUANTITIES.items() if quantity == becomes)
@@ -69,7 +69,7 @@ def csv_columns() -> tuple[str, ...]:
 
 
 def open_radar_csv(path: Path) -> PlainSource:
-    """Read a CSV file of radar returns; rows of one time are one scan.
+    """Read a CSV file of radar returns; rows with the same time form one scan.
 
     Raises:
         RecordingError: a column has no unit or an unknown one, a position or the time is missing, or a row is damaged.
@@ -117,20 +117,20 @@ def _read_header(path: Path, names: Sequence[str]) -> _Header:
             unused.append(written.strip())
     if time is None:
         raise RecordingError(
-            f"{path}: no column of time; the first line must name columns and units, such as {CSV_EXAMPLE}"
+            f"{path}: no time column; the first line must name columns and units, such as {CSV_EXAMPLE}"
         )
     have = {column.name for column in columns}
     if len(have) < len(columns):
-        raise RecordingError(f"{path}: two columns say the same: {', '.join(names)}; keep one of them")
+        raise RecordingError(f"{path}: two columns hold the same quantity: {', '.join(names)}; keep one of them")
     if not ({"x", "y"} <= have or {"range", "azimuth"} <= have):
         raise RecordingError(
-            f"{path}: no position; x_m and y_m, or range_m and azimuth_deg, are needed, such as {CSV_EXAMPLE}"
+            f"{path}: no position columns; x_m and y_m, or range_m and azimuth_deg, are required, such as {CSV_EXAMPLE}"
         )
     return _Header(*time, tuple(columns), tuple(unused))
 
 
 def _split(written: str) -> tuple[str, str]:
-    """Take "x_m", "x [m]" or "#timestamp (ns)" apart into name and unit."""
+    """Split "x_m", "x [m]" or "#timestamp (ns)" into name and unit."""
     text = written.strip().lower().lstrip("# ")
     match = re.fullmatch(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]", text)
     if match:
@@ -149,14 +149,14 @@ def _unit(path: Path, written: str, unit: str, known: Mapping[str, object]) -> s
     units = ", ".join(known)
     example = f"{_split(written)[0]}_{next(iter(known))}"
     if not unit:
-        raise RecordingError(f"{path}: column '{written.strip()}' names no unit; write {example}; known units: {units}")
+        raise RecordingError(f"{path}: column '{written.strip()}' has no unit; write {example}; known units: {units}")
     raise RecordingError(f"{path}: column '{written.strip()}' has the unknown unit '{unit}'; known units: {units}")
 
 
 def _read_rows(path: Path, header: _Header, rows: Iterable[list[str]]) -> tuple[np.ndarray, np.ndarray]:
-    times, values = array("q"), array("d")  # eight bytes a figure, where lists of Python's numbers take forty
+    times, values = array("q"), array("d")  # eight bytes per number; a Python list would take forty
     places = [column.place for column in header.columns]
-    known, time = "", 0  # the rows of a scan have the same time
+    known, time = "", 0  # rows of a scan have the same time
     for number, row in enumerate(rows, start=2):
         if not row or not any(map(str.strip, row)):
             continue
@@ -167,9 +167,9 @@ def _read_rows(path: Path, header: _Header, rows: Iterable[list[str]]) -> tuple[
             values.extend([_number(row[place]) for place in places])
         except (ValueError, IndexError, OverflowError, RecordingError) as error:
             why = "too few columns" if isinstance(error, IndexError) else str(error)
-            raise RecordingError(f"{path}: line {number}: {why}; mend or remove the line") from error
+            raise RecordingError(f"{path}: line {number}: {why}; fix or remove the line") from error
     if not times:
-        raise RecordingError(f"{path}: the file has a header and no rows")
+        raise RecordingError(f"{path}: the file has a header but no rows")
     scale = np.array([column.scale for column in header.columns])
     return np.array(times, dtype=np.int64), np.array(values, dtype=np.float64).reshape(-1, len(scale)) * scale
 

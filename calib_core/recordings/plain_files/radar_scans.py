@@ -1,4 +1,4 @@
-"""Radar returns from one file per scan: nuScenes .pcd and View-of-Delft .bin."""
+"""Read radar returns from one file per scan: nuScenes .pcd and View-of-Delft .bin."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -59,7 +59,7 @@ def _open(folder: Path, files: Sequence[Path], what: str, points: Callable[[Path
 def _content(path: Path) -> bytes:
     try:
         if path.stat().st_size > _MAX_BYTES:
-            raise MessageError(f"{path.name} has {path.stat().st_size} bytes, too many for one radar scan")
+            raise MessageError(f"{path.name} has {path.stat().st_size} bytes, which is too large for a radar scan")
         return path.read_bytes()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}; is it still there?") from error
@@ -74,7 +74,7 @@ def points_of_bin(path: Path) -> np.ndarray:
     data = _content(path)
     if len(data) % _DELFT.itemsize:
         raise MessageError(
-            f"{path.name} has {len(data)} bytes, no multiple of {_DELFT.itemsize}: not a View-of-Delft radar file "
+            f"{path.name} has {len(data)} bytes, not a multiple of {_DELFT.itemsize}: not a View-of-Delft radar file "
             "(7 float32 per return: x y z RCS v_r v_r_compensated time)"
         )
     return np.frombuffer(data, dtype=_DELFT)
@@ -84,7 +84,7 @@ def points_of_pcd(path: Path) -> np.ndarray:
     """Read a scan in PCD version 0.7, binary or ascii.
 
     Raises:
-        MessageError: the header is damaged, or the points are packed or fewer than it says.
+        MessageError: the header is damaged, the points are compressed, or there are fewer than the header says.
     """
     data = _content(path)
     head, body = _head(path, data)
@@ -95,7 +95,9 @@ def points_of_pcd(path: Path) -> np.ndarray:
         rows = body.decode("ascii", "replace").split()
         fields = len(dtype.names or ())
         if len(rows) < count * fields or any(dtype[name].subdtype for name in dtype.names or ()):
-            raise MessageError(f"{path.name} has {len(rows)} figures; {count * fields} are needed: the file is damaged")
+            raise MessageError(
+                f"{path.name} has {len(rows)} numbers, but {count * fields} are required: the file is damaged"
+            )
         table = np.array(rows[: count * fields], dtype=np.float64).reshape(count, fields)
         points = np.zeros(count, dtype=dtype)
         for number, name in enumerate(dtype.names or ()):
@@ -103,11 +105,12 @@ def points_of_pcd(path: Path) -> np.ndarray:
         return points
     if kind != "binary":
         raise MessageError(
-            f"{path.name} holds '{kind}' data; binary and ascii can be read: convert it with pcl_convert_pcd_ascii_binary"
+            f"{path.name} has '{kind}' data, but only binary and ascii are supported; "
+            "convert it with pcl_convert_pcd_ascii_binary"
         )
     if len(body) < count * dtype.itemsize:
         raise MessageError(
-            f"{path.name} has {len(body)} bytes of points; {count * dtype.itemsize} are needed: the file is cut short"
+            f"{path.name} has {len(body)} bytes of points, but {count * dtype.itemsize} are required: the file is truncated"
         )
     return np.frombuffer(body, dtype=dtype, count=count)
 
@@ -118,7 +121,7 @@ def _head(path: Path, data: bytes) -> tuple[dict[str, list[str]], bytes]:
     while "DATA" not in head:
         end = data.find(b"\n", place, _HEAD_BYTES)
         if end < 0:
-            raise MessageError(f"{path.name} has no PCD header (no line DATA); it is damaged or something else")
+            raise MessageError(f"{path.name} has no PCD header (no DATA line); it is damaged or not a PCD file")
         words = data[place:end].decode("ascii", "replace").split("#")[0].split()
         if words:
             head[words[0].upper()] = words[1:]
@@ -144,12 +147,12 @@ def _dtype(path: Path, head: dict[str, list[str]]) -> "np.dtype[np.void]":
         return dtype
     except (KeyError, ValueError, TypeError, OverflowError, MemoryError) as error:
         raise MessageError(
-            f"{path.name} has a PCD header whose FIELDS, SIZE, TYPE and COUNT do not fit ({error})"
+            f"{path.name} has a PCD header with inconsistent FIELDS, SIZE, TYPE and COUNT ({error})"
         ) from error
 
 
 def _whole(path: Path, head: dict[str, list[str]], *names: str) -> int:
     words = next((head[name] for name in names if head.get(name)), ["none"])
     if not words[0].isdigit():
-        raise MessageError(f"{path.name} has a PCD header that gives no number of points")
+        raise MessageError(f"{path.name} has a PCD header without the number of points")
     return int(words[0])

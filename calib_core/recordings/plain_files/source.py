@@ -1,4 +1,4 @@
-"""A recording that is no ROS container: times in a list, messages made when they are asked for."""
+"""A source outside ROS containers: a list of times, with messages built on demand."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -20,17 +20,17 @@ _HEADER_BYTES = 16
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlainSource:
-    """One folder or file with one topic; a Source.
+    """One folder or file with one topic; implements Source.
 
     Attributes:
         path: the folder or file.
-        size_bytes: of all it holds.
-        container: for people.
+        size_bytes: total size.
+        container: description of the format.
         channel: its topic.
         times_ns: (n,) ascending.
-        message: makes the message of a row.
-        warnings: what opening it brought to light.
-        closed: called when no more is read.
+        message: builds the message of a row.
+        warnings: problems found on opening it.
+        closed: called on closing.
     """
 
     path: Path
@@ -43,7 +43,7 @@ class PlainSource:
     closed: Callable[[], None] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse times that no message can carry.
+        """Refuse times that a message cannot represent.
 
         Raises:
             RecordingError: one is before 1970 or after 2106.
@@ -52,7 +52,7 @@ class PlainSource:
         if low < 0 or high >= NS_PER_S << 32:
             raise RecordingError(
                 f"{self.path}: a time is {(low if low < 0 else high) / NS_PER_S:.6g} s, outside the years 1970 to 2106; "
-                "look at its unit"
+                "check its unit"
             )
 
     @property
@@ -67,20 +67,20 @@ class PlainSource:
 
     @property
     def later_warnings(self) -> tuple[DataWarning, ...]:
-        """Nothing: what cannot be read is told message by message."""
+        """None: unreadable files are reported message by message."""
         return ()
 
     def index(self, channel_id: int) -> MessageIndex:
-        """Tell where the messages lie: row by row."""
+        """Return the index of the messages: one row each."""
         rows = np.arange(len(self.times_ns) if channel_id == self.channel.id else 0, dtype=np.int64)
         return MessageIndex(self.times_ns[rows], rows, np.zeros_like(rows))
 
     def read(self, chunk: int, offset: int) -> bytes:
-        """Make one message."""
+        """Build one message."""
         return self.message(chunk)
 
     def heads(self, index: MessageIndex, size: int, *, keep: bool = False) -> Heads:
-        """Return the first bytes of many messages; for stamps alone, no file is read."""
+        """Return the first bytes of many messages; no file is read if only the stamps are needed."""
         rows = np.zeros((len(index), size), dtype=np.uint8)
         lengths = np.full(len(index), max(size, _HEADER_BYTES), dtype=np.int64)
         fault = ""
@@ -97,7 +97,7 @@ class PlainSource:
         return Heads(rows, lengths, fault)
 
     def close(self) -> None:
-        """Close what is open."""
+        """Close the source."""
         if self.closed is not None:
             self.closed()
 

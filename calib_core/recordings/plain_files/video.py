@@ -1,4 +1,4 @@
-"""Camera frames from a video file. Its frames have times from its beginning only; when that was, a person says."""
+"""Read camera frames from a video file. Frame times count from its beginning, so the user gives the start time."""
 
 import threading
 from pathlib import Path
@@ -25,18 +25,18 @@ _STEP_BACK = 60
 
 
 def open_video(path: Path, start: str | None) -> PlainSource:
-    """Open a video file as a camera; every frame is decoded once to learn its time.
+    """Open a video file as a camera; every frame is decoded once to find its time.
 
     Args:
         path: the file.
-        start: the time of its first frame, as --video-start has it.
+        start: the time of its first frame, as given by --video-start.
 
     Raises:
-        RecordingError: no start was given, or the file is no video.
+        RecordingError: no start was given, or the file is not a video.
     """
     if start is None:
         raise RecordingError(
-            f"{path}: a video does not say when it began; give the time of its first frame with --video-start, as seconds "
+            f"{path}: a video has no start time; give the time of its first frame with --video-start, as seconds "
             "since 1970 (1714557600.25) or a date (2024-05-01T12:00:00.25+02:00)"
         )
     try:
@@ -59,13 +59,13 @@ def open_video(path: Path, start: str | None) -> PlainSource:
 def _uneven(path: Path) -> DataWarning:
     return DataWarning(
         "video-times",
-        f"{path.name}: the file gives several frames the same time; they are spread evenly over its length",
-        "give the recording the video was made from, if there is one: a video loses the frames' own times",
+        f"{path.name}: several frames have the same time; all frames are spaced evenly over the length of the video",
+        "use the recording the video was made from, if there is one: a video does not keep the frames' stamps",
     )
 
 
 class _Video:
-    """A video read frame by frame, forwards where possible; safe from several threads."""
+    """A video read frame by frame, sequentially where possible; thread-safe."""
 
     def __init__(self, path: Path) -> None:
         import cv2
@@ -90,9 +90,7 @@ class _Video:
             offsets.append(round(self._capture.get(cv2.CAP_PROP_POS_MSEC) * 1e6))
         if not offsets:
             self._capture.release()
-            raise RecordingError(
-                f"{self.path}: no video that can be read (OpenCV finds no frame in it); convert it to mp4"
-            )
+            raise RecordingError(f"{self.path}: not a readable video (OpenCV finds no frame in it); convert it to mp4")
         self._rewind(0)
         return np.array(offsets, dtype=np.float64)
 
@@ -118,7 +116,9 @@ class _Video:
             found, pixels = self._capture.read()
             self._next += 1
         if not found or self._next != row + 1:
-            raise MessageError(f"{self.path.name}: frame {row} cannot be decoded; the file is damaged from there on")
+            raise MessageError(
+                f"{self.path.name}: frame {row} cannot be decoded; the file is damaged from that frame on"
+            )
         settings = [
             cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY,
             cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,

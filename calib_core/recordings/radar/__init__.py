@@ -1,1 +1,1 @@
-"""Radar messages, whatever their layout, as scans."""
+"""Read radar messages of any supported layout as scans."""

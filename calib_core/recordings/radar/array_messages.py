@@ -1,4 +1,4 @@
-"""Radar messages whose returns are columns already: arrays of one length side by side (Delphi's Ethernet driver)."""
+"""Read radar messages that hold their returns as parallel arrays of equal length (Delphi's Ethernet driver)."""
 
 from dataclasses import dataclass, replace
 
@@ -12,7 +12,7 @@ __all__ = ["ArrayLayout"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArrayLayout:
-    """Reads messages of fixed arrays; only those of the registry, since arrays side by side may be anything.
+    """Reads messages of fixed arrays; only layouts in the registry, since parallel arrays may hold anything.
 
     Attributes:
         definition: of the message.
@@ -29,7 +29,7 @@ class ArrayLayout:
 
     @classmethod
     def recognise(cls, definition: Definition) -> "ArrayLayout | None":
-        """Look at the names of a message's arrays."""
+        """Recognise a message by the names of its arrays."""
         names = [field.name for field in definition.fields if field.count and field.type in PRIMITIVES]
         decoder, plan = find_decoder("arrays", names), plan_for("arrays", names)
         if decoder is None or plan is None:
@@ -38,8 +38,8 @@ class ArrayLayout:
 
     @property
     def description(self) -> str:
-        """Say what is read."""
-        return f"arrays side by side: {self.plan.describe()}"
+        """Describe what is read."""
+        return f"parallel arrays: {self.plan.describe()}"
 
     def returns(self, payload: bytes) -> Returns:
         """Read one scan.
@@ -54,5 +54,5 @@ class ArrayLayout:
         return returns_from(self.plan, lambda name: message.array(name)[:count])
 
     def with_plan(self, plan: ColumnPlan) -> "ArrayLayout":
-        """Read by another plan."""
+        """Return the same layout with another plan."""
         return replace(self, plan=plan)

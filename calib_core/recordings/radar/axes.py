@@ -1,4 +1,4 @@
-"""Where the axes of a radar's messages point, where a person says so: the words of --radar-axes."""
+"""Axis directions and angle unit of a radar's messages, as given by --radar-axes."""
 
 import re
 from dataclasses import dataclass
@@ -21,14 +21,14 @@ _EXAMPLE = "for example --radar-axes forward,right,up or --radar-axes forward,le
 
 @dataclass(frozen=True, slots=True)
 class RadarAxes:
-    """What a person says about a radar's messages.
+    """The user's --radar-axes.
 
-    Polar messages are first turned into x, y, z as if their azimuth were positive to the left and their elevation
-    upwards; so "forward,right,up" is also how to say that azimuth is positive to the right.
+    Polar messages are first converted to x, y, z with azimuth positive to the left and elevation positive upwards, so
+    "forward,right,up" also means that azimuth is positive to the right.
 
     Attributes:
-        directions: where the message's x, y and z point.
-        degrees: its angles are in degrees (True), radians (False), or as its layout says (None).
+        directions: the directions of the message's x, y and z.
+        degrees: whether its angles are in degrees (True) or radians (False); None for the layout's own unit.
     """
 
     directions: tuple[str, str, str] = ("forward", "left", "up")
@@ -45,45 +45,46 @@ class RadarAxes:
 
     @property
     def words(self) -> str:
-        """The words of --radar-axes."""
+        """The value of --radar-axes."""
         unit = () if self.degrees is None else ("degrees" if self.degrees else "radians",)
         return ",".join((*self.directions, *unit))
 
     def describe(self) -> str:
-        """Say it in words."""
+        """Describe the axes and the unit as text."""
         words = ", ".join(f"{axis} {word}" for axis, word in zip("xyz", self.directions, strict=True))
         unit = "" if self.degrees is None else f", angles in {'degrees' if self.degrees else 'radians'}"
-        return f"axes as told: {words}{unit}"
+        return f"axes as given: {words}{unit}"
 
 
 def parse_radar_axes(text: str) -> RadarAxes:
-    """Read the words of --radar-axes: three directions, a unit of angles, or both.
+    """Parse the value of --radar-axes: three directions, an angle unit, or both.
 
     Args:
         text: such as "forward,right,up", "degrees" or "forward,left,up,degrees".
 
     Raises:
-        OptionError: a word is unknown, one is missing, or two directions lie on one axis.
+        OptionError: a word is unknown, one is missing, or two directions lie on the same axis.
     """
     words = [word for word in re.split(r"[,\s]+", text.strip().lower()) if word]
     unknown = next((word for word in words if word not in _DIRECTIONS and word not in _UNITS), None)
     if unknown is not None:
         raise OptionError(
-            f"--radar-axes {text}: '{unknown}' is no direction; forward, backward, left, right, up, down are, "
+            f"--radar-axes {text}: '{unknown}' is unknown; use forward, backward, left, right, up, down, "
             f"and degrees or radians for the angles; {_EXAMPLE}"
         )
     units = [word for word in words if word in _UNITS]
     directions = [word for word in words if word in _DIRECTIONS]
     if len(units) > 1 or len(directions) not in (0, 3) or not words:
         raise OptionError(
-            f"--radar-axes {text}: say where the message's x, y and z point, in this order, and at most one unit; {_EXAMPLE}"
+            f"--radar-axes {text}: give the directions of the message's x, y and z in this order, and at most one unit; "
+            f"{_EXAMPLE}"
         )
     degrees = units[0] == "degrees" if units else None
     if not directions:
         return RadarAxes(degrees=degrees)
     if len({_DIRECTIONS[word][0] for word in directions}) < 3:
         raise OptionError(
-            f"--radar-axes {text}: two of the directions lie on one line; x, y and z must differ; {_EXAMPLE}"
+            f"--radar-axes {text}: two of the directions lie on the same axis; x, y and z must differ; {_EXAMPLE}"
         )
     x, y, z = directions
     return RadarAxes((x, y, z), degrees)

@@ -1,4 +1,4 @@
-"""Contradictions inside a radar's messages: ranges against positions, signs and units of angles."""
+"""Check radar messages for contradictions: ranges and positions, signs and units of angles."""
 
 import numpy as np
 
@@ -16,13 +16,13 @@ _MIRROR = "--radar-axes forward,right,up"
 
 
 def about_claims(radar: RadarStream | None) -> list[DataWarning]:
-    """Say what a radar's layout leaves open and where its messages contradict themselves, from a sample of them."""
+    """Warn about conventions assumed for a radar's layout and about contradictions in a sample of its messages."""
     if radar is None:
         return []
     plan, name = radar.layout.plan, radar.topic.name
     warnings = []
     if plan.assumed and plan.axes is None:
-        hint = f"if the calibration comes out mirrored, try {_MIRROR}; degrees or radians can be added"
+        hint = f"if the calibration turns out mirrored, try {_MIRROR}; add degrees or radians to set the unit"
         warnings.append(DataWarning("radar-convention-assumed", f"{name} ({plan.decoder}): {plan.assumed}", hint))
     if any(plan.claimed):
         warnings.extend(_contradictions(name, plan, radar.claims(_SAMPLED_SCANS)))
@@ -47,7 +47,7 @@ def _contradictions(name: str, plan: ColumnPlan, found: Returns) -> list[DataWar
 
 
 def _angle_unit(name: str, plan: ColumnPlan, angles: np.ndarray) -> list[DataWarning]:
-    """Find angles that can hardly be of the unit they are read in."""
+    """Warn about angles whose values do not fit the unit they are read in."""
     angles = np.abs(angles[np.isfinite(angles)])
     if not len(angles) or not angles.any():
         return []
@@ -55,7 +55,7 @@ def _angle_unit(name: str, plan: ColumnPlan, angles: np.ndarray) -> list[DataWar
     if not plan.degrees and largest > 2.0 * np.pi:
         what, hint = f"has angles up to {largest:.1f}, which cannot be radians", "degrees"
     elif plan.degrees and largest < np.pi / 2 and len(angles) >= 4 * _FEW:
-        what, hint = f"has no angle above {largest:.2f}, which is little for degrees", "radians"
+        what, hint = f"has no angle above {largest:.2f}, which is small for degrees", "radians"
     else:
         return []
     read = "degrees" if plan.degrees else "radians"
@@ -79,13 +79,13 @@ def _range(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray) ->
             "radar-range-contradicts",
             f"{name}: {plan.claimed[0]} and the length of {', '.join(plan.position)} differ by {typical:.2f} m (median); "
             "the positions are used",
-            "ask the driver's authors which is right: positions may be in another frame or unit, or already moved to the vehicle",
+            "ask the driver's authors which is right: positions may be in another unit or frame, such as the vehicle's",
         )
     ]
 
 
 def _azimuth(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray) -> list[DataWarning]:
-    """Find by which sign and unit the message's azimuth fits its x and y."""
+    """Find the sign and unit in which the message's azimuth matches its x and y."""
     telling = np.isfinite(claimed) & (np.abs(own) > _MIN_ANGLE_RAD)
     if plan.axes is not None or np.count_nonzero(telling) < _FEW or not np.any(claimed[telling]):
         return []
@@ -101,7 +101,8 @@ def _azimuth(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray) 
         return [
             DataWarning(
                 "radar-azimuth-contradicts",
-                f"{columns} disagree in every unit and sign ({np.degrees(error):.0f} degrees at best); the positions are used",
+                f"{columns} disagree in every unit and sign (by {np.degrees(error):.0f} degrees at best); "
+                "the positions are used",
                 "ask the driver's authors which is right; if x is not forward, say so with --radar-axes",
             )
         ]
@@ -111,7 +112,7 @@ def _azimuth(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray) 
         DataWarning(
             "radar-azimuth-mirrored",
             f"{columns} have opposite signs; the positions are used, with y to the left",
-            f"if y points to the right: {_MIRROR}; the handedness check of the calibration tells which it is",
+            f"if y points to the right: {_MIRROR}; the handedness check of the calibration shows which is right",
         )
     ]
 
@@ -123,7 +124,7 @@ def _elevation(name: str, plan: ColumnPlan, claimed: np.ndarray, own: np.ndarray
     return [
         DataWarning(
             "radar-elevation-zero",
-            f"{name}: {plan.claimed[2]} is always 0, yet the positions have heights; the positions are used",
-            "nothing to do where only the angle is not filled in; else ask the driver's authors what z is",
+            f"{name}: {plan.claimed[2]} is always 0, but the heights of the positions are not; the positions are used",
+            "no action needed if the driver just does not fill in the angle; otherwise ask its authors what z means",
         )
     ]

@@ -1,4 +1,4 @@
-"""From a message's field names to the columns that are used: by the registry, or by the names alone."""
+"""Choose the columns to use from a message's field names: by the registry, or by the names alone."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -11,7 +11,7 @@ __all__ = ["find_decoder", "plan_for", "plan_like"]
 
 
 def find_decoder(kind: MessageKind, names: Iterable[str]) -> Decoder | None:
-    """Return the layout with these fields, the one that asks for most of them; None where none fits.
+    """Return the layout that requires the most of these fields; None if none matches.
 
     Args:
         kind: what the fields are fields of.
@@ -23,7 +23,7 @@ def find_decoder(kind: MessageKind, names: Iterable[str]) -> Decoder | None:
 
 
 def plan_for(kind: MessageKind, names: Iterable[str], arrays: Iterable[str] = ()) -> ColumnPlan | None:
-    """Plan the columns of a message: as the registry says, or by their names alone; None where there is no position.
+    """Plan the columns of a message by the registry or by their names alone; None if there is no position.
 
     Args:
         kind: what the fields are fields of.
@@ -59,7 +59,7 @@ def plan_for(kind: MessageKind, names: Iterable[str], arrays: Iterable[str] = ()
 
 
 def plan_like(first: ColumnPlan, kind: MessageKind, names: Iterable[str]) -> ColumnPlan | None:
-    """Plan a later message of a topic: its own columns, with what a person said about the first."""
+    """Plan a later message of a topic: its own columns, with the user's axes of the first plan."""
     plan = plan_for(kind, names)
     if plan is None:
         return None

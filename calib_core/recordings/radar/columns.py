@@ -1,4 +1,4 @@
-"""Which columns of a radar message are position, speed, amplitude and noise, whatever a driver calls them."""
+"""Recognise position, speed, amplitude and noise among the columns of a radar message, whatever their names."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -39,10 +39,10 @@ _INVALID_DOPPLER = ("invalidrangerate", "invaliddoppler", "invalidvelocity")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Returns:
-    """The returns of one scan as columns; the meaning is that of RadarScan. Columns of NaN alone may be read-only.
+    """The returns of one scan as columns, with the meaning of RadarScan. All-NaN columns may be read-only.
 
     Attributes:
-        claimed_polar: range, azimuth and elevation as the message has them, NaN for what it has not; only where asked for.
+        claimed_polar: range, azimuth and elevation as given in the message, NaN for missing ones; only on request.
     """
 
     points_radar_m: Points3
@@ -56,34 +56,34 @@ class Returns:
 
 
 def no_returns() -> Returns:
-    """Return a scan of nothing."""
+    """Return an empty scan."""
     return Returns(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros((0, 3)))
 
 
 @dataclass(frozen=True, slots=True)
 class ColumnPlan:
-    """The driver's names of the columns that are used.
+    """The driver's names for the columns in use.
 
     Attributes:
-        position: x, y and perhaps z [m]; or range [m], azimuth and perhaps elevation.
-        polar: position is polar.
-        degrees: the angles are in degrees.
+        position: x, y and optionally z [m]; or range [m], azimuth and optionally elevation.
+        polar: whether position is polar.
+        degrees: whether the angles are in degrees.
         doppler: radial speed [m/s], or None.
-        velocity: components [m/s] whose part along the line of sight is the radial speed where doppler is None.
-        amplitude: a figure in dB, or None.
-        amplitude_scale: its unit in dB.
-        sigma: standard deviations of range, azimuth and elevation; None each where there is none.
-        spoils_position: flags that say the position is not valid.
-        spoils_doppler: flags that say the speed is not valid.
-        needed: flags that are zero where there is no return.
-        azimuth_sign: 1 where azimuth is positive to the left, -1 to the right.
+        velocity: components [m/s]; if doppler is None, the radial speed is their part along the line of sight.
+        amplitude: amplitude in dB, or None.
+        amplitude_scale: unit of the amplitude in dB.
+        sigma: standard deviations of range, azimuth and elevation, None for each that is missing.
+        spoils_position: flags that mark the position as invalid.
+        spoils_doppler: flags that mark the speed as invalid.
+        needed: flags that are zero if there is no return.
+        azimuth_sign: 1 if azimuth is positive to the left, -1 if to the right.
         covariance: an array with the position's covariance [m^2], or None.
-        claimed: range, azimuth and elevation beside the position, or those it is made of; for finding contradictions.
-        axes: what a person says about axes and units; None for nothing.
-        decoder: the layout's name in the registry; "" for one read by its column names alone.
-        assumed: what the layout's documents leave open, as a sentence; "" for nothing.
-        shared_with_lidars: lidars have the same columns.
-        claiming: fill in Returns.claimed_polar.
+        claimed: columns of range, azimuth and elevation, whether or not the position is made of them; to find contradictions.
+        axes: the user's axes and units; None if not given.
+        decoder: the layout's name in the registry; "" if the message is read by its column names alone.
+        assumed: what the layout's documentation leaves open, as a sentence; "" if nothing.
+        shared_with_lidars: whether lidars have the same columns.
+        claiming: whether to fill in Returns.claimed_polar.
     """
 
     position: tuple[str, ...]
@@ -108,14 +108,14 @@ class ColumnPlan:
 
     @property
     def looks_like_radar(self) -> bool:
-        """Tell whether more than a position and an intensity is there, as a lidar has them."""
+        """Return whether there are columns other than the position and intensity that a lidar also has."""
         if self.decoder:
             return not self.shared_with_lidars
         amplitude = self.amplitude is not None and _plain(self.amplitude) != "intensity"
         return self.polar or self.doppler is not None or bool(self.velocity) or amplitude
 
     def describe(self) -> str:
-        """Say in a few words what is read from where."""
+        """Describe briefly which columns are read."""
         words = [f"position from {', '.join(self.position)}"]
         if self.polar:
             side = "left" if self.azimuth_sign > 0 else "right"
@@ -134,7 +134,7 @@ class ColumnPlan:
         return (f"{self.decoder}: " if self.decoder else "") + "; ".join(words)
 
     def read_as(self, axes: RadarAxes) -> "ColumnPlan":
-        """Follow what a person says about axes and units."""
+        """Apply the user's axes and units."""
         return replace(self, axes=axes, degrees=self.degrees if axes.degrees is None else axes.degrees)
 
 
@@ -147,7 +147,7 @@ _UNKNOWN.setflags(write=False)
 
 
 def unknown(n: int, columns: int = 0) -> np.ndarray:
-    """Return (n,) or (n, columns) NaN that cannot be written to: all of them share their memory."""
+    """Return read-only NaN of shape (n,) or (n, columns); all such arrays share memory."""
     size = n * max(1, columns)
     values = _UNKNOWN[:size]
     if len(values) < size:
@@ -157,7 +157,7 @@ def unknown(n: int, columns: int = 0) -> np.ndarray:
 
 
 def plan_columns(names: Iterable[str]) -> ColumnPlan | None:
-    """Recognise the columns of a radar by their names; None where there is no position.
+    """Recognise the columns of a radar by their names; None if there is no position.
 
     Args:
         names: as the message spells them; nested ones dotted.
@@ -204,13 +204,13 @@ def _cartesian(by_plain: dict[str, str]) -> tuple[str, ...]:
 
 
 def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
-    """Take the returns of one scan out of a message.
+    """Extract the returns of one scan from a message.
 
     Args:
         plan: which columns to use.
-        column: gives a column by the driver's name, of any number type; (n,), or (m, k) with n = m k; it is not changed.
+        column: returns a column by the driver's name, of any number type; (n,), or (m, k) with n = m k; not modified.
     """
-    with np.errstate(all="ignore"):  # damaged bytes may hold signalling NaN, and figures whose squares overflow
+    with np.errstate(all="ignore"):  # damaged bytes may hold signalling NaN, and numbers whose squares overflow
         return _returns(plan, column)
 
 
@@ -234,12 +234,12 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
 
 
 def _floats(values: np.ndarray) -> Values:
-    """Copy a column into contiguous numbers."""
+    """Copy a column into a contiguous float array."""
     return np.array(values, dtype=np.float64, order="C").reshape(-1)
 
 
 def _position(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Points3:
-    """Return positions in the message's own axes; angles taken as positive to the left and upwards."""
+    """Return positions in the message's own axes, with angles positive to the left and upwards."""
     parts = [column(name) for name in plan.position]
     position = np.empty((parts[0].size, 3))
     for axis, part in enumerate(parts):
@@ -264,7 +264,7 @@ def _sigma(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Poin
     if plan.degrees:
         sigma[:, 1:] = np.radians(sigma[:, 1:])
     if not turn[2, 2]:
-        sigma[:, 1:] = np.nan  # what was azimuth is no longer about the upward axis
+        sigma[:, 1:] = np.nan  # the azimuth is then no longer measured about the upward axis
     return sigma
 
 

@@ -1,4 +1,4 @@
-"""The registry of radar layouts: a message is recognised by its fields, never by its package's name."""
+"""Recognise radar layouts by a message's fields, never by the name of its package."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,10 +20,10 @@ RadarLayout: TypeAlias = ScanLayout | PointLayout
 
 
 def recognise(definition: Definition, payload: bytes) -> RadarLayout | None:
-    """Return the reader of a message's layout, None where it is not a radar's.
+    """Return the reader of a message's layout, None if it is not a radar's.
 
     Raises:
-        MessageError: it is one by its definition, but the message contradicts itself.
+        MessageError: its definition is a radar's, but the message is inconsistent.
     """
     if is_cloud(definition):
         return CloudLayout.recognise(definition, payload)
@@ -39,10 +39,10 @@ def recognise(definition: Definition, payload: bytes) -> RadarLayout | None:
 
 
 def layouts_of_parts(first: RadarLayout, definitions: Sequence[Definition]) -> tuple[RadarLayout, ...]:
-    """Return the reader of each file's share of a topic, given the one of its first.
+    """Return the reader for each file's part of a topic, given the reader for the first.
 
     Raises:
-        MessageError: the files hold different messages under one name.
+        MessageError: the files have different message layouts under one topic.
     """
     return tuple(_same_layout(first, definition) for definition in definitions)
 
@@ -58,7 +58,7 @@ def _same_layout(first: RadarLayout, definition: Definition) -> RadarLayout:
     found = type(first).recognise(definition) if isinstance(first, ListLayout | ArrayLayout) else None
     if found is None:
         raise MessageError(
-            f"the files hold {first.definition.type} and {definition.type} messages of different layout under one topic; "
+            f"the files have {first.definition.type} and {definition.type} messages with different layouts under one topic; "
             "open them one at a time"
         )
     return found.with_plan(found.plan.read_as(first.plan.axes)) if first.plan.axes else found

@@ -1,4 +1,4 @@
-"""Radar messages that are a list of returns, targets or tracks, and drivers that send one return per message."""
+"""Read radar messages with a list of returns, targets or tracks, and drivers that send one return per message."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,7 +20,7 @@ _SHORTEST_CYCLE_NS = 5e6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ListLayout:
-    """Reads messages of a header and one list: radar_msgs, Ainstein, Continental, object lists."""
+    """Reads messages with a header and one list: radar_msgs, Ainstein, Continental, object lists."""
 
     definition: Definition
     list_name: str
@@ -31,7 +31,7 @@ class ListLayout:
 
     @classmethod
     def recognise(cls, definition: Definition) -> "ListLayout | None":
-        """Find the one list whose elements have a position and something only a radar has."""
+        """Find the list whose elements have a position and a field that only radars have."""
         for field in definition.fields:
             if field.count != 0 or field.type not in definition.types:
                 continue
@@ -42,7 +42,7 @@ class ListLayout:
 
     @property
     def description(self) -> str:
-        """Say what is read."""
+        """Describe what is read."""
         return f"list '{self.list_name}': {self.plan.describe()}"
 
     def returns(self, payload: bytes) -> Returns:
@@ -57,7 +57,7 @@ class ListLayout:
         return returns_from(self.plan, lambda name: message.column(self.list_name, name))
 
     def with_plan(self, plan: ColumnPlan) -> "ListLayout":
-        """Read by another plan."""
+        """Return the same layout with another plan."""
         return replace(self, plan=plan)
 
 
@@ -79,12 +79,12 @@ def leaf_names(definition: Definition, kind: str, prefix: str = "") -> tuple[lis
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointLayout:
-    """Reads drivers that publish every return as a message of its own (ti_mmwave_rospkg and its forks).
+    """Reads drivers that publish every return as a separate message (ti_mmwave_rospkg and its forks).
 
     Attributes:
         frame_number: the field that numbers scans, or None.
         point_number: the field that numbers returns within a scan, or None.
-        pins: where the lengths of the strings in front of the last number lie, and what they are in the first message.
+        pins: offsets of the lengths of all strings before the last number, and their values in the first message.
     """
 
     definition: Definition
@@ -99,7 +99,7 @@ class PointLayout:
 
     @classmethod
     def recognise(cls, definition: Definition, payload: bytes) -> "PointLayout | None":
-        """Look at the fields of fixed size: a position and a speed make a radar return."""
+        """Recognise a radar return by its fields of fixed size: a position and a speed."""
         dtype, pins = fixed_part(definition, payload)
         names = dtype.names or ()
         strings = [field.name for field in definition.fields if field.type == "string"]
@@ -119,17 +119,17 @@ class PointLayout:
 
     @property
     def description(self) -> str:
-        """Say what is read."""
+        """Describe what is read."""
         how = self.frame_number or self.point_number or "pauses"
-        return f"one return per message, scans told apart by {how}: {self.plan.describe()}"
+        return f"one return per message, scans separated by {how}: {self.plan.describe()}"
 
     def returns_of_rows(self, rows: np.ndarray) -> Returns:
-        """Read many returns from the first bytes (n, dtype.itemsize) of their messages."""
+        """Read many returns from the first bytes of their messages, (n, dtype.itemsize)."""
         points = self.view(rows)
         return _known_snr(returns_from(self.plan, lambda name: points[name]))
 
     def returns(self, payload: bytes) -> Returns:
-        """Read the return of one whole message, whatever its strings.
+        """Read the return in one whole message with strings of any length.
 
         Raises:
             MessageError: the bytes do not fit the definition.
@@ -146,14 +146,14 @@ class PointLayout:
         return decode(self.definition, payload)
 
     def misfits(self, rows: np.ndarray) -> np.ndarray:
-        """Tell which rows have strings of another length than the first, so that their fields lie elsewhere."""
+        """Return which rows have string lengths other than the first message's, and therefore other field offsets."""
         moved = np.zeros(len(rows), dtype=bool)
         for pin in (pin for pin in self.pins if pin.offset + 4 <= rows.shape[1]):
             moved |= (rows[:, pin.offset : pin.offset + 4] != np.frombuffer(pin.length, dtype=np.uint8)).any(axis=1)
         return moved
 
     def with_plan(self, plan: ColumnPlan) -> "PointLayout":
-        """Read by another plan."""
+        """Return the same layout with another plan."""
         return replace(self, plan=plan)
 
     def view(self, rows: np.ndarray) -> np.ndarray:
@@ -162,12 +162,12 @@ class PointLayout:
 
     @property
     def group_bytes(self) -> int:
-        """How many bytes of a message hold the stamp and the numbers that tell scans apart."""
+        """How many leading bytes of a message contain the stamp and the numbers that separate scans."""
         places = [self._place(name) for name in (self.frame_number, self.point_number) if name]
         return max([12, *(offset + code.itemsize for code, offset in places)])
 
     def numbers(self, rows: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Read frame and point numbers from rows of at least group_bytes: (n,) each, None for one there is not."""
+        """Read frame and point numbers from rows of at least group_bytes: (n,) each, None for a missing one."""
         frame = self._column(rows, self.frame_number).copy() if self.frame_number else None
         return frame, self._column(rows, self.point_number).copy() if self.point_number else None
 
@@ -182,7 +182,7 @@ class PointLayout:
 
 
 def _known_snr(found: Returns) -> Returns:
-    """Leave out intensities of zero: the stock driver never fills them in."""
+    """Replace zero intensities by NaN: the stock driver never fills them in."""
     if found.snr_db.flags.writeable:
         found.snr_db[found.snr_db == 0.0] = np.nan
     return found
@@ -191,10 +191,10 @@ def _known_snr(found: Returns) -> Returns:
 def first_of_scans(
     times_ns: TimesNs, frame_numbers: np.ndarray | None = None, point_numbers: np.ndarray | None = None
 ) -> np.ndarray:
-    """Find the message that begins each scan, in drivers that send one message per return.
+    """Find the message that begins each scan, for drivers that send one message per return.
 
     A scan ends where the frame number changes; without one, where the point number does not rise; and in any case at a
-    pause longer than half the usual time between scans (a scan of one return has no number to tell it from the next).
+    pause longer than half the usual time between scans (the numbers cannot separate scans of a single return).
 
     Args:
         times_ns: (n,) stamps in the order of the recording.
@@ -202,7 +202,7 @@ def first_of_scans(
         point_numbers: (n,) or None.
 
     Returns:
-        (m,) indices, ascending, the first is 0; empty where n is 0.
+        (m,) indices, ascending, the first is 0; empty if n is 0.
     """
     n = len(times_ns)
     if n < 2:
@@ -223,10 +223,10 @@ def first_of_scans(
 
 
 def _between_scans_ns(pauses_ns: np.ndarray) -> float:
-    """Return a pause that lies between those within a scan and those between scans.
+    """Return a threshold between the pauses within a scan and those between scans.
 
-    It is the middle of the widest gap between their logarithms; where they are all alike, no radar cycle is shorter
-    than 5 ms, and no driver takes that long from one return to the next.
+    It is the middle of the widest gap between their logarithms. If all pauses are alike, it is half of the shortest one, but
+    at least 5 ms: no radar cycle is shorter, and no driver takes that long from one return to the next.
     """
     positive = np.sort(pauses_ns[pauses_ns > 0]).astype(np.float64)
     if not len(positive):

@@ -1,4 +1,4 @@
-"""Standard deviations of range, azimuth and elevation from the covariance a tracker gives its positions."""
+"""Standard deviations of range, azimuth and elevation from a tracker's position covariance."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ _UPPER = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
 def full_covariance(rows: np.ndarray) -> np.ndarray:
-    """Return (n, 3, 3) position covariances [m^2] from rows as messages have them.
+    """Return (n, 3, 3) position covariances [m^2] from the rows in messages.
 
     Args:
         rows: (n, 6) xx, xy, xz, yy, yz, zz; (n, 9) row-major; or (n, 36) of x, y, z and three rotations, row-major.
@@ -25,7 +25,7 @@ def full_covariance(rows: np.ndarray) -> np.ndarray:
 def sigma_polar_from_covariance(points_radar_m: Points3, covariance_m2: np.ndarray) -> Points3:
     """Return (n, 3) standard deviations of range [m], azimuth and elevation [rad]; NaN where a variance is not positive.
 
-    Trackers write 0 or -1 for what they do not know.
+    Trackers write 0 or -1 for unknown variances.
 
     Args:
         points_radar_m: (n, 3).

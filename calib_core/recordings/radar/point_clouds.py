@@ -1,4 +1,4 @@
-"""Radar returns in sensor_msgs/PointCloud2 (and the older PointCloud), whatever their layout in memory."""
+"""Read radar returns from sensor_msgs/PointCloud2 (and the older PointCloud) of any memory layout."""
 
 import struct
 from dataclasses import dataclass, field, replace
@@ -22,18 +22,18 @@ _LIDAR_POINTS = 5000
 
 
 def is_cloud(definition: Definition) -> bool:
-    """Tell whether a message is laid out as sensor_msgs/PointCloud2."""
+    """Return whether a message is laid out as sensor_msgs/PointCloud2."""
     return definition.names >= _CLOUD_NAMES
 
 
 def is_channel_cloud(definition: Definition) -> bool:
-    """Tell whether a message is laid out as sensor_msgs/PointCloud."""
+    """Return whether a message is laid out as sensor_msgs/PointCloud."""
     return definition.names >= {"points", "channels"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shape:
-    """How one point lies in memory, and what of it is used."""
+    """The memory layout of a point, and the plan for reading it."""
 
     dtype: np.dtype[Any]
     plan: ColumnPlan
@@ -45,7 +45,7 @@ def _no_known() -> dict[bytes, _Shape]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CloudLayout:
-    """Reads PointCloud2. The description of the fields is parsed once, then recognised by its bytes."""
+    """Reads PointCloud2. The field description is parsed once, then recognised by its bytes."""
 
     definition: Definition
     plan: ColumnPlan
@@ -56,7 +56,7 @@ class CloudLayout:
 
     @classmethod
     def recognise(cls, definition: Definition, payload: bytes) -> "CloudLayout | None":
-        """Look at a first message; None where it holds no positions."""
+        """Recognise the layout from a first message; None if it contains no positions."""
         message = decode(definition, payload)
         plan = plan_for("cloud", _point_dtype(message, payload_byte_order(payload, definition)).names or ())
         if plan is None:
@@ -66,14 +66,14 @@ class CloudLayout:
 
     @property
     def description(self) -> str:
-        """Say what is read."""
+        """Describe what is read."""
         return self.plan.describe()
 
     def returns(self, payload: bytes) -> Returns:
         """Read one cloud.
 
         Raises:
-            MessageError: the message contradicts itself.
+            MessageError: the message is inconsistent.
         """
         fast = self._by_known_bytes(payload)
         if fast is not None:
@@ -85,7 +85,7 @@ class CloudLayout:
         dtype = _point_dtype(message, order)
         plan = plan_like(self.plan, "cloud", dtype.names or ())
         if plan is None:
-            raise MessageError(f"a cloud has only the fields {', '.join(dtype.names or ('(none)',))}: no position")
+            raise MessageError(f"a cloud has no position, only the fields {', '.join(dtype.names or ('(none)',))}")
         points = _points(data, dtype, height, width, step)
         if height == 1 and order == "<":
             start = _after_header(payload, self.definition) + 8
@@ -93,14 +93,14 @@ class CloudLayout:
         return _returns(points, plan)
 
     def returns_of_rows(self, rows: np.ndarray, lengths: np.ndarray) -> tuple[Returns, np.ndarray] | None:
-        """Read many one-row clouds at once; None unless all have the frame and the field description of a cloud seen before.
+        """Read many one-row clouds at once; None unless all have the frame and field description of an earlier cloud.
 
         Args:
             rows: (n, size) uint8, whole messages.
-            lengths: (n,) how long each is.
+            lengths: (n,) length of each message.
 
         Returns:
-            the returns of all, and how many each cloud has.
+            all returns, and the number of returns of each cloud.
         """
         try:
             start = _after_header(rows[0].tobytes(), self.definition)
@@ -120,7 +120,7 @@ class CloudLayout:
         return None
 
     def with_plan(self, plan: ColumnPlan) -> "CloudLayout":
-        """Read by another plan."""
+        """Return the same layout with another plan."""
         return replace(self, plan=plan, _known={})
 
     def _remember(self, block: bytes, shape: _Shape) -> None:
@@ -128,7 +128,7 @@ class CloudLayout:
             self._known[block] = shape
 
     def _by_known_bytes(self, payload: bytes) -> Returns | None:
-        """Read a one-row cloud whose field description was seen before; None for any other."""
+        """Read a one-row cloud with a known field description; None for any other."""
         if not self._known:
             return None
         try:
@@ -148,23 +148,23 @@ class CloudLayout:
 
 
 def _after_header(payload: bytes, definition: Definition) -> int:
-    """Return where the fields after the header begin; both serialisations have the frame's length at byte 12."""
+    """Return the offset of the fields after the header; in both serialisations the frame's length is at byte 12."""
     end = 16 + int(struct.unpack_from("<I", payload, 12)[0])
     return end + (-end % 4 if definition.encoding == "cdr" else 0)
 
 
 def _point_dtype(message: Message, order: str) -> np.dtype[Any]:
-    """Build the dtype of one point from the PointField list, holes and all."""
+    """Build the dtype of one point from the PointField list, including padding."""
     step = message.whole("point_step")
     big = bool(message.whole("is_bigendian"))
     names, formats, offsets = [], [], []
     if not 0 < step <= _MAX_POINT_STEP:
-        raise MessageError(f"a cloud has points of {step} bytes; 1 to {_MAX_POINT_STEP} can be read")
+        raise MessageError(f"a cloud has points of {step} bytes; 1 to {_MAX_POINT_STEP} are supported")
     for point_field in message.messages("fields"):
         name, code = point_field.text("name"), _FORMATS.get(point_field.whole("datatype"))
         if code is None:
             raise MessageError(
-                f"cloud field '{name}' has the unknown datatype {point_field.whole('datatype')}; 1 to 8 are known"
+                f"cloud field '{name}' has the unknown datatype {point_field.whole('datatype')}; 1 to 8 are defined"
             )
         offset = point_field.whole("offset")
         if offset + int(code[1]) > step:
@@ -177,12 +177,12 @@ def _point_dtype(message: Message, order: str) -> np.dtype[Any]:
 
 
 def _points_of_rows(rows: np.ndarray, start: int, width: np.ndarray, dtype: np.dtype[Any]) -> np.ndarray:
-    """Return the points of many clouds: (n, width) in place where all clouds are of one size, else behind one another.
+    """Return the points of many clouds: an (n, width) view if all clouds have the same size, otherwise concatenated.
 
     Args:
         rows: (n, size) whole messages.
-        start: where in a row the points begin.
-        width: (n,) how many points each has.
+        start: offset of the points in a row.
+        width: (n,) number of points of each cloud.
         dtype: of a point.
     """
     if (width == width[0]).all():
@@ -197,7 +197,7 @@ def _points_of_rows(rows: np.ndarray, start: int, width: np.ndarray, dtype: np.d
 
 
 def _points(data: np.ndarray, dtype: np.dtype[Any], height: int, width: int, row_step: int) -> np.ndarray:
-    """View the bytes as points, rows that are padded included."""
+    """View the bytes as points, including padded rows."""
     count, used = height * width, width * dtype.itemsize
     if not count:
         return np.zeros(0, dtype=dtype)
@@ -219,7 +219,7 @@ def _returns(points: np.ndarray, plan: ColumnPlan) -> Returns:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelCloudLayout:
-    """Reads sensor_msgs/PointCloud: points as float32 x, y, z, everything else in named channels (Oculii)."""
+    """Reads sensor_msgs/PointCloud: points as float32 x, y, z, and other quantities in named channels (Oculii)."""
 
     definition: Definition
     plan: ColumnPlan
@@ -229,7 +229,7 @@ class ChannelCloudLayout:
 
     @classmethod
     def recognise(cls, definition: Definition, payload: bytes) -> "ChannelCloudLayout | None":
-        """Look at a first message."""
+        """Recognise the layout from a first message."""
         columns = _channel_columns(decode(definition, payload))
         plan = plan_for("channels", columns)
         if plan is None:
@@ -238,14 +238,14 @@ class ChannelCloudLayout:
 
     @property
     def description(self) -> str:
-        """Say what is read."""
+        """Describe what is read."""
         return self.plan.describe()
 
     def returns(self, payload: bytes) -> Returns:
         """Read one cloud.
 
         Raises:
-            MessageError: a column the first message had is missing.
+            MessageError: a column of the first message is missing.
         """
         columns = _channel_columns(decode(self.definition, payload))
         if not len(columns["x"]):
@@ -253,10 +253,10 @@ class ChannelCloudLayout:
         try:
             return returns_from(self.plan, lambda name: columns[name])
         except KeyError as error:
-            raise MessageError(f"a cloud lacks the channel {error}, which the first one has") from error
+            raise MessageError(f"a cloud lacks the channel {error} of the first cloud") from error
 
     def with_plan(self, plan: ColumnPlan) -> "ChannelCloudLayout":
-        """Read by another plan."""
+        """Return the same layout with another plan."""
         return replace(self, plan=plan)
 
 

@@ -1,8 +1,8 @@
-"""The registry of radar layouts: how each is recognised, and what its figures mean.
+"""The registry of radar layouts: how each is recognised, and what its values mean.
 
 A layout is recognised by the names of its fields, as the recording itself declares them, never by the name of a
-package: three packages are called radar_msgs. Of several that fit, the one with the most fields is taken; a message
-that fits none is read by its column names alone (radar_columns).
+package: three packages are called radar_msgs. If several match, the one with the most fields is used; a message
+that matches none is read by its column names alone (columns.py).
 """
 
 from dataclasses import dataclass
@@ -21,19 +21,19 @@ _AWAY = "positive moving away"
 
 @dataclass(frozen=True, slots=True)
 class Decoder:
-    """One layout: what recognises it, what its axes, units and signs are, and where its names mislead.
+    """One layout: how it is recognised, its axes, units and signs, and where its names mislead.
 
     Attributes:
-        name: for people.
+        name: name for display.
         source: the packages or data sets that use it, with the message's name.
         kind: what the fields are fields of.
-        fields: all must be there; case does not matter. Those of lists are of an element, nested ones dotted.
+        fields: all are required; case does not matter. For lists, the fields of an element; nested ones dotted.
         axes: where x, y and z point [m]; for polar messages after their conversion.
         angles: unit and signs of azimuth and elevation.
         speed: sign of the radial speed [m/s], or how it comes about.
         amplitude: unit of the amplitude.
         noise: what the message says about its own noise.
-        note: what else a person should know.
+        note: anything else the user should know.
         assumed: what no document of the layout states, as a sentence; it becomes a warning.
         polar: range, azimuth and perhaps elevation where their names do not say so.
         doppler: the radial speed where its name does not say so.

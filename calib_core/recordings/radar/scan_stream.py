@@ -1,4 +1,4 @@
-"""The stream of radar scans of a recording: decoded in blocks, by window."""
+"""The stream of radar scans of a recording, decoded in blocks and by window."""
 
 import contextlib
 import threading
@@ -32,7 +32,7 @@ _MOST_WINDOW_BYTES = 1 << 23
 
 
 class RadarStream:
-    """The scans of one radar topic, decoded in blocks when asked for.
+    """The scans of one radar topic, decoded in blocks on demand.
 
     Args:
         topic: the radar topic.
@@ -44,7 +44,7 @@ class RadarStream:
     def __init__(self, topic: Topic, layouts: Sequence[RadarLayout], stamps_ns: TimesNs, heads: np.ndarray) -> None:
         self.topic = topic
         self.layout: RadarLayout = layouts[0]
-        """Of the first part; all parts of a driver that sends one return per message share it."""
+        """The layout of the first part; with one return per message, all parts share it."""
         self._layouts = layouts
         self._blocks: OrderedDict[int, RadarScans] = OrderedDict()
         self._lock = threading.Lock()
@@ -59,10 +59,10 @@ class RadarStream:
         self.times_ns: TimesNs = frozen_array(stamps_ns[first][order], (None,), dtype=np.int64)
 
     def _numbers(self, layout: PointLayout, heads: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Read the numbers that tell scans apart; of messages with longer strings than the first, from the whole message."""
+        """Read the numbers that separate scans; if a message's strings are longer than the first's, from the whole message."""
         frame, point = layout.numbers(heads)
         for row in np.flatnonzero(layout.misfits(heads)).tolist():
-            with contextlib.suppress(RecordingError):  # told when the scan itself is read
+            with contextlib.suppress(RecordingError):  # reported when the scan itself is read
                 message = layout.message(self.topic.payload(row))
                 for numbers, name in ((frame, layout.frame_number), (point, layout.point_number)):
                     if numbers is not None and name:
@@ -107,7 +107,7 @@ class RadarStream:
         return block
 
     def windows(self) -> Iterator[RadarScans]:
-        """Decode all scans in order, about as many returns at a time; nothing of it is kept."""
+        """Decode all scans in order, about equally many returns at a time, without caching."""
         first, count = 0, _FIRST_WINDOW_SCANS
         while first < len(self.times_ns):
             scans = self._decoded(np.arange(first, min(first + count, len(self.times_ns))))
@@ -123,7 +123,7 @@ class RadarStream:
         return self._decoded(np.unique(places.astype(np.int64)))
 
     def claims(self, count: int) -> Returns:
-        """Decode of at most count scans the messages' own ranges and angles beside the positions, in the message's own axes."""
+        """Decode ranges and angles as given, and positions in the message's own axes, of at most count scans."""
         layout = self.layout.with_plan(replace(self.layout.plan, claiming=True, axes=None))
         places = np.unique(np.linspace(0, len(self.times_ns) - 1, min(count, len(self.times_ns))).astype(np.int64))
         first, last = self._first[places], np.minimum(self._last[places], self._first[places] + _CLAIMS_OF_A_SCAN)
@@ -135,7 +135,7 @@ class RadarStream:
             return layout.returns_of_rows(heads.rows[whole])
         found = []
         for row in rows.tolist():
-            with contextlib.suppress(RecordingError):  # told when the scan itself is read
+            with contextlib.suppress(RecordingError):  # reported when the scan itself is read
                 found.append(layout.returns(self.topic.payload(row)))
         return _joined(found)
 
@@ -151,7 +151,7 @@ class RadarStream:
         return _stacked(self.times_ns[scans], [len(scan) for scan in returns], _joined(returns))
 
     def _decoded_clouds(self, layout: CloudLayout, scans: np.ndarray) -> RadarScans | None:
-        """Decode clouds that are all alike in one go; None where they have to be read one by one."""
+        """Decode clouds with equal layout at once; None if they must be read one by one."""
         messages = self._first[scans]
         heads = self.topic.heads(messages, self._cloud_bytes)
         longest = int(heads.lengths.max())
@@ -164,7 +164,7 @@ class RadarStream:
         return None if found is None else _stacked(self.times_ns[scans], found[1].tolist(), found[0])
 
     def _returns(self, message: int) -> Returns:
-        """Decode one message; one that cannot be read is an empty scan, and is told."""
+        """Decode one message; an unreadable one becomes an empty scan and is reported."""
         layout = self._layouts[int(self.topic.part[message])]
         assert not isinstance(layout, PointLayout)
         try:
@@ -187,15 +187,15 @@ class RadarStream:
         returns = layout.returns_of_rows(heads.rows)
         if short.any():
             returns.points_radar_m[short] = np.nan
-            self._note_unreadable(dict.fromkeys(messages[short].tolist(), "the message is cut short"))
+            self._note_unreadable(dict.fromkeys(messages[short].tolist(), "the message is truncated"))
         misfits = np.flatnonzero(layout.misfits(heads.rows) & ~short).tolist()
-        returns = _joined([returns, no_returns()]) if misfits else returns  # a copy that can be written to
+        returns = _joined([returns, no_returns()]) if misfits else returns  # a writable copy
         for row in misfits:
             self._reread(layout, int(messages[row]), row, returns)
         return _stacked(self.times_ns[scans], counts.tolist(), returns)
 
     def _reread(self, layout: PointLayout, message: int, row: int, returns: Returns) -> None:
-        """Read a return whose fields lie elsewhere than in the first message, and put it into its row."""
+        """Read a return whose field offsets differ from the first message's, and store it in its row."""
         try:
             single = layout.returns(self.topic.payload(message))
         except MessageError as error:
@@ -224,7 +224,7 @@ def _joined_claims(scans: Sequence[Returns]) -> Points3 | None:
 
 
 def _stacked(times_ns: TimesNs, counts: Sequence[int], returns: Returns) -> RadarScans:
-    """Make scans of returns that nobody else has."""
+    """Build scans from returns that nothing else references."""
     for column in (returns.points_radar_m, returns.doppler_mps, returns.snr_db, returns.sigma_polar):
         column.setflags(write=False)
     return RadarScans(
@@ -253,7 +253,7 @@ def _cut(scans: RadarScans, first: int, last: int) -> RadarScans:
 
 
 def join_scans(pieces: Sequence[RadarScans]) -> RadarScans:
-    """Put scans behind one another; the pieces must be in order of time."""
+    """Concatenate scans; the pieces must be in time order."""
     if len(pieces) < 2:
         return pieces[0] if pieces else RadarScans()
     counts = np.concatenate([np.diff(piece.first_return) for piece in pieces])

@@ -1,1 +1,1 @@
-"""The clocks of a recording, and times as people write them."""
+"""The clocks of a recording, and parsing and formatting of times."""

@@ -1,4 +1,4 @@
-"""How good the two clocks of a topic are, and which one is used and why."""
+"""Diagnose the two clocks of a topic: how regular they are, which one is used, and why."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -28,27 +28,27 @@ class ClockDiagnosis:
 
     Attributes:
         topic: its name.
-        chosen: the clock its times are by.
-        reason: why, in words.
-        messages: how many were looked at.
-        stamped: the messages carry stamps; without them all that compares stamps is None or 0.
-        zero_stamps: stamps that are zero.
-        from_1970: the stamps are no dates, but count from the start of a device.
-        repeated_stamps: stamps that are the same as the one before.
-        backward_stamps: stamps before the one before.
-        worst_step_back_s: the largest of those steps [s].
-        delay_s: by how much receiving usually lags the stamp [s].
-        delay_jitter_s: median deviation of that from its median [s].
-        drift_ppm: by how much the stamps run fast against receiving, in millionths; None for short recordings.
-        drift_s: what that comes to from beginning to end [s].
-        jumps: how often the delay changes suddenly and stays.
-        largest_jump_s: by how much at most [s].
-        period_s: usual time between scans or images [s]; None with fewer than two.
-        gaps: times between neighbours longer than five periods.
-        longest_gap_s: the longest time between neighbours [s].
-        islands: stretches of data with more than ten seconds of nothing between them.
-        covered_s: how long those stretches are together [s].
-        one_per_return: every message is a single radar return, with a stamp of its own.
+        chosen: the clock used for its times.
+        reason: why that clock was chosen.
+        messages: number of messages examined.
+        stamped: whether the messages have stamps; if not, everything that compares stamps is None or 0.
+        zero_stamps: number of zero stamps.
+        from_1970: the stamps are not dates, but count from the start of a device.
+        repeated_stamps: number of stamps equal to the previous one.
+        backward_stamps: number of stamps earlier than the previous one.
+        worst_step_back_s: the largest such step [s].
+        delay_s: median receive time minus stamp [s].
+        delay_jitter_s: median absolute deviation of that delay from its median [s].
+        drift_ppm: by how much the stamps run faster than the receive times [ppm]; None for short recordings.
+        drift_s: the total drift over the recording [s].
+        jumps: number of sudden, lasting changes of the delay.
+        largest_jump_s: the largest such change [s].
+        period_s: median time between scans or images [s]; None with fewer than two.
+        gaps: number of gaps longer than five periods.
+        longest_gap_s: longest time between consecutive scans or images [s].
+        islands: number of stretches of data separated by pauses of more than ten seconds.
+        covered_s: total length of those stretches [s].
+        one_per_return: every message is a single radar return with its own stamp.
     """
 
     topic: str
@@ -76,25 +76,25 @@ class ClockDiagnosis:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What is worth knowing, in words; empty where all is as it should be."""
+        """Notable observations as text; empty if there are none."""
         found = [
             (self.zero_stamps > 0, f"{self.zero_stamps} of {self.messages} stamps are zero"),
             (self.from_1970, "the stamps count from the start of a device, not from 1970"),
-            (self.one_per_return, "one message per return: the stamps within a scan differ"),
+            (self.one_per_return, "one message per return: stamps differ within a scan"),
             (
                 self.repeated_stamps > 0 and not self.one_per_return,
-                f"{_counted(self.repeated_stamps, 'stamp repeats', 'stamps repeat')} the one before",
+                f"{_counted(self.repeated_stamps, 'stamp repeats', 'stamps repeat')} the previous one",
             ),
             (
                 self.backward_stamps > 0,
-                f"{_counted(self.backward_stamps, 'stamp goes', 'stamps go')} back, by up to {self.worst_step_back_s:.3f} s",
+                f"{_counted(self.backward_stamps, 'stamp goes', 'stamps go')} backwards, by up to {self.worst_step_back_s:.3f} s",
             ),
             (
                 self.jumps > 0,
-                f"the delay jumps {_counted(self.jumps, 'time', 'times')}, by up to {span_text(self.largest_jump_s)}",
+                f"the delay jumps {_counted(self.jumps, 'time', 'times')} by up to {span_text(self.largest_jump_s)}",
             ),
             (self._drifts, f"the stamps drift by {self.drift_s * 1e3:.0f} ms ({self.drift_ppm or 0:.0f} ppm)"),
-            (self.islands > 1, f"{self.islands} stretches of data, {span_text(self.covered_s)} in all"),
+            (self.islands > 1, f"{self.islands} separate stretches of data, {span_text(self.covered_s)} in total"),
             (self.gaps > 0, f"{_counted(self.gaps, 'gap', 'gaps')}, the longest {span_text(self.longest_gap_s)}"),
         ]
         return tuple(text for there, text in found if there)
@@ -113,22 +113,22 @@ def diagnose(
     *,
     times_ns: TimesNs,
     chosen: Literal["header", "receive"],
-    wish: Clock,
+    requested: Clock,
     one_per_return: bool = False,
 ) -> ClockDiagnosis:
-    """Look at both clocks of a topic.
+    """Diagnose both clocks of a topic.
 
     Args:
         stamps: both clocks, message by message in the order received.
-        times_ns: (k,) the times in use, of scans or images, ascending.
-        chosen: the clock those are by.
-        wish: the clock a person asked for.
+        times_ns: (k,) the times of scans or images in use, ascending.
+        chosen: the clock of those times.
+        requested: the clock the user asked for.
         one_per_return: every message is a single radar return.
     """
     found = ClockDiagnosis(
         stamps.topic,
         chosen,
-        _reason(stamps, chosen, wish),
+        _reason(stamps, chosen, requested),
         len(stamps.receive_ns),
         stamps.header_ns is not None,
         one_per_return=one_per_return,
@@ -137,24 +137,26 @@ def diagnose(
     if stamps.header_ns is None or not len(stamps.header_ns):
         return found
     found = _with_delay(_with_order(found, stamps.header_ns), stamps.header_ns, stamps.receive_ns)
-    if chosen == "header" and wish == "auto" and (found.jumps or found._drifts):
-        return replace(found, reason="the stamps are dates in order, although they do not keep step with receiving")
+    if chosen == "header" and requested == "auto" and (found.jumps or found._drifts):
+        return replace(
+            found, reason="the stamps are in order, although they jump or drift relative to the receive times"
+        )
     return found
 
 
-def _reason(stamps: Stamps, chosen: str, wish: Clock) -> str:
-    if wish != "auto":
-        return f"it was asked for with --clock {wish}"
+def _reason(stamps: Stamps, chosen: str, requested: Clock) -> str:
+    if requested != "auto":
+        return f"--clock {requested} was given"
     fault = header_fault(stamps)
     if chosen == "header":
         return (
-            "the stamps are sound" if fault is None else "the stamps are no dates, but both sensors have the same clock"
+            "the stamps are sound" if fault is None else "the stamps are not dates, but both sensors use the same clock"
         )
-    return f"it {fault}" if fault else "its stamps and the other sensor's cannot be compared"
+    return f"it {fault}" if fault else "its stamps cannot be compared with the other sensor's"
 
 
 def between_islands(steps_s: Values) -> np.ndarray:
-    """Tell which steps in time (n,) [s] are pauses that part the data into islands."""
+    """Return which time steps (n,) [s] are long pauses that separate stretches of data (islands)."""
     return steps_s > max(_ISLAND_S, _GAP_PERIODS * float(np.median(steps_s)))
 
 
@@ -188,7 +190,7 @@ def _with_order(found: ClockDiagnosis, header_ns: TimesNs) -> ClockDiagnosis:
 
 
 def _with_delay(found: ClockDiagnosis, header_ns: TimesNs, receive_ns: TimesNs) -> ClockDiagnosis:
-    """Compare both clocks: usual delay, sudden changes, and drift of what is left without them."""
+    """Compare both clocks: median delay, sudden changes, and the drift that remains without them."""
     dated = header_ns != 0
     if not dated.any():
         return found
@@ -200,15 +202,15 @@ def _with_delay(found: ClockDiagnosis, header_ns: TimesNs, receive_ns: TimesNs) 
     if len(lag_s) < 4 * _WINDOW:
         return found
     blocks = len(lag_s) // _WINDOW
-    calm_s = np.median(lag_s[: blocks * _WINDOW].reshape(blocks, _WINDOW), axis=1)
-    steps_s = np.diff(calm_s)
+    delays_s = np.median(lag_s[: blocks * _WINDOW].reshape(blocks, _WINDOW), axis=1)
+    steps_s = np.diff(delays_s)
     jumped = np.abs(steps_s) > _JUMP_S
     starts = jumped & ~np.concatenate([[False], jumped[:-1]])
-    calm_s = calm_s - np.concatenate([[0.0], np.cumsum(np.where(jumped, steps_s, 0.0))])
+    delays_s = delays_s - np.concatenate([[0.0], np.cumsum(np.where(jumped, steps_s, 0.0))])
     at_s = received_s[: blocks * _WINDOW].reshape(blocks, _WINDOW).mean(axis=1)
     span_s = float(at_s[-1] - at_s[0])
     if span_s > 0:
-        slope = float(np.polyfit((at_s - at_s[0]) / span_s, calm_s, 1)[0]) / span_s
+        slope = float(np.polyfit((at_s - at_s[0]) / span_s, delays_s, 1)[0]) / span_s
         found = replace(found, drift_ppm=-slope * 1e6, drift_s=-slope * span_s)
     return replace(
         found, jumps=int(np.count_nonzero(starts)), largest_jump_s=float(np.abs(steps_s[jumped]).max(initial=0.0))
@@ -216,7 +218,7 @@ def _with_delay(found: ClockDiagnosis, header_ns: TimesNs, receive_ns: TimesNs) 
 
 
 def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
-    """Say what in the clocks can spoil a calibration."""
+    """Warn about clock problems that can degrade a calibration."""
     warnings = []
     for one in found:
         by_stamps = one.chosen == "header"
@@ -224,27 +226,27 @@ def about_clocks(found: Sequence[ClockDiagnosis]) -> list[DataWarning]:
             warnings.append(
                 DataWarning(
                     "clock-jumps",
-                    f"the stamps of {one.topic} jump against receive time, {_counted(one.jumps, 'time', 'times')} and by up to "
-                    f"{span_text(one.largest_jump_s)}: its clock was set during the recording, or the driver hung",
-                    "compare with --clock receive, and keep only clicks from one side of a jump",
+                    f"the stamps of {one.topic} jump relative to the receive times, {_counted(one.jumps, 'time', 'times')} "
+                    f"and by up to {span_text(one.largest_jump_s)}: its clock was set during the recording, or the driver hung",
+                    "compare with --clock receive, and keep only the clicks before or after the jump",
                 )
             )
         if by_stamps and abs(one.drift_s) > _DRIFT_S:
             warnings.append(
                 DataWarning(
                     "clock-drift",
-                    f"the stamps of {one.topic} drift against receive time by {abs(one.drift_s) * 1e3:.0f} ms in all "
-                    f"({abs(one.drift_ppm or 0):.0f} ppm): its clock is not kept in step with the recorder's",
-                    "use one clock for both sensors (PTP or NTP), or --clock receive",
+                    f"the stamps of {one.topic} drift relative to the receive times by {abs(one.drift_s) * 1e3:.0f} ms in total "
+                    f"({abs(one.drift_ppm or 0):.0f} ppm): its clock is not synchronized with the recorder's",
+                    "synchronize the clocks of both sensors (PTP or NTP), or use --clock receive",
                 )
             )
         if one.islands > 1:
             warnings.append(
                 DataWarning(
                     "islands",
-                    f"{one.topic} comes in {one.islands} stretches with up to {span_text(one.longest_gap_s)} of nothing between "
-                    f"them: {span_text(one.covered_s)} of data in all",
-                    "click only where both sensors have data; if the stretches should be one, files may be missing",
+                    f"{one.topic} has {one.islands} stretches of data separated by up to {span_text(one.longest_gap_s)}: "
+                    f"{span_text(one.covered_s)} of data in total",
+                    "click only where both sensors have data; if there should be no gaps, files may be missing",
                 )
             )
     return warnings

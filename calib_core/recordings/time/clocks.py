@@ -1,7 +1,7 @@
-"""Which of the two clocks of a recording to trust: the stamp in the message, or the recorder's.
+"""Choose between the two clocks of a recording: the stamps in the messages and the recorder's receive times.
 
-Header stamps are the time of measurement and the default. They are left for the receive times where they cannot be
-right, and then the other sensor must not silently stay on another clock.
+Header stamps are the time of measurement and the default. Receive times are used if the stamps cannot be right; the
+other sensor must then not silently stay on a different clock.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Stamps:
     Attributes:
         topic: its name.
         receive_ns: (n,) the recorder's clock.
-        header_ns: (n,) the stamps in the messages; None where they carry none.
+        header_ns: (n,) the stamps in the messages; None if they carry none.
     """
 
     topic: str
@@ -41,18 +41,18 @@ class Stamps:
 
     @property
     def offset_ns(self) -> float:
-        """By how much receiving usually lags the stamp [ns]."""
+        """Median of receive time minus stamp [ns]."""
         assert self.header_ns is not None
         return float(np.median(self.receive_ns - self.header_ns))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClockChoice:
-    """The clock each topic goes by.
+    """The clock chosen for each topic.
 
     Attributes:
-        clocks: "header" or "receive", topic by topic in the order asked.
-        warnings: what a person must know about it.
+        clocks: "header" or "receive" for each topic, in the order given.
+        warnings: what the user must know about it.
     """
 
     clocks: tuple[Literal["header", "receive"], ...]
@@ -60,22 +60,22 @@ class ClockChoice:
 
 
 def header_fault(stamps: Stamps) -> str | None:
-    """Say why the header stamps of a topic cannot be used, in words that follow its name; None where they can."""
+    """Explain why the header stamps of a topic cannot be used, as a phrase that follows its name; None if they can."""
     header, n = stamps.header_ns, len(stamps.receive_ns)
     if header is None:
-        return "carries no stamps"
+        return "has no stamps"
     if n == 0:
         return None
     zero = int(np.count_nonzero(header == 0))
     if zero == n:
-        return f"has stamps that are all zero ({n} messages)"
+        return f"has only zero stamps ({n} messages)"
     if n > 1 and np.all(header == header[0]):
-        return f"has the same stamp in all of its {n} messages"
+        return f"has the same stamp in all {n} messages"
     if zero > _MANY * n:
-        return f"has {zero} of {n} stamps that are zero"
+        return f"has {zero} zero stamps in {n} messages"
     if _ancient(header) and not _ancient(stamps.receive_ns):
         seconds = float(np.median(header)) / NS_PER_S
-        return f"has stamps from the year 1970 ({seconds:.3f} s), counted from the start of a device and not as a date"
+        return f"has stamps from the year 1970 ({seconds:.3f} s), which count from the start of a device"
     return _disorder(header[header != 0])
 
 
@@ -88,20 +88,20 @@ def _disorder(header: TimesNs) -> str | None:
     back = int(np.count_nonzero(steps < 0))
     worst_s = -float(steps.min(initial=0)) / NS_PER_S
     if back > max(1, _MANY * len(steps)) or worst_s > 1.0:
-        return f"has {back} stamps of {len(header)} that go backwards, by up to {worst_s:.3f} s"
+        return f"has {back} of {len(header)} stamps that go backwards, by up to {worst_s:.3f} s"
     return None
 
 
-def choose_clocks(radar: Stamps, camera: Stamps, wish: Clock = "auto") -> ClockChoice:
+def choose_clocks(radar: Stamps, camera: Stamps, requested: Clock = "auto") -> ClockChoice:
     """Choose the clock of both sensors so that their times can be compared.
 
     Args:
-        radar: the radar's stamps; for drivers that send one message per return, message by message.
-        camera: the camera's.
-        wish: "auto", or the clock a person asked for.
+        radar: the radar's stamps; for drivers that send one message per return, one per message.
+        camera: the camera's stamps.
+        requested: "auto", or the clock the user asked for.
     """
-    if wish != "auto":
-        return ClockChoice((wish, wish), ())
+    if requested != "auto":
+        return ClockChoice((requested, requested), ())
     both = (radar, camera)
     faults = tuple(header_fault(stamps) for stamps in both)
     if faults == (None, None) or (_from_boot(radar) and _from_boot(camera) and _near(radar, camera)):
@@ -113,12 +113,12 @@ def choose_clocks(radar: Stamps, camera: Stamps, wish: Clock = "auto") -> ClockC
             if abs(lag_s) <= 1.0:
                 clocks: tuple[Literal["header", "receive"], ...] = ("receive", "header")
                 return ClockChoice(clocks if number else clocks[::-1], tuple(warnings))
-            warnings.append(_mixed(f"the stamps of {sound.topic} are {span_text(lag_s)} away from receive time"))
+            warnings.append(_mixed(f"the stamps of {sound.topic} differ from the receive times by {span_text(lag_s)}"))
     return ClockChoice(("receive", "receive"), tuple(warnings))
 
 
 def _from_boot(stamps: Stamps) -> bool:
-    """Tell whether stamps are sound but count from 1970: simulated time, or a machine without a date."""
+    """Return whether stamps are sound but close to 1970: simulated time, or a machine whose date is not set."""
     if stamps.header_ns is None or not len(stamps.header_ns) or not stamps.header_ns.any():
         return False
     constant = len(stamps.header_ns) > 1 and bool(np.all(stamps.header_ns == stamps.header_ns[0]))
@@ -133,13 +133,11 @@ def _both_usable(radar: Stamps, camera: Stamps) -> ClockChoice:
     if not (len(radar.receive_ns) and len(camera.receive_ns)):
         return ClockChoice(("header", "header"), ())
     if _near(radar, camera):
-        worst_s = _parting_s(radar, camera)
+        worst_s = _divergence_s(radar, camera)
         if worst_s <= _AGREE_NS / NS_PER_S:
             return ClockChoice(("header", "header"), ())
-        parting = (
-            f"the stamps of {radar.topic} and {camera.topic} part during the recording, by up to {span_text(worst_s)}"
-        )
-        return ClockChoice(("receive", "receive"), (_mixed(parting),))
+        divergence = f"the stamps of {radar.topic} and {camera.topic} diverge during the recording, by up to {span_text(worst_s)}"
+        return ClockChoice(("receive", "receive"), (_mixed(divergence),))
     assert radar.header_ns is not None
     assert camera.header_ns is not None
     if not _overlap(radar.receive_ns, camera.receive_ns) and _overlap(radar.header_ns, camera.header_ns):
@@ -147,24 +145,28 @@ def _both_usable(radar: Stamps, camera: Stamps) -> ClockChoice:
     apart_s = (radar.offset_ns - camera.offset_ns) / NS_PER_S
     return ClockChoice(
         ("receive", "receive"),
-        (_mixed(f"the stamps of {radar.topic} and {camera.topic} are on clocks {span_text(apart_s)} apart"),),
+        (
+            _mixed(
+                f"the stamps of {radar.topic} and {camera.topic} come from clocks that are {span_text(apart_s)} apart"
+            ),
+        ),
     )
 
 
-def _parting_s(radar: Stamps, camera: Stamps) -> float:
-    """Return by how much the delays of both differ at worst [s], for more than a few messages; 0 in short recordings.
+def _divergence_s(radar: Stamps, camera: Stamps) -> float:
+    """Return the largest difference between both delays [s], ignoring a few outliers; 0 for short recordings.
 
-    A clock that is set or drifts on the way does that to one of them; the recorder's own clock does it to both alike.
+    A sensor clock that drifts or is set during the recording changes one delay; the recorder's own clock changes both.
     """
-    (at_ns, lag_s), (other_ns, other_s) = _calm_lags(radar), _calm_lags(camera)
+    (at_ns, lag_s), (other_ns, other_s) = _median_lags(radar), _median_lags(camera)
     if min(len(at_ns), len(other_ns)) < _FEWEST_BLOCKS:
         return 0.0
     apart_s = np.abs(lag_s - np.interp(at_ns, other_ns, other_s))
     return float(np.quantile(apart_s, 1.0 - _FEW_BLOCKS))
 
 
-def _calm_lags(stamps: Stamps) -> tuple[np.ndarray, np.ndarray]:
-    """Return times of receiving [ns] and median delays [s] of eleven messages each, in a thousand places at most."""
+def _median_lags(stamps: Stamps) -> tuple[np.ndarray, np.ndarray]:
+    """Return receive times [ns] and median delays [s] of blocks of eleven messages, for at most a thousand blocks."""
     assert stamps.header_ns is not None
     dated = np.flatnonzero(stamps.header_ns)
     blocks = len(dated) // _BLOCK
@@ -182,25 +184,25 @@ def _overlap(a: TimesNs, b: TimesNs) -> bool:
 def _mixed(why: str) -> DataWarning:
     return DataWarning(
         "mixed-clocks",
-        f"{why}, so receive times are used for both sensors",
-        "receive times include the delay of the drivers: stand still longer at each placement, or choose the clock yourself "
-        "(--clock header or --clock receive)",
+        f"{why}: receive times are used for both sensors",
+        "receive times include driver delays: keep the reflector still for longer at each placement, or choose the clock "
+        "yourself (--clock header or --clock receive)",
     )
 
 
 def _fell_back(stamps: Stamps, fault: str) -> DataWarning:
     return DataWarning(
         "stamps-unusable",
-        f"{stamps.topic} {fault}; the time of receiving is used instead",
-        "receive times include the delay of the driver: stand still longer at each placement, and have the driver fill in "
-        "header.stamp next time",
+        f"{stamps.topic} {fault}; receive times are used instead",
+        "receive times include the driver delay: keep the reflector still for longer at each placement, and have the driver "
+        "fill in header.stamp next time",
     )
 
 
-def choose_clock(stamps: Stamps, wish: Clock = "auto") -> ClockChoice:
-    """Choose the clock of a topic that stands alone."""
-    if wish != "auto":
-        return ClockChoice((wish,), ())
+def choose_clock(stamps: Stamps, requested: Clock = "auto") -> ClockChoice:
+    """Choose the clock of a single topic."""
+    if requested != "auto":
+        return ClockChoice((requested,), ())
     fault = header_fault(stamps)
     if fault is None or _from_boot(stamps):
         return ClockChoice(("header",), ())

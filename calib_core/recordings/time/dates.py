@@ -1,4 +1,4 @@
-"""Stamps as dates, for people."""
+"""Format stamps and durations as text."""
 
 from datetime import UTC, datetime
 
@@ -8,7 +8,7 @@ __all__ = ["span_text", "utc"]
 
 
 def utc(time: TimeNs) -> str:
-    """Write a stamp as date and time with milliseconds, UTC."""
+    """Format a stamp as UTC date and time with milliseconds."""
     seconds, rest = divmod(int(time), NS_PER_S)
     try:
         moment = datetime.fromtimestamp(seconds, tz=UTC)
@@ -18,7 +18,7 @@ def utc(time: TimeNs) -> str:
 
 
 def span_text(seconds: float) -> str:
-    """Write how far times are apart, in the unit that keeps it short."""
+    """Format a time difference in seconds, minutes, hours or days."""
     seconds = abs(seconds)
     for size, unit in ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
         if seconds >= 2 * size:

@@ -1,4 +1,4 @@
-"""Times as people and programs write them: in file names, columns and options. Never through floating point."""
+"""Parse times in file names, columns and options, without floating point."""
 
 import re
 from datetime import UTC, datetime, timedelta
@@ -21,7 +21,7 @@ _YEARS_NS = (978_307_200 * NS_PER_S, 4_102_444_800 * NS_PER_S)
 def time_from_name(stem: str) -> TimeNs | None:
     """Find the time since 1970 in a file's name: 19 digits are ns, 16 us, 13 ms, 10 s, with a fraction or without.
 
-    Several numbers may be in a name; the last that is a time between 2001 and 2100 counts.
+    If a name has several numbers, the last one that is a time between 2001 and 2100 is used.
     """
     found = None
     for match in _IN_NAME.finditer(stem):
@@ -40,7 +40,7 @@ def read_time(text: str, unit: TimeUnit | None = None) -> TimeNs:
 
     Args:
         text: a number, or a date such as 2024-05-01T12:00:00.25+02:00 (without a zone: UTC).
-        unit: of the number; by the count of its digits when not given.
+        unit: of the number; if not given, derived from the number of digits.
 
     Raises:
         RecordingError: it is neither.
@@ -53,7 +53,7 @@ def read_time(text: str, unit: TimeUnit | None = None) -> TimeNs:
     unit = unit or _UNIT_OF_DIGITS.get(len(whole))
     if unit is None:
         raise RecordingError(
-            f"'{text}' has {len(whole)} digits, so its unit cannot be told; 10 are taken as seconds, 13 ms, 16 us, 19 ns"
+            f"'{text}' has {len(whole)} digits, which does not determine its unit; 10 digits mean s, 13 ms, 16 us, 19 ns"
         )
     if len(whole) > 19:
         raise RecordingError(f"'{text[:40]}' has {len(whole)} digits, too many for a time")
@@ -61,7 +61,7 @@ def read_time(text: str, unit: TimeUnit | None = None) -> TimeNs:
     digits = (fraction or "").ljust(9, "0")[:9]
     time = (-1 if sign == "-" else 1) * (int(whole) * scale + int(digits) * scale // NS_PER_S)
     if abs(time) >= 1 << 63:
-        raise RecordingError(f"'{text}' {unit} is no time; look at its unit")
+        raise RecordingError(f"'{text}' {unit} is not a valid time; check its unit")
     return TimeNs(time)
 
 
@@ -72,7 +72,7 @@ def _read_date(text: str) -> TimeNs:
         moment = datetime.fromisoformat(re.sub(r"\.\d+", "", text))
     except ValueError as error:
         raise RecordingError(
-            f"'{text}' is no time; write seconds since 1970 (1714557600.25) or a date (2024-05-01T12:00:00.25+02:00)"
+            f"'{text}' is not a time; write seconds since 1970 (1714557600.25) or a date (2024-05-01T12:00:00.25+02:00)"
         ) from error
     moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
     seconds = (moment - _EPOCH) // timedelta(seconds=1)

@@ -6,7 +6,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from app.cli.flags import SimulationFlags
+from app.cli.simulate import SimulationFlags
 from calib_core.camera import CAMERA_MODELS, CameraModel
 from calib_core.errors import InputError
 from calib_core.interchange import camera_info_text, read_camera

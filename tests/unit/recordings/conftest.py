@@ -1,4 +1,4 @@
-"""Recordings written with rosbags, message by message: the other side of the reader under test."""
+"""Write recordings with rosbags, message by message, as the counterpart of the reader under test."""
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
@@ -69,7 +69,7 @@ class Ros:
     def cloud(
         self, stamp_ns: int, points: np.ndarray, *, padding: int = 0, height: int = 1, frame: str = "radar"
     ) -> Any:
-        """Build a PointCloud2 from a structured array, holes and byte order as they are."""
+        """Build a PointCloud2 from a structured array, keeping padding and byte order."""
         dtype = points.dtype
         point_field = self.store.types["sensor_msgs/msg/PointField"]
         assert dtype.fields is not None
@@ -149,7 +149,7 @@ Row = tuple[str, int, Any]
 
 
 def write_rows(path: Path, ros: Ros, rows: Iterable[Row], container: str) -> Path:
-    """Write rows in the order given; return the file."""
+    """Write rows in the given order; return the file."""
     kind, _, compression = container.partition("-")
     if kind == "bag":
         writer1 = Writer1(path)
@@ -234,7 +234,7 @@ POINTS = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("velocity", "<f4")
 
 
 def some_points(n: int = 3, shift: float = 0.0) -> np.ndarray:
-    """Return n points of the plainest radar cloud."""
+    """Return n points of the simplest radar cloud."""
     points = np.zeros(n, dtype=POINTS)
     points["x"] = 3.0 + np.arange(n) + shift
     points["y"] = 0.5 - np.arange(n)
@@ -261,11 +261,11 @@ def plain_rows(
 
 @pytest.fixture
 def plain() -> Callable[..., list[Row]]:
-    """Return the function that makes an ordinary recording."""
+    """Return the function that builds an ordinary recording."""
     return plain_rows
 
 
 @pytest.fixture
 def cloud_points() -> Callable[..., np.ndarray]:
-    """Return the function that makes points of the plainest radar cloud."""
+    """Return the function that builds points of the simplest radar cloud."""
     return some_points

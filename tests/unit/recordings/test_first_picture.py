@@ -1,4 +1,4 @@
-"""The first picture comes from the beginning of a file, and little else is read."""
+"""The first picture is read from the beginning of a file, and little else is read."""
 
 from typing import Any
 
@@ -72,7 +72,7 @@ def test_little_of_a_large_bag_is_read_for_it(ros1, plain, jpeg, write, monkeypa
     assert sum(read) < 1_000_000
 
 
-def test_gaps_behind_the_chunks_of_a_bag_are_not_read(ros1, plain, jpeg, tmp_path, monkeypatch):
+def test_gaps_after_the_chunks_of_a_bag_are_not_read(ros1, plain, jpeg, tmp_path, monkeypatch):
     path = tmp_path / "gaps.bag"
     writer = Writer(path)
     topics: dict[str, Any] = {}
@@ -110,7 +110,7 @@ def test_a_file_without_its_end_has_no_first_picture_before_it_is_opened(keep, r
     assert first_picture([path]) is None
 
 
-def test_what_is_no_recording_of_ros_has_no_first_picture(tmp_path):
+def test_files_that_are_not_ros_recordings_have_no_first_picture(tmp_path):
     (tmp_path / "a.txt").write_text("nothing")
     assert first_picture([tmp_path / "a.txt"]) is None
     assert first_picture([tmp_path]) is None

@@ -1,4 +1,4 @@
-"""What `cocalib info` says."""
+"""The text that `cocalib info` prints."""
 
 import json
 
@@ -32,10 +32,10 @@ time      2023-11-14 22:13:20.030 UTC to 2023-11-14 22:13:21.950 UTC, 1.9 s
           radar and camera overlap for 1.9 s
 
 used as     topic                     type                         messages     rate  longest gap  jitter  clock
-intrinsics  /camera/camera_info       sensor_msgs/CameraInfo             20  10.0 Hz      0.100 s  0.0 ms  received
-camera      /camera/image/compressed  sensor_msgs/CompressedImage        20  10.0 Hz      0.100 s  0.0 ms  measured
-            /odd                      std_msgs/String                     1                                received
-radar       /radar/points             sensor_msgs/PointCloud2            20  10.0 Hz      0.100 s  0.0 ms  measured
+intrinsics  /camera/camera_info       sensor_msgs/CameraInfo             20  10.0 Hz      0.100 s  0.0 ms  receive
+camera      /camera/image/compressed  sensor_msgs/CompressedImage        20  10.0 Hz      0.100 s  0.0 ms  header
+            /odd                      std_msgs/String                     1                                receive
+radar       /radar/points             sensor_msgs/PointCloud2            20  10.0 Hz      0.100 s  0.0 ms  header
 
 clocks    /camera/image/compressed: header stamps, because the stamps are sound
             received 30.0 ms after the stamp (± 0.0 ms)
@@ -55,7 +55,7 @@ warning   /radar/points has the same height (0 m) for every return: it measures 
 
 
 @pytest.mark.parametrize("part", ["radar", "camera", "nothing"])
-def test_a_recording_that_lacks_something_is_described_all_the_same(part, ros, write, plain, jpeg):
+def test_an_incomplete_recording_is_described(part, ros, write, plain, jpeg):
     rows = [row for row in plain(ros, jpeg) if part in row[0]]
     with inspect_recording(write(ros, rows)) as recording:
         text = describe(recording)
@@ -79,14 +79,14 @@ def test_the_summary_survives_json(ros, write, plain, jpeg):
 
 
 @pytest.mark.parametrize("encoding", ["bgr8", "bayer_rggb8", "mono8"])
-def test_raw_pixels_are_called_by_their_encoding(ros, write, encoding):
+def test_raw_pixels_are_described_by_their_encoding(ros, write, encoding):
     pixels = np.zeros((48, 64 * (3 if encoding == "bgr8" else 1)), dtype=np.uint8)
     message = ros.image(START_NS, pixels, encoding, width=64)
     with inspect_recording(write(ros, [("/camera/image_raw", START_NS, message)])) as recording:
         assert f"64 x 48 px, raw {encoding}" in describe(recording)
 
 
-def test_a_png_is_called_one_whatever_its_message_says(ros, write):
+def test_a_png_is_described_as_png_whatever_its_message_says(ros, write):
     png = cv2.imencode(".png", np.zeros((48, 64, 3), np.uint8))[1].tobytes()
     with inspect_recording(write(ros, [("/camera/image", START_NS, ros.compressed(START_NS, png))])) as recording:
         assert "64 x 48 px, png" in describe(recording)
@@ -95,4 +95,4 @@ def test_a_png_is_called_one_whatever_its_message_says(ros, write):
 def test_what_cannot_be_read_is_explained(ros1, write):
     message = ros1.compressed(START_NS, b"qoif" + bytes(30), "qoi")
     with inspect_recording(write(ros1, [("/camera/qoi", START_NS, message)])) as recording:
-        assert "topic /camera/qoi: the encoding 'qoi' is not supported" in describe(recording)
+        assert "topic /camera/qoi: the encoding 'qoi' cannot be read" in describe(recording)

@@ -1,4 +1,4 @@
-"""Every container opens, gives the same values, and refuses in words."""
+"""Every container opens, gives the same values, and fails with a clear error."""
 
 import shutil
 import struct
@@ -37,7 +37,7 @@ def test_every_container_gives_the_same_scans_frames_and_camera(container, conta
         assert recording.warnings == ()
 
 
-def test_a_folder_a_data_file_and_a_suffix_that_lies_open_alike(ros2, write, plain, jpeg, tmp_path):
+def test_a_folder_a_data_file_and_a_wrong_suffix_open_alike(ros2, write, plain, jpeg, tmp_path):
     file = write(ros2, plain(ros2, jpeg), "db3")
     lying = shutil.copy(file, tmp_path / "surprise.bag")
     above = tmp_path / "above"
@@ -65,7 +65,7 @@ def test_a_topic_split_over_files_is_joined_in_order_of_time(ros1, write, plain,
         assert recording.image_bytes(19).data == jpeg
 
 
-def test_the_same_messages_in_two_files_are_used_once_and_said(ros1, ros2, write, plain, jpeg):
+def test_the_same_messages_in_two_files_are_used_once_with_a_warning(ros1, ros2, write, plain, jpeg):
     paths = [write(ros1, plain(ros1, jpeg)), write(ros2, plain(ros2, jpeg))]
     with open_recording(paths) as recording:
         assert len(recording.radar_times) == 20
@@ -150,7 +150,7 @@ def test_a_missing_file_is_named(tmp_path):
     assert "no recording given" in refusal([])
 
 
-def test_an_empty_file_is_said_to_be_empty(tmp_path):
+def test_an_empty_file_is_reported_as_empty(tmp_path):
     path = tmp_path / "empty.bag"
     path.touch()
     assert refusal(path).startswith(f"{path}: the file is empty (0 bytes)")
@@ -160,12 +160,12 @@ def test_an_empty_file_is_said_to_be_empty(tmp_path):
     ("content", "words"),
     [
         (b"hello world, I am text", "not a recording (it begins with b'hello wo')"),
-        (b"\x28\xb5\x2f\xfd" + bytes(20), "compressed as a whole with Zstandard, and nothing can be unpacked"),
+        (b"\x28\xb5\x2f\xfd" + bytes(20), "the Zstandard-compressed file cannot be decompressed"),
         (b"PK\x03\x04" + bytes(20), "zip"),
-        (b"#ROSBAG V1.2\n", "version 1.2; only 2.0 can be read: rosbag migrate"),
+        (b"#ROSBAG V1.2\n", "version 1.2; only 2.0 is supported: rosbag migrate"),
     ],
 )
-def test_a_file_that_is_no_recording_is_told_apart(tmp_path, content, words):
+def test_a_file_that_is_not_a_recording_is_identified(tmp_path, content, words):
     path = tmp_path / "what.bag"
     path.write_bytes(content)
     assert words in refusal(path)
@@ -174,15 +174,15 @@ def test_a_file_that_is_no_recording_is_told_apart(tmp_path, content, words):
 def test_an_empty_folder_and_a_folder_with_a_missing_file_are_refused(tmp_path, ros2, write, plain, jpeg):
     folder = tmp_path / "nothing"
     folder.mkdir()
-    assert "the folder holds no recording" in refusal(folder)
+    assert "the folder contains no recording" in refusal(folder)
     file = write(ros2, plain(ros2, jpeg), "mcap")
     file.rename(tmp_path / "moved.mcap")
-    assert f"metadata.yaml lists {file.name}, which is not there" in refusal(file.parent)
+    assert f"metadata.yaml lists {file.name}, which does not exist" in refusal(file.parent)
 
 
 def test_a_recording_without_messages_is_refused_but_can_be_inspected(container, container_ros, write):
     path = write(container_ros, [], container)
-    assert "holds no messages" in refusal(path)
+    assert "contains no messages" in refusal(path)
     with inspect_recording(path) as recording:
         assert recording.topics == ()
 
@@ -193,7 +193,7 @@ def test_a_recording_without_radar_or_camera_names_what_there_is(ros, write, pla
     assert "no readable camera image topic; topics: /radar/points (sensor_msgs/" in text
     assert "--image-topic" in text
     camera = write(ros, [row for row in plain(ros, jpeg) if "camera" in row[0]], name="camera")
-    assert "no radar topic that can be read" in refusal(camera)
+    assert "no readable radar topic" in refusal(camera)
     with inspect_recording(radar) as recording:
         assert recording.image_topic is None
         assert len(recording.image_times) == 0
@@ -213,7 +213,7 @@ def test_a_wrong_choice_of_topic_names_the_right_ones(ros, write, plain, jpeg):
     assert "camera info topics: /camera/camera_info" in text
 
 
-def test_sensors_without_a_time_in_common_are_refused_with_both_intervals(ros, write, plain, jpeg):
+def test_sensors_that_do_not_overlap_in_time_are_refused_with_both_intervals(ros, write, plain, jpeg):
     rows = plain(ros, jpeg)
     day_ns = 86_400 * NS_PER_S
     radar = write(ros, [row for row in rows if "radar" in row[0]], name="radar")
@@ -227,7 +227,7 @@ def test_sensors_without_a_time_in_common_are_refused_with_both_intervals(ros, w
         assert [warning.code for warning in recording.warnings] == ["no-overlap"]
 
 
-def test_a_damaged_definition_of_another_topic_harms_nothing(ros1, write, plain, jpeg):
+def test_a_damaged_definition_of_another_topic_does_no_harm(ros1, write, plain, jpeg):
     ros1.define("odd_msgs/msg/Odd", "Header header\nfloat32 value\n")
     odd = ros1.new("odd_msgs/msg/Odd", header=ros1.header(START_NS), value=1.0)
     path = write(ros1, [*plain(ros1, jpeg), ("/odd", START_NS, odd)])
@@ -241,7 +241,7 @@ def test_a_damaged_definition_of_another_topic_harms_nothing(ros1, write, plain,
         assert len(recording.radar_scans()) == 20
 
 
-def test_a_damaged_message_of_another_topic_harms_nothing(ros, write, plain, jpeg):
+def test_a_damaged_message_of_another_topic_does_no_harm(ros, write, plain, jpeg):
     ros.define("log_msgs/msg/Line", "Header header\nstring text\nfloat32 level\n")
     line = ros.new("log_msgs/msg/Line", header=ros.header(START_NS), text="all is well", level=1.0)
     path = write(ros, [*plain(ros, jpeg), ("/log", START_NS, line)], "bag" if ros.generation == 1 else "db3")

@@ -1,4 +1,4 @@
-"""The camera as a video: the same JPEG, at the recorded times."""
+"""Writing the camera as a video: the same JPEG, at the recorded times."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def test_every_frame_is_in_the_video_as_recorded_at_its_recorded_time(ros, write
     assert [path.name for path in tmp_path.glob("*.part")] == []
 
 
-def test_png_is_encoded_and_frames_that_do_not_fit_are_left_out_and_counted(ros1, write, jpeg, tmp_path):
+def test_png_is_encoded_and_unusable_frames_are_skipped_and_counted(ros1, write, jpeg, tmp_path):
     pytest.importorskip("av")
     import cv2
 
@@ -58,7 +58,9 @@ def test_png_is_encoded_and_frames_that_do_not_fit_are_left_out_and_counted(ros1
     assert [data[:2] for _, data in packets(tmp_path / "camera.mp4")] == [b"\xff\xd8"] * 3
 
 
-def test_another_suffix_and_a_missing_library_are_said_and_leave_no_file(ros1, write, jpeg, tmp_path, monkeypatch):
+def test_an_unsupported_suffix_or_a_missing_library_is_an_error_and_leaves_no_file(
+    ros1, write, jpeg, tmp_path, monkeypatch
+):
     path = write(ros1, camera_rows(ros1, [jpeg]))
     with open_recording(path, require=("image",)) as recording:
         with pytest.raises(InputError, match=r"unsupported video format; use \.mp4, \.mov, \.mkv"):

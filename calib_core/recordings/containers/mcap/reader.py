@@ -1,4 +1,4 @@
-"""MCAP files: the index from the summary; walked over where there is none."""
+"""Read MCAP files: index from the summary, or by scanning the file if there is none."""
 
 import struct
 import zlib
@@ -46,7 +46,7 @@ class McapSource(ChunkedSource):
 
     Args:
         file: the file.
-        first_of: read only the chunks with which these channels begin, and refuse a file without an index; None reads all.
+        first_of: read only the first chunks of these channels, and refuse a file without an index; None reads all.
     """
 
     format_name = "MCAP"
@@ -65,7 +65,7 @@ class McapSource(ChunkedSource):
     # -- opening
 
     def _open(self) -> None:
-        """Read the index, or make one."""
+        """Read the index, or build one."""
         closed, indexed = True, False
         try:
             summary = self._summary_start()
@@ -80,7 +80,7 @@ class McapSource(ChunkedSource):
         self._found.clear()
 
     def _summary_start(self) -> int | None:
-        """Return where the summary begins, 0 for a file without one, None for a file that was not closed."""
+        """Return the position of the summary; 0 for a file without one, None for a file that was not closed."""
         tail = self.file.up_to(max(0, self.size_bytes - _TAIL_BYTES), _TAIL_BYTES)
         if len(tail) < _TAIL_BYTES or tail[-8:] != MAGIC or tail[0] != FOOTER:
             return None
@@ -89,12 +89,12 @@ class McapSource(ChunkedSource):
 
     def _damaged(self, position: int) -> RecordingError:
         return RecordingError(
-            f"{self.path}: the record at byte {position} is damaged or cut short; repair it first: "
+            f"{self.path}: the record at byte {position} is damaged or truncated; repair it first: "
             f"mcap recover {self.path.name}"
         )
 
     def _read_summary(self, start: int) -> bool:
-        """Read the summary and the message indexes; False where the file has to be walked over to know its messages."""
+        """Read the summary and the message indexes; False if the file must be scanned to find its messages."""
         if not self._summary_is_sound(start):
             raise self._damaged(start)
         infos = self._read_chunk_infos(start)
@@ -107,10 +107,10 @@ class McapSource(ChunkedSource):
         return bool(infos) and complete and known >= self._found.keys() and count >= self._counted
 
     def _read_beginning(self, first_of: ChannelFilter) -> None:
-        """Read the indexes of the chunks with which some channels begin.
+        """Read the indexes of the first chunks of some channels.
 
         Raises:
-            RecordingError: the file has no index that says so.
+            RecordingError: the file has no such index.
         """
         start = self._summary_start()
         if not start:
@@ -123,7 +123,7 @@ class McapSource(ChunkedSource):
         self._note_indexes()
 
     def _read_chunk_infos(self, start: int, first_of: ChannelFilter | None = None) -> list[ChunkInfo]:
-        """Read the summary: channels, statistics, and what it says about chunks; all, or until some channels are found."""
+        """Read the summary (channels, statistics, chunk indexes), in full or until some channels are found."""
         infos: list[ChunkInfo] = []
         declared = Declarations()
         stretch = FileStretch(self.file, start, self.size_bytes - _TAIL_BYTES - start)
@@ -149,7 +149,7 @@ class McapSource(ChunkedSource):
         return infos
 
     def _summary_is_sound(self, start: int) -> bool:
-        """Compare the summary, up to the footer's last fields, with the checksum in the footer; 0 there means none."""
+        """Verify the summary section against the checksum in the footer; 0 means no checksum."""
         end = self.size_bytes - len(MAGIC) - 4
         wanted = int.from_bytes(self.file.up_to(end, 4), "little")
         found = 0
@@ -158,7 +158,7 @@ class McapSource(ChunkedSource):
         return found == wanted
 
     def _read_chunk_index(self, info: ChunkInfo) -> None:
-        """Note one chunk, and read the message indexes that follow it."""
+        """Record one chunk, and read the message indexes that follow it."""
         number = len(self.chunks)
         self.chunks.append(Chunk(info.data_position, info.stored_bytes, info.size_bytes, info.compression))
         first_byte, last_byte = info.index_place
@@ -185,10 +185,10 @@ class McapSource(ChunkedSource):
             self.note_index(channel, MessageIndex.sorted_from(columns[:, 0], columns[:, 1], columns[:, 2]))
 
     def _scan(self, *, closed: bool) -> None:
-        """Walk over the file from its beginning.
+        """Scan the file from its beginning.
 
         Args:
-            closed: its end is in good order, so that a walk without losses needs no warning.
+            closed: whether the file ends properly; a scan without losses then needs no warning.
         """
         found = scan_mcap(self.file)
         self.chunks, self.channels, self.recovered = found.chunks, found.declarations.channels, True
@@ -218,38 +218,38 @@ class McapSource(ChunkedSource):
     def _too_few(self, count: int) -> DataWarning:
         return DataWarning(
             "messages-missing",
-            f"{self.path.name} says that it holds {self._counted} messages, but {count} are in it",
-            "check that what you need is there; the rest was lost before or while the file was written",
+            f"{self.path.name} declares {self._counted} messages, but contains {count}",
+            "check that the data you need is there; the rest was lost before or while the file was written",
         )
 
     # -- reading
 
     def checksum(self, chunk: int) -> int:
-        """Return the CRC-32 of a chunk's unpacked records; 0 where the file has none."""
+        """Return the stored CRC-32 of a chunk's uncompressed records; 0 if the file has none."""
         where = self.chunks[chunk]
         return int.from_bytes(self.file.up_to(crc_position(where.position, where.compression), 4), "little")
 
     def locate(self, chunk: int, offset: int) -> tuple[int, int]:
-        """Return where the message itself begins, and its length."""
+        """Return the offset of the message itself, and its length."""
         head = self.piece(chunk, offset, RECORD.size)
         kind, size = RECORD.unpack(head) if len(head) == RECORD.size else (0, 0)
         if kind != MESSAGE or not MESSAGE_HEAD.size <= size <= MAX_RECORD_BYTES:
             raise RecordingError(
-                f"{self.path}: no message where the index says (chunk {chunk}, byte {offset}); the file is damaged: "
+                f"{self.path}: no message at the indexed position (chunk {chunk}, byte {offset}); the file is damaged: "
                 f"mcap recover {self.path.name}"
             )
         return offset + self.lead_bytes, size - MESSAGE_HEAD.size
 
     def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Recognise message records; all of them are alike."""
+        """Recognise message records, which all have the same layout."""
         sizes = np.ascontiguousarray(rows[:, 1:9]).view("<i8")[:, 0] - MESSAGE_HEAD.size
         return (rows[:, 0] == MESSAGE) & (sizes >= 0) & (sizes <= MAX_RECORD_BYTES), sizes
 
 
 def _shows(infos: list[ChunkInfo], declared: Declarations, first_of: ChannelFilter) -> bool:
-    """Tell whether some channels are known, and in the chunks seen so far."""
+    """Return whether the wanted channels are known, and all of them occur in the chunks seen so far."""
     count = len(infos)
-    if count < FIRST_CHUNKS or count & (count - 1):  # looked at again whenever there are twice as many
+    if count < FIRST_CHUNKS or count & (count - 1):  # checked again each time their number doubles
         return False
     wanted = {channel.id for channel in declared.channels if first_of(channel)}
     return bool(wanted) and wanted <= {number for info in infos for number in info.channels}

@@ -1,4 +1,4 @@
-"""MCAP's records: their kinds, and what schemas, channels and chunks say."""
+"""Parse MCAP records: record kinds, schemas, channels and chunks."""
 
 import struct
 from collections.abc import Iterator, Mapping
@@ -38,7 +38,7 @@ STATISTICS, DATA_END = 11, 15
 RECORD = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 MAX_RECORD_BYTES = 1 << 28
-_CHUNK_HEAD_BYTES = RECORD.size + 40  # less the name of the compression
+_CHUNK_HEAD_BYTES = RECORD.size + 40  # without the compression name
 _MAX_INDEX_BYTES = 1 << 26
 _FORMATS = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl"}
 
@@ -58,10 +58,10 @@ class Declarations:
         self._channels: dict[int, tuple[int, str, str]] = {}
 
     def note(self, kind: int, body: bytes) -> bool:
-        """Note a schema or a channel; other records are passed over.
+        """Record a schema or a channel; other records are ignored.
 
         Returns:
-            False where the record is damaged.
+            False if the record is damaged.
         """
         try:
             if kind == SCHEMA:
@@ -84,7 +84,7 @@ class Declarations:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """The channels, each with its schema where there is one."""
+        """The channels, each with its schema if there is one."""
         return tuple(self._channel(number, *entry) for number, entry in self._channels.items())
 
     def _channel(self, number: int, schema_number: int, topic: str, encoding: str) -> Channel:
@@ -95,14 +95,14 @@ class Declarations:
 
 @dataclass(frozen=True, slots=True)
 class ChunkHead:
-    """What comes before the records of a chunk.
+    """The header before the records of a chunk.
 
     Attributes:
-        size: how long it is.
-        unpacked_bytes: the size the chunk declares.
+        size: its length.
+        unpacked_bytes: the declared uncompressed size of the chunk.
         compression: "" for none.
-        stored_bytes: how many bytes follow.
-        checksum: CRC-32 of the unpacked bytes; 0 for none.
+        stored_bytes: number of bytes that follow.
+        checksum: CRC-32 of the uncompressed bytes; 0 for none.
     """
 
     size: int
@@ -113,7 +113,7 @@ class ChunkHead:
 
 
 def chunk_head(body: bytes) -> ChunkHead | None:
-    """Read the head of a chunk's body; None where it is none."""
+    """Read the header of a chunk's body; None if it is invalid."""
     try:
         compression, place = string_at(body, 28)
         stored = struct.unpack_from("<Q", body, place)[0]
@@ -124,23 +124,23 @@ def chunk_head(body: bytes) -> ChunkHead | None:
 
 
 def crc_position(position: int, compression: str) -> int:
-    """Return where a chunk's checksum lies, given where its bytes begin."""
+    """Return the position of a chunk's checksum, given the position of its data."""
     return position - 16 - len(compression)
 
 
 @dataclass(frozen=True, slots=True)
 class ChunkInfo:
-    """What the summary says about one chunk.
+    """The summary's entry for one chunk.
 
     Attributes:
         start_ns: log time of its first message.
         position: of its record in the file.
         record_bytes: size of that record.
-        channels: that have messages in it, where it is indexed.
-        index_bytes: how long the message indexes behind it are.
+        channels: those with messages in it, if it is indexed.
+        index_bytes: length of the message indexes after it.
         compression: "" for none.
         stored_bytes: its size in the file.
-        size_bytes: its size unpacked.
+        size_bytes: its uncompressed size.
     """
 
     start_ns: int
@@ -154,22 +154,22 @@ class ChunkInfo:
 
     @property
     def data_position(self) -> int:
-        """Where its bytes begin."""
+        """The position of its data."""
         return self.position + _CHUNK_HEAD_BYTES + len(self.compression)
 
     @property
     def index_place(self) -> tuple[int, int]:
-        """Where its message indexes begin and end."""
+        """The begin and end of its message indexes."""
         begin = self.position + self.record_bytes
         return begin, begin + self.index_bytes
 
     def inside(self, file_bytes: int) -> bool:
-        """Tell whether it can lie in a file of this size."""
+        """Return whether it lies within a file of this size."""
         return self.data_position + self.stored_bytes <= file_bytes and self.index_bytes <= _MAX_INDEX_BYTES
 
 
 def chunk_info(body: bytes) -> ChunkInfo | None:
-    """Read a chunk index record; None where it is damaged."""
+    """Read a chunk index record; None if it is damaged."""
     try:
         start_ns, _, position, length, map_bytes = struct.unpack_from("<QQQQI", body)
         channels = tuple(number for number, _ in struct.iter_unpack("<HQ", body[36 : 36 + map_bytes]))
@@ -182,14 +182,14 @@ def chunk_info(body: bytes) -> ChunkInfo | None:
 
 
 def statistics(body: bytes) -> tuple[int, Mapping[int, int]]:
-    """Read how many messages there are, in all and by channel; nothing of what is cut off."""
+    """Read the number of messages, in total and by channel, ignoring truncated entries."""
     entries = body[46 : 46 + int.from_bytes(body[42:46], "little")]
     by_channel = dict(struct.iter_unpack("<HQ", entries[: len(entries) // 10 * 10]))
     return int.from_bytes(body[:8], "little"), by_channel
 
 
 def walk(stretch: Stretch, place: int = 0) -> Iterator[tuple[int, int, int]]:
-    """Walk over records: kind, place of the body, size of the body; ends where a record runs past the end."""
+    """Iterate over records (kind, offset of the body, size of the body); stop at a record that extends past the end."""
     while place + RECORD.size <= stretch.size:
         kind, size = RECORD.unpack(stretch.up_to(place, RECORD.size))
         start = place + RECORD.size
@@ -200,8 +200,8 @@ def walk(stretch: Stretch, place: int = 0) -> Iterator[tuple[int, int, int]]:
 
 
 def string_at(data: bytes, place: int) -> tuple[str, int]:
-    """Read a length-prefixed string; return it and the place after it."""
+    """Read a length-prefixed string; return it and the offset after it."""
     length = struct.unpack_from("<I", data, place)[0]
     if place + 4 + length > len(data):
-        raise struct.error("string runs past its record")
+        raise struct.error("string extends past its record")
     return data[place + 4 : place + 4 + length].decode("utf-8", "replace"), place + 4 + length

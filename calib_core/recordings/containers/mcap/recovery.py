@@ -1,4 +1,4 @@
-"""MCAP files without a usable index: walked from the beginning, every whole message found, what is lost counted."""
+"""Recover MCAP files without a usable index: scan from the beginning, find every complete message, count the losses."""
 
 import re
 import zlib
@@ -35,17 +35,17 @@ _LAST_KIND, _PRIVATE = 15, 0x80
 
 @dataclass(slots=True)
 class FoundInMcap:
-    """What a walk over a file found.
+    """The result of scanning a file.
 
     Attributes:
         declarations: schemas and channels.
-        chunks: the first stands for the whole file, with the messages outside chunks.
+        chunks: the first represents the whole file, for messages outside chunks.
         messages: (log time [ns], chunk, offset) by channel.
-        ended: the end of the data was reached in good order.
-        lost_bytes: that could not be understood, in the file and in unpacked chunks.
-        damaged_chunks: that could not be unpacked whole.
+        ended: whether the scan reached the end of the data without errors.
+        lost_bytes: number of bytes that could not be parsed, in the file and in decompressed chunks.
+        damaged_chunks: number of chunks that could not be fully decompressed.
         fault: why the first of those could not.
-        tried: how often a record was looked for behind a damaged stretch; bounded.
+        tried: number of attempts to find a record after a damaged stretch; bounded.
     """
 
     declarations: Declarations
@@ -59,7 +59,7 @@ class FoundInMcap:
 
 
 def scan_mcap(file: FileBytes) -> FoundInMcap:
-    """Walk over a file from its first record.
+    """Scan a file from its first record.
 
     Args:
         file: the file.
@@ -97,7 +97,7 @@ def _sound(head: ChunkHead) -> bool:
 
 
 def _note(stretch: Stretch, kind: int, start: int, size: int, found: FoundInMcap, chunk: int = 0) -> None:
-    """Note a message, a schema or a channel."""
+    """Record a message, a schema or a channel."""
     if kind == MESSAGE and size >= MESSAGE_HEAD.size:
         channel, _, log_time, _ = MESSAGE_HEAD.unpack(stretch.up_to(start, MESSAGE_HEAD.size))
         if log_time < 1 << 63:
@@ -107,7 +107,7 @@ def _note(stretch: Stretch, kind: int, start: int, size: int, found: FoundInMcap
 
 
 def _following(stretch: Stretch, start: int, found: FoundInMcap) -> int:
-    """Return where the next record begins that makes sense together with the one behind it; the end where none does."""
+    """Return the offset of the next plausible record that is followed by another; the end if there is none."""
     while found.tried < _MAX_TRIES:
         place = stretch.find(_CANDIDATE, start)
         if place < 0:
@@ -126,7 +126,7 @@ def _following(stretch: Stretch, start: int, found: FoundInMcap) -> int:
 
 
 def _scan_chunk(file: FileBytes, position: int, stored: int, head: ChunkHead, found: FoundInMcap) -> None:
-    """Note all whole messages of a chunk, also of one that is cut off or damaged."""
+    """Record all complete messages of a chunk, even if it is truncated or damaged."""
     number = len(found.chunks)
     size = stored
     stretch: Stretch = FileStretch(file, position, stored)
@@ -154,7 +154,7 @@ def _unpacked(file: FileBytes, position: int, stored: int, head: ChunkHead, foun
     try:
         refuse_bomb(stored, head.unpacked_bytes, where=where)
         if stored > MAX_RECORD_BYTES:
-            raise RecordingError(f"{where}: {stored} packed bytes in one chunk are refused as damaged")
+            raise RecordingError(f"{where}: {stored} compressed bytes in one chunk are refused as damaged")
     except RecordingError as error:
         found.damaged_chunks, found.fault = found.damaged_chunks + 1, found.fault or str(error)
         found.lost_bytes += stored
@@ -167,6 +167,6 @@ def _unpacked(file: FileBytes, position: int, stored: int, head: ChunkHead, foun
     else:
         if head.checksum and zlib.crc32(whole) != head.checksum:
             found.damaged_chunks += 1
-            found.fault = found.fault or f"{where}: its bytes do not have the checksum they were written with"
+            found.fault = found.fault or f"{where}: wrong checksum"
         return whole
     return unpack_what_is_there(data, head.compression, head.unpacked_bytes)

@@ -1,4 +1,4 @@
-"""Where the messages of a ROS 1 bag lie: the index block behind each of its chunks."""
+"""Locate the messages of a ROS 1 bag from the index block after each chunk."""
 
 import struct
 from collections.abc import Mapping, Sequence
@@ -20,13 +20,13 @@ _ENTRY = np.dtype([("sec", "<u4"), ("nanosec", "<u4"), ("offset", "<u4")])
 _MAX_HEADER_BYTES = 1 << 24
 _MAX_INDEX_BYTES = 1 << 26
 _HEAD_BYTES = 256
-_BLOCK_BYTES = 128  # more than the head of an index record
+_BLOCK_BYTES = 128  # longer than the header of an index record
 _AHEAD = 256
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BagIndex:
-    """Chunks, and where the messages of each connection lie in them."""
+    """Chunks, and the locations of each connection's messages in them."""
 
     chunks: list[Chunk]
     indexes: Mapping[int, MessageIndex]
@@ -35,13 +35,13 @@ class BagIndex:
 def read_indexes(file: FileBytes, infos: Sequence[ChunkInfo], end: int, picked: Sequence[ChunkInfo]) -> BagIndex:
     """Read the index blocks that follow each chunk.
 
-    One read gets the block of a chunk and the head of the next one.
+    One read covers the block of a chunk and the header of the next chunk.
 
     Args:
         file: the bag.
         infos: of all chunks.
-        end: where the last block ends.
-        picked: those to read.
+        end: end of the last block.
+        picked: the chunks to read.
 
     Raises:
         RecordingError: a chunk or a block is damaged.
@@ -65,24 +65,24 @@ def read_indexes(file: FileBytes, infos: Sequence[ChunkInfo], end: int, picked: 
 
 
 def _block_bytes(info: ChunkInfo) -> int:
-    """Return more than the index block of a chunk takes."""
+    """Return an upper bound of the size of a chunk's index block."""
     return min(sum(_BLOCK_BYTES + count * _ENTRY.itemsize for count in info.counts.values()), _MAX_INDEX_BYTES)
 
 
 def _window(info: ChunkInfo, following: int) -> tuple[int, int]:
-    """Guess where the block of a chunk begins, and go on past the head of the next chunk."""
+    """Return a window from the estimated beginning of a chunk's block to past the header of the next chunk."""
     return max(info.position, following - _block_bytes(info)), following + _HEAD_BYTES
 
 
 def _records_of(
     windows: "_Windows", number: int, place: tuple[int, int], info: ChunkInfo
 ) -> list[tuple[int, bytes]] | None:
-    """Return the entries of each connection in a chunk; None where they are damaged.
+    """Return the entries of each connection in a chunk; None if they are damaged.
 
     Args:
-        windows: what is read.
+        windows: the bytes read.
         number: of the window.
-        place: where the block begins, and where the next chunk does: usually, but not always, next to it.
+        place: positions of the block and of the next chunk, which usually, but not always, follows the block.
         info: of the chunk.
     """
     room = max(0, min(place[1] - place[0], _MAX_INDEX_BYTES))
@@ -98,11 +98,11 @@ def _connections_in(info: ChunkInfo) -> int:
 
 
 class _Windows:
-    """Stretches of a file that are read one after another, the disk told about those to come.
+    """Parts of a file that are read in order, with prefetching.
 
     Args:
         file: the file.
-        places: where each begins and ends, ascending.
+        places: begin and end of each, ascending.
     """
 
     def __init__(self, file: FileBytes, places: Sequence[tuple[int, int]]) -> None:
@@ -113,19 +113,19 @@ class _Windows:
     def _read(self, number: int) -> bytes:
         if number == 0:
             self._file.expect(self._places[:_AHEAD])
-        if number % _AHEAD == 0:  # the disk goes on while these are read
+        if number % _AHEAD == 0:  # prefetch while these are read
             self._file.expect(self._places[number + _AHEAD : number + 2 * _AHEAD])
         begin, end = self._places[number]
         self._last = (number, self._file.up_to(begin, end - begin))
         return self._last[1]
 
     def before(self, number: int, position: int) -> bytes:
-        """Return what the window before this one has from a position on; nothing where that is not in it."""
+        """Return the bytes of the previous window from a position on; empty if the position is not in it."""
         first, end = self._places[number - 1] if number and self._last[0] == number - 1 else (0, 0)
         return self._last[1][position - first :] if first <= position < end else b""
 
     def piece(self, number: int, begin: int, size: int) -> bytes:
-        """Return bytes that should be in a window; they are read by themselves where they are not."""
+        """Return bytes that should be in a window; they are read separately if they are not."""
         if self._last[0] != number:
             self._read(number)
         start = begin - self._places[number][0]
@@ -134,7 +134,7 @@ class _Windows:
 
 
 def _chunk(file: FileBytes, position: int, ahead: bytes) -> Chunk:
-    """Read a chunk's header, from bytes that are there already if they are enough."""
+    """Read a chunk's header, from the bytes already read if they suffice."""
     length = _U32.unpack_from(ahead)[0] if len(ahead) >= 4 else _MAX_HEADER_BYTES
     if length + 8 > len(ahead):
         length = _U32.unpack(file.at(position, 4))[0]
@@ -154,7 +154,7 @@ def _chunk(file: FileBytes, position: int, ahead: bytes) -> Chunk:
 
 
 def _index_records(block: bytes, wanted: int) -> list[tuple[int, bytes]] | None:
-    """Return the entries of so many connections, or of fewer where the block ends; None where it is damaged or cut."""
+    """Return the entries of the wanted number of connections, or fewer if the block ends; None if damaged or truncated."""
     records: list[tuple[int, bytes]] = []
     place = 0
     while place + 8 <= len(block) and len(records) < wanted:

@@ -1,4 +1,4 @@
-"""ROS 1 bags, version 2.0: the index from the file's tail, messages by position."""
+"""Read ROS 1 bags, version 2.0: index from the file's tail, messages by position."""
 
 import re
 import struct
@@ -41,7 +41,7 @@ class Rosbag1Source(ChunkedSource):
 
     Args:
         file: the bag.
-        first_of: read only the chunks with which these channels begin, and refuse a damaged bag; None reads all.
+        first_of: read only the first chunks of these channels, and refuse a damaged bag; None reads all.
     """
 
     format_name = "ROS 1 bag"
@@ -53,7 +53,9 @@ class Rosbag1Source(ChunkedSource):
         magic = _MAGIC.match(head)
         if not magic or magic.groups() != (b"2", b"0"):
             version = ".".join(part.decode() for part in magic.groups()) if magic else "?"
-            raise RecordingError(f"{file.path}: a ROS 1 bag of version {version}; only 2.0 can be read: rosbag migrate")
+            raise RecordingError(
+                f"{file.path}: a ROS 1 bag of version {version}; only 2.0 is supported: rosbag migrate"
+            )
         header, after = self._record(magic.end(), _BAG_HEADER)
         if header.get("encryptor"):
             raise RecordingError(f"{file.path}: the bag is encrypted; decrypt it first: rosbag decrypt")
@@ -69,11 +71,11 @@ class Rosbag1Source(ChunkedSource):
         self.keep()
 
     def _read_tail(self, header: Mapping[str, bytes], first_of: ChannelFilter | None) -> tuple[list[ChunkInfo], int]:
-        """Read connections and chunk infos; return the latter, and where the last chunk's messages are over."""
+        """Read connections and chunk infos; return the latter, and the end of the last chunk."""
         position = _number(header.get("index_pos", b""), 8)
         if not 0 < position <= self.size_bytes:
             raise RecordingError(
-                f"{self.path}: the bag was not closed properly and has no index (recorder killed, or copy cut short); "
+                f"{self.path}: the bag was not closed properly and has no index (recorder killed, or copy truncated); "
                 f"repair it first: rosbag reindex {self.path.name}"
             )
         self.channels, infos = read_tail(self.file, position, first_of)
@@ -86,7 +88,7 @@ class Rosbag1Source(ChunkedSource):
         return infos, position
 
     def _read_indexes(self, infos: list[ChunkInfo], end: int, first_of: ChannelFilter | None) -> None:
-        """Read where the messages are."""
+        """Read the locations of the messages."""
         self.counts = counts_of(infos)
         picked = infos if first_of is None else first_chunks(infos, [c.id for c in self.channels if first_of(c)])
         found = read_indexes(self.file, infos, end, picked)
@@ -97,7 +99,7 @@ class Rosbag1Source(ChunkedSource):
             raise damaged(self.file, end)
 
     def _recover(self, start: int, fault: RecordingError) -> None:
-        """Index a bag that has no index, or a damaged one, by walking over all of it."""
+        """Index a bag with a missing or damaged index by scanning all of it."""
         found = scan_bag(self.file, start)
         self.recovered = True
         self.chunks = found.chunks
@@ -110,7 +112,7 @@ class Rosbag1Source(ChunkedSource):
         known = {number: entries for number, entries in found.messages.items() if number in channels}
         if not known:
             raise RecordingError(
-                f"{fault}; all of its {self.size_bytes} bytes were searched, and there is no whole message in them"
+                f"{fault}; all of its {self.size_bytes} bytes were searched without finding a complete message"
             )
         self.indexes = {}
         for connection, entries in known.items():
@@ -144,7 +146,7 @@ class Rosbag1Source(ChunkedSource):
     # -- reading
 
     def locate(self, chunk: int, offset: int) -> tuple[int, int]:
-        """Return where the message begins; connection records in front of it are passed over."""
+        """Return the offset of the message and its length, skipping connection records before it."""
         for _ in range(1000):
             head = self.piece(chunk, offset, 256)
             length = _U32.unpack_from(head)[0] if len(head) >= 4 else _MAX_HEADER_BYTES
@@ -161,12 +163,12 @@ class Rosbag1Source(ChunkedSource):
                 break
             offset += 8 + length + size
         raise RecordingError(
-            f"{self.path}: no message where the index says (chunk {chunk}, byte {offset}); the bag is damaged: "
+            f"{self.path}: no message at the indexed position (chunk {chunk}, byte {offset}); the bag is damaged: "
             f"rosbag reindex {self.path.name}"
         )
 
     def usual(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Recognise plain message records: a header of 38 bytes with op=2 where the first record has it."""
+        """Recognise plain message records: a header of 38 bytes, with op=2 at the same offset as in the first record."""
         words = np.ascontiguousarray(rows[:, [0, 1, 2, 3, 42, 43, 44, 45]]).view("<u4")
         mark = rows[0].tobytes().find(b"op=\x02")
         usual = words[:, 0] == _MESSAGE_HEADER_BYTES

@@ -1,7 +1,7 @@
-"""Bags without an index: what a killed recorder, a full disk or a broken copy left behind.
+"""Recover bags without an index, left by a killed recorder, a full disk or an incomplete copy.
 
-The file is walked from its beginning. Every whole message is found, also those in a chunk that is cut off and those
-behind a damaged stretch; what is lost is counted.
+The file is scanned from its beginning. Every complete message is found, including those in a truncated chunk or after
+a damaged stretch; losses are counted.
 """
 
 import re
@@ -28,7 +28,7 @@ _BACK_BYTES = 96
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One record: its header's fields, and where its data lies in what was walked."""
+    """One record: its header's fields, and the location of its data."""
 
     fields: dict[str, bytes]
     kind: int
@@ -38,22 +38,22 @@ class Record:
 
     @property
     def end(self) -> int:
-        """Where the next record begins."""
+        """The offset of the next record."""
         return self.data_place + self.data_size
 
 
 @dataclass(slots=True)
 class FoundInBag:
-    """What a walk over a bag found.
+    """The result of scanning a bag.
 
     Attributes:
-        chunks: with as many bytes as are there; the first stands for the whole file, with messages outside chunks.
+        chunks: with the available bytes; the first represents the whole file, for messages outside chunks.
         connections: the record of each, with its data.
         messages: (receive time [ns], chunk, offset) by connection.
-        lost_bytes: that could not be understood, in the file and in unpacked chunks.
-        damaged_chunks: whose bytes could be unpacked only up to some place, or not at all.
+        lost_bytes: number of bytes that could not be parsed, in the file and in decompressed chunks.
+        damaged_chunks: number of chunks that could not be fully decompressed.
         fault: why the first of those could not.
-        tried: how often a record was looked for behind a damaged stretch; bounded.
+        tried: number of attempts to find a record after a damaged stretch; bounded.
     """
 
     chunks: list[Chunk]
@@ -66,7 +66,7 @@ class FoundInBag:
 
 
 def _record(stretch: Stretch, place: int) -> Record | None:
-    """Read the record at a place; None where there is none."""
+    """Read the record at a place; None if there is none."""
     head = stretch.up_to(place, 512)
     if len(head) < 8:
         return None
@@ -82,12 +82,12 @@ def _record(stretch: Stretch, place: int) -> Record | None:
 
 
 class _Walk:
-    """Go from record to record; behind a damaged stretch go on at the next record that makes sense.
+    """Iterate over records; after a damaged stretch, continue at the next plausible record.
 
     Args:
-        stretch: what is walked over.
-        found: counts what is passed over, and how often a place was tried.
-        inside: of a chunk, where there are no chunks.
+        stretch: the bytes to scan.
+        found: counts the skipped bytes and the attempts.
+        inside: whether this is inside a chunk, which cannot contain chunks.
     """
 
     def __init__(self, stretch: Stretch, found: FoundInBag, *, inside: bool) -> None:
@@ -96,7 +96,7 @@ class _Walk:
         self._kinds = (_MESSAGE, _CONNECTION) if inside else (_MESSAGE, _CONNECTION, _CHUNK)
 
     def records(self, place: int) -> Iterator[Record]:
-        """Yield the records from a place on; a chunk that runs past the end, or whose size is wrong, is cut."""
+        """Yield the records from an offset on; a chunk that extends past the end, or has a wrong size, is truncated."""
         while place < self._stretch.size:
             record = _record(self._stretch, place)
             if record is not None and record.end <= self._stretch.size:
@@ -112,7 +112,7 @@ class _Walk:
             place = after
 
     def _next(self, start: int) -> Record | None:
-        """Find the next record that makes sense."""
+        """Find the next plausible record."""
         while self._found.tried < _MAX_CANDIDATES:
             mark = self._stretch.find(_MARK, start)
             if mark < 0:
@@ -127,11 +127,11 @@ class _Walk:
 
 
 def scan_bag(file: FileBytes, start: int) -> FoundInBag:
-    """Walk over a bag from the first record after its header.
+    """Scan a bag from the first record after its header.
 
     Args:
         file: the bag.
-        start: where that record is.
+        start: position of that record.
     """
     found = FoundInBag([Chunk(0, file.size_bytes, file.size_bytes, "none")])
     stretch = FileStretch(file, 0, file.size_bytes)
@@ -144,7 +144,7 @@ def scan_bag(file: FileBytes, start: int) -> FoundInBag:
 
 
 def _scan_chunk(file: FileBytes, record: Record, found: FoundInBag) -> None:
-    """Note all whole messages of a chunk; a chunk whose compression is damaged gives what comes before the damage."""
+    """Record all complete messages of a chunk; in a damaged compressed chunk, those before the damage."""
     stored = min(record.data_size, file.size_bytes - record.data_place)
     compression = record.fields.get("compression", b"").decode("utf-8", "replace")
     size = int.from_bytes(record.fields.get("size", b""), "little")
@@ -161,7 +161,7 @@ def _scan_chunk(file: FileBytes, record: Record, found: FoundInBag) -> None:
 
 
 def _note(stretch: Stretch, record: Record, chunk: int, found: FoundInBag) -> None:
-    """Note a message or a connection."""
+    """Record a message or a connection."""
     if record.kind == _CONNECTION:
         _note_connection(record, stretch.up_to(record.data_place, record.data_size), found)
     elif record.kind == _MESSAGE and {"conn", "time"} <= record.fields.keys() and len(record.fields["time"]) == 8:
@@ -171,12 +171,12 @@ def _note(stretch: Stretch, record: Record, chunk: int, found: FoundInBag) -> No
 
 
 def _unpacked(file: FileBytes, record: Record, stored: int, compression: str, size: int, found: FoundInBag) -> bytes:
-    """Unpack a chunk as far as it goes; note what is wrong with it."""
+    """Decompress a chunk as far as possible; record what is wrong with it."""
     where = f"chunk at byte {record.place}"
     try:
         refuse_bomb(stored, size, where=where)
         if stored > _MAX_STORED_BYTES:
-            raise RecordingError(f"{where}: {stored} packed bytes in one chunk are refused as damaged")
+            raise RecordingError(f"{where}: {stored} compressed bytes in one chunk are refused as damaged")
     except RecordingError as error:
         found.damaged_chunks, found.fault = found.damaged_chunks + 1, found.fault or str(error)
         found.lost_bytes += stored

@@ -1,4 +1,4 @@
-"""The tail of a ROS 1 bag: its connections, and what it says about each chunk."""
+"""Read the tail of a ROS 1 bag: its connections and chunk infos."""
 
 import struct
 from collections.abc import Iterable, Mapping
@@ -20,12 +20,12 @@ _HEAD_BYTES = 256
 
 @dataclass(frozen=True, slots=True)
 class ChunkInfo:
-    """What the tail says about one chunk.
+    """The tail's entry for one chunk.
 
     Attributes:
         position: of its record in the file.
         start_ns: when its first message was received.
-        counts: of messages, by connection.
+        counts: number of messages by connection.
     """
 
     position: int
@@ -34,7 +34,7 @@ class ChunkInfo:
 
 
 def damaged(file: FileBytes, position: int) -> RecordingError:
-    """Say that a record is damaged."""
+    """Return the error for a damaged record."""
     return RecordingError(
         f"{file.path}: the record at byte {position} is damaged, or the bag was not closed properly; "
         f"repair it first: rosbag reindex {file.path.name}"
@@ -44,11 +44,11 @@ def damaged(file: FileBytes, position: int) -> RecordingError:
 def read_tail(
     file: FileBytes, position: int, first_of: ChannelFilter | None = None
 ) -> tuple[tuple[Channel, ...], list[ChunkInfo]]:
-    """Read connections and chunk infos, which follow one another to the end of the file.
+    """Read connections and chunk infos, which extend to the end of the file.
 
     Args:
         file: the bag.
-        position: where they begin.
+        position: of the first of them.
         first_of: stop when chunks with messages of all these channels are found; None reads everything.
 
     Raises:
@@ -70,22 +70,22 @@ def read_tail(
 
 @dataclass(slots=True)
 class _Tail:
-    """What is found in the tail."""
+    """The contents of the tail read so far."""
 
     channels: dict[int, Channel]
     infos: list[ChunkInfo]
     shape: "_InfoShape | None" = None
 
     def shows(self, first_of: ChannelFilter) -> bool:
-        """Tell whether some chunks are known, and the channels are in them."""
+        """Return whether the wanted channels are known, and all of them occur in the chunks seen so far."""
         count = len(self.infos)
-        if count < FIRST_CHUNKS or count & (count - 1):  # looked at again whenever there are twice as many
+        if count < FIRST_CHUNKS or count & (count - 1):  # checked again each time their number doubles
             return False
         wanted = {channel.id for channel in self.channels.values() if first_of(channel)}
         return bool(wanted) and wanted <= counts_of(self.infos).keys()
 
     def note(self, header: bytes, data: bytes) -> bool:
-        """Note a record; False where it is damaged."""
+        """Record an entry; False if it is damaged."""
         if self.shape is not None and self.shape.fits(header):
             self.infos.append(self.shape.info(header, data))
             return True
@@ -117,7 +117,7 @@ def _head(stretch: Stretch, place: int, file: FileBytes, origin: int) -> tuple[b
 
 @dataclass(frozen=True, slots=True)
 class _InfoShape:
-    """Where a chunk info's header has its fields: recorders write all of them alike."""
+    """The field offsets in a chunk info's header: recorders write all of them with the same layout."""
 
     length: int
     kind: int
@@ -149,7 +149,7 @@ class _InfoShape:
 
 
 def channel_of(header: Mapping[str, bytes], data: bytes) -> Channel | None:
-    """Read a connection record; None where it is damaged."""
+    """Read a connection record; None if it is damaged."""
     fields = fields_of(data)
     if fields is None or "conn" not in header:
         return None
@@ -173,7 +173,7 @@ def counts_of(infos: Iterable[ChunkInfo]) -> Mapping[int, int]:
 
 
 def first_chunks(infos: Iterable[ChunkInfo], connections: Iterable[int]) -> list[ChunkInfo]:
-    """Return the chunks with which these connections begin, each once, in order of their places."""
+    """Return the first chunk of each of these connections, without duplicates, in file order."""
     earliest = sorted(infos, key=lambda info: (info.start_ns, info.position))
     found = [next((info for info in earliest if info.counts.get(number)), None) for number in connections]
     return sorted({info.position: info for info in found if info is not None}.values(), key=lambda info: info.position)

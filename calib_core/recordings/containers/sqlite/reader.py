@@ -1,4 +1,4 @@
-"""ROS 2 bags in SQLite (.db3): messages by row."""
+"""Read ROS 2 bags in SQLite (.db3), one message per row."""
 
 import sqlite3
 import threading
@@ -39,9 +39,9 @@ class SqliteSource:
     """One .db3 file.
 
     Args:
-        file: the file; only its path and size are used, SQLite reads it by itself.
-        packed: each message is a Zstandard frame of its own (compression_mode: MESSAGE in metadata.yaml).
-        first_rows: look only at so many rows, and refuse damaged ones; None looks at all.
+        file: the file; only its path and size are used, since SQLite reads it itself.
+        packed: each message is a separate Zstandard frame (compression_mode: MESSAGE in metadata.yaml).
+        first_rows: read only this many rows, and refuse damaged ones; None reads all.
     """
 
     def __init__(self, file: "FileBytes", *, packed: bool = False, first_rows: int | None = None) -> None:
@@ -65,17 +65,17 @@ class SqliteSource:
 
     @property
     def counts(self) -> Mapping[int, int]:
-        """Nothing: a database says nowhere how many rows it has."""
+        """Empty: a database does not store its number of rows."""
         return {}
 
     @property
     def later_warnings(self) -> tuple[DataWarning, ...]:
-        """Nothing: damage shows while it is opened, or in the messages themselves."""
+        """Empty: damage is found on opening, or in the messages themselves."""
         return ()
 
     @property
     def container(self) -> str:
-        """Name the format and its compression."""
+        """The format and its compression."""
         return "ROS 2 SQLite, zstd" if self._packed else "ROS 2 SQLite"
 
     def _damaged(self, error: object) -> RecordingError:
@@ -85,7 +85,7 @@ class SqliteSource:
         try:
             with self._lock:
                 return self._connection.execute(query, values).fetchall()
-        except (sqlite3.Error, UnicodeDecodeError) as error:  # the second where a damaged name is in the message
+        except (sqlite3.Error, UnicodeDecodeError) as error:  # the latter if the message contains a damaged name
             raise self._damaged(error) from error
 
     def _read_channels(self) -> tuple[Channel, ...]:
@@ -93,7 +93,7 @@ class SqliteSource:
         if not {"messages", "topics"} <= tables:
             raise RecordingError(
                 f"{self.path}: an SQLite file without the tables of a ROS 2 bag (messages, topics); "
-                "give a file that ros2 bag record wrote"
+                "open a file written by ros2 bag record"
             )
         definitions = self._definitions() if "message_definitions" in tables else {}
         channels = []
@@ -104,7 +104,7 @@ class SqliteSource:
         return tuple(channels)
 
     def _definitions(self) -> dict[Any, tuple[str, str]]:
-        """Read the definitions; where they are damaged the well-known ones have to do."""
+        """Read the definitions; if they are damaged, well-known ones are used."""
         query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions ORDER BY id DESC"
         try:
             return {name: (_FORMATS.get(form, ""), str(text or "")) for name, form, text in self._rows(query)}
@@ -118,7 +118,7 @@ class SqliteSource:
         return {}
 
     def index(self, channel_id: int) -> MessageIndex:
-        """Tell where the messages of a channel lie: SQLite walks over all rows' heads once, for all channels."""
+        """Return the locations of a channel's messages; SQLite scans the heads of all rows once, for all channels."""
         if self._indexes is None:
             found = self._all_rows()
             self._indexes = self._sorted(found.columns)
@@ -129,7 +129,7 @@ class SqliteSource:
         return self._indexes.get(channel_id, MessageIndex(empty, empty, empty))
 
     def _all_rows(self) -> FoundRows:
-        """Return topic, time and number of every row, from the cache where they are there."""
+        """Return topic, time and number of every row, from the cache if possible."""
         if self._first_rows is not None:
             return self._beginning(self._first_rows)
         kept = self._kept.get("rows") if self._kept is not None else None
@@ -158,12 +158,12 @@ class SqliteSource:
         }
 
     def read(self, chunk: int, offset: int) -> bytes:
-        """Read one message whole; chunk is its row."""
+        """Read one whole message; chunk is its row."""
         rows = self._rows("SELECT data FROM messages WHERE id = ?", chunk)
         if not rows:
-            raise self._damaged(f"row {chunk} is gone")
+            raise self._damaged(f"row {chunk} is missing")
         if not isinstance(rows[0][0], bytes):
-            raise self._damaged(f"row {chunk} holds no bytes")
+            raise self._damaged(f"row {chunk} contains no bytes")
         return self._unpacked(rows[0][0], chunk)
 
     def _unpacked(self, data: bytes, row: int) -> bytes:
@@ -195,7 +195,7 @@ class SqliteSource:
         return Heads(rows, lengths, fault)
 
     def _fill_by_query(self, index: MessageIndex, rows: np.ndarray, lengths: np.ndarray) -> None:
-        """Read the heads of short messages, a stretch of rows per query; what is not found keeps the length -1."""
+        """Read the heads of short messages, a range of rows per query; rows not found keep the length -1."""
         size = rows.shape[1]
         order = np.argsort(index.chunk)
         numbers = index.chunk[order]
@@ -206,11 +206,11 @@ class SqliteSource:
         for first in range(0, len(numbers), _QUERY_ROWS):
             stretch = numbers[first : first + _QUERY_ROWS]
             if int(stretch[-1] - stretch[0]) > 4 * _QUERY_ROWS:
-                continue  # many rows of other topics lie between: one by one is cheaper
+                continue  # many rows of other topics in between: single reads are cheaper
             try:
                 answer = self._rows(query, size, int(stretch[0]), int(stretch[-1]))
             except RecordingError:
-                continue  # damaged somewhere: one by one
+                continue  # damaged somewhere: read one by one
             found = [row for row in answer if type(row[1]) is bytes]
             ids = np.fromiter((row[0] for row in found), dtype=np.int64, count=len(found))
             heads = np.frombuffer(b"".join(row[1].ljust(size, b"\0") for row in found), dtype=np.uint8).reshape(

@@ -1,4 +1,4 @@
-"""SQLite databases opened with care: logs of killed recorders, cut and damaged files, hostile contents."""
+"""Open SQLite databases safely: logs of killed recorders, truncated and damaged files, malicious contents."""
 
 import shutil
 import sqlite3
@@ -31,9 +31,9 @@ class FoundRows:
 
     Attributes:
         columns: (n, 3) topic, time [ns], row.
-        holes: stretches of row numbers that lie in damaged parts of the file; the end of the last may be unknown.
-        strange: rows whose time or topic is no number.
-        fault: what SQLite says about the damage; "" without any.
+        holes: ranges of row numbers in damaged parts of the file; the end of the last may be unknown.
+        strange: number of rows whose time or topic is not a number.
+        fault: SQLite's error message for the damage; "" if there is none.
     """
 
     columns: np.ndarray
@@ -43,13 +43,13 @@ class FoundRows:
 
 
 def connect(file: FileBytes, until_closed: ExitStack) -> sqlite3.Connection:
-    """Open a database for reading only. A write-ahead log left by a killed recorder is read too, never passed over.
+    """Open a database read-only. A write-ahead log left by a killed recorder is always read too.
 
-    Where SQLite cannot read the log in place, on a medium that cannot be written, database and log are copied first.
+    If SQLite cannot read the log in place, on a read-only medium, database and log are copied first.
 
     Args:
         file: the database.
-        until_closed: takes what has to be cleared away when the database is closed.
+        until_closed: receives what must be cleaned up when the database is closed.
 
     Raises:
         RecordingError: SQLite refuses it.
@@ -64,12 +64,12 @@ def connect(file: FileBytes, until_closed: ExitStack) -> sqlite3.Connection:
         connection.close()
         return _copied(file, log, until_closed)
     except sqlite3.DatabaseError:
-        pass  # damaged: told where it is read
+        pass  # damaged: reported when it is read
     return connection
 
 
 def _copied(file: FileBytes, log: Path, until_closed: ExitStack) -> sqlite3.Connection:
-    """Copy database and log to a place that can be written, and open the copy."""
+    """Copy database and log to a writable folder, and open the copy."""
     folder = until_closed.enter_context(TemporaryDirectory(prefix="cocalib-", ignore_cleanup_errors=True))
     copy = Path(folder) / "copy.db3"
     try:
@@ -77,8 +77,8 @@ def _copied(file: FileBytes, log: Path, until_closed: ExitStack) -> sqlite3.Conn
         shutil.copyfile(log, f"{copy}-wal")
     except OSError as error:
         raise RecordingError(
-            f"{file.path}: its -wal file can only be read where the folder is writable, and copying both failed: "
-            f"{error.strerror}; copy both files to a folder of your own"
+            f"{file.path}: its -wal file can only be read in a writable folder, and copying both failed: "
+            f"{error.strerror}; copy both files to a writable folder"
         ) from error
     return _connection(file.path, copy, "mode=ro")
 
@@ -89,7 +89,7 @@ def _connection(path: Path, stored: Path, mode: str) -> sqlite3.Connection:
         connection = sqlite3.connect(address, uri=True, check_same_thread=False, isolation_level=None)
         connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _MAX_VALUE_BYTES)
         connection.execute("PRAGMA trusted_schema=OFF")
-        connection.execute("PRAGMA writable_schema=ON")  # a cut file is opened all the same; nothing is ever written
+        connection.execute("PRAGMA writable_schema=ON")  # opens truncated files too; nothing is ever written
     except sqlite3.Error as error:
         raise damaged_database(path, error) from error
     connection.text_factory = lambda raw: raw.decode("utf-8", "replace")
@@ -97,16 +97,16 @@ def _connection(path: Path, stored: Path, mode: str) -> sqlite3.Connection:
 
 
 def damaged_database(path: Path, error: object) -> RecordingError:
-    """Say that SQLite cannot read something."""
+    """Return the error for a database that SQLite cannot read."""
     why = " ".join(str(error).split())[:200]
     return RecordingError(
         f"{path}: not a readable ROS 2 SQLite bag ({why}); if the recorder was killed, keep the -wal file "
-        "beside it in a writable folder; otherwise copy the file again"
+        "next to it in a writable folder; otherwise copy the file again"
     )
 
 
 def first_rows(connection: sqlite3.Connection, count: int) -> FoundRows:
-    """Read topic, time and number of the first so many rows, and nothing behind them.
+    """Read topic, time and number of the first count rows, and nothing after them.
 
     Raises:
         sqlite3.Error: they are damaged.
@@ -118,11 +118,11 @@ def first_rows(connection: sqlite3.Connection, count: int) -> FoundRows:
 
 
 def scan_rows(connection: sqlite3.Connection, path: Path) -> FoundRows:
-    """Read topic, time and number of every row; around damaged pages, row by row.
+    """Read topic, time and number of every row, row by row around damaged pages.
 
     Args:
         connection: to the database.
-        path: for messages, and for the most rows there can be.
+        path: of the database; its size limits the number of rows.
     """
     try:
         batches, strange = _batches(connection, "SELECT topic_id, timestamp, id FROM messages", ())
@@ -133,7 +133,7 @@ def scan_rows(connection: sqlite3.Connection, path: Path) -> FoundRows:
 
 
 def _batches(connection: sqlite3.Connection, query: str, values: tuple[int, ...]) -> tuple[list[np.ndarray], int]:
-    """Run a query; return its rows of whole numbers, and how many rows were others."""
+    """Run a query; return its rows of integers, and the number of other rows."""
     batches, strange = [], 0
     cursor = connection.execute(query, values)
     while rows := cursor.fetchmany(_BATCH_ROWS):
@@ -164,7 +164,7 @@ def _last_row(connection: sqlite3.Connection, path: Path) -> int:
 
 
 def _around_damage(connection: sqlite3.Connection, last: int, fault: str) -> FoundRows:
-    """Halve stretches of rows that fail until what fails is small; widest first, and no more than so often."""
+    """Bisect failing ranges of rows until they are small, widest first, with a limited number of queries."""
     waiting = deque([(0, last)])
     batches: list[np.ndarray] = []
     holes: list[tuple[int, int]] = []
@@ -204,18 +204,18 @@ def _rows_text(low: int, high: int) -> str:
 
 
 def about_rows(path: Path, found: FoundRows, unknown: int) -> list[DataWarning]:
-    """Say what was lost in a database.
+    """Warn about what was lost in a database.
 
     Args:
         path: the file.
         found: its rows.
-        unknown: rows of topics that the file does not describe.
+        unknown: number of rows of topics that the file does not describe.
     """
     lost = []
     if found.fault:
         where = ", ".join(_rows_text(low, high) for low, high in found.holes[:3])
         lost.append(
-            f"it is damaged or cut short ({found.fault}): {len(found.columns)} messages were found; "
+            f"it is damaged or truncated ({found.fault}): {len(found.columns)} messages were recovered; "
             + (
                 f"rows {where}{', ...' if len(found.holes) > 3 else ''} are lost"
                 if where
@@ -223,9 +223,9 @@ def about_rows(path: Path, found: FoundRows, unknown: int) -> list[DataWarning]:
             )
         )
     if found.strange:
-        lost.append(f"{found.strange} rows without a time or a topic are left out")
+        lost.append(f"{found.strange} rows without a time or a topic are skipped")
     if unknown:
-        lost.append(f"{unknown} messages belong to topics that the file does not describe, and are left out")
+        lost.append(f"{unknown} messages belong to topics that the file does not describe, and are skipped")
     if not lost:
         return []
     return [DataWarning("damaged-file", f"{path.name}: {'; '.join(lost)}", "copy the file again from its source")]

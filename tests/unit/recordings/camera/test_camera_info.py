@@ -54,7 +54,7 @@ def test_lens_models_are_read(ros, write, model, distortion, expected, coefficie
         ({"width": 640, "height": 640}, "camera-size"),
     ],
 )
-def test_intrinsics_that_cannot_be_used_are_none_and_said(ros, write, changes, code):
+def test_unusable_intrinsics_are_none_with_a_warning(ros, write, changes, code):
     camera, codes, warnings = camera_of(write, ros, ros.camera_info(**changes))
     assert camera is None
     assert codes == [code]
@@ -78,21 +78,21 @@ def test_binning_keeps_pixel_centres_in_place(ros, write):
     assert codes == []
 
 
-def test_intrinsics_of_a_resized_image_are_scaled_and_said(ros, write):
+def test_intrinsics_of_a_resized_image_are_scaled_with_a_warning(ros, write):
     camera, codes, _ = camera_of(write, ros, ros.camera_info(), size=(320, 240))
     assert camera is not None
     np.testing.assert_allclose(camera.matrix_px, [[250, 0, 159.5], [0, 255, 119.5], [0, 0, 1]])
     assert codes == ["camera-scaled"]
 
 
-def test_a_rectified_image_goes_by_the_projection_matrix(ros, write):
+def test_a_rectified_image_uses_the_projection_matrix(ros, write):
     camera, codes, _ = camera_of(write, ros, ros.camera_info(), topic="/camera/image_rect_color")
     assert camera is not None
     assert (camera.model, codes) == ("pinhole", [])
     np.testing.assert_allclose(camera.matrix_px, [[450, 0, 319.5 * 0.9], [0, 459, 239.5 * 0.9], [0, 0, 1]])
 
 
-def test_intrinsics_that_change_on_the_way_are_said(ros, write):
+def test_intrinsics_that_change_during_the_recording_give_a_warning(ros, write):
     other = ros.camera_info(K=2 * np.array([500.0, 0, 319.5, 0, 510.0, 239.5, 0, 0, 0.5]))
     camera, codes, _ = camera_of(write, ros, ros.camera_info(), other)
     assert camera is not None

@@ -1,4 +1,4 @@
-"""Images: files passed through, pixels converted, the rest refused in words."""
+"""Images: files are passed through, pixels converted, and the rest refused with a clear error."""
 
 import cv2
 import numpy as np
@@ -7,7 +7,7 @@ import pytest
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import RecordingOptions, inspect_recording, open_recording
-from calib_core.recordings.camera.jpeg import mended_jpeg
+from calib_core.recordings.camera.jpeg import repaired_jpeg
 
 START_NS = 1_700_000_000 * NS_PER_S
 EXIF_TURNED = b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"
@@ -40,7 +40,7 @@ def test_a_png_is_passed_through_byte_for_byte(ros, write):
         np.testing.assert_array_equal(recording.image(0), picture())
 
 
-def test_an_orientation_in_the_exif_block_does_not_turn_the_picture(ros, write, jpeg):
+def test_an_orientation_in_the_exif_block_does_not_rotate_the_picture(ros, write, jpeg):
     turned = jpeg[:2] + EXIF_TURNED + jpeg[2:]
     assert cv2.imdecode(np.frombuffer(turned, dtype=np.uint8), cv2.IMREAD_COLOR).shape == (64, 48, 3)
     with opened(write, ros, ros.compressed(START_NS, turned)) as recording:
@@ -52,13 +52,13 @@ def test_a_missing_end_marker_is_added(ros, write, jpeg):
     assert jpeg.endswith(b"\xff\xd9")
     with opened(write, ros, ros.compressed(START_NS, jpeg[:-2])) as recording:
         assert recording.image_bytes(0).data == jpeg
-    assert mended_jpeg(jpeg + bytes(8))[0] == jpeg + bytes(8)
+    assert repaired_jpeg(jpeg + bytes(8))[0] == jpeg + bytes(8)
 
 
 @pytest.mark.parametrize("cut", [0, 2, 3, 30])
 def test_a_jpeg_cut_before_its_picture_is_refused(jpeg, cut):
     with pytest.raises(MessageError):
-        mended_jpeg(jpeg[:cut])
+        repaired_jpeg(jpeg[:cut])
 
 
 @pytest.mark.parametrize(
@@ -166,14 +166,14 @@ def test_a_png_of_16_bit_grey_that_says_mono16_is_stretched(ros, write) -> None:
     [
         (
             "16UC1",
-            "the encoding '16UC1' cannot be read; a depth image has no agreed brightness; convert it to mono8",
+            "the encoding '16UC1' is not supported; a depth image has no defined brightness scale, convert it to mono8",
         ),
-        ("32FC1", "a depth image has no agreed brightness"),
-        ("bayer_rggb12", "'bayer_rggb12' cannot be read; jpeg, png, mono8"),
-        ("nonsense", "'nonsense' cannot be read; jpeg, png, mono8"),
+        ("32FC1", "a depth image has no defined brightness scale"),
+        ("bayer_rggb12", "'bayer_rggb12' is not supported; jpeg, png, mono8"),
+        ("nonsense", "'nonsense' is not supported; jpeg, png, mono8"),
     ],
 )
-def test_raw_encodings_that_cannot_be_read_are_refused_in_words(ros, write, encoding, words):
+def test_unsupported_raw_encodings_are_refused_with_a_clear_error(ros, write, encoding, words):
     message = ros.image(START_NS, np.zeros((4, 8), dtype=np.uint8), encoding, width=4)
     with pytest.raises(RecordingError, match="no readable camera image topic") as caught:
         opened(write, ros, message)
@@ -183,15 +183,15 @@ def test_raw_encodings_that_cannot_be_read_are_refused_in_words(ros, write, enco
 @pytest.mark.parametrize(
     ("data", "form", "words"),
     [
-        (b"qoif" + bytes(40), "rgb8; qoi", "the encoding 'qoi' is not supported; record in jpeg or png"),
+        (b"qoif" + bytes(40), "rgb8; qoi", "the encoding 'qoi' cannot be read; record in jpeg or png"),
         (bytes(12) + b"\x89PNG" + bytes(40), "16UC1; compressedDepth", "is a depth image, not a picture"),
-        (b"RIFF1234WEBP" + bytes(40), "webp", "the encoding 'webp' is not supported"),
-        (b"", "jpeg", "the encoding 'jpeg' is not supported"),
+        (b"RIFF1234WEBP" + bytes(40), "webp", "the encoding 'webp' cannot be read"),
+        (b"", "jpeg", "the encoding 'jpeg' cannot be read"),
         (b"\xff\xd8\xff\xe0", "jpeg", "the JPEG ends before its image data"),
         (cv2.imencode(".png", np.zeros((4, 4), np.uint16))[1].tobytes(), "16UC1; png compressed ", "16-bit grey"),
     ],
 )
-def test_compressed_images_that_cannot_be_read_are_refused_in_words(ros, write, data, form, words):
+def test_unreadable_compressed_images_are_refused_with_a_clear_error(ros, write, data, form, words):
     path = write(ros, [("/camera/image", START_NS, ros.compressed(START_NS, data, form))])
     with pytest.raises(MessageError, match="topic /camera/image") as caught:
         open_recording(path, RecordingOptions(image_topic="/camera/image"), require=())
@@ -211,14 +211,14 @@ def test_compressed_images_that_cannot_be_read_are_refused_in_words(ros, write, 
         ({"step": 2**31}, "the message is damaged"),
     ],
 )
-def test_images_whose_sizes_contradict_themselves_are_refused(ros, write, changes, words):
+def test_images_with_inconsistent_sizes_are_refused(ros, write, changes, words):
     message = ros.image(START_NS, picture()[:, :, 0], "mono8", **changes)
     with pytest.raises(RecordingError) as caught:
         opened(write, ros, message)
     assert words in str(caught.value)
 
 
-def test_one_damaged_frame_does_not_take_the_others_down(ros, write, jpeg):
+def test_one_damaged_frame_does_not_affect_the_others(ros, write, jpeg):
     broken = jpeg[:60]
     with opened(
         write, ros, *(ros.compressed(START_NS + i * 10**8, d) for i, d in enumerate([jpeg, broken, jpeg]))
@@ -229,7 +229,7 @@ def test_one_damaged_frame_does_not_take_the_others_down(ros, write, jpeg):
             recording.image_bytes(1)
 
 
-def test_frames_with_the_same_stamp_are_shown_once_and_said(ros, write, jpeg):
+def test_frames_with_the_same_stamp_are_shown_once_with_a_warning(ros, write, jpeg):
     messages = [ros.compressed(START_NS + (i // 2) * 10**8, jpeg) for i in range(6)]
     with opened(write, ros, *messages) as recording:
         assert recording.image_times.tolist() == [START_NS, START_NS + 10**8, START_NS + 2 * 10**8]

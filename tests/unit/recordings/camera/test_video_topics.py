@@ -1,4 +1,4 @@
-"""Topics of H.264 and H.265: frames that need those before them."""
+"""H.264 and H.265 topics: frames that depend on those before them."""
 
 import sqlite3
 from collections.abc import Callable
@@ -32,7 +32,7 @@ def number_in(picture: np.ndarray) -> int:
 
 @pytest.fixture(scope="module", params=["h264", "hevc"])
 def coded(request: pytest.FixtureRequest) -> tuple[str, list[bytes]]:
-    """Return the codec and one coded frame per picture, as an encoder on a robot sends them."""
+    """Return the codec and one encoded frame per picture, as an encoder on a robot sends them."""
     codec = str(request.param)
     context: Any = av.CodecContext.create({"h264": "libx264", "hevc": "libx265"}[codec], "w")
     context.width, context.height, context.pix_fmt, context.time_base = 128, 64, "yuv420p", Fraction(1, 10)
@@ -91,7 +91,7 @@ def recorded(write: Any, ros: Any, build: Build, codec: str, packets: list[bytes
 
 
 @pytest.mark.parametrize("build", [foxglove, ffmpeg, image])
-def test_every_frame_of_a_video_topic_is_its_own_in_any_order(build, coded, ros2, write) -> None:
+def test_every_frame_of_a_video_topic_is_decoded_correctly_in_any_order(build, coded, ros2, write) -> None:
     with open_recording(recorded(write, ros2, build, *coded), require=("image",)) as recording:
         assert recording.camera_frame == "cam"
         np.testing.assert_array_equal(recording.image_times, START_NS + 10**8 * np.arange(FRAMES))
@@ -102,7 +102,7 @@ def test_every_frame_of_a_video_topic_is_its_own_in_any_order(build, coded, ros2
         assert recording.warnings == ()
 
 
-def test_frames_before_the_first_key_frame_are_left_out_and_said(coded, ros2, write) -> None:
+def test_frames_before_the_first_key_frame_are_skipped_with_a_warning(coded, ros2, write) -> None:
     codec, packets = coded
     with open_recording(recorded(write, ros2, foxglove, codec, packets[3:]), require=("image",)) as recording:
         (warning,) = recording.warnings
@@ -112,7 +112,7 @@ def test_frames_before_the_first_key_frame_are_left_out_and_said(coded, ros2, wr
         assert number_in(recording.image(0)) == KEY_EVERY
 
 
-def test_a_damaged_frame_does_not_take_the_next_key_frame_down(coded, ros2, write) -> None:
+def test_a_damaged_frame_does_not_affect_the_next_key_frame(coded, ros2, write) -> None:
     codec, packets = coded
     packets = [*packets[:5], b"", *packets[6:]]
     with open_recording(recorded(write, ros2, foxglove, codec, packets), require=("image",)) as recording:

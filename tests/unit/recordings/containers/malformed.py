@@ -1,4 +1,4 @@
-"""Recordings that are broken in every way we know of, built from one that is whole.
+"""Recordings broken in every known way, built from an intact one.
 
 Each case takes a Kit and returns the path to open. All of them are built by
 `python -m tests.unit.recordings.containers.malformed FOLDER`.
@@ -44,7 +44,7 @@ def _bomb(compress: Callable[[bytes], bytes]) -> bytes:
 
 @dataclass(frozen=True)
 class Kit:
-    """What a case is built from: a folder of its own, and one picture."""
+    """The materials of a case: its own folder, and one picture."""
 
     folder: Path
     jpeg: bytes
@@ -103,7 +103,7 @@ def without_index(raw: bytearray) -> bytes:
 
 
 def chunk_places(raw: bytes | bytearray) -> list[int]:
-    """Return where the data of each chunk of a bag begins."""
+    """Return the position of the data of each chunk of a bag."""
     places, place = [], raw.find(b"op=\x05")
     while place >= 0:
         start = place - 8
@@ -248,7 +248,7 @@ def bag_chunk_that_declares_three_gigabytes(kit: Kit) -> Path:
 
 @case
 def bag_bomb(kit: Kit) -> Path:
-    """A chunk of a few hundred bytes that unpacks to 200 MB."""
+    """A chunk of a few hundred bytes that decompresses to 200 MB."""
 
     def change(raw: bytearray) -> bytes:
         start = chunk_places(raw)[-1]
@@ -429,7 +429,7 @@ def mcap_with_a_summary_past_its_end(kit: Kit) -> Path:
 
 @case
 def mcap_bomb(kit: Kit) -> Path:
-    """A chunk of 20 kB that unpacks to 200 MB."""
+    """A chunk of 20 kB that decompresses to 200 MB."""
     bomb = _bomb(zstd.compress)
     head = struct.pack("<QQQI", START_NS, START_NS, BOMB_BYTES, 0) + struct.pack("<I", 4) + b"zstd"
     chunk = record(6, head + struct.pack("<Q", len(bomb)) + bomb)
@@ -452,7 +452,7 @@ def mcap_packed_with_lz4(kit: Kit) -> Path:
 
 @case
 def packed_bomb(kit: Kit) -> Path:
-    """A file of 40 kB that unpacks to half a GB."""
+    """A file of 40 kB that decompresses to half a GB."""
     path = kit.folder / "r.mcap.zstd"
     path.write_bytes(zstd.compress(bytes(1 << 26)) * 8)
     return path

@@ -1,4 +1,4 @@
-"""MCAP files written by the specification, with parts left out that other writers leave out."""
+"""Write MCAP files according to the specification, optionally without parts that other writers omit."""
 
 import struct
 import zlib
@@ -64,7 +64,7 @@ def mcap(
     chunk_rows=10**9,
     checksums=False,
 ) -> bytes:
-    """Write an MCAP, with the parts left out that a test asks for."""
+    """Write an MCAP without the parts that a test omits."""
     topics = sorted({topic for topic, _, _ in rows})
     declared = declarations(ros, rows, encoding, schemas)
     if profile is None:

@@ -1,4 +1,4 @@
-"""MCAP files carry checksums: of each chunk, and of the summary. What does not have them any more is told."""
+"""MCAP files have checksums of each chunk and of the summary. Mismatches are reported."""
 
 import struct
 
@@ -21,7 +21,7 @@ def write(tmp_path, ros, rows, change=None, **shape):
 
 
 def spoil_checksum(number):
-    """Change the checksum of a chunk: as good as changing what it is of, and no unpacker notices it before."""
+    """Change the checksum of a chunk: equivalent to changing its contents, but not detected by the decompressor first."""
 
     def change(data):
         place = 0
@@ -36,7 +36,7 @@ def spoil_checksum(number):
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_checksums_that_are_right_are_not_spoken_of(shape, ros2, plain, jpeg, tmp_path):
+def test_correct_checksums_give_no_warning(shape, ros2, plain, jpeg, tmp_path):
     with open_recording(write(tmp_path, ros2, plain(ros2, jpeg, n=20), **shape)) as recording:
         assert recording.image_bytes(19).data == jpeg
         assert len(recording.radar_scans()) == 20
@@ -44,7 +44,7 @@ def test_checksums_that_are_right_are_not_spoken_of(shape, ros2, plain, jpeg, tm
 
 
 @pytest.mark.parametrize("compression", ["", "lz4"])
-def test_a_chunk_without_its_checksum_is_told_and_its_messages_are_counted(compression, ros2, plain, jpeg, tmp_path):
+def test_a_chunk_with_a_wrong_checksum_gives_a_warning_with_its_message_count(compression, ros2, plain, jpeg, tmp_path):
     path = write(tmp_path, ros2, plain(ros2, jpeg, n=20), spoil_checksum(1), compression=compression)
     with open_recording(path) as recording:
         assert recording.image_bytes(7).data == jpeg
@@ -54,7 +54,7 @@ def test_a_chunk_without_its_checksum_is_told_and_its_messages_are_counted(compr
     assert "1 of the chunks read so far, with 15 messages;" in warning.message
 
 
-def test_a_flipped_byte_in_a_picture_is_told(ros2, plain, jpeg, tmp_path):
+def test_a_flipped_byte_in_a_picture_gives_a_warning(ros2, plain, jpeg, tmp_path):
     def flip(data):
         data[data.index(jpeg, data.index(jpeg, len(data) // 2) + 1) + len(jpeg) // 2] ^= 1
 
@@ -65,7 +65,9 @@ def test_a_flipped_byte_in_a_picture_is_told(ros2, plain, jpeg, tmp_path):
         assert [warning.code for warning in recording.warnings] == ["checksum"]
 
 
-def test_a_packed_chunk_without_its_checksum_counts_as_damaged_in_a_file_without_index(ros2, plain, jpeg, tmp_path):
+def test_a_compressed_chunk_with_a_wrong_checksum_counts_as_damaged_in_a_file_without_index(
+    ros2, plain, jpeg, tmp_path
+):
     path = write(tmp_path, ros2, plain(ros2, jpeg, n=20), spoil_checksum(2), compression="lz4", summary=False)
     with open_recording(path) as recording:
         assert len(recording.radar_scans()) == 20
@@ -73,7 +75,7 @@ def test_a_packed_chunk_without_its_checksum_counts_as_damaged_in_a_file_without
         assert "wrong checksum" in recording.warnings[0].message
 
 
-def test_a_summary_without_its_checksum_is_not_trusted(ros2, plain, jpeg, tmp_path):
+def test_a_summary_with_a_wrong_checksum_is_not_trusted(ros2, plain, jpeg, tmp_path):
     def change(data):
         data[data.rindex(b"/radar/points") + 1] ^= 0x20  # in the repeated channel, which comes in the summary
 

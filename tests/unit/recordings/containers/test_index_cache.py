@@ -1,4 +1,4 @@
-"""Opening a file again uses what was found out the first time, and never what belongs to another file."""
+"""Reopening a file uses its cached index, and never that of another file."""
 
 import os
 import shutil
@@ -22,7 +22,7 @@ START_NS = 1_700_000_000 * NS_PER_S
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """Switch the cache on for files of any size, in a folder of the test."""
+    """Enable the cache for files of any size, in the test's folder."""
     monkeypatch.setenv("COCALIB_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(index_cache, "SMALLEST_FILE_BYTES", 0)
     return tmp_path / "cache"
@@ -78,7 +78,7 @@ def test_reopening_gives_the_same_and_reads_neither_index_nor_stamps_again(path,
     assert contents(path) == first
 
 
-def test_a_file_that_changed_is_read_anew(path, folder):
+def test_a_changed_file_is_read_again(path, folder):
     contents(path)
     before = set(folder.iterdir())
     os.utime(path, ns=(1, path.stat().st_mtime_ns + 1))
@@ -89,14 +89,14 @@ def test_a_file_that_changed_is_read_anew(path, folder):
 @pytest.mark.parametrize(
     "damage", [lambda raw: b"", lambda raw: raw[:-100], lambda raw: raw[:300] + bytes(200) + raw[500:], lambda _: b"{}"]
 )
-def test_a_damaged_cache_is_passed_over(path, folder, damage):
+def test_a_damaged_cache_is_ignored(path, folder, damage):
     first = contents(path)
     for entry in folder.iterdir():
         entry.write_bytes(damage(entry.read_bytes()))
     assert contents(path) == first
 
 
-def test_an_entry_whose_numbers_make_no_sense_is_passed_over(path, folder):
+def test_an_entry_with_inconsistent_numbers_is_ignored(path, folder):
     first = contents(path)
     for entry in folder.iterdir():
         with np.load(entry, allow_pickle=False) as kept:
@@ -124,7 +124,7 @@ def test_damaged_files_are_not_kept(folder, tmp_path, jpeg):
     assert not list(folder.glob("*-index.index.npz"))
 
 
-def test_the_cache_stays_small_by_dropping_what_was_not_used_for_longest(folder, monkeypatch):
+def test_the_cache_stays_small_by_dropping_the_least_recently_used_entries(folder, monkeypatch):
     monkeypatch.setattr(index_cache, "_MAX_TOTAL_BYTES", 30_000)
     cache = FileCache(folder, "key")
     for number in range(5):
@@ -136,7 +136,7 @@ def test_the_cache_stays_small_by_dropping_what_was_not_used_for_longest(folder,
     assert cache.get("large") is None
 
 
-def test_a_folder_that_cannot_be_written_is_no_error(tmp_path, path, monkeypatch):
+def test_a_read_only_cache_folder_is_not_an_error(tmp_path, path, monkeypatch):
     monkeypatch.setattr(index_cache, "SMALLEST_FILE_BYTES", 0)
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("COCALIB_CACHE", str(tmp_path / "file" / "below"))

@@ -1,4 +1,4 @@
-"""Every malformed recording: how much of it is kept, and the exact words about the rest."""
+"""Every malformed recording: how much is recovered, and the exact messages about the rest."""
 
 import json
 import os
@@ -28,14 +28,14 @@ LOSSLESS = {
     "db3_with_a_log_left_over",
     "db3_with_metadata_that_is_no_yaml",
 }
-"""Odd, but nothing is lost and nothing is said."""
+"""Unusual recordings that are read without losses and without warnings."""
 
 EXPECTED: dict[str, list[Any]] = json.loads(Path(__file__).with_name("malformed_expected.json").read_text())
-"""Scans, pictures, and everything that is said: warnings, problems of topics, or the refusal."""
+"""Number of scans, number of pictures, and all messages: warnings, topic problems, or the error."""
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_what_is_whole_is_kept_and_what_is_lost_is_said(name, tmp_path, jpeg):
+def test_complete_messages_are_recovered_and_losses_are_reported(name, tmp_path, jpeg):
     path = CASES[name](Kit(tmp_path, jpeg))
     scans = pictures = 0
     try:
@@ -57,7 +57,7 @@ def _picture(recording, index):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_first_picture_is_a_whole_one_or_none(name, tmp_path, jpeg):
+def test_a_first_picture_is_complete_or_none(name, tmp_path, jpeg):
     path = CASES[name](Kit(tmp_path, jpeg))
     picture = first_picture([path])
     assert picture is None or picture.data == jpeg
@@ -104,7 +104,7 @@ def test_hostile_heads_lengths_and_offsets_never_crash_hang_or_eat_memory(name, 
 
 
 def _read_everything(path):
-    """Read what there is; nothing but RecordingError may come out."""
+    """Read everything; only RecordingError may be raised."""
     try:
         with inspect_recording(path) as recording:
             recording.radar_scans()
@@ -116,7 +116,7 @@ def _read_everything(path):
 
 
 def _peak_kib() -> int:
-    """Return the most memory this process has had so far [KiB]; 0 where that is not known."""
+    """Return the peak memory use of this process [KiB]; 0 if unknown."""
     if sys.platform == "win32":
         return 0
     import resource

@@ -1,4 +1,4 @@
-"""MCAP files other writers make: no chunks, no index, no summary, LZ4, other encodings."""
+"""MCAP files of other writers: no chunks, no index, no summary, LZ4, other encodings."""
 
 import struct
 
@@ -38,7 +38,7 @@ def test_every_shape_of_the_format_gives_every_message(shape, ros, plain, jpeg, 
 
 
 @pytest.mark.parametrize("shape", [{"summary": False}, {"chunked": False}])
-def test_a_file_that_was_not_closed_is_read_up_to_its_end_and_said(shape, ros2, plain, jpeg, tmp_path):
+def test_a_file_that_was_not_closed_is_read_to_its_end_with_a_warning(shape, ros2, plain, jpeg, tmp_path):
     path = tmp_path / "made.mcap"
     data = mcap(ros2, plain(ros2, jpeg, n=40), **shape)
     path.write_bytes(data[: data.rindex(b"\x0f" + struct.pack("<Q", 4))] + b"\x05\x30")
@@ -59,7 +59,7 @@ def test_an_encoding_that_is_not_of_ros_is_a_problem_of_its_topic(ros2, plain, j
 
 
 @pytest.mark.parametrize("claimed", [1 << 40, 1 << 63, (1 << 64) - 1])
-def test_a_chunk_that_claims_to_be_longer_than_any_file_is_walked_over(claimed, ros2, plain, jpeg, tmp_path):
+def test_a_chunk_that_claims_to_be_longer_than_any_file_is_skipped(claimed, ros2, plain, jpeg, tmp_path):
     data = bytearray(mcap(ros2, plain(ros2, jpeg, n=20), chunk_rows=15))
     start = 8 + 9 + int.from_bytes(data[9:17], "little")
     length = 9 + int.from_bytes(data[start + 1 : start + 9], "little")

@@ -18,7 +18,7 @@ from calib_core.recordings.messages.definitions import Field, parse_definition
 START_NS = 1_700_000_000 * NS_PER_S
 
 
-def test_a_definition_with_all_that_the_language_has_is_understood():
+def test_a_definition_with_every_feature_of_the_language_is_parsed():
     text = """
 # a comment
 string<=10 name "a # default = x"   # another
@@ -63,7 +63,7 @@ INJECTIONS = [
 
 @pytest.mark.parametrize("text", INJECTIONS)
 def test_code_in_a_definition_is_never_run(text, ros1, write, tmp_path, monkeypatch, plain, jpeg):
-    """The payload sits in the bag as a recorder would have written it; opening either refuses or decodes it as data."""
+    """The payload is in the bag as a recorder would write it; opening either refuses it or decodes it as data."""
     monkeypatch.chdir(tmp_path)
     before = set(sys.modules)
     ros1.define("odd_msgs/msg/Odd", "Header header\nfloat32 x\n")
@@ -97,13 +97,13 @@ def test_code_in_a_definition_is_never_run(text, ros1, write, tmp_path, monkeypa
         ("float32 x\n=====\nnonsense", "begins with 'nonsense' instead of MSG:"),
     ],
 )
-def test_definitions_that_make_no_sense_are_refused_in_words(text, words):
+def test_invalid_definitions_are_refused_with_a_clear_error(text, words):
     with pytest.raises(MessageError) as caught:
         parse_definition("test_msgs/Thing", text, "ros1")
     assert words in str(caught.value)
 
 
-def test_a_definition_in_idl_is_understood():
+def test_a_definition_in_idl_is_parsed():
     text = """
 ================================================================================
 IDL: test_msgs/msg/Thing
@@ -134,7 +134,7 @@ element = st.lists(st.sampled_from(PRIMITIVES), min_size=1, max_size=4)
 
 
 class Random:
-    """Random messages of a random definition, made through rosbags."""
+    """Random messages of a random definition, built with rosbags."""
 
     def __init__(self, fields: list[tuple[str, str]], inner: list[str], inner_text: bool, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
@@ -228,7 +228,7 @@ def test_bytes_that_do_not_fit_are_refused(payload, words):
         decode(definition, payload)
 
 
-def test_a_count_of_billions_is_refused_before_memory_is_asked_for():
+def test_a_count_of_billions_is_refused_before_memory_is_allocated():
     definition = parse_definition("t_msgs/List", "Inner[] values\n====\nMSG: t_msgs/Inner\nstring text", "ros1")
     with pytest.raises(MessageError, match="claims 4294967295 elements in a message of 24 bytes"):
         decode(definition, b"\xff\xff\xff\xff" + bytes(20))

@@ -1,4 +1,4 @@
-"""Messages that bear the names of standard fields with other types: a problem of their topic, nothing else."""
+"""Messages with standard field names of other types: a problem of their topic only."""
 
 import numpy as np
 import pytest

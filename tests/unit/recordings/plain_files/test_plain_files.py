@@ -79,7 +79,7 @@ def test_written_times_are_read_exactly(text, unit, expected) -> None:
 
 
 @pytest.mark.parametrize(("text", "words"), [("yesterday", "'yesterday' is not a time"), ("12345", "has 5 digits")])
-def test_what_is_no_time_is_refused(text, words) -> None:
+def test_invalid_times_are_refused(text, words) -> None:
     with pytest.raises(RecordingError, match=words):
         read_time(text)
 
@@ -123,7 +123,7 @@ def test_the_fingerprint_of_a_folder_follows_its_contents(tmp_path) -> None:
         ("front/times.txt", "1700000000.0\n1700000001.0\n"),
     ],
 )  # fmt: skip
-def test_a_table_beside_gives_the_times(tmp_path, table, text) -> None:
+def test_a_table_next_to_the_files_gives_the_times(tmp_path, table, text) -> None:
     folder = pictures(tmp_path / "front", ["b.png", "a.png"])
     radar_csv(tmp_path / table, text)
     with open_recording(folder, require=("image",)) as recording:
@@ -131,7 +131,7 @@ def test_a_table_beside_gives_the_times(tmp_path, table, text) -> None:
         np.testing.assert_array_equal(recording.image(1), pixels(0))
 
 
-def test_pictures_without_a_time_are_left_out_and_said(tmp_path) -> None:
+def test_pictures_without_a_time_are_skipped_with_a_warning(tmp_path) -> None:
     folder = pictures(tmp_path / "front", [f"{START_NS}.png", "notes.png", "zebra.png"])
     with open_recording(folder, require=("image",)) as recording:
         assert len(recording.image_times) == 1
@@ -140,13 +140,13 @@ def test_pictures_without_a_time_are_left_out_and_said(tmp_path) -> None:
     assert "2 of 3 files have no time and are skipped; the first is notes.png" in warning.message
 
 
-def test_pictures_without_any_times_are_refused_in_words(tmp_path) -> None:
+def test_pictures_without_any_times_are_refused_with_a_clear_error(tmp_path) -> None:
     text = refusal(pictures(tmp_path / "front", ["a.png", "b.png"]))
     assert "no times in the file names (a.png)" in text
     assert "add a CSV with the columns file,time_ns to the folder" in text
 
 
-def test_one_damaged_picture_does_not_take_the_others_down(tmp_path) -> None:
+def test_one_damaged_picture_does_not_affect_the_others(tmp_path) -> None:
     folder = pictures(tmp_path / "front", [f"{START_NS + i}.png" for i in range(3)])
     (folder / f"{START_NS + 1}.png").write_bytes(b"GIF89a nothing")
     with open_recording(folder, require=("image",)) as recording:
@@ -202,7 +202,7 @@ def test_a_nuscenes_radar_folder_is_a_radar(tmp_path) -> None:
     np.testing.assert_array_equal(found.snr_db, rows[:, 2])
 
 
-def test_an_ascii_pcd_is_read_and_a_packed_one_is_explained(tmp_path) -> None:
+def test_an_ascii_pcd_is_read_and_a_compressed_one_is_explained(tmp_path) -> None:
     folder = tmp_path / "radar"
     folder.mkdir()
     head = "VERSION .7\nFIELDS x y z velocity snr\nSIZE 4 4 4 4 4\nTYPE F F F F F\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA "
@@ -227,7 +227,7 @@ def delft(folder: Path, count: int = 3) -> np.ndarray:
     return rows.astype(np.float64)
 
 
-def test_a_view_of_delft_folder_goes_with_its_pictures_by_number(tmp_path) -> None:
+def test_a_view_of_delft_folder_is_matched_with_its_pictures_by_number(tmp_path) -> None:
     rows = delft(tmp_path / "velodyne")
     camera = pictures(tmp_path / "image_2", [f"{number:05}.jpg" for number in range(3)])
     with open_recording([tmp_path / "velodyne", camera]) as recording:
@@ -268,7 +268,7 @@ def test_a_radar_csv_is_a_radar(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("delimiter", [";", "\t"])
-def test_columns_may_be_parted_by_semicolons_or_tabs(tmp_path, delimiter) -> None:
+def test_columns_may_be_separated_by_semicolons_or_tabs(tmp_path, delimiter) -> None:
     text = "time_ns,x_m,y_m,doppler_mps\n1700000000000000001,3,1,-0.25\n".replace(",", delimiter)
     with open_recording(radar_csv(tmp_path / "scan.csv", text), require=("radar",)) as recording:
         np.testing.assert_array_equal(recording.radar_scans().points_radar_m, [[3, 1, 0]])
@@ -299,7 +299,7 @@ def test_units_in_the_header_are_followed(tmp_path, header, row) -> None:
         ("time_ns,x,y_m\n1,2,3\n", "column 'x' has no unit; write x_m"),
         ("time_fortnights,x_m,y_m\n1,2,3\n", "column 'time_fortnights' has the unknown unit 'fortnights'"),
         ("x_m,y_m\n1,2\n", "no time column; the first line must name columns and units, such as time_ns,x_m"),
-        ("time_ns,x_m,snr_db\n1,2,3\n", "no position; x_m and y_m, or range_m and azimuth_deg, are needed"),
+        ("time_ns,x_m,snr_db\n1,2,3\n", "no position columns; x_m and y_m, or range_m and azimuth_deg, are required"),
         ("time_ns,range_m,r_m,azimuth_deg\n1,2,3,4\n", "two columns hold the same quantity"),
         ("time_ns,x_m,y_m\n", "the file has a header but no rows"),
         ("time_ns,x_m,y_m\n1,2,3\n2,two,3\n", "line 3: could not convert string to float: 'two'"),
@@ -307,7 +307,7 @@ def test_units_in_the_header_are_followed(tmp_path, header, row) -> None:
         ("", "no time column"),
     ],
 )
-def test_a_csv_that_leaves_something_open_is_refused_in_words(tmp_path, text, words) -> None:
+def test_an_ambiguous_csv_is_refused_with_a_clear_error(tmp_path, text, words) -> None:
     assert words in refusal(radar_csv(tmp_path / "a.csv", text))
 
 
@@ -349,16 +349,16 @@ def test_a_video_with_its_start_is_a_camera(tmp_path, suffix, start) -> None:
         assert (frame.format, frame.width_px, frame.height_px) == ("jpeg", 64, 48)
 
 
-def test_a_video_without_its_start_or_without_frames_is_refused_in_words(tmp_path) -> None:
+def test_a_video_without_its_start_or_without_frames_is_refused_with_a_clear_error(tmp_path) -> None:
     assert "give the time of its first frame with --video-start" in refusal(video(tmp_path / "cam.avi"))
-    assert "--video-start: 'noon' is no time" in refusal(tmp_path / "cam.avi", video_start="noon")
+    assert "--video-start: 'noon' is not a time" in refusal(tmp_path / "cam.avi", video_start="noon")
     (tmp_path / "b.mp4").write_bytes(b"nothing of the kind")
     assert "not a readable video" in refusal(tmp_path / "b.mp4", video_start="1700000000")
 
 
 def test_a_start_without_a_video_is_refused_rather_than_ignored(project_root: Path) -> None:
     words = refusal(project_root / "sample_data" / "rooftop" / "camera.bag", video_start="1700000000")
-    assert "there is no video among camera.bag" in words
+    assert "no video among camera.bag" in words
 
 
 # -- together
@@ -374,7 +374,7 @@ def test_plain_files_join_a_bag_as_one_recording(ros1, write, plain, jpeg, tmp_p
         assert len(recording.fingerprint()) == 2
 
 
-def test_folders_of_one_name_stay_two_topics(tmp_path) -> None:
+def test_folders_with_the_same_name_stay_separate_topics(tmp_path) -> None:
     folders = [pictures(tmp_path / side / "images", [f"{START_NS}.png"]) for side in ("left", "right")]
     with open_recording(folders, require=("image",)) as recording:
         assert [topic.name for topic in recording.topics] == ["/images/image", "/right/images/image"]
@@ -383,8 +383,8 @@ def test_folders_of_one_name_stay_two_topics(tmp_path) -> None:
 def test_mixed_folders_and_single_files_are_explained(tmp_path) -> None:
     mixed = pictures(tmp_path / "mixed", [f"{START_NS}.png"])
     (mixed / "a.pcd").write_bytes(b"")
-    assert "put pictures and radar files into folders of their own" in refusal(mixed)
-    assert "give the folder that holds them all" in refusal(mixed / f"{START_NS}.png")
+    assert "put pictures and radar files into separate folders" in refusal(mixed)
+    assert "open the folder with all such files" in refusal(mixed / f"{START_NS}.png")
 
 
 def test_damaged_radar_files_and_csv_are_answered_with_values_or_one_clear_error(tmp_path) -> None:
@@ -424,11 +424,11 @@ def test_damaged_radar_files_and_csv_are_answered_with_values_or_one_clear_error
         ("9200000000000000000", "outside the years 1970 to 2106"),
     ],
 )
-def test_times_that_no_message_can_carry_are_refused_in_words(tmp_path, time, words) -> None:
+def test_times_that_no_message_can_represent_are_refused_with_a_clear_error(tmp_path, time, words) -> None:
     assert words in refusal(radar_csv(tmp_path / "a.csv", f"time_ns,x_m,y_m\n{time},1,2\n"))
 
 
-def test_the_folder_of_a_data_set_stands_for_what_it_holds(tmp_path, ros1, write, plain, jpeg) -> None:
+def test_the_folder_of_a_data_set_opens_its_contents(tmp_path, ros1, write, plain, jpeg) -> None:
     root = tmp_path / "drive"
     root.mkdir()
     pictures(root / "camera", ["a.png", "b.png"])
@@ -440,4 +440,4 @@ def test_the_folder_of_a_data_set_stands_for_what_it_holds(tmp_path, ros1, write
         assert recording.image_times.tolist() == [START_NS, START_NS + 10**8]
     write(ros1, plain(ros1, jpeg), name="drive/all")
     with open_recording(root) as recording:
-        assert recording.radar_topic == "/radar/points"  # a recording of ROS goes first
+        assert recording.radar_topic == "/radar/points"  # ROS recordings take precedence

@@ -1,4 +1,4 @@
-"""One message of every radar layout, built from the definition its drivers publish, with what must be read from it."""
+"""One message of every radar layout, built from the definition its drivers publish, with the expected values."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -39,7 +39,7 @@ class CloudSpec:
 
 
 def true_angles(points: np.ndarray, *, sign: float = 1.0, degrees: bool = False) -> None:
-    """Fill in range, azimuth and elevation as they follow from x, y, z."""
+    """Fill in range, azimuth and elevation computed from x, y, z."""
     scale = np.degrees(1.0) if degrees else 1.0
     across = np.hypot(points["x"], points["y"])
     for name in points.dtype.names or ():
@@ -104,7 +104,7 @@ CLOUDS: Mapping[str, CloudSpec] = {
 
 
 def cloud_sample(ros: Any, name: str) -> Sample:
-    """Fill a cloud with figures of every field's own type."""
+    """Fill a cloud with numbers of each field's type."""
     spec = CLOUDS[name]
     names, formats = zip(*(words.split(":") for words in spec.fields.split()), strict=True)
     formats = [("<" if code[1] != "1" else "") + code for code in formats]

@@ -53,7 +53,7 @@ def opened(write, ros, messages, *, topic="/radar", step_ns=100_000_000, **optio
 # -- clouds
 
 
-def test_a_cloud_is_read_through_holes_mixed_types_and_padded_rows(ros, write):
+def test_a_cloud_with_padding_mixed_types_and_padded_rows_is_read(ros, write):
     dtype = np.dtype(
         {
             "names": ["id", "x", "y", "z", "v", "rcs"],
@@ -82,7 +82,7 @@ def test_a_big_endian_cloud_is_read(ros, write, cloud_points):
         np.testing.assert_array_equal(scans.scan(number).snr_db, points["snr"])
 
 
-def test_clouds_whose_layout_changes_on_the_way_are_each_read_by_their_own(ros, write, cloud_points):
+def test_clouds_whose_layout_changes_are_each_read_by_their_own(ros, write, cloud_points):
     wide = cloud_points(5)
     narrow = wide[["x", "y", "z"]].astype([("x", "<f8"), ("y", "<f8"), ("z", "<f8")])
     empty = cloud_points(0)
@@ -105,7 +105,7 @@ def test_returns_that_are_not_numbers_keep_their_row(ros, write, cloud_points):
     np.testing.assert_array_equal(scan.snr_db, points["snr"])
 
 
-def test_a_polar_cloud_with_its_own_noise_is_carried_over(ros, write):
+def test_a_polar_cloud_with_its_own_noise_is_converted(ros, write):
     names = ("azimuth", "azimuth_std", "elevation", "elevation_std", "range", "range_std", "range_rate", "rcs")
     points = np.zeros(5, dtype=[(name, "<f4") for name in names])
     rng = np.random.default_rng(5)
@@ -121,8 +121,8 @@ def test_a_polar_cloud_with_its_own_noise_is_carried_over(ros, write):
     np.testing.assert_array_equal(scan.doppler_mps, points["range_rate"])
 
 
-def test_angles_beside_positions_are_not_used():
-    """CARLA's azimuth has the sign of another frame than its y."""
+def test_angles_are_not_used_if_there_are_positions():
+    """The sign of CARLA's azimuth is opposite to that of its y."""
     plan = plan_columns(["x", "y", "z", "Range", "Velocity", "AzimuthAngle", "ElevationAngle"])
     assert plan is not None
     assert (plan.position, plan.polar, plan.doppler) == (("x", "y", "z"), False, "Velocity")
@@ -154,7 +154,7 @@ def test_speed_along_the_line_of_sight_comes_from_velocity_components(ros, write
         np.testing.assert_allclose(recording.radar_scans().doppler_mps, [(3 + 8) / 5, -1.0])
 
 
-def test_a_cloud_that_contradicts_itself_counts_as_empty_and_is_said(ros, write, cloud_points):
+def test_an_inconsistent_cloud_counts_as_empty_with_a_warning(ros, write, cloud_points):
     good, bad = ros.cloud(START_NS, cloud_points()), ros.cloud(START_NS + 10**8, cloud_points())
     bad.width = 1000
     with opened(write, ros, [good, bad, good]) as recording:
@@ -165,7 +165,7 @@ def test_a_cloud_that_contradicts_itself_counts_as_empty_and_is_said(ros, write,
         assert "1 radar messages could not be read and count as empty; the first is number 1" in warning.message
 
 
-def test_a_lidar_beside_the_radar_is_not_chosen_and_alone_it_is_said(ros, write, cloud_points):
+def test_a_radar_is_chosen_over_a_lidar_and_a_lidar_alone_gives_a_warning(ros, write, cloud_points):
     lidar = np.zeros(6000, dtype=[("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4")])
     lidar["z"] = np.arange(6000)
     rows = [
@@ -181,7 +181,7 @@ def test_a_lidar_beside_the_radar_is_not_chosen_and_alone_it_is_said(ros, write,
         assert [warning.code for warning in recording.warnings] == ["looks-like-lidar"]
 
 
-def test_a_radar_without_elevation_is_said_to_be_flat(ros, write, cloud_points):
+def test_a_radar_without_elevation_gives_a_warning(ros, write, cloud_points):
     points = cloud_points(3)
     points["z"] = 0.0
     with opened(write, ros, [ros.cloud(START_NS, points)]) as recording:
@@ -273,7 +273,7 @@ def test_ainstein_angles_are_degrees(ros, write):
     assert (scan.doppler_mps[0], scan.snr_db[0]) == (0.5, 9.0)
 
 
-def test_a_list_of_poses_is_no_radar(ros, write, plain, jpeg):
+def test_a_list_of_poses_is_not_a_radar(ros, write, plain, jpeg):
     pose = ros.new(
         "geometry_msgs/msg/Pose",
         position=ros.new("geometry_msgs/msg/Point", x=1.0, y=2.0, z=3.0),
@@ -345,7 +345,7 @@ def test_the_scan_messages_are_preferred_to_the_drivers_cloud(ros, write):
 
 @given(st.lists(st.integers(1, 12), min_size=1, max_size=40), st.integers(20, 200), st.integers(0, 3), st.data())
 def test_grouping_finds_every_scan_whatever_the_driver_filtered_out(counts, period_ms, phase, data):
-    """Point numbers rise within a scan; some points are missing; messages lie close together in time."""
+    """Point numbers rise within a scan, some points are missing, and messages are close together in time."""
     times, numbers, owners = [], [], []
     for scan, count in enumerate(counts):
         kept = sorted(data.draw(st.sets(st.integers(0, 60), min_size=count, max_size=count)))
@@ -355,9 +355,9 @@ def test_grouping_finds_every_scan_whatever_the_driver_filtered_out(counts, peri
     first = first_of_scans(np.array(times) + phase, None, np.array(numbers))
     scans = np.searchsorted(first, np.arange(len(times)), side="right") - 1
     together = np.diff(owners) == 0
-    assert np.all(np.diff(scans)[together] == 0)  # no scan is ever torn apart
+    assert np.all(np.diff(scans)[together] == 0)  # no scan is ever split
     resets = np.diff(numbers) <= 0
-    assert np.all(np.diff(scans)[resets] == 1)  # and where the numbers fall, one ends
+    assert np.all(np.diff(scans)[resets] == 1)  # and a scan ends where the numbers fall
     if np.count_nonzero(resets) > 2 and np.all(np.diff(np.flatnonzero(resets)) > 0):
         usual = np.median(np.diff(np.array(times)[np.flatnonzero(resets) + 1]))
         if usual <= 1.5 * period_ms * 10**6:
@@ -365,7 +365,7 @@ def test_grouping_finds_every_scan_whatever_the_driver_filtered_out(counts, peri
 
 
 @given(st.lists(st.integers(1, 9), min_size=1, max_size=30), st.booleans())
-def test_without_numbers_scans_are_told_apart_by_pauses(counts, same_stamp):
+def test_without_numbers_scans_are_separated_by_pauses(counts, same_stamp):
     times = [scan * 50_000_000 + (0 if same_stamp else 100_000 * k) for scan, n in enumerate(counts) for k in range(n)]
     first = first_of_scans(np.array(times, dtype=np.int64))
     assert first.tolist() == np.concatenate([[0], np.cumsum(counts)[:-1]]).tolist()
@@ -395,7 +395,7 @@ def test_returns_flagged_as_invalid_keep_their_row_without_a_value(ros, write):
 
 
 def test_big_endian_messages_are_read(ros2, write, cloud_points, monkeypatch, plain, jpeg):
-    """A machine of the other byte order wrote them; CDR says so in its first bytes."""
+    """Written on a machine of the other byte order, which CDR declares in its first bytes."""
     little = ros2.serialise
     monkeypatch.setattr(
         ros2, "serialise", lambda m: bytes(ros2.store.serialize_cdr(m, m.__msgtype__, little_endian=False))

@@ -1,4 +1,4 @@
-"""Every layout of the registry, read from bytes built from its real definition; contradictions; axes that a person tells."""
+"""Every layout of the registry, read from bytes built from its real definition; contradictions; axes given by the user."""
 
 import contextlib
 import random
@@ -51,7 +51,7 @@ def test_a_layout_is_recognised_and_read(name: str, ros: Any, write: Callable[..
 
 
 def damaged(payload: bytes, rng: random.Random) -> bytes:
-    """Overwrite, remove or cut off a few bytes; counts of billions are among them."""
+    """Overwrite, remove or truncate a few bytes, including counts of billions."""
     raw = bytearray(payload)
     for _ in range(rng.choice([1, 1, 2, 4])):
         place = rng.randrange(max(1, len(raw)))
@@ -88,7 +88,7 @@ def test_damaged_messages_of_any_layout_give_values_or_one_clear_error(name: str
 @pytest.mark.parametrize(
     "name", ["Oculii cloud", "ARS548 detections, 18 fields", "radar_msgs scan", "radar_msgs tracks"]
 )
-def test_what_ros_itself_defines_is_read_from_bags_without_definitions(name: str, ros2: Any, write: Any) -> None:
+def test_types_that_ros_defines_are_read_from_bags_without_definitions(name: str, ros2: Any, write: Any) -> None:
     expected = sample(ros2, name)
     path = write(ros2, [("/radar", START_NS, message) for message in expected.messages], "db3")
     database = sqlite3.connect(path)
@@ -141,7 +141,7 @@ def azimuth(xyz: np.ndarray) -> np.ndarray:
         ),
     ],
 )
-def test_columns_that_contradict_the_positions_are_said(columns, code, words, ros1, write, cloud_points) -> None:
+def test_columns_that_contradict_the_positions_give_a_warning(columns, code, words, ros1, write, cloud_points) -> None:
     with opened(write, ros1, changed(ros1, cloud_points, **columns)) as recording:
         assert [warning.code for warning in recording.warnings] == ([code] if code else [])
         assert all(words in warning.message for warning in recording.warnings)
@@ -154,7 +154,7 @@ def polar_cloud(ros: Any, azimuths: np.ndarray) -> Any:
     return ros.cloud(START_NS, points)
 
 
-def test_angles_of_the_wrong_unit_are_said_and_one_option_sets_them_right(ros1, write) -> None:
+def test_angles_in_the_wrong_unit_give_a_warning_and_one_option_corrects_them(ros1, write) -> None:
     angles = np.linspace(-60.0, 60.0, 24)
     message = polar_cloud(ros1, angles)
     with opened(write, ros1, [message]) as recording:
@@ -169,7 +169,7 @@ def test_angles_of_the_wrong_unit_are_said_and_one_option_sets_them_right(ros1, 
     np.testing.assert_allclose(np.degrees(np.arctan2(points[:, 1], points[:, 0])), angles, atol=1e-4)
 
 
-def test_radians_read_as_degrees_are_said(ros2, write) -> None:
+def test_radians_read_as_degrees_give_a_warning(ros2, write) -> None:
     kind = ros2.define(
         "ainstein_radar_msgs/msg/RadarTarget",
         "uint16 target_id\nfloat64 snr\nfloat64 range\nfloat64 speed\nfloat64 azimuth\nfloat64 elevation\n",
@@ -188,7 +188,7 @@ def test_radians_read_as_degrees_are_said(ros2, write) -> None:
     assert "small for degrees" in warning.message
 
 
-# -- axes that a person tells
+# -- axes given by the user
 
 
 @pytest.mark.parametrize(
@@ -201,7 +201,7 @@ def test_radians_read_as_degrees_are_said(ros2, write) -> None:
         ("degrees", np.eye(3)),
     ],
 )
-def test_the_words_for_axes_become_a_signed_permutation(words, expected) -> None:
+def test_the_axes_option_becomes_a_signed_permutation(words, expected) -> None:
     axes = parse_radar_axes(words)
     np.testing.assert_array_equal(axes.matrix, expected)
     assert axes.degrees == {"radians": False, "degrees": True}.get(words.rpartition(",")[2])
@@ -217,13 +217,13 @@ def test_the_words_for_axes_become_a_signed_permutation(words, expected) -> None
         ("forward,backward,up", "two of the directions lie on the same axis"),
     ],
 )
-def test_axes_that_make_no_sense_are_refused_in_words(words, complaint) -> None:
+def test_invalid_axes_are_refused_with_a_clear_error(words, complaint) -> None:
     with pytest.raises(OptionError, match="--radar-axes") as caught:
         parse_radar_axes(words)
     assert complaint in str(caught.value)
 
 
-def test_axes_that_a_person_tells_hold_for_positions_and_noise_and_are_shown(ros, write, cloud_points) -> None:
+def test_axes_given_by_the_user_apply_to_positions_and_are_shown(ros, write, cloud_points) -> None:
     points = cloud_points(5)
     messages = [ros.cloud(START_NS + i * 10**8, points[: 5 - i]) for i in range(2)]
     with opened(write, ros, messages, radar_axes="right,forward,up") as recording:
@@ -233,7 +233,7 @@ def test_axes_that_a_person_tells_hold_for_positions_and_noise_and_are_shown(ros
     np.testing.assert_array_equal(found, np.stack([points["y"], -points["x"], points["z"]], axis=1))
 
 
-def test_a_mirrored_radar_is_set_right_and_its_assumption_is_no_longer_told(ros, write) -> None:
+def test_a_mirrored_radar_is_corrected_and_its_assumption_gives_no_warning(ros, write) -> None:
     expected = sample(ros, "UniBw detections")
     with opened(write, ros, expected.messages, radar_axes="forward,right,up") as recording:
         found = recording.radar_scans()
@@ -241,7 +241,7 @@ def test_a_mirrored_radar_is_set_right_and_its_assumption_is_no_longer_told(ros,
     np.testing.assert_allclose(found.points_radar_m, expected.points * [1, -1, 1], rtol=1e-6)
 
 
-def test_the_noise_of_a_track_turns_with_its_axes(ros1, write) -> None:
+def test_the_noise_of_a_track_is_rotated_with_its_axes(ros1, write) -> None:
     expected = sample(ros1, "radar_msgs tracks")
     assert expected.sigma is not None
     with opened(write, ros1, expected.messages, radar_axes="forward,right,up") as recording:
@@ -250,10 +250,12 @@ def test_the_noise_of_a_track_turns_with_its_axes(ros1, write) -> None:
     write_again = lambda *a, **k: write(*a, name="again", **k)  # noqa: E731
     with opened(write_again, ros1, expected.messages, radar_axes="forward,up,left") as recording:
         turned = recording.radar_scans().sigma_polar
-    np.testing.assert_allclose(turned[0], expected.sigma[0][[0, 2, 1]], rtol=1e-6)  # straight ahead: they change places
+    np.testing.assert_allclose(
+        turned[0], expected.sigma[0][[0, 2, 1]], rtol=1e-6
+    )  # straight ahead, azimuth and elevation swap
 
 
-def test_an_option_of_nonsense_is_refused_before_anything_is_read(ros1, write, plain, jpeg) -> None:
+def test_an_invalid_option_is_refused_before_anything_is_read(ros1, write, plain, jpeg) -> None:
     with pytest.raises(OptionError, match="'sideways' is unknown"):
         open_recording(write(ros1, plain(ros1, jpeg)), RecordingOptions(radar_axes="sideways"))
 

@@ -1,4 +1,4 @@
-"""What is said about the two clocks of a topic."""
+"""The diagnosis of the two clocks of a topic."""
 
 import numpy as np
 import pytest
@@ -17,11 +17,11 @@ RECEIVE_NS = START_NS + 100 * MS * np.arange(2000)
 SOUND_NS = RECEIVE_NS - 20 * MS
 
 
-def look(header_ns, receive_ns=RECEIVE_NS, *, chosen="header", wish="auto", times_ns=None, one_per_return=False):
+def look(header_ns, receive_ns=RECEIVE_NS, *, chosen="header", requested="auto", times_ns=None, one_per_return=False):
     header = None if header_ns is None else np.asarray(header_ns, dtype=np.int64)
     times = np.sort(header if chosen == "header" else receive_ns) if times_ns is None else times_ns
     stamps = Stamps("/radar", np.asarray(receive_ns, dtype=np.int64), header)
-    return diagnose(stamps, times_ns=times, chosen=chosen, wish=wish, one_per_return=one_per_return)
+    return diagnose(stamps, times_ns=times, chosen=chosen, requested=requested, one_per_return=one_per_return)
 
 
 def changed(where, by_ns):
@@ -30,7 +30,7 @@ def changed(where, by_ns):
     return header
 
 
-def test_sound_clocks_leave_nothing_to_remark():
+def test_sound_clocks_give_no_remarks():
     found = look(SOUND_NS)
     assert (found.remarks, about_clocks([found])) == ((), [])
     assert (found.reason, found.messages, found.islands, found.gaps) == ("the stamps are sound", 2000, 1, 0)
@@ -51,7 +51,7 @@ def test_sound_clocks_leave_nothing_to_remark():
         (SOUND_NS - START_NS + 60 * NS_PER_S, "the stamps count from the start of a device, not from 1970", None),
     ],
 )
-def test_what_is_odd_about_stamps_is_remarked(header_ns, remark, code):
+def test_irregular_stamps_give_remarks(header_ns, remark, code):
     found = look(header_ns, times_ns=np.sort(header_ns[header_ns != 0]))
     small = "20 ms" in remark
     assert (remark in found.remarks) != small
@@ -75,19 +75,19 @@ def test_islands_and_gaps_of_data_are_counted():
 def test_the_reason_for_the_clock_is_given():
     assert look(np.zeros(2000), chosen="receive").reason == "it has only zero stamps (2000 messages)"
     assert look(None, chosen="receive", times_ns=RECEIVE_NS).reason == "it has no stamps"
-    assert look(SOUND_NS, chosen="receive", wish="receive").reason == "--clock receive was given"
+    assert look(SOUND_NS, chosen="receive", requested="receive").reason == "--clock receive was given"
     assert "cannot be compared" in look(SOUND_NS, chosen="receive").reason
     assert "both sensors use the same clock" in look(SOUND_NS - START_NS).reason
     assert "jump or drift relative to the receive times" in look(changed(np.s_[1000:], 5 * NS_PER_S)).reason
 
 
-def test_a_driver_that_stamps_every_return_is_named_so():
+def test_a_driver_that_stamps_every_return_is_recognised():
     found = look(SOUND_NS, one_per_return=True)
     assert found.remarks == ("one message per return: stamps differ within a scan",)
 
 
 @given(st.lists(st.integers(-(2**62), 2**62), max_size=80), st.sampled_from(["header", "receive"]))
-def test_no_stamps_are_too_strange_to_look_at(header, chosen):
+def test_any_stamps_can_be_diagnosed(header, chosen):
     receive = START_NS + 100 * MS * np.arange(len(header))
     found = look(header, receive, chosen=chosen)
     assert found.messages == len(header)
