@@ -6,8 +6,8 @@
     calibration = cc.calibrate_pairs(pairs, cc.read_camera("camera_info.yaml")).unwrap()
     print(calibration)
 
-Every name in `__all__` is public: see "What is public" in CONTRIBUTING.md. A name is imported when it is first used, so
-that `import calib_core` costs next to nothing.
+Every name in `__all__` is public: see "What is public" in CONTRIBUTING.md. Names are imported on first
+use, so `import calib_core` is cheap.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""The camera: a camera matrix behind a lens model, projection with analytic Jacobians, and the way back.
+"""The camera: a lens model followed by a camera matrix; projection with analytic Jacobians, and its inverse.
 
 Camera frame: x right, y down, z forward. Pixel (0, 0) is the centre of the top-left pixel, as in OpenCV.
 """
@@ -18,7 +18,7 @@ __all__ = ["CAMERA_MODELS", "Camera", "CameraModel"]
 CAMERA_MODELS: tuple[str, ...] = tuple(LENS_MODELS)
 if TYPE_CHECKING:
     CameraModel: TypeAlias = str
-else:  # the command line offers, and our files and their schemas take, what is registered
+else:  # the command line, our files and their schemas accept what is registered
     CameraModel = Literal[CAMERA_MODELS]
 
 
@@ -54,7 +54,7 @@ class Camera:
         if not (np.all(np.isfinite(self.matrix_px)) and np.all(np.isfinite(self.distortion))):
             raise ValueError("the camera matrix and the distortion must be finite")
         if self.matrix_px[0, 0] <= 0 or self.matrix_px[1, 1] <= 0:
-            raise ValueError("the focal lengths must be positive (a zero camera matrix means: not calibrated)")
+            raise ValueError("the focal lengths must be positive (a zero camera matrix means not calibrated)")
 
     @property
     def lens(self) -> LensModel:
@@ -63,7 +63,7 @@ class Camera:
 
     @property
     def is_distorted(self) -> bool:
-        """Whether its matrix alone does not tell where a point is seen: a coefficient is not zero, or the lens is a fisheye."""
+        """Whether the matrix alone does not give the projection: a coefficient is not zero, or the lens is a fisheye."""
         return not self.lens.is_perspective or bool(self.distortion.any())
 
     def project(self, points_camera_m: Points3) -> Points2:
@@ -75,18 +75,18 @@ class Camera:
         return self.project_with_jacobian(points_camera_m)[0]
 
     def project_with_jacobian(self, points_camera_m: Points3) -> tuple[Points2, np.ndarray]:
-        """Project points and differentiate: pixels (n, 2) and d pixel / d point (n, 2, 3) [px/m]."""
+        """Project points to pixels (n, 2), with the derivative d pixel / d point (n, 2, 3) [px/m]."""
         pixels, d_point = self.project_planes(np.ascontiguousarray(np.asarray(points_camera_m, dtype=np.float64).T))
         return np.ascontiguousarray(pixels.T), np.ascontiguousarray(d_point.T)
 
     def project_planes(self, points_camera_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Project and differentiate points given as planes, one row per coordinate: NumPy is quick along long rows.
+        """Project points stored one row per coordinate, with derivatives; NumPy is fast along long rows.
 
         Args:
-            points_camera_m: (..., 3, n), the leading axes those of any batch.
+            points_camera_m: (..., 3, n); the leading axes are batch axes.
 
         Returns:
-            Pixels (..., 2, n) and d pixel / d point (..., 3, 2, n): first the coordinate, then the pixel's row.
+            Pixels (..., 2, n) and d pixel / d point (..., 3, 2, n), indexed by coordinate, then row of the pixel.
         """
         plane, d_plane = LENS_MODELS[self.model].project(points_camera_m, self.distortion)
         linear = self.matrix_px[:2, :2]
@@ -107,14 +107,14 @@ class Camera:
         return np.asarray(planes.T)
 
     def in_image(self, pixels_px: Points2, *, margin_px: float = 0.0) -> Flags:
-        """Tell which pixels lie on the image, whose edge is half a pixel outside the outermost pixel centres."""
+        """Return which pixels are in the image, whose edge is half a pixel outside the outermost pixel centres."""
         u, v = np.asarray(pixels_px, dtype=np.float64).T
         low, right, bottom = -0.5 - margin_px, self.width_px - 0.5 + margin_px, self.height_px - 0.5 + margin_px
         with np.errstate(invalid="ignore"):
             return (u >= low) & (u <= right) & (v >= low) & (v <= bottom)
 
     def sees(self, points_camera_m: Points3) -> Flags:
-        """Tell which points the lens really images: in front, on the image, and on the near side of the distortion's fold."""
+        """Return which points the lens images: in front of it, in the image, and before the distortion folds back."""
         points = np.asarray(points_camera_m, dtype=np.float64)
         pixels = self.project(points)
         visible = self.in_image(pixels)
@@ -128,7 +128,7 @@ class Camera:
         return visible & same
 
     def scaled(self, factor: float) -> "Camera":
-        """Return the camera of the same picture resized by a factor, pixel centres kept in place."""
+        """Return the camera for the picture resized by a factor, with pixel centres kept in place."""
         matrix = self.matrix_px.copy()
         matrix[:2, :2] *= factor
         matrix[:2, 2] = (matrix[:2, 2] + 0.5) * factor - 0.5

@@ -1,4 +1,4 @@
-"""Files in and out: clicks, pairs, cameras, calibrations, and every format others read."""
+"""Read and write files: clicks, pairs, cameras, calibrations, and the formats of other tools."""
 
 from calib_core.interchange.adopting import adopt, adopted_calibration
 from calib_core.interchange.calibration_file import (

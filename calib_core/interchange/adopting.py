@@ -1,4 +1,4 @@
-"""Take over a calibration that somebody else wrote: whatever format it was in, it becomes a calibration-1 file."""
+"""Convert a calibration written by another tool, in any known format, to a calibration-1 file."""
 
 import numpy as np
 
@@ -18,43 +18,45 @@ _UNKNOWN = float("nan")
 def adopt(
     found: ImportedCalibration, source: str, *, camera: Camera | None = None, provenance: Provenance | None = None
 ) -> CalibrationFile:
-    """Return a calibration-1 file of what a reader found; one that is calibration-1 already stays as it is.
+    """Convert what a reader found to a calibration-1 file; calibration-1 is returned unchanged.
 
     Args:
         found: what `read_any` returned.
-        source: its name, for error messages.
-        camera: the intrinsics, where the file has none.
-        provenance: where it comes from.
+        source: the file's name, for error messages.
+        camera: the intrinsics, if the file has none.
+        provenance: where the calibration comes from.
 
     Raises:
-        InputError: the file contradicts itself, misses its own check point, or there is no camera.
+        InputError: the file contradicts itself, fails its own check point, or there is no camera.
     """
     if found.file is not None and camera is not None:
-        raise InputError(f"{source}: is calibration-1 and was solved with the camera in it; leave the other camera out")
+        raise InputError(
+            f"{source}: is calibration-1 and contains the camera it was solved with; omit the other camera"
+        )
     _refuse_wrong(found, source, camera)
     if found.file is not None:
         return found.file
     known = found.camera or camera
     if known is None:
-        raise InputError(f"{source}: {found.format} carries no camera; give its intrinsics too: --camera FILE")
+        raise InputError(f"{source}: {found.format} contains no camera; give its intrinsics with --camera FILE")
     calibration = adopted_calibration(found, source, camera=known)
     frames = found.frames or FrameNames()
     return CalibrationFile(calibration, frames, choose_check_point(calibration), provenance or Provenance())
 
 
 def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Camera) -> Calibration:
-    """Return what a reader found as a calibration seen through a camera; what the file does not say stays unknown.
+    """Return what a reader found as a calibration with a given camera; whatever the file does not state is unknown.
 
     Args:
         found: what `read_any` returned.
-        source: its name, for error messages and for the warning.
-        camera: the intrinsics to look through.
+        source: the file's name, for error messages and the warning.
+        camera: the intrinsics to use.
 
     Raises:
-        InputError: the file contradicts itself, or misses its own check point.
+        InputError: the file contradicts itself, or fails its own check point.
     """
     _refuse_wrong(found, source, camera)
-    assumed = tuple(DataWarning("assumed", note, "make sure that it is so") for note in found.notes)
+    assumed = tuple(DataWarning("assumed", note, "verify this assumption") for note in found.notes)
     return Calibration(
         camera_from_radar=found.camera_from_radar,
         covariance=found.file.calibration.covariance if found.file else np.full((6, 6), _UNKNOWN),
@@ -62,23 +64,23 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
         metrics=Metrics(_UNKNOWN, _UNKNOWN, _UNKNOWN, 0),
         pairs=(),
         unpaired=(),
-        warnings=(*assumed, _taken_over(found, source)),
+        warnings=(*assumed, _imported_warning(found, source)),
         options=CalibrationOptions(),
     )
 
 
-def _taken_over(found: ImportedCalibration, source: str) -> DataWarning:
+def _imported_warning(found: ImportedCalibration, source: str) -> DataWarning:
     return DataWarning(
         "imported",
-        f"taken over from {source} ({found.format}): its pairs are not known, nor what it was made from",
-        "check it: cocalib open RECORDING --calibration FILE, and click the reflector",
+        f"imported from {source} ({found.format}): its pairs and input data are unknown",
+        "check it with cocalib open RECORDING --calibration FILE: click the reflector",
     )
 
 
 def _refuse_wrong(found: ImportedCalibration, source: str, camera: Camera | None) -> None:
     if found.format == TRUTH_FORMAT:
         raise InputError(
-            f"{source}: is what a simulation holds for true, no calibration; compare with it: cocalib check FILE --against"
+            f"{source}: is the ground truth of a simulation, not a calibration; compare with it: cocalib check FILE --against"
         )
     for result in check(found, camera=camera).results:
         if result.level == "error":

@@ -1,4 +1,4 @@
-"""A solved calibration together with what makes it readable by others: frames, check point, provenance."""
+"""A solved calibration with what is stored along with it in a file: frame names, check point, provenance."""
 
 from dataclasses import dataclass, field
 
@@ -23,9 +23,9 @@ _FALLBACK_RANGE_M = 10.0
 
 @dataclass(frozen=True, slots=True)
 class FrameNames:
-    """The names of the two frames. A leading "/" is dropped, as tf2 wants it.
+    """The names of the two frames. A leading "/" is dropped, as tf2 requires.
 
-    Names come from recordings and end up in launch files, where "$" would start a substitution: it is refused.
+    Names come from recordings and are written to launch files, where "$" would start a substitution; it is refused.
 
     Attributes:
         radar: x forward, y left, z up.
@@ -39,11 +39,11 @@ class FrameNames:
         for role in ("radar", "camera"):
             object.__setattr__(self, role, _checked_name(getattr(self, role), role))
         if self.radar == self.camera:
-            raise InputError(f"both frames are called {self.radar!r}; name them apart")
+            raise InputError(f"both frames are called {self.radar!r}; give them different names")
 
     @property
     def camera_link(self) -> str:
-        """The camera's body frame (x forward, y left, z up) that URDF and Autoware hang the optical frame on."""
+        """The camera's body frame (x forward, y left, z up), parent of the optical frame in URDF and Autoware."""
         stem = self.camera
         for ending in _OPTICAL_ENDINGS:
             stem = stem.removesuffix(ending)
@@ -54,30 +54,30 @@ class FrameNames:
 def _checked_name(name: str, role: str) -> str:
     shown = name.strip().lstrip("/")
     if not shown:
-        raise InputError(f"the {role} frame has no name; name it, for example {role!r}")
+        raise InputError(f"the {role} frame has no name; give it one, for example {role!r}")
     if not shown.isprintable() or any(character in shown for character in "$`\\\"'<>&"):
         raise InputError(
-            f"the {role} frame is called {name!r}; take a name without control characters, quotes or any of $ ` \\ < > &"
+            f"the {role} frame is called {name!r}; use a name without control characters, quotes or any of $ ` \\ < > &"
         )
     if len(shown) > 200:
-        raise InputError(f"the {role} frame's name has {len(shown)} characters; take one of at most 200")
+        raise InputError(f"the {role} frame's name has {len(shown)} characters; use at most 200")
     return shown
 
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Where a calibration comes from; None where a part does not apply.
+    """Where a calibration comes from; None where not applicable.
 
     Attributes:
         inputs: the files it was made from.
         radar_topic: the topic of the radar returns.
         image_topic: the topic of the images.
         camera_info_topic: the topic of the intrinsics.
-        radar_clock: "header" or "receive": which stamp times the radar.
-        image_clock: the same for the images.
-        radar_axes: what a person said about the radar's axes and units, as --radar-axes has it.
-        video_start: when a video's first frame was taken, as --video-start has it.
-        version: of this program.
+        radar_clock: which stamps the radar scans use: "header" or "receive".
+        image_clock: the same for the frames.
+        radar_axes: the radar's axes and units as the user gave them, in the syntax of --radar-axes.
+        video_start: when a video's first frame was taken, in the syntax of --video-start.
+        version: the version of this program.
     """
 
     inputs: tuple[InputFile, ...] = ()
@@ -93,11 +93,11 @@ class Provenance:
 
 @dataclass(frozen=True, slots=True)
 class UnknownResult:
-    """A result that a later version wrote and this one does not know.
+    """A result written by a later version and unknown to this one.
 
     Attributes:
-        place: the keys and list positions that lead to it, its own key last.
-        json_text: its value.
+        place: the path to it: keys and list indices, its own key last.
+        json_text: its value as JSON.
     """
 
     place: tuple[str | int, ...]
@@ -109,11 +109,11 @@ class CalibrationFile:
     """The content of a calibration-1 file.
 
     Attributes:
-        calibration: the pose, its covariance and what each pair says about it.
+        calibration: the pose, its covariance and the results for each pair.
         frames: the names of the two frames.
-        check_point: a radar point and the pixel it must come out at; None where a foreign file has none.
+        check_point: a radar point and the pixel it must project to; None if a file from another tool has none.
         provenance: where it comes from.
-        unknown: results that a later version wrote and this one does not know; kept when written again.
+        unknown: results written by a later version and unknown to this one; kept when the file is rewritten.
     """
 
     calibration: Calibration
@@ -124,18 +124,18 @@ class CalibrationFile:
 
 
 def choose_check_point(calibration: Calibration) -> CheckPoint | None:
-    """Choose the inlier's radar position, rounded to a millimetre, that comes out nearest to the image's centre.
+    """Choose the inlier radar position, rounded to a millimetre, that projects nearest to the image centre.
 
-    Without an inlier in the image it is a point ten metres along a ray off the centre. None when the lens sees neither.
+    If no inlier is in the image, use a point ten metres along a ray off the centre. None if the lens images neither.
     """
     camera = calibration.camera
     centre_px = np.array([camera.width_px - 1, camera.height_px - 1]) / 2
     inliers = sorted((pair for pair in calibration.pairs if pair.inlier), key=_id)
     points_radar_m = np.round([pair.point_radar_m for pair in inliers], 3).reshape(-1, 3)
-    if not _first_seen(calibration, points_radar_m).size:
+    if not _indices_seen(calibration, points_radar_m).size:
         ray = camera.rays(centre_px[None] * (0.9, 1.15))
         points_radar_m = np.round(calibration.camera_from_radar.inverse() @ (ray * _FALLBACK_RANGE_M), 3)
-    seen = _first_seen(calibration, points_radar_m)
+    seen = _indices_seen(calibration, points_radar_m)
     if not seen.size:
         return None
     points_radar_m = points_radar_m[seen]
@@ -148,8 +148,8 @@ def _id(pair: PairResult) -> str:
     return pair.id
 
 
-def _first_seen(calibration: Calibration, points_radar_m: np.ndarray) -> np.ndarray:
-    """Return the indices of the points that are finite and that the lens images."""
+def _indices_seen(calibration: Calibration, points_radar_m: np.ndarray) -> np.ndarray:
+    """Return the indices of the points that the lens images; none if a point is not finite."""
     if not len(points_radar_m) or not np.isfinite(points_radar_m).all():
         return np.zeros(0, dtype=np.int64)
     return np.flatnonzero(calibration.camera.sees(calibration.camera_from_radar @ points_radar_m))

@@ -1,4 +1,4 @@
-"""What is inside an exported file, as text for people: binary files are unpacked, their arrays written out."""
+"""The content of an exported file as readable text: binary files are unpacked and their arrays printed."""
 
 import io
 from collections.abc import Iterator, Mapping
@@ -16,7 +16,7 @@ _MAT_TEXT_BYTES = 116
 
 
 def contents_text(written: Export) -> str:
-    """Return a text file as it is, and what a binary file holds, one member after the other."""
+    """Return a text file unchanged, and a binary file as text, one member after the other."""
     content = written.content
     if isinstance(content, str):
         return content
@@ -26,7 +26,7 @@ def contents_text(written: Export) -> str:
     if content.startswith(b"MATLAB"):
         comment = content[:_MAT_TEXT_BYTES].decode("ascii", errors="replace").rstrip("\0 ")
         return "\n".join([comment, "", *_variables(load_mat(content, source=written.file_name))]) + "\n"
-    return f"binary, {len(content):,} bytes\n"  # a format of an installed package, whose layout we do not know
+    return f"binary, {len(content):,} bytes\n"  # a format of an installed package, with an unknown layout
 
 
 def _member(name: str, data: bytes) -> str:
@@ -50,6 +50,6 @@ def _variables(values: Mapping[str, Any], owner: str = "") -> Iterator[str]:
 
 
 def _rows(array: np.ndarray) -> list[str]:
-    """Write an array row by row, each number with six digits."""
+    """Format an array row by row, each number with six significant digits."""
     rows = np.atleast_2d(array)
     return ["".join(f"{value:>13.6g}" for value in row.ravel().tolist()) for row in rows]

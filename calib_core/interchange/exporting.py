@@ -1,4 +1,4 @@
-"""A calibration in another format: written, or refused in words where the format cannot carry it."""
+"""Export a calibration to another format, or refuse with a clear error if the format cannot represent it."""
 
 from dataclasses import dataclass
 
@@ -12,8 +12,8 @@ from calib_core.interchange.formats.registry import format_named, written_format
 __all__ = ["Export", "export"]
 
 _RECTIFIED_NOTE = (
-    "written for rectified pictures, as you say yours are: undistorted with this same camera matrix, no distortion left; "
-    "on pictures as the camera took them it is wrong"
+    "written for rectified pictures: undistorted with this same camera matrix, no distortion left; "
+    "wrong for pictures as the camera took them"
 )
 
 
@@ -22,9 +22,9 @@ class Export:
     """A file to write.
 
     Attributes:
-        file_name: what to call it.
-        content: text, or bytes where the format is binary.
-        notes: what a person must know who uses it.
+        file_name: the default name.
+        content: text, or bytes if the format is binary.
+        notes: what a user of the file must know.
     """
 
     file_name: str
@@ -40,44 +40,45 @@ class Export:
 def export(
     file: CalibrationFile, name: str, *, parent_from_radar: RigidTransform | None = None, rectified: bool = False
 ) -> Export:
-    """Write a calibration in another format: the same calibration gives the same bytes.
+    """Export a calibration to another format; the same calibration gives the same bytes.
 
     Args:
         file: what to export.
-        name: of a format that is written.
+        name: of a format that can be written.
         parent_from_radar: the radar's pose in the third frame of "autoware" (kit), "driveworks" (rig) or "nuscenes" (ego).
-        rectified: the pictures that the file is for are undistorted with this same camera matrix, no distortion left;
-            "kitti" and "nuscenes" have no place for distortion and take a distorted lens only so.
+        rectified: the file is for pictures undistorted with this same camera matrix, no distortion left; required for
+            a distorted lens by "kitti" and "nuscenes", which cannot store distortion.
 
     Raises:
-        InputError: no such format, or it cannot carry this calibration: why, and what to take instead.
+        InputError: no such format, or it cannot represent this calibration; the message says why and what to use instead.
     """
     chosen = format_named(name)
     if chosen.write is None:
-        raise InputError(f"the format {name} is only read; cocalib export --to list names those that are written")
+        raise InputError(
+            f"the format {name} can only be read; cocalib export --to list shows those that can be written"
+        )
     camera = file.calibration.camera
-    _refuse_what_the_lens_forbids(chosen, camera, rectified=rectified)
+    _check_lens(chosen, camera, rectified=rectified)
     if parent_from_radar is None:
         content = chosen.write(file)
     elif chosen.write_in_parent is None:
         able = ", ".join(known.name for known in written_formats() if known.write_in_parent)
-        raise InputError(f"the format {name} has no third frame to pose the radar in; those that have: {able}")
+        raise InputError(f"the format {name} has no third frame to place the radar in; formats that have one: {able}")
     else:
         content = chosen.write_in_parent(file, parent_from_radar)
     notes = (*chosen.notes, _RECTIFIED_NOTE) if chosen.is_for_rectified and camera.is_distorted else chosen.notes
     return Export(chosen.file_name, content, notes)
 
 
-def _refuse_what_the_lens_forbids(chosen: Format, camera: Camera, *, rectified: bool) -> None:
+def _check_lens(chosen: Format, camera: Camera, *, rectified: bool) -> None:
     if rectified and not chosen.is_for_rectified:
         asking = ", ".join(known.name for known in written_formats() if known.is_for_rectified)
         raise InputError(
-            f"rectified pictures concern the formats without a place for distortion ({asking}), and {chosen.name} is none of "
-            "them; leave rectified out"
+            f"rectified applies only to formats that cannot store distortion ({asking}), not to {chosen.name}; omit it"
         )
     if chosen.is_for_rectified and camera.is_distorted and not rectified:
         raise InputError(
-            f"the format {chosen.name} holds a camera matrix but has no place for the distortion of this {camera.model} lens, "
-            "so it would be wrong on the pictures as taken; choose a format that has one, opencv or numpy for example, or say "
-            "that your pictures are rectified, undistorted with this same camera matrix (--rectified; on the page, the tick box)"
+            f"the format {chosen.name} stores a camera matrix but not the distortion of this {camera.model} lens, so it would "
+            "be wrong for pictures as taken; use a format that stores it, such as opencv or numpy, or, if your pictures are "
+            "undistorted with this same camera matrix, say so with --rectified (on the page, tick the box)"
         )

@@ -1,4 +1,4 @@
-"""Files by their path, for scripts and notebooks: read, write, export and check in one call each."""
+"""Read, write, export and check files by path, one call each, for scripts and notebooks."""
 
 from pathlib import Path
 from typing import TypeAlias
@@ -36,27 +36,27 @@ _MAX_TEXT_BYTES = 64 << 20
 
 
 def read_camera(path: PathLike, *, image_size_px: tuple[int, int] | None = None) -> Camera:
-    """Read intrinsics: ROS camera_info YAML, OpenCV YAML or XML, Kalibr camchain, or JSON of ours.
+    """Read intrinsics: ROS camera_info YAML, OpenCV YAML or XML, Kalibr camchain, or our own JSON.
 
     Args:
-        path: of the file; "file.yml#cam1" says which camera where it holds several.
-        image_size_px: width and height, used where the file does not tell them.
+        path: of the file; "file.yml#cam1" selects one of several cameras.
+        image_size_px: width and height, used if the file does not state them.
 
     Raises:
-        InputError: the file cannot be read, or holds no camera.
+        InputError: the file cannot be read, or contains no camera.
     """
     return read_camera_file(path, image_size_px=image_size_px)
 
 
 def read_pairs(path: PathLike, *, noise: NoiseOptions | None = None) -> pairs_json.PairsFile:
-    """Read a pairs-1 file: pairs, camera, and what it says about noise and the camera's position.
+    """Read a pairs-1 file: pairs, camera and, if stated, noise and camera position.
 
     Args:
         path: of the file.
-        noise: assumed where the file says nothing; None takes the defaults.
+        noise: used where the file states none; None uses the defaults.
 
     Raises:
-        InputError: the file, the place in it and what to do.
+        InputError: invalid content; the message names the file, the place and what to do.
     """
     return pairs_json.read_pairs(_text(path), str(path), noise=noise)
 
@@ -74,7 +74,7 @@ def read_clicks(path: PathLike) -> tuple[ReflectorClick, ...]:
     """Read a clicks-1 file.
 
     Raises:
-        InputError: the file, the place in it and what to do.
+        InputError: invalid content; the message names the file, the place and what to do.
     """
     return tuple(clicks_json.read_clicks(_text(path), str(path)))
 
@@ -92,7 +92,7 @@ def read_calibration(path: PathLike) -> CalibrationFile:
     """Read a calibration-1 file.
 
     Raises:
-        InputError: the file, the place in it and what to do; also when its two transforms or a quaternion disagree.
+        InputError: invalid content, or transforms that disagree; the message names the file, the place and what to do.
     """
     return calibration_json.read_calibration(_text(path), str(path))
 
@@ -104,12 +104,12 @@ def write_calibration(
     frames: FrameNames | None = None,
     provenance: Provenance | None = None,
 ) -> None:
-    """Write a calibration-1 file: the same calibration gives the same bytes.
+    """Write a calibration-1 file; the same calibration gives the same bytes.
 
     Args:
-        path: where to.
-        calibration: a result of the solver, or a file that was read, which is written as it is.
-        frames: names of the two frames, for a result; None takes "radar" and "camera_optical".
+        path: of the file to write.
+        calibration: a result of the solver, or the content of a file, which is written unchanged.
+        frames: names of the two frames, for a result; None uses "radar" and "camera_optical".
         provenance: where a result comes from.
 
     Raises:
@@ -126,16 +126,16 @@ def write_calibration(
 def export(
     calibration: Calibration | CalibrationFile, name: str, *, frames: FrameNames | None = None, rectified: bool = False
 ) -> Export:
-    """Write a calibration in the format of another tool.
+    """Export a calibration to the format of another tool.
 
     Args:
-        calibration: a result of the solver, or a file that was read.
+        calibration: a result of the solver, or the content of a file.
         name: of the format, such as "tf2", "urdf", "kalibr", "opencv" or "kitti".
-        frames: names of the two frames, for a result; None takes "radar" and "camera_optical".
+        frames: names of the two frames, for a result; None uses "radar" and "camera_optical".
         rectified: the pictures are undistorted with this same camera matrix; see the notes of "kitti" and "nuscenes".
 
     Raises:
-        InputError: no such format, or it cannot carry this calibration: why, and what to take instead.
+        InputError: no such format, or it cannot represent this calibration; the message says why and what to use instead.
     """
     file = (
         calibration_json.calibration_file(calibration, frames) if isinstance(calibration, Calibration) else calibration
@@ -150,16 +150,16 @@ def check(
     camera: Camera | None = None,
     pairs: PathLike | None = None,
 ) -> reports.CheckReport:
-    """Check a calibration by its check point, by another calibration, by pairs, and by what is plausible.
+    """Check a calibration against its check point, another calibration and pairs, and for plausibility.
 
     Args:
         calibration: a file of any format that can be read, or a result.
         against: a calibration of the same sensors that is known to be right.
-        camera: the intrinsics, where the file has none.
-        pairs: a file of pairs or a calibration-1 file: radar positions and where they were seen.
+        camera: the intrinsics, if the file has none.
+        pairs: a pairs-1 or calibration-1 file: radar positions and the pixels where they were seen.
 
     Raises:
-        InputError: a file cannot be read, or holds no pose.
+        InputError: a file cannot be read, or contains no pose.
     """
     return reports.check(
         _imported(calibration),

@@ -1,4 +1,4 @@
-"""What a format is to us: its name, what its numbers are, the writer, and the reader beside it."""
+"""A calibration file format: its name, what its numbers mean, its writer and its reader."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ __all__ = ["CameraShare", "Comment", "Format", "Reads"]
 
 Comment = Literal["#", "<!-- -->", "keys", "none"]
 CameraShare = Literal["none", "matrix", "lens"]
-"""What of the camera a format carries: nothing, its matrix with no place for distortion, or the whole lens."""
+"""How much of the camera a format stores: nothing, its matrix without distortion, or the whole lens."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,9 +21,9 @@ class Reads:
     """How a format is read.
 
     Attributes:
-        recognizes: tells from a file's content whether it is of this format; it raises nothing.
-        read: returns the calibration in content that was recognized, given what to call the file in an error; raises
-            InputError where the content is wrong.
+        recognizes: returns whether a file's content is of this format; raises nothing.
+        read: returns the calibration in recognized content, given the name of the file for error messages; raises
+            InputError if the content is invalid.
     """
 
     recognizes: Callable[[Content], bool]
@@ -35,17 +35,17 @@ class Format:
     """One format of calibration files.
 
     Attributes:
-        name: what `--to` takes.
-        title: one line for people.
-        numbers: what the file's numbers are, in one line: which way they carry points, and in which order they stand.
-        file_name: what the file is called unless a person says otherwise.
-        camera: what of the camera is in it too.
-        comment: how it says its frames and check point in words: "#", "<!-- -->", its own keys, or none.
-        write: turns a calibration into the file's content; refuses in words what the format cannot carry. None where
-            the format is only read.
-        reads: how it is recognized and read; None where the format is only written.
-        notes: what a person must know who uses it, one sentence each.
-        write_in_parent: the same under a known pose of the radar in a third frame (kit, ego); None where there is none.
+        name: the value of `--to`.
+        title: a one-line description.
+        numbers: what the numbers in the file mean, in one line: the direction of the transform and the order of the numbers.
+        file_name: the default file name.
+        camera: how much of the camera it stores.
+        comment: where it states its frames and check point: in comments ("#", "<!-- -->"), in keys of its own, or nowhere.
+        write: returns the file content for a calibration; raises InputError for what the format cannot represent. None
+            if the format can only be read.
+        reads: how it is recognized and read; None if the format can only be written.
+        notes: what a user of the file must know, one sentence each.
+        write_in_parent: like write, with a given pose of the radar in a third frame (kit, ego); None if it has none.
     """
 
     name: str
@@ -61,5 +61,5 @@ class Format:
 
     @property
     def is_for_rectified(self) -> bool:
-        """Whether its pictures must be rectified: it carries a camera matrix and has no place for distortion."""
+        """Whether its pictures must be rectified: it stores a camera matrix but no distortion."""
         return self.camera == "matrix"

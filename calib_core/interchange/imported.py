@@ -1,4 +1,4 @@
-"""What a reader found in somebody's file: the pose as written there, and what it means."""
+"""What a reader found in a file: the pose as written, and what it means."""
 
 import re
 from dataclasses import dataclass
@@ -33,29 +33,29 @@ Direction = Literal["camera_from_radar", "radar_from_camera"]
 Axes = Literal["optical", "link"]
 
 TRUTH_FORMAT = "truth"
-"""What a simulation says is true: to compare with, never to calibrate from."""
+"""The ground truth of a simulation: for comparison, never a calibration."""
 
-_FEW_DIGITS = 2e-3
+_ROUNDING = 2e-3
 _LARGEST = 1e12
 _RADAR_NAME = re.compile(r"radar|rdr|mmwave|umrr|ars\d|srr|mrr|lrr", re.IGNORECASE)
 _CAMERA_NAME = re.compile(r"cam|optical|image|rgb", re.IGNORECASE)
 
 
-def _refuse_endless(*arrays: np.ndarray) -> None:
+def _refuse_too_large(*arrays: np.ndarray) -> None:
     if not all((np.abs(array) <= _LARGEST).all() for array in arrays):
-        raise ValueError("a number is not finite, or larger than any position or pixel")
+        raise ValueError("a number is not finite, or too large for a position or a pixel")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WrittenPose:
-    """A pose as the file writes it, before it is turned into camera_from_radar.
+    """A pose as written in the file, before conversion to camera_from_radar.
 
     Attributes:
         form: how the rotation is written.
         rotation: (3, 3), (4,) in the order of the form, or (3,) roll, pitch, yaw [rad].
         translation_m: (3,).
-        direction: what p_target = R p_source + t means with these numbers.
-        axes: of the camera frame meant: optical, or the body frame camera_link (x forward).
+        direction: which transform the numbers are, in p_target = R p_source + t.
+        axes: of the camera frame: optical, or body axes as in camera_link (x forward).
     """
 
     form: Form
@@ -68,36 +68,36 @@ class WrittenPose:
         shape = {"matrix": (3, 3), "rpy": (3,)}.get(self.form, (4,))
         object.__setattr__(self, "rotation", frozen_array(self.rotation, shape))
         object.__setattr__(self, "translation_m", frozen_array(self.translation_m, (3,)))
-        _refuse_endless(self.rotation, self.translation_m)
+        _refuse_too_large(self.rotation, self.translation_m)
 
     def rotation_matrix(self) -> np.ndarray:
         """Return the rotation as written, as a matrix.
 
         Raises:
-            ValueError: it is none.
+            ValueError: it is not a rotation.
         """
         if self.form == "matrix":
-            return nearest_rotation(self.rotation, tolerance=_FEW_DIGITS)
+            return nearest_rotation(self.rotation, tolerance=_ROUNDING)
         if self.form == "rpy":
             return matrix_from_rpy(self.rotation)
         wxyz = np.roll(self.rotation, 1) if self.form == "quaternion_xyzw" else self.rotation
-        if abs(float(np.linalg.norm(wxyz)) - 1.0) > _FEW_DIGITS:
+        if abs(float(np.linalg.norm(wxyz)) - 1.0) > _ROUNDING:
             raise ValueError(f"the quaternion {self.rotation.tolist()} has length {np.linalg.norm(wxyz):.4g}, not 1")
         return matrix_from_quaternion_wxyz(wxyz)
 
     def as_written(self) -> RigidTransform:
-        """Return the numbers as they stand, whichever two frames they connect.
+        """Return the transform as written, whichever two frames it connects.
 
         Raises:
-            ValueError: the rotation is none.
+            ValueError: the rotation is invalid.
         """
         return RigidTransform(self.rotation_matrix(), self.translation_m)
 
     def camera_from_radar(self) -> RigidTransform:
-        """Return the pose in our one meaning: p_camera = R p_radar + t, camera optical.
+        """Return the pose in our convention: p_camera = R p_radar + t, optical camera frame.
 
         Raises:
-            ValueError: the rotation is none.
+            ValueError: the rotation is invalid.
         """
         written = self.as_written()
         meant = written if self.direction == "camera_from_radar" else written.inverse()
@@ -110,8 +110,8 @@ class StatedCheckPoint:
 
     Attributes:
         radar_m: (3,) the point in the radar frame.
-        camera_m: (3,) where it must come out in the camera frame; None when only the pixel is stated.
-        pixel_px: (2,) where it must come out in the image, through the lens; None when only camera_m is stated.
+        camera_m: (3,) where it must be in the camera frame; None if only the pixel is stated.
+        pixel_px: (2,) the pixel it must project to, through the lens; None if only camera_m is stated.
     """
 
     radar_m: Vector3
@@ -124,7 +124,7 @@ class StatedCheckPoint:
             object.__setattr__(self, "camera_m", frozen_array(self.camera_m, (3,)))
         if self.pixel_px is not None:
             object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
-        _refuse_endless(*(part for part in (self.radar_m, self.camera_m, self.pixel_px) if part is not None))
+        _refuse_too_large(*(part for part in (self.radar_m, self.camera_m, self.pixel_px) if part is not None))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,12 +134,12 @@ class ImportedCalibration:
     Attributes:
         format: the format it was read as.
         pose: the pose as written, with the meaning the file gives it.
-        camera: the camera; None where the format or the file has none.
-        frames: the two frames' names; None where the file has none.
-        check_point: None where the file states none.
-        notes: what had to be assumed, one sentence each.
-        faults: where the file contradicts itself, one sentence each.
-        file: everything else, when it is a calibration-1 file.
+        camera: the camera; None if the format or the file has none.
+        frames: the two frame names; None if the file has none.
+        check_point: None if the file states none.
+        notes: the assumptions that were made, one sentence each.
+        faults: the contradictions in the file, one sentence each.
+        file: everything else, if it is a calibration-1 file.
     """
 
     format: str
@@ -153,24 +153,24 @@ class ImportedCalibration:
 
     @property
     def camera_from_radar(self) -> RigidTransform:
-        """The pose in our one meaning: p_camera = R p_radar + t, camera optical."""
+        """The pose in our convention: p_camera = R p_radar + t, optical camera frame."""
         return self.pose.camera_from_radar()
 
     def checked(self, source: str) -> "ImportedCalibration":
-        """Return itself when its rotation is one.
+        """Return itself if its rotation is valid.
 
         Raises:
-            InputError: it is mirrored, or not a rotation at all.
+            InputError: the rotation is mirrored, or not a rotation at all.
         """
         try:
             self.pose.camera_from_radar()
         except ValueError as error:
-            raise InputError(f"{source}: {error}; a proper rotation is needed") from None
+            raise InputError(f"{source}: {error}; give a proper rotation") from None
         return self
 
 
 def imported(file: CalibrationFile) -> ImportedCalibration:
-    """Return a calibration of ours as if it had been read from its file."""
+    """Return one of our calibrations as if it had been read from its file."""
     pose, check = file.calibration.camera_from_radar, file.check_point
     return ImportedCalibration(
         "json",
@@ -184,7 +184,7 @@ def imported(file: CalibrationFile) -> ImportedCalibration:
 
 @dataclass(frozen=True, slots=True)
 class Roles:
-    """Which of two frames is whose, and what was assumed for it."""
+    """Which of two frames is the radar's and which the camera's, and what was assumed."""
 
     direction: Direction
     axes: Axes
@@ -193,12 +193,12 @@ class Roles:
 
 
 def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
-    """Tell what "the pose of child in parent" means: which frame is the radar's, and which axes the camera's has.
+    """Interpret "the pose of child in parent": which frame is the radar's, and which axes the camera's has.
 
     Args:
         parent: name of the frame the pose is given in; its numbers carry child points into it.
         child: name of the other.
-        stated: what the file says in words about its frames, if it does.
+        stated: the frames that the file states in a comment, if it does.
 
     Raises:
         InputError: a frame has no name.
@@ -210,7 +210,7 @@ def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
         radar_first = not (looks_like_radar(child) and not looks_like_radar(parent))
         radar, camera = (parent, child) if radar_first else (child, parent)
         if not (looks_like_radar(radar) and not looks_like_radar(camera)):
-            notes.append(f"no word says which frame is the radar's; took {radar!r} for it")
+            notes.append(f"the file does not say which frame is the radar's; assumed {radar!r}")
     if stated is not None and camera in (stated.camera, stated.camera_link):
         axes: Axes = "optical" if camera == stated.camera else "link"
         frames = stated
@@ -218,17 +218,17 @@ def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
         axes = "link" if camera.endswith("_link") and "optical" not in camera else "optical"
         if "optical" not in camera:
             meant = "optical axes (z forward)" if axes == "optical" else "body axes (x forward)"
-            notes.append(f"took {camera!r} for {meant}")
+            notes.append(f"assumed that {camera!r} has {meant}")
         frames = FrameNames(radar, camera if axes == "optical" else camera.removesuffix("_link") + "_optical")
     direction: Direction = "radar_from_camera" if parent == radar else "camera_from_radar"
     return Roles(direction, axes, frames, tuple(notes))
 
 
 def looks_like_camera(name: str) -> bool:
-    """Tell whether a frame's name is one that people give to cameras."""
+    """Return whether a frame name looks like a camera's."""
     return bool(_CAMERA_NAME.search(name))
 
 
 def looks_like_radar(name: str) -> bool:
-    """Tell whether a frame's name is one that people give to radars."""
+    """Return whether a frame name looks like a radar's."""
     return bool(_RADAR_NAME.search(name)) and not _CAMERA_NAME.search(name)

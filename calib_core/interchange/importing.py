@@ -1,4 +1,4 @@
-"""Read a calibration back from whatever format it is in."""
+"""Read a calibration in any known format."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ __all__ = ["calibration_bytes", "read_any", "read_any_file"]
 
 _MAX_BYTES = 256 * 1024 * 1024
 _KNOWN = (
-    "known are calibration-1, static_transform_publisher in a command or launch file, URDF, Autoware, Apollo and "
+    "known: calibration-1, static_transform_publisher in a command or launch file, URDF, Autoware, Apollo and "
     "stamped transforms, Kalibr with T_cam_radar, OpenCV with R and T, KITTI, nuScenes, DriveWorks, Foxglove, "
     "COLMAP, mat, npz, matrix"
 )
@@ -21,13 +21,13 @@ def read_any_file(path: str | Path) -> ImportedCalibration:
     """Read a calibration from a file of any format in the registry.
 
     Raises:
-        InputError: the file cannot be read, or holds no pose.
+        InputError: the file cannot be read, or contains no pose.
     """
     return read_any(calibration_bytes(path), str(Path(path)))
 
 
 def calibration_bytes(path: str | Path) -> bytes:
-    """Return the content of a file, for those who need more of it than `read_any` tells.
+    """Return the content of a file, for callers that need more of it than `read_any` returns.
 
     Raises:
         InputError: it cannot be read, or is too large for a calibration.
@@ -42,17 +42,17 @@ def calibration_bytes(path: str | Path) -> bytes:
 
 
 def read_any(content: str | bytes, source: str = "calibration") -> ImportedCalibration:
-    """Read a calibration from the content of a file of any format in the registry; the content tells the format.
+    """Read a calibration from the content of a file of any format in the registry; the content determines the format.
 
     Raises:
-        InputError: it holds no pose that we know how to read; what was looked for.
+        InputError: it contains no pose in a known format; the message says what was looked for.
     """
     try:
         return _read(content, source)
     except InputError as error:
         if str(error).startswith(f"{source}: "):
             raise
-        raise InputError(f"{source}: {error}") from None  # a frame's name is refused without knowing the file
+        raise InputError(f"{source}: {error}") from None  # FrameNames refuses a name without knowing the file
 
 
 def _read(content: str | bytes, source: str) -> ImportedCalibration:
@@ -66,7 +66,7 @@ def _read(content: str | bytes, source: str) -> ImportedCalibration:
 
 
 def _refusal(content: Content, source: str) -> InputError:
-    """Say what is in a file that no format recognizes."""
+    """Return the error for a file that no format recognizes, with what is in it."""
     if content.syntax == "bytes":
         return InputError(f"{source}: neither text nor an archive; {_KNOWN}")
     if content.syntax == "xml" and content.value is None:

@@ -1,4 +1,4 @@
-"""The pose of the radar in a third frame (sensor kit, ego), as seven numbers that a person types."""
+"""The pose of the radar in a third frame (sensor kit, ego), given as seven numbers."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ def parent_pose(numbers: Sequence[float]) -> RigidTransform:
     """Return parent_from_radar from x, y, z [m] and the quaternion qx, qy, qz, qw.
 
     Raises:
-        InputError: there are not seven, one is not finite, or the quaternion does not have the length 1.
+        InputError: there are not seven numbers, one is not finite, or the quaternion's length is not 1.
     """
     if len(numbers) != 7 or not all(map(math.isfinite, numbers)):
         raise InputError(

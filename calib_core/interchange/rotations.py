@@ -1,4 +1,4 @@
-"""Rotations as other formats write them: fixed-axis roll, pitch, yaw, both quaternion orders, and optical against body axes."""
+"""Rotations as other formats write them: fixed-axis roll, pitch, yaw, both quaternion orders, optical and body axes."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ LINK_FROM_OPTICAL = RigidTransform(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], 
 """From optical axes (x right, y down, z forward) to body axes (x forward, y left, z up), REP-103."""
 
 OPTICAL_RPY_RAD = (-np.pi / 2, 0.0, -np.pi / 2)
-"""The same rotation as URDF writes it."""
+"""The same rotation as URDF's roll, pitch, yaw."""
 
 
 def matrix_from_rpy(rpy_rad: Vector3) -> Matrix33:
@@ -34,9 +34,9 @@ def matrix_from_rpy(rpy_rad: Vector3) -> Matrix33:
 
 
 def rpy_from_matrix(rotation: Matrix33) -> Vector3:
-    """Return (roll, pitch, yaw) [rad]; at a pitch of 90 degrees, where only one sum is fixed, yaw is what is left at 0.
+    """Return (roll, pitch, yaw) [rad]; at a pitch of 90 degrees, where only roll and yaw together are determined, yaw is 0.
 
-    Roll is taken from the matrix with yaw undone, so that it keeps its digits next to that pitch.
+    Roll is computed from the matrix with yaw undone, which keeps its precision near that pitch.
     """
     r = np.asarray(rotation, dtype=np.float64)
     across = float(np.hypot(r[0, 0], r[1, 0]))

@@ -1,1 +1,1 @@
-"""Lens models: how each projects and what other software calls it, one module per family; `registry` lists them."""
+"""Lens models: their projections and their names in other software, one module per family; `registry` lists them."""

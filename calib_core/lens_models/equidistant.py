@@ -1,4 +1,4 @@
-"""The equidistant (Kannala-Brandt) lens model of OpenCV's fisheye module: the radius follows the angle from the axis."""
+"""The equidistant (Kannala-Brandt) lens model of OpenCV's fisheye module: the radius is a function of the angle from the axis."""
 
 import numpy as np
 

@@ -11,14 +11,14 @@ from calib_core.arrays import Points2, Points3, Values
 __all__ = ["Elsewhere", "LensModel", "NameElsewhere", "Project", "TypicalLens", "Unproject"]
 
 Elsewhere: TypeAlias = Literal["camera_info", "kalibr", "opencv", "colmap", "foxglove"]
-"""Formats that name the lens model in words of their own; `camera_info` is ROS's message and its YAML file."""
+"""Formats with their own names for lens models; `camera_info` is ROS's message and its YAML file."""
 
 Project: TypeAlias = Callable[[np.ndarray, Values], tuple[np.ndarray, np.ndarray]]
-"""Points (..., 3, n) in the camera frame and the coefficients in; the image plane (..., 2, n) and d plane / d point
-(..., 3, 2, n) out, first the coordinate, then the row of the plane. NaN where the lens sees no such point."""
+"""Maps points (..., 3, n) in the camera frame and coefficients to the image plane (..., 2, n) and d plane / d point
+(..., 3, 2, n), indexed by coordinate, then row of the plane. NaN for points that the lens does not image."""
 
 Unproject: TypeAlias = Callable[[Points2, Values], Points3]
-"""Image plane (n, 2) and the coefficients in; unit rays (n, 3) in the camera frame out. NaN where there is none."""
+"""Maps the image plane (n, 2) and coefficients to unit rays (n, 3) in the camera frame. NaN where there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class NameElsewhere:
     Attributes:
         where: the format.
         name: the lens model's name there.
-        coefficients: how many are written with that name; zeros are appended or dropped to reach that number. None writes
+        coefficients: how many are written with that name; zeros are appended or dropped to reach that number. None means
             as many as the camera has.
     """
 
@@ -39,13 +39,13 @@ class NameElsewhere:
 
 @dataclass(frozen=True, slots=True)
 class TypicalLens:
-    """What the simulator gives a camera of a lens model.
+    """The simulator's camera for a lens model.
 
     Attributes:
-        distortion: coefficients of a lens whose distortion a person can see.
+        distortion: coefficients of a lens with visible distortion.
         field_of_view_deg: horizontal field of view before distortion [deg].
-        radius_at: the distance from the centre of the image plane of a ray at an angle [rad] from the axis, all
-            coefficients zero: np.tan for a lens model that is then a pinhole.
+        radius_at: the distance from the centre of the image plane at which a ray at an angle [rad] from the axis
+            lands if all coefficients are zero; np.tan for a lens model that is then a pinhole.
     """
 
     distortion: tuple[float, ...] = ()
@@ -55,24 +55,24 @@ class TypicalLens:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LensModel:
-    """A lens model; `registry.LENS_MODELS` holds those that a camera can have.
+    """A lens model; `registry.LENS_MODELS` lists those that a camera can have.
 
-    The image plane is where the camera matrix starts: pixel = K (plane, 1).
+    The camera matrix is applied to the image plane: pixel = K (plane, 1).
 
     Attributes:
-        name: what our files, options and messages call it.
+        name: its name in our files, options and messages.
         coefficients: the names of its distortion coefficients, in the order of `Camera.distortion`.
         counts: how many of them a camera may have, in ascending order; fewer means that the last ones are zero.
         project: from points to the image plane, with the Jacobian.
         unproject: from the image plane to rays.
         is_perspective: whether it is a pinhole, which keeps straight lines straight, when all coefficients are zero.
-        opencv: the function of OpenCV that projects through it, if there is one. cv2.projectPoints tells its models
-            apart by the number of coefficients; ours are told apart in the same way where a file names none.
-        typical: what the simulator gives a camera.
-        names_elsewhere: its names in other formats; of several in one format the first that holds the coefficients is
+        opencv: the function of OpenCV that projects through it, if there is one. cv2.projectPoints distinguishes
+            its models by the number of coefficients; so do we if a file names none.
+        typical: the simulator's camera.
+        names_elsewhere: its names in other formats; if a format has several, the first that can store the coefficients is
             written. A format without one refuses the lens.
-        names_in_files: the names, in lower case, that a camera file may call it by.
-        names_in_messages: the same of a CameraInfo message; "" stands for a message that names no lens model.
+        names_in_files: the names, in lower case, that a camera file may use for it.
+        names_in_messages: the same for a CameraInfo message; "" is for a message that names no lens model.
     """
 
     name: str
@@ -92,7 +92,7 @@ class LensModel:
             raise ValueError(f"{self.name}: counts must ascend from 0 or more, got {self.counts}")
         if self.counts[-1] != len(self.coefficients):
             raise ValueError(
-                f"{self.name}: {len(self.coefficients)} coefficients are named, counts end at {self.counts[-1]}"
+                f"{self.name}: {len(self.coefficients)} coefficients are named, but counts ends at {self.counts[-1]}"
             )
         if len(self.typical.distortion) not in self.counts:
             raise ValueError(f"{self.name}: the typical lens has {len(self.typical.distortion)} coefficients")

@@ -1,4 +1,4 @@
-"""From a lens model to the name and the coefficients another format writes, and back."""
+"""Convert between a lens model and its name and coefficients in another format."""
 
 from dataclasses import dataclass
 
@@ -22,11 +22,11 @@ _TITLES: dict[Elsewhere, str] = {
 
 @dataclass(frozen=True, slots=True)
 class WrittenLens:
-    """A lens in the words of another format.
+    """A lens as another format writes it.
 
     Attributes:
         name: the lens model's name there.
-        coefficients: as many as belong to that name.
+        coefficients: as many as that name requires.
     """
 
     name: str
@@ -34,7 +34,7 @@ class WrittenLens:
 
 
 def written_lens(lens: LensModel, distortion: Values, where: Elsewhere) -> WrittenLens:
-    """Return what a format writes of a lens.
+    """Return a lens as a format writes it.
 
     Args:
         lens: the camera's lens model.
@@ -42,12 +42,12 @@ def written_lens(lens: LensModel, distortion: Values, where: Elsewhere) -> Writt
         where: the format.
 
     Raises:
-        InputError: it has no name for this lens model, or no place for a coefficient that is not zero.
+        InputError: the format has no name for this lens model, or cannot store a coefficient that is not zero.
     """
     names = [known for known in lens.names_elsewhere if known.where == where]
     if not names:
         raise InputError(
-            f"{_TITLES[where]} has no name for the lens model {lens.name}; json, matlab and numpy files hold every lens"
+            f"{_TITLES[where]} has no name for the lens model {lens.name}; json, matlab and numpy can store every lens"
         )
     for known in names:
         count = len(distortion) if known.coefficients is None else known.coefficients
@@ -62,12 +62,12 @@ def written_lens(lens: LensModel, distortion: Values, where: Elsewhere) -> Writt
     missing = left_out[0] if len(left_out) == 1 else f"{left_out[0]} to {left_out[-1]}"
     raise InputError(
         f"{_TITLES[where]}'s {longest.name} model has no {missing}, which this camera uses; "
-        f"export with --to {_holding(lens)}, or calibrate the camera with {' '.join(kept)} only"
+        f"export with --to {_format_for(lens)}, or calibrate the camera with {' '.join(kept)} only"
     )
 
 
-def _holding(lens: LensModel) -> str:
-    """Name a format to export to that holds every coefficient."""
+def _format_for(lens: LensModel) -> str:
+    """Return the name of a format that can store every coefficient."""
     return "opencv" if any(known.where == "opencv" for known in lens.names_elsewhere) else "json"
 
 
@@ -87,7 +87,7 @@ def names_in(where: Elsewhere) -> tuple[str, ...]:
 
 
 def lenses_of_opencv() -> tuple[LensModel, ...]:
-    """Return the lens models that cv2.projectPoints tells apart by their number of coefficients."""
+    """Return the lens models that cv2.projectPoints distinguishes by their number of coefficients."""
     return tuple(
         sorted(
             (lens for lens in LENS_MODELS.values() if lens.opencv == "projectPoints"), key=lambda lens: lens.counts[-1]
@@ -96,6 +96,6 @@ def lenses_of_opencv() -> tuple[LensModel, ...]:
 
 
 def opencv_lens(count: int) -> LensModel:
-    """Return the lens model that a number of coefficients means to cv2.projectPoints: the smallest that has as many."""
+    """Return the lens model that cv2.projectPoints uses for a number of coefficients: the smallest with at least as many."""
     lenses = lenses_of_opencv()
     return next((lens for lens in lenses if lens.counts[-1] >= count), lenses[-1])

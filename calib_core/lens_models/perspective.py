@@ -1,6 +1,6 @@
-"""Lenses that distort the ideal image plane z = 1: projection with its Jacobian, and Newton's method for the way back.
+"""Lenses that distort the ideal image plane z = 1: projection with its Jacobian, and its inverse by Newton's method.
 
-Such a lens model is one function: where an ideal point (x, y) = (X / Z, Y / Z) comes out, and the Jacobian of that.
+Such a lens model is one function, which maps an ideal point (x, y) = (X / Z, Y / Z) to a distorted one with its Jacobian.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ __all__ = ["Distort", "project_distorted", "unproject_distorted"]
 Distort: TypeAlias = Callable[
     [Values, Values, list[float]], tuple[tuple[Values, Values], tuple[Values, Values, Values]]
 ]
-"""Ideal x and y and the coefficients in; distorted x and y out, and xx, xy = yx and yy of the Jacobian, which is symmetric."""
+"""Maps ideal x, y and coefficients to distorted x, y and the entries xx, xy = yx and yy of the symmetric Jacobian."""
 
 _NEWTON_STEPS = 60
 _NEWTON_TOLERANCE = 1e-13
@@ -60,7 +60,7 @@ def unproject_distorted(plane: Points2, k: list[float], distort: Distort) -> Poi
 
 
 def _undistorted(plane: Points2, k: list[float], distort: Distort) -> Points2:
-    """Invert the lens model by Newton's method; NaN where it does not come back to the image-plane point."""
+    """Invert the lens model by Newton's method; NaN where the result does not map back to the image-plane point."""
     wanted_x, wanted_y = plane.T.copy()
     x, y = wanted_x, wanted_y
     with np.errstate(all="ignore"):
@@ -71,8 +71,8 @@ def _undistorted(plane: Points2, k: list[float], distort: Distort) -> Points2:
             step_x = (d_yy * error_x - d_xy * error_y) / determinant
             step_y = (d_xx * error_y - d_xy * error_x) / determinant
             length = np.hypot(step_x, step_y)
-            held = np.minimum(1.0, 0.5 / np.where(length > 0, length, 1.0))
-            x, y = x - step_x * held, y - step_y * held
+            damping = np.minimum(1.0, 0.5 / np.where(length > 0, length, 1.0))
+            x, y = x - step_x * damping, y - step_y * damping
             if np.fmax.reduce(length, initial=0.0) < _NEWTON_TOLERANCE:  # NaN does not count
                 break
         (distorted_x, distorted_y), _ = distort(x, y, k)

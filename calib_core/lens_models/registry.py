@@ -16,4 +16,4 @@ _LENSES: tuple[LensModel, ...] = (
 )
 
 LENS_MODELS: Final[dict[str, LensModel]] = {lens.name: lens for lens in _LENSES}
-"""By name, in the order in which they are listed to a person."""
+"""By name, in display order."""

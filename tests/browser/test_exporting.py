@@ -26,7 +26,7 @@ def solved(page: Driver, workspace: Workspace, project_root: Path) -> Driver:
 
 
 def choose(page: Driver, name: str) -> None:
-    """Choose a format and wait for its text; if it is for rectified pictures only, say that they are."""
+    """Choose a format and wait for its text; if it is for rectified pictures only, declare them rectified."""
     page.page.click(f'{DIALOG} [data-export="{name}"]')
     if name != "clicks" and format_named(name).is_for_rectified:
         page.page.check(RECTIFIED)
@@ -116,7 +116,7 @@ def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_with_a_re
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("x: 3.5")
 
 
-def test_a_format_without_a_place_for_distortion_is_refused_until_the_pictures_are_said_to_be_rectified(
+def test_a_format_that_cannot_store_distortion_is_refused_until_the_pictures_are_declared_rectified(
     solved: Driver, tmp_path: Path
 ) -> None:
     page = solved.page
@@ -125,7 +125,7 @@ def test_a_format_without_a_place_for_distortion_is_refused_until_the_pictures_a
     expect(page.locator(RECTIFIED)).to_be_hidden()
     for name in ("kitti", "nuscenes"):
         page.click(f'{DIALOG} [data-export="{name}"]')
-        expect(page.locator(f"{DIALOG} .reason")).to_contain_text(f"The format {name} holds a camera matrix")
+        expect(page.locator(f"{DIALOG} .reason")).to_contain_text(f"The format {name} stores a camera matrix")
         expect(page.locator(f"{DIALOG} .reason")).to_contain_text("opencv or numpy")
         expect(page.locator(f"{DIALOG} .first")).to_be_disabled()
         expect(page.locator(RECTIFIED)).not_to_be_checked()
@@ -149,7 +149,7 @@ def test_a_format_without_a_place_for_distortion_is_refused_until_the_pictures_a
     page.click(f'{DIALOG} [data-export="kitti"]')
     expect(page.locator(RECTIFIED)).to_be_checked()
     page.uncheck(RECTIFIED)
-    expect(page.locator(f"{DIALOG} .reason")).to_contain_text("no place for the distortion")
+    expect(page.locator(f"{DIALOG} .reason")).to_contain_text("not the distortion of this")
     expect(page.locator(f"{DIALOG} .first")).to_be_disabled()
 
 

@@ -195,13 +195,13 @@ def test_import_turns_another_stacks_file_into_a_calibration_again(
     assert "0 deg apart" in checked.out
 
 
-def test_a_format_without_a_place_for_distortion_wants_to_hear_that_the_pictures_are_rectified(
+def test_a_format_that_cannot_store_distortion_needs_the_option_rectified(
     cocalib: Cocalib, calibration: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "calib.txt"
     refused = cocalib("export", calibration, "--to", "kitti", "--out", out)
     assert refused.code == 2
-    assert "kitti holds a camera matrix but has no place for the distortion of this plumb_bob lens" in refused.err
+    assert "kitti stores a camera matrix but not the distortion of this plumb_bob lens" in refused.err
     assert "opencv or numpy" in refused.err
     assert "--rectified" in refused.err
     assert len(refused.err.splitlines()) == 1

@@ -1,4 +1,4 @@
-"""Laws of the files: what goes out comes back, the same input gives the same bytes, and no input does anything but be refused."""
+"""Laws of the files: what is written reads back, the same input gives the same bytes, and bad input is only ever refused."""
 
 import dataclasses
 import json
@@ -84,7 +84,7 @@ def file_of(pose: RigidTransform, camera: Camera, frames: FrameNames | None = No
 
 
 def refusal(read: Callable[..., object], *given: object) -> str:
-    """Return the words in which an input is refused; empty when it is not."""
+    """Return the message with which an input is refused; empty if it is not."""
     try:
         read(*given)
     except InputError as error:
@@ -97,7 +97,7 @@ def refusal(read: Callable[..., object], *given: object) -> str:
 @given(pose=poses(), camera=cameras(), frames=frame_names())
 @example(pose=RigidTransform.identity(), camera=CAMERA, frames=FrameNames("two  spaces", "radar   or not"))
 @example(pose=RigidTransform.identity(), camera=CAMERA, frames=FrameNames("front--left", "---"))
-def test_a_pose_comes_back_from_every_format_bit_for_bit_or_nearly(name, pose, camera, frames):
+def test_a_pose_reads_back_from_every_format(name, pose, camera, frames):
     file = file_of(pose, camera, frames)
     refused = refusal(lambda: export(file, name, rectified=format_named(name).is_for_rectified))
     if refused:
@@ -122,7 +122,7 @@ def test_a_pose_comes_back_from_every_format_bit_for_bit_or_nearly(name, pose, c
 @given(pose=poses(), direction=st.sampled_from(["roll", "pitch", "yaw"]))
 @example(pose=RigidTransform(matrix_from_rpy(np.array([0.3, np.pi / 2, 0.7])), np.zeros(3)), direction="yaw")
 @example(pose=RigidTransform(matrix_from_rpy(np.array([0.3, -np.pi / 2 + 1e-7, 0.7])), np.zeros(3)), direction="yaw")
-def test_fixed_axis_angles_give_the_rotation_back_also_at_the_poles(pose, direction):
+def test_fixed_axis_angles_reproduce_the_rotation_also_at_the_poles(pose, direction):
     rpy = rpy_from_matrix(pose.rotation)
 
     np.testing.assert_allclose(matrix_from_rpy(rpy), pose.rotation, rtol=0, atol=1e-9)
@@ -132,7 +132,7 @@ def test_fixed_axis_angles_give_the_rotation_back_also_at_the_poles(pose, direct
 
 
 @given(value=st.floats(allow_nan=False, allow_infinity=False))
-def test_a_number_comes_back_bit_for_bit_from_every_reader(value):
+def test_a_number_reads_back_bit_for_bit_in_every_reader(value):
     text = number_text(value)
 
     assert float(text) == value
@@ -156,7 +156,7 @@ def test_a_number_comes_back_bit_for_bit_from_every_reader(value):
         max_size=6,
     )
 )
-def test_clicks_come_back(clicks):
+def test_clicks_read_back(clicks):
     text = write_clicks(clicks)
 
     assert read_clicks(text) == tuple(sorted(clicks, key=lambda click: (click.image_time, click.id)))
@@ -166,7 +166,7 @@ def test_clicks_come_back(clicks):
 
 @settings(max_examples=30, deadline=None)
 @given(pose=poses(), camera=cameras(), values=st.lists(st.floats(allow_subnormal=False), min_size=9, max_size=9))
-def test_whatever_a_calibration_holds_the_file_is_json_and_reads_back_the_same(pose, camera, values):
+def test_whatever_a_calibration_contains_the_file_is_json_and_reads_back_the_same(pose, camera, values):
     a, b, c, d, e, f, g, h, i = values
     finite = [x if abs(x) < 1e9 else 1.0 for x in (a, b, c)]
     pairs = (
@@ -278,7 +278,7 @@ def test_a_damaged_file_is_read_or_refused(name, place, junk, cut):
 
 @settings(max_examples=30, deadline=None)
 @given(pose=poses(), edit=st.sampled_from(["direction", "axes", "translation", "rotation"]))
-def test_a_slip_is_never_passed_over(pose, edit):
+def test_a_slip_is_never_missed(pose, edit):
     file = file_of(pose, CAMERA)
     right = imported(file)
     changes = {

@@ -1,4 +1,4 @@
-"""Every slip planted in every format that can hold it, at random poses: a check finds it and calls it by its name."""
+"""Every slip planted in every format that can contain it, at random poses: a check finds and names it."""
 
 import dataclasses
 import json
@@ -27,7 +27,7 @@ from calib_core.interchange import (
     read_any,
 )
 from calib_core.interchange.calibration_file import choose_check_point
-from calib_core.interchange.check.slips import suspected_slips
+from calib_core.interchange.check.slips import undone_slips
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, Metrics
@@ -67,7 +67,7 @@ def transposed(written: np.ndarray, _: WrittenPose) -> np.ndarray:
 
 
 def reordered(written: np.ndarray, pose: WrittenPose) -> np.ndarray:
-    """Return what is read where w stands first and should stand last, or the other way round."""
+    """Return what is read if w is first and should be last, or vice versa."""
     shift = -1 if pose.form == "quaternion_wxyz" else 1
     wrong = written.copy()
     wrong[:3, :3] = Rotation.from_quat(np.roll(Rotation.from_matrix(written[:3, :3]).as_quat(), shift)).as_matrix()
@@ -101,17 +101,19 @@ SLIPS: dict[str, Callable[[np.ndarray, WrittenPose], np.ndarray]] = {
 }
 
 
-def with_words_of(right: bytes, wrong: bytes) -> bytes:
+def with_check_point_of(right: bytes, wrong: bytes) -> bytes:
     """Return the wrong file with the check point that the right one states."""
     if right.startswith(b"PK"):
         members = unpack(right, source="right")
-        return pack({name: with_words_of(members[name], data) for name, data in unpack(wrong, source="wrong").items()})
+        return pack(
+            {name: with_check_point_of(members[name], data) for name, data in unpack(wrong, source="wrong").items()}
+        )
     stated = re.search(rb"check point: .* px", right)
     return re.sub(rb"check point: .* px", stated[0].replace(b"\\", b"\\\\"), wrong) if stated else wrong
 
 
 def planted(file: CalibrationFile, name: str, slip: Callable[[np.ndarray, WrittenPose], np.ndarray]) -> bytes:
-    """Return a file whose numbers went through a slip, while its words are those of the right one."""
+    """Return a file whose numbers contain a slip but whose check point is that of the right one."""
     rectified = format_named(name).is_for_rectified
     right = export(file, name, rectified=rectified).data
     pose = read_any(right).pose
@@ -119,7 +121,7 @@ def planted(file: CalibrationFile, name: str, slip: Callable[[np.ndarray, Writte
     meant = WrittenPose("matrix", numbers[:3, :3], numbers[:3, 3], pose.direction, pose.axes).camera_from_radar()
     calibration = dataclasses.replace(file.calibration, camera_from_radar=meant)
     wrong = export(dataclasses.replace(file, calibration=calibration), name, rectified=rectified)
-    return with_words_of(right, wrong.data)
+    return with_check_point_of(right, wrong.data)
 
 
 def named_errors(wrong: ImportedCalibration, file: CalibrationFile, *, by_other: bool) -> list[str]:
@@ -132,13 +134,13 @@ def explaining(wrong: ImportedCalibration, file: CalibrationFile) -> set[str]:
     """Return every single slip that would explain the numbers exactly."""
     right = file.calibration.camera_from_radar.as_matrix()
     slips = set()
-    for suspected in takewhile(lambda one: len(one.slips) == 1, suspected_slips(wrong.pose)):
+    for candidate in takewhile(lambda one: len(one.slips) == 1, undone_slips(wrong.pose)):
         try:
-            undone = suspected.pose.camera_from_radar().as_matrix()
+            undone = candidate.pose.camera_from_radar().as_matrix()
         except ValueError:
             continue
         if np.abs(undone - right).max() < 1e-6:
-            slips.add(suspected.slips[0].code)
+            slips.add(candidate.slips[0].code)
     return slips
 
 
@@ -146,7 +148,7 @@ def explaining(wrong: ImportedCalibration, file: CalibrationFile) -> set[str]:
 @pytest.mark.parametrize("name", [known.name for known in FORMATS])
 @settings(max_examples=4, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(pose=poses())
-def test_a_planted_mistake_is_called_by_its_name_in_every_format(name, slip, pose):
+def test_a_planted_slip_is_named_in_every_format(name, slip, pose):
     file = file_of(pose)
     wrong = read_any(planted(file, name, SLIPS[slip]))
     assume(np.abs(wrong.camera_from_radar.as_matrix() - pose.as_matrix()).max() > 0.01)
@@ -164,7 +166,7 @@ def test_a_planted_mistake_is_called_by_its_name_in_every_format(name, slip, pos
 @pytest.mark.parametrize("slip", ["degrees-for-radians", "angle-order"])
 @settings(max_examples=10, deadline=None)
 @given(pose=poses())
-def test_wrong_angles_are_called_by_their_name(name, slip, pose):
+def test_wrong_angles_are_named(name, slip, pose):
     file = file_of(pose)
     text = export(file, name).data.decode()
     if name == "tf2":
@@ -194,7 +196,7 @@ def test_wrong_angles_are_called_by_their_name(name, slip, pose):
 
 @settings(max_examples=20, deadline=None)
 @given(pose=poses())
-def test_radians_in_a_rig_that_wants_degrees_are_called_so(pose):
+def test_radians_in_a_rig_that_expects_degrees_are_named(pose):
     file = file_of(pose)
     rig = json.loads(export(file, "driveworks").data)
     written = rig["rig"]["sensors"][1]["nominalSensor2Rig_FLU"]

@@ -1,4 +1,4 @@
-"""The camera by example; its laws, with OpenCV as the second opinion, are in tests/properties."""
+"""The camera by example; its laws, with OpenCV as the reference, are in tests/properties."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def test_a_pinhole_projects_by_similar_triangles() -> None:
 
 
 @pytest.mark.parametrize("model", ["pinhole", "plumb_bob", "rational_polynomial"])
-def test_points_behind_or_next_to_the_camera_have_no_pixel(model: CameraModel) -> None:
+def test_points_behind_the_camera_or_at_zero_depth_have_no_pixel(model: CameraModel) -> None:
     pixels = typical_camera(model).project(np.array([[0.0, 0.0, -4.0], [1.0, 0.0, 0.0], [0.0, 0.0, 2.0]]))
     assert np.isnan(pixels).all(axis=1).tolist() == [True, True, False]
 
@@ -60,14 +60,14 @@ def test_the_image_ends_half_a_pixel_outside_the_outermost_centres() -> None:
 
 
 @pytest.mark.parametrize("model", CAMERA_MODELS)
-def test_a_camera_sees_points_ahead_and_not_behind_or_to_the_side(model: CameraModel) -> None:
+def test_a_camera_sees_what_is_ahead_and_not_what_is_behind_or_to_the_side(model: CameraModel) -> None:
     points = np.array([[0.1, -0.1, 5.0], [0.0, 0.0, -5.0], [50.0, 0.0, 1.0]])
     assert typical_camera(model).sees(points).tolist() == [True, False, False]
 
 
 def test_a_point_beyond_the_fold_of_the_distortion_is_not_seen_though_it_projects_into_the_image() -> None:
     camera = Camera("plumb_bob", 640, 480, MATRIX_PX, np.array([-0.4, 0.0, 0.0, 0.0]))
-    beyond = np.array([[1.6, 0.0, 1.0]])  # r (1 - 0.4 r^2) has its summit at r = 0.91
+    beyond = np.array([[1.6, 0.0, 1.0]])  # r (1 - 0.4 r^2) has its maximum at r = 0.91
     assert camera.in_image(camera.project(beyond)).all()
     assert not camera.sees(beyond).any()
     assert camera.sees(np.array([[0.5, 0.0, 1.0]])).all()
@@ -75,7 +75,7 @@ def test_a_point_beyond_the_fold_of_the_distortion_is_not_seen_though_it_project
 
 def test_a_pixel_outside_the_lens_has_no_ray() -> None:
     camera = Camera("plumb_bob", 640, 480, MATRIX_PX, np.array([-0.4, 0.0, 0.0, 0.0]))
-    rays = camera.rays(np.array([[319.5 + 500.0 * 0.7, 239.5], [400.0, 239.5]]))  # the summit lies at 0.61
+    rays = camera.rays(np.array([[319.5 + 500.0 * 0.7, 239.5], [400.0, 239.5]]))  # the maximum is at 0.61
     assert np.isnan(rays).all(axis=1).tolist() == [True, False]
 
 

@@ -32,7 +32,7 @@ def test_the_public_names_are_sorted_complete_and_documented() -> None:
         assert (getattr(cc, name).__doc__ or "").strip(), name
 
 
-def test_the_names_for_type_checkers_are_those_available_at_run_time(project_root: Path) -> None:
+def test_the_names_for_type_checkers_are_those_that_can_be_imported(project_root: Path) -> None:
     module = ast.parse((project_root / "calib_core" / "__init__.py").read_text(encoding="utf-8"))
     guarded = next(node for node in module.body if isinstance(node, ast.If))
     imported = {
@@ -57,7 +57,7 @@ def test_a_misspelt_name_is_refused_with_a_clear_error() -> None:
         _ = cc.calibrat  # type: ignore[attr-defined]
 
 
-def test_a_calibration_survives_its_file(solved: cc.Calibration, tmp_path: Path) -> None:
+def test_a_calibration_reads_back_from_its_file(solved: cc.Calibration, tmp_path: Path) -> None:
     path = tmp_path / "calibration.json"
     cc.write_calibration(path, solved, frames=cc.FrameNames("radar_front", "cam_optical"))
     file = cc.read_calibration(path)
@@ -67,7 +67,7 @@ def test_a_calibration_survives_its_file(solved: cc.Calibration, tmp_path: Path)
     assert (tmp_path / "again.json").read_bytes() == path.read_bytes()
 
 
-def test_pairs_and_clicks_survive_their_files(simulated: SimulatedPairs, tmp_path: Path) -> None:
+def test_pairs_and_clicks_read_back_from_their_files(simulated: SimulatedPairs, tmp_path: Path) -> None:
     cc.write_pairs(tmp_path / "pairs.json", cc.PairsFile(simulated.camera, simulated.pairs))
     assert [pair.id for pair in cc.read_pairs(tmp_path / "pairs.json").pairs] == [pair.id for pair in simulated.pairs]
     clicks = (cc.ReflectorClick(TimeNs(7), "c1", 3.0, 4.0),)

@@ -1,1 +1,1 @@
-"""Camera intrinsics in whatever file people have them."""
+"""Camera intrinsics from the file formats in common use."""

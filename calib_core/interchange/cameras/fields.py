@@ -1,4 +1,4 @@
-"""Find cameras among a file's values: ROS, OpenCV, Kalibr and CameraInfo each have their own keys."""
+"""Find the cameras in a file's parsed values; ROS, OpenCV, Kalibr and CameraInfo each use their own keys."""
 
 import re
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from calib_core.lens_models.registry import LENS_MODELS
 
 __all__ = ["FoundCamera", "find_cameras", "floats"]
 
-_MATRIX_KEYS = {  # the camera matrix's key -> the distortion's
+_MATRIX_KEYS = {  # key of the camera matrix -> keys of the distortion
     "camera_matrix": ("distortion_coefficients", "dist_coeffs", "distortion_coeffs", "dist_coeff"),
     "Camera_Matrix": ("Distortion_Coefficients",),
     "cameraMatrix": ("distCoeffs",),
@@ -32,14 +32,14 @@ _HEIGHT_KEYS = ("image_height", "image_Height", "height", "height_px")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundCamera:
-    """What a file says about one camera, before anything is checked.
+    """What a file says about one camera, before any check.
 
     Attributes:
         name: its key in the file.
-        model: our name of its lens model; "" where the file leaves it to the number of coefficients.
+        model: our name for its lens model; "" if the file implies it by the number of coefficients.
         matrix_px: (9,) row-major.
-        distortion: as many as the file has.
-        size_px: width and height; None where the file does not tell.
+        distortion: the coefficients, as many as the file has.
+        size_px: width and height; None if the file does not state them.
     """
 
     name: str
@@ -52,12 +52,12 @@ class FoundCamera:
         """Return the camera.
 
         Raises:
-            InputError: no image size, or a camera cannot be like that.
+            InputError: the image size is missing, or a parameter is invalid.
         """
         size = self.size_px or image_size_px
         if size is None:
             raise InputError(
-                f"{source}: {self.name}: the file does not tell the image's size; add image_width and image_height to it"
+                f"{source}: {self.name}: the image size is missing; add image_width and image_height to the file"
             )
         model, distortion = _lens(self.model, self.distortion, source=source, name=self.name)
         try:
@@ -67,10 +67,10 @@ class FoundCamera:
 
 
 def find_cameras(content: Mapping[str, Any], *, source: str) -> tuple[FoundCamera, ...]:
-    """Find every camera a file's values hold, in the file's order.
+    """Find every camera in a file's values, in file order.
 
     Raises:
-        InputError: there is one, but a part of it is missing or is no number.
+        InputError: a camera is incomplete, or a value is not a number.
     """
     ours = _our_camera(content, source=source)
     if ours:
@@ -90,7 +90,7 @@ def find_cameras(content: Mapping[str, Any], *, source: str) -> tuple[FoundCamer
 
 
 def _our_camera(content: Mapping[str, Any], *, source: str) -> FoundCamera | None:
-    """Read the camera of pairs-1, of calibration-1, or one that stands alone."""
+    """Read the camera of pairs-1 or calibration-1, or a camera object on its own."""
     nested = isinstance(content.get("camera"), Mapping)
     inner = content["camera"] if nested else content
     if not {"matrix_px", "width_px", "height_px"} & set(inner):
@@ -109,7 +109,7 @@ def _our_camera(content: Mapping[str, Any], *, source: str) -> FoundCamera | Non
 def _flat_camera(
     content: Mapping[str, Any], matrix_key: str, distortion_keys: tuple[str, ...], *, source: str
 ) -> FoundCamera:
-    """Read the layouts that keep matrix, distortion and size side by side: ROS, OpenCV, CameraInfo."""
+    """Read the flat layouts, which have matrix, distortion and size at one level: ROS, OpenCV, CameraInfo."""
     distortion = next((content[key] for key in distortion_keys if content.get(key) is not None), ())
     model = str(content.get("distortion_model") or content.get("model") or "")
     if str(content.get("fisheye_model", "0")).lower() in ("1", "true"):
@@ -147,12 +147,12 @@ def _kalibr_camera(key: str, block: Mapping[str, Any], *, source: str) -> FoundC
 
 
 def _refuse_crop(content: Mapping[str, Any], *, source: str) -> None:
-    """Refuse a camera matrix that belongs to another picture than the one recorded (REP-104)."""
+    """Refuse a camera matrix that does not belong to the recorded picture (REP-104)."""
     roi = content.get("roi")
     cropped = isinstance(roi, Mapping) and any(roi.get(key) for key in ("x_offset", "y_offset"))
     if cropped or any(content.get(key) not in (None, 0, 1) for key in ("binning_x", "binning_y")):
         raise InputError(
-            f"{source}: binning or a region of interest is set; give the camera of the recorded picture itself"
+            f"{source}: binning or a region of interest is set; give the intrinsics of the recorded picture"
         )
 
 
@@ -166,9 +166,9 @@ def _model(name: str, *, source: str) -> str:
 
 
 def _lens(model: str, distortion: tuple[float, ...], *, source: str, name: str) -> tuple[str, tuple[float, ...]]:
-    """Settle model and coefficients: OpenCV's number of coefficients tells the model, surplus zeros are dropped."""
+    """Determine model and coefficients: an unnamed model follows from their number as in OpenCV; surplus zeros are dropped."""
     lens = LENS_MODELS[model] if model else opencv_lens(len(distortion))
-    if not distortion:  # ROS calls a pinhole plumb_bob, too
+    if not distortion:  # ROS also calls a pinhole plumb_bob
         lens = next((bare for bare in lenses_named("camera_info", lens.name) if 0 in bare.counts), lens)
     longest = lens.counts[-1]
     if len(distortion) > longest and not any(distortion[longest:]):
@@ -196,10 +196,10 @@ def _matrix(value: Any, *, source: str, place: str) -> tuple[float, ...]:
 
 
 def floats(value: Any, *, source: str, place: str, length: int | None = None) -> tuple[float, ...]:
-    """Return the finite numbers of a list, a list of rows, or an OpenCV or ROS matrix, row by row.
+    """Return the finite numbers in a list, a list of rows, or an OpenCV or ROS matrix, row by row.
 
     Raises:
-        InputError: there is something else among them, or another number of them.
+        InputError: an entry is not a finite number, or there are too few or too many.
     """
     if isinstance(value, Mapping):
         value = value.get("data", ())
@@ -218,5 +218,5 @@ def _number(value: Any, *, source: str, place: str) -> float:
     except (TypeError, ValueError):
         number = float("nan")
     if not abs(number) <= _LARGEST:
-        raise InputError(f"{source}: {place}: {str(value)[:60]!r} is not a number to calculate with; correct it")
+        raise InputError(f"{source}: {place}: {str(value)[:60]!r} is not a valid number; correct it")
     return number

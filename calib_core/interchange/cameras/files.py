@@ -1,4 +1,4 @@
-"""Read a camera from whatever file people have, and write ROS's camera_info YAML."""
+"""Read a camera from the file formats in common use, and write ROS camera_info YAML."""
 
 from pathlib import Path
 from typing import Any
@@ -25,16 +25,16 @@ _LOOKED_FOR = (
 def read_camera(
     text: str, source: str = "camera", *, name: str | None = None, image_size_px: tuple[int, int] | None = None
 ) -> Camera:
-    """Read a camera from ROS camera_info YAML, OpenCV FileStorage YAML or XML, Kalibr camchain, or JSON of ours.
+    """Read a camera from ROS camera_info YAML, OpenCV FileStorage YAML or XML, Kalibr camchain, or our own JSON.
 
     Args:
         text: the file's content.
-        source: what to call the file in an error.
-        name: which one, where the file holds several ("cam1", "M2"); None where it holds one.
-        image_size_px: width and height, used where the file does not tell them.
+        source: the name of the file in error messages.
+        name: which camera, if the file has several ("cam1", "M2"); None if it has one.
+        image_size_px: width and height, used if the file does not state them.
 
     Raises:
-        InputError: what was looked for, what was found, what to do.
+        InputError: no camera, or an invalid one; the message says what was looked for, what was found and what to do.
     """
     content = _load(text, source=source)
     cameras = find_cameras(content, source=source) if isinstance(content, dict) else ()
@@ -45,10 +45,10 @@ def read_camera(
 
 
 def read_camera_file(path: str | Path, *, image_size_px: tuple[int, int] | None = None) -> Camera:
-    """Read a camera from a file; "file.yml#cam1" says which one where it holds several.
+    """Read a camera from a file; "file.yml#cam1" selects one of several.
 
     Raises:
-        InputError: the file cannot be read, or holds no camera.
+        InputError: the file cannot be read, or contains no camera.
     """
     file, name = Path(path), None
     if not file.exists() and "#" in str(path):
@@ -56,7 +56,7 @@ def read_camera_file(path: str | Path, *, image_size_px: tuple[int, int] | None 
         file = Path(head)
     try:
         if file.stat().st_size > _MAX_BYTES:
-            raise InputError(f"{file}: too large for a camera file; is it the right one?")
+            raise InputError(f"{file}: too large for a camera file; is it the right file?")
         text = file.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
@@ -66,7 +66,7 @@ def read_camera_file(path: str | Path, *, image_size_px: tuple[int, int] | None 
 
 
 def camera_info_text(camera: Camera, name: str = "camera") -> str:
-    """Write ROS's camera_info YAML (camera_calibration): what image pipelines and `--camera` read.
+    """Write ROS camera_info YAML (as camera_calibration does), which image pipelines and `--camera` read.
 
     Raises:
         InputError: ROS has no name for this lens.
@@ -108,10 +108,10 @@ def _chosen(cameras: tuple[FoundCamera, ...], name: str | None, *, source: str) 
     names = [camera.name for camera in cameras]
     if name is not None:
         if name not in names:
-            raise InputError(f"{source}: no camera {name!r} in it; it holds {', '.join(names)}")
+            raise InputError(f"{source}: no camera {name!r} in it; it contains {', '.join(names)}")
         return cameras[names.index(name)]
     if len(cameras) > 1:
         raise InputError(
-            f"{source}: holds {len(cameras)} cameras; say which: {', '.join(f'{source}#{n}' for n in names)}"
+            f"{source}: contains {len(cameras)} cameras; choose one: {', '.join(f'{source}#{n}' for n in names)}"
         )
     return cameras[0]

@@ -1,1 +1,1 @@
-"""Checks of a calibration file: the check point, the slips that explain a miss, another calibration, pairs."""
+"""Check a calibration file against its check point, another calibration or pairs, and find the slip behind a mismatch."""

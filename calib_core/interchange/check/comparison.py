@@ -1,4 +1,4 @@
-"""How far two calibrations lie apart: in degrees, in centimetres, and in pixels at distances that matter."""
+"""The difference between two calibrations in degrees, in centimetres, and in pixels at typical distances."""
 
 from dataclasses import dataclass
 
@@ -13,18 +13,18 @@ __all__ = ["Comparison", "PixelDifference", "compare", "shown"]
 
 DISTANCES_M = (5.0, 20.0, 60.0)
 _GRID = 7
-_NOTHING = 1e-9
+_ZERO_LENGTH = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class PixelDifference:
-    """How far apart the two project points at one distance.
+    """How far apart two calibrations project points at one distance.
 
     Attributes:
-        distance_m: from the camera.
+        distance_m: distance from the camera.
         rms_px: root mean square over the image.
-        max_px: the largest over the image.
-        sigma_px: the root mean square to be expected from the two covariances; NaN where neither is known.
+        max_px: maximum over the image.
+        sigma_px: root mean square expected from the two covariances; NaN if neither is known.
     """
 
     distance_m: float
@@ -35,17 +35,17 @@ class PixelDifference:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Two calibrations side by side.
+    """The difference between two calibrations.
 
     Attributes:
         rotation_deg: angle between the two rotations.
-        rotation_sigma_deg: its standard deviation by the covariances, along its own axis; NaN where neither is known.
+        rotation_sigma_deg: its standard deviation about its own axis, from the covariances; NaN if neither is known.
         position_cm: distance between the two camera positions in the radar frame.
-        position_sigma_cm: its standard deviation along its own direction; NaN where neither is known.
+        position_sigma_cm: its standard deviation along its own direction; NaN if neither is known.
         pixels: at 5, 20 and 60 m; empty without a camera.
-        chi2: squared distance in units of the covariances, 6 degrees of freedom; NaN where neither is known.
-        p_value: chance of a chi2 this large if the two were independent and right; NaN where chi2 is.
-        covariances: how many of the two are known.
+        chi2: squared Mahalanobis distance under the known covariances, 6 degrees of freedom; NaN if neither is known.
+        p_value: probability of a chi2 this large if the two are independent and right; NaN if chi2 is.
+        covariances: how many of the two covariances are known.
     """
 
     rotation_deg: float
@@ -58,25 +58,25 @@ class Comparison:
     covariances: int
 
     def lines(self) -> tuple[str, ...]:
-        """Return the comparison as lines for people."""
+        """Return the comparison as readable lines."""
         rows = [
             f"rotation: {shown(self.rotation_deg)} deg apart{_plus_minus(self.rotation_sigma_deg, 'deg')}",
             f"camera position: {shown(self.position_cm)} cm apart{_plus_minus(self.position_sigma_cm, 'cm')}",
         ]
         for at in self.pixels:
-            expected = "" if np.isnan(at.sigma_px) else f", expected {at.sigma_px:.3g} px by the covariances"
-            rows.append(f"at {at.distance_m:g} m: {shown(at.rms_px)} px rms, {shown(at.max_px)} px at most{expected}")
+            expected = "" if np.isnan(at.sigma_px) else f", expected {at.sigma_px:.3g} px from the covariances"
+            rows.append(f"at {at.distance_m:g} m: {shown(at.rms_px)} px rms, {shown(at.max_px)} px max{expected}")
         if np.isfinite(self.chi2):
             rows.append(
-                f"together: chi2 {shown(self.chi2)} for 6 degrees of freedom (p = {self.p_value:.2g} if the two are independent)"
+                f"overall: chi2 {shown(self.chi2)} for 6 degrees of freedom (p = {self.p_value:.2g} if the two are independent)"
             )
         if self.covariances == 1:
-            rows.append("the uncertainty of one of the two is not known; the standard deviations are the other's alone")
+            rows.append("only one of the two uncertainties is known; the standard deviations come from that one alone")
         return tuple(rows)
 
 
 def shown(value: float) -> str:
-    """Write a figure with three digits; what is below a millionth is rounding and shown as 0."""
+    """Format a number with three significant digits; anything up to a millionth is rounding and shown as 0."""
     return f"{value if abs(value) > 1e-6 else 0:.3g}"
 
 
@@ -85,12 +85,12 @@ def _plus_minus(sigma: float, unit: str) -> str:
 
 
 def compare(a: ImportedCalibration, b: ImportedCalibration, *, camera: Camera | None = None) -> Comparison:
-    """Compare two calibrations of the same sensors; the covariances of both add up, as for independent data.
+    """Compare two calibrations of the same sensors; the covariances are added, as for independent data.
 
     Args:
         a: one of them.
         b: the other.
-        camera: the intrinsics, where neither has any.
+        camera: the intrinsics, if neither has any.
     """
     a_pose, b_pose = a.camera_from_radar, b.camera_from_radar
     error = b_pose.error_from(a_pose)
@@ -123,7 +123,7 @@ def _known_covariances(a: ImportedCalibration, b: ImportedCalibration) -> list[M
 
 def _sigma_along(direction: np.ndarray, covariance: np.ndarray) -> float:
     length = float(np.linalg.norm(direction))
-    variance = np.trace(covariance) / 3 if length < _NOTHING else direction @ covariance @ direction / length**2
+    variance = np.trace(covariance) / 3 if length < _ZERO_LENGTH else direction @ covariance @ direction / length**2
     return float(np.sqrt(variance)) if variance >= 0 else float("nan")
 
 
@@ -139,7 +139,7 @@ def _chi2(error: np.ndarray, covariance: Matrix66) -> tuple[float, float]:
 def _pixels(
     a: ImportedCalibration, b: ImportedCalibration, camera: Camera, distance_m: float, covariance: Matrix66
 ) -> PixelDifference:
-    """Compare over a grid of pixels whose rays are followed for a distance."""
+    """Compare the projections of points at one distance along the rays of a pixel grid."""
     columns, rows = np.linspace(0, camera.width_px - 1, _GRID), np.linspace(0, camera.height_px - 1, _GRID)
     grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
     points_camera_m = camera.rays(grid) * distance_m

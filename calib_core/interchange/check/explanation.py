@@ -1,11 +1,11 @@
-"""Findings of a check, and the slip that explains why a pose misses what it should meet."""
+"""Results of a check, and the slip that explains a mismatch."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.check.slips import SuspectedSlips, suspected_slips
+from calib_core.interchange.check.slips import UndoneSlips, undone_slips
 from calib_core.interchange.imported import WrittenPose
 
 __all__ = ["CheckResult", "explain", "explained"]
@@ -13,13 +13,13 @@ __all__ = ["CheckResult", "explain", "explained"]
 
 @dataclass(frozen=True, slots=True)
 class CheckResult:
-    """One thing a check found.
+    """One result of a check.
 
     Attributes:
         level: "good" (verified), "warning" (look at it) or "error" (the file is wrong).
         code: one word for programs.
         message: what was found, with figures.
-        hint: what to do about it; empty when nothing needs doing.
+        hint: what to do about it; empty if nothing needs to be done.
     """
 
     level: Literal["good", "warning", "error"]
@@ -28,31 +28,31 @@ class CheckResult:
     hint: str = ""
 
 
-def explain(pose: WrittenPose, miss: Callable[[RigidTransform], float], limit: float) -> SuspectedSlips | None:
-    """Return the fewest slips that bring the miss under the limit; of equally few, the best."""
-    best: tuple[int, float, SuspectedSlips] | None = None
-    for suspected in suspected_slips(pose):
+def explain(pose: WrittenPose, miss: Callable[[RigidTransform], float], limit: float) -> UndoneSlips | None:
+    """Find the fewest slips that, undone, bring the miss within the limit; among equally few, the best."""
+    best: tuple[int, float, UndoneSlips] | None = None
+    for undone in undone_slips(pose):
         try:
-            missed = miss(suspected.pose.camera_from_radar())
+            missed = miss(undone.pose.camera_from_radar())
         except ValueError:
             continue
-        rank = (len(suspected.slips), missed)
+        rank = (len(undone.slips), missed)
         if missed <= limit and (best is None or rank < best[:2]):
-            best = (*rank, suspected)
+            best = (*rank, undone)
     return best[2] if best else None
 
 
-def explained(suspected: SuspectedSlips, before: str) -> CheckResult:
-    """Return the result that names the slips.
+def explained(undone: UndoneSlips, mismatch: str) -> CheckResult:
+    """Return an error result that names the slips.
 
     Args:
-        suspected: the slips.
-        before: what was missed, to stand before the colon.
+        undone: the slips.
+        mismatch: what does not fit, with figures; it starts the message.
     """
-    slips = suspected.slips
+    slips = undone.slips
     return CheckResult(
         "error",
         "+".join(slip.code for slip in slips),
-        f"{before}: " + ", and ".join(slip.message for slip in slips),
+        f"{mismatch}: " + ", and ".join(slip.message for slip in slips),
         ", and ".join(slip.hint for slip in slips),
     )

@@ -1,4 +1,4 @@
-"""Pairs as evidence for or against a calibration: seen through it, radar positions must come out near their pixels."""
+"""Check a calibration against pairs: the radar positions must project near their pixels."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +32,7 @@ class CheckPairs:
     Attributes:
         points_radar_m: (n, 3), n at least 4.
         pixels_px: (n, 2).
-        camera: the camera the pixels are of.
+        camera: the camera the pixels belong to.
     """
 
     points_radar_m: Points3
@@ -44,7 +44,7 @@ class CheckPairs:
         object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (None, 2)))
 
     def median_miss_px(self, camera_from_radar: RigidTransform) -> float:
-        """Return the median distance between where the points come out and their pixels; infinite behind the camera."""
+        """Return the median distance between the projected points and their pixels; infinite behind the camera."""
         apart = np.linalg.norm(self.camera.project(camera_from_radar @ self.points_radar_m) - self.pixels_px, axis=1)
         return float(np.median(np.where(np.isfinite(apart), apart, np.inf)))
 
@@ -53,11 +53,11 @@ def read_check_pairs_file(path: Path) -> CheckPairs:
     """Read pairs-1, or the inliers of a calibration-1 file.
 
     Raises:
-        InputError: the file cannot be read, is neither, or holds fewer than four pairs.
+        InputError: the file cannot be read, is neither, or contains fewer than four pairs.
     """
     try:
         if path.stat().st_size > _MAX_BYTES:
-            raise InputError(f"{path}: too large for a file of pairs; is it the right one?")
+            raise InputError(f"{path}: too large for a file of pairs; is it the right file?")
         return read_check_pairs(path.read_text(encoding="utf-8-sig"), str(path))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the path") from None
@@ -69,7 +69,7 @@ def read_check_pairs(text: str, source: str = "pairs") -> CheckPairs:
     """Read pairs-1, or the inliers of a calibration-1 text.
 
     Raises:
-        InputError: it is neither, or holds fewer than four pairs.
+        InputError: it is neither, or contains fewer than four pairs.
     """
     if json_object(text, source=source).get("schema") == CALIBRATION_SCHEMA:
         calibration = read_calibration(text, source).calibration
@@ -82,22 +82,24 @@ def read_check_pairs(text: str, source: str = "pairs") -> CheckPairs:
         points = [pair.candidates[0].position_radar_m for pair in file.pairs]
         pixels = [pair.pixel_px for pair in file.pairs]
     if len(points) < MIN_PAIRS:
-        raise InputError(f"{source}: holds {len(points)} pairs; at least {MIN_PAIRS} are needed to judge a pose by")
+        raise InputError(f"{source}: contains {len(points)} pairs; a check needs at least {MIN_PAIRS}")
     return CheckPairs(np.array(points), np.array(pixels), camera)
 
 
-def by_pairs(pose: WrittenPose, evidence: CheckPairs) -> CheckResult:
-    """Hold a pose against pairs: near them, far from them because of a slip, or far from them."""
-    near_px = _NEAR * float(np.hypot(evidence.camera.width_px, evidence.camera.height_px))
-    missed_px = evidence.median_miss_px(pose.camera_from_radar())
-    count = len(evidence.points_radar_m)
-    where = f"{shown(missed_px)} px away or more" if np.isfinite(missed_px) else "behind the camera"
-    before = f"half of the {count} pairs come out {where}"
+def by_pairs(pose: WrittenPose, pairs: CheckPairs) -> CheckResult:
+    """Check a pose against pairs: it fits, a slip explains why not, or nothing does."""
+    near_px = _NEAR * float(np.hypot(pairs.camera.width_px, pairs.camera.height_px))
+    missed_px = pairs.median_miss_px(pose.camera_from_radar())
+    count = len(pairs.points_radar_m)
+    where = f"{shown(missed_px)} px or more from their pixels" if np.isfinite(missed_px) else "behind the camera"
+    mismatch = f"half of the {count} pairs project {where}"
     if missed_px <= near_px:
-        return CheckResult("good", "pairs-fit", f"half of the {count} pairs come out within {shown(missed_px)} px")
-    suspected = explain(pose, evidence.median_miss_px, min(near_px, _CLEARLY_BETTER * missed_px))
-    if suspected is not None:
-        return explained(suspected, before)
+        return CheckResult(
+            "good", "pairs-fit", f"half of the {count} pairs project within {shown(missed_px)} px of their pixels"
+        )
+    undone = explain(pose, pairs.median_miss_px, min(near_px, _CLEARLY_BETTER * missed_px))
+    if undone is not None:
+        return explained(undone, mismatch)
     return CheckResult(
-        "error", "pairs-missed", f"{before}, and no slip explains it", "the sensors moved, or the pose is wrong"
+        "error", "pairs-missed", f"{mismatch}, and no known slip explains it", "the sensors moved, or the pose is wrong"
     )

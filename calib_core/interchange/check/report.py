@@ -1,4 +1,4 @@
-"""Check a calibration file: does its check point come out, and if not, which slip explains it?"""
+"""Check a calibration file: does it reproduce its check point, and if not, which slip explains it?"""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,27 +10,28 @@ from calib_core.geometry import RigidTransform, rotation_angle_rad
 from calib_core.interchange.check.comparison import Comparison, compare, shown
 from calib_core.interchange.check.explanation import CheckResult, explain, explained
 from calib_core.interchange.check.pair_residuals import CheckPairs, by_pairs
-from calib_core.interchange.check.slips import suspected_slips
+from calib_core.interchange.check.slips import undone_slips
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 
 __all__ = ["CheckReport", "Verdict", "check"]
 
 Verdict = Literal["right", "wrong", "doubtful", "unproven"]
-"""Proved by what is known; contradicted; implausible with nothing to prove it; plausible with nothing to prove it."""
+"""Confirmed; contradicted; implausible, with nothing to test it against; plausible, with nothing to test it against."""
 
-
-_SILENT = "check-point-unused"
-_PROOF = "prove it with --against FILE (a calibration you trust) or --pairs FILE (radar positions and pixels)"
+_CHECK_POINT_UNUSED = "check-point-unused"
+_HOW_TO_TEST = "test it with --against FILE (a calibration you trust) or --pairs FILE (radar positions and pixels)"
 _SUMMARIES: dict[Verdict, tuple[str, ...]] = {
-    "doubtful": (f"DOUBTFUL: this looks wrong, and nothing in the file can tell; {_PROOF}",),
-    "unproven": (f"not proven: nothing contradicts this pose, and nothing in the file can prove it; {_PROOF}",),
+    "doubtful": (f"DOUBTFUL: this looks wrong, but the file has nothing to test it against; {_HOW_TO_TEST}",),
+    "unproven": (
+        f"not proven: nothing contradicts this pose, but the file has nothing to test it against; {_HOW_TO_TEST}",
+    ),
 }
 _CLOSE = 1e-4
 _CLOSE_PX = 0.05
 _SAME_SENSORS_RAD = np.radians(10.0)
 _SAME_SENSORS_M = 0.5
 _CLEARLY_BETTER = 0.2
-_NO_COINCIDENCE = 1e-3
+_EXACT_FIT = 1e-3
 _ROUNDING = 1e-4
 _FAR_M = 20.0
 _SIDEWAYS_RAD = np.radians(60.0)
@@ -39,12 +40,12 @@ _FORWARD_RAD = np.radians(35.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CheckReport:
-    """What a check says about a file.
+    """The report of a check.
 
     Attributes:
         imported: what was read.
-        results: in the order they were checked.
-        comparison: against the other calibration, where one was given.
+        results: in the order of the checks.
+        comparison: with the other calibration, if one was given.
     """
 
     imported: ImportedCalibration
@@ -53,21 +54,21 @@ class CheckReport:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing is wrong; warnings do not count."""
+        """Whether there is no error; warnings do not count."""
         return all(result.level != "error" for result in self.results)
 
     @property
     def verdict(self) -> Verdict:
-        """What the results come to."""
+        """The overall verdict."""
         levels = {result.level for result in self.results}
         if "error" in levels:
             return "wrong"
         if "good" in levels:
             return "right"
-        return "doubtful" if any(result.code != _SILENT for result in self.results) else "unproven"
+        return "doubtful" if any(result.code != _CHECK_POINT_UNUSED for result in self.results) else "unproven"
 
     def lines(self) -> tuple[str, ...]:
-        """Return the report as lines for people."""
+        """Return the report as readable lines."""
         frames = self.imported.frames
         named = f", radar {frames.radar!r}, camera {frames.camera!r}" if frames else ", frames not named"
         rows = [f"read as {self.imported.format}{named}"]
@@ -76,7 +77,7 @@ class CheckReport:
             label = {"good": "ok", "warning": "warning", "error": "WRONG"}[result.level]
             rows.append(f"{label}: {result.message}" + (f"; {result.hint}" if result.hint else ""))
         if self.comparison is not None:
-            rows += [f"against the other: {line}" for line in self.comparison.lines()]
+            rows += [f"compared with the other: {line}" for line in self.comparison.lines()]
         return (*rows, *_SUMMARIES.get(self.verdict, ()))
 
 
@@ -87,13 +88,13 @@ def check(
     camera: Camera | None = None,
     pairs: CheckPairs | None = None,
 ) -> CheckReport:
-    """Check a calibration by its own check point, by another calibration, by pairs, and by what is plausible.
+    """Check a calibration against its own check point, another calibration and pairs, and for plausibility.
 
     Args:
         imported: what read_any returned.
         against: a calibration of the same sensors that is known to be right.
-        camera: the intrinsics, where the file has none.
-        pairs: radar positions and where they were seen.
+        camera: the intrinsics, if the file has none.
+        pairs: radar positions and the pixels where they were seen.
     """
     results = [
         CheckResult("error", "contradiction", fault, "correct the one that is wrong") for fault in imported.faults
@@ -108,20 +109,20 @@ def check(
         results.append(by_pairs(imported.pose, pairs))
     if imported.file is not None:
         results += _by_its_pairs(imported)
-    held = [result for result in results if result.code not in ("contradiction", _SILENT)]
-    if not held or (against is None and not any(result.level == "error" for result in held)):
-        results += _by_plausibility(imported.pose, verified=bool(held))
+    pose_tests = [result for result in results if result.code not in ("contradiction", _CHECK_POINT_UNUSED)]
+    if not pose_tests or (against is None and not any(result.level == "error" for result in pose_tests)):
+        results += _by_plausibility(imported.pose, verified=bool(pose_tests))
     comparison = compare(against, imported, camera=camera) if against is not None else None
     return CheckReport(imported, tuple(results), comparison)
 
 
 def _by_check_point(pose: WrittenPose, stated: StatedCheckPoint, camera: Camera | None) -> CheckResult:
-    shown = "(" + ", ".join(f"{value:.4g}" for value in stated.radar_m) + ") m"
+    point = "(" + ", ".join(f"{value:.4g}" for value in stated.radar_m) + ") m"
     if stated.camera_m is None and camera is None:
         return CheckResult(
             "warning",
-            _SILENT,
-            f"the check point {shown} states a pixel, and there is no camera to compute it with",
+            _CHECK_POINT_UNUSED,
+            f"the check point {point} is given as a pixel, but there is no camera to project it with",
             "check it with --against calibration.json, which has the camera",
         )
 
@@ -130,21 +131,21 @@ def _by_check_point(pose: WrittenPose, stated: StatedCheckPoint, camera: Camera 
 
     missed = miss(pose.camera_from_radar())
     if missed <= 1.0:
-        return CheckResult("good", "check-point", f"the check point {shown} comes out where the file says")
-    suspected = explain(pose, miss, 1.0)
-    came_out = _came_out(pose.camera_from_radar(), stated, camera)
-    if suspected is None:
+        return CheckResult("good", "check-point", f"the check point {point} is reproduced")
+    undone = explain(pose, miss, 1.0)
+    mismatch = _mismatch(pose.camera_from_radar(), stated, camera)
+    if undone is None:
         return CheckResult(
             "error",
             "check-point-missed",
-            f"the check point {shown} {came_out}, and no single slip explains it",
-            "the numbers were changed: export the file again",
+            f"the check point {point} {mismatch}, and no known slip explains it",
+            "the numbers were changed; export the file again",
         )
-    return explained(suspected, f"the check point {shown} {came_out}")
+    return explained(undone, f"the check point {point} {mismatch}")
 
 
 def _miss(candidate: RigidTransform, stated: StatedCheckPoint, camera: Camera | None) -> float:
-    """Return how far the check point misses, in units of the tolerance."""
+    """Return the error of the check point in units of the tolerance."""
     point_camera_m = candidate @ stated.radar_m[None]
     if stated.camera_m is not None:
         return float(np.linalg.norm(point_camera_m[0] - stated.camera_m) / (_CLOSE * np.linalg.norm(stated.camera_m)))
@@ -154,15 +155,15 @@ def _miss(candidate: RigidTransform, stated: StatedCheckPoint, camera: Camera | 
     return apart if np.isfinite(apart) else float("inf")
 
 
-def _came_out(candidate: RigidTransform, stated: StatedCheckPoint, camera: Camera | None) -> str:
+def _mismatch(candidate: RigidTransform, stated: StatedCheckPoint, camera: Camera | None) -> str:
     point_camera_m = candidate @ stated.radar_m[None]
     if stated.pixel_px is not None and camera is not None:
         pixel = camera.project(point_camera_m)[0]
-        there = f"({pixel[0]:.1f}, {pixel[1]:.1f})" if np.isfinite(pixel).all() else "behind the camera"
-        return f"comes out at {there} instead of pixel ({stated.pixel_px[0]:.1f}, {stated.pixel_px[1]:.1f})"
+        there = f"to ({pixel[0]:.1f}, {pixel[1]:.1f})" if np.isfinite(pixel).all() else "behind the camera"
+        return f"projects {there} instead of to pixel ({stated.pixel_px[0]:.1f}, {stated.pixel_px[1]:.1f})"
     wanted = stated.camera_m if stated.camera_m is not None else np.full(3, np.nan)
     got, want = (", ".join(f"{value:.3f}" for value in point) for point in (point_camera_m[0], wanted))
-    return f"comes out at ({got}) m in the camera frame instead of ({want}) m"
+    return f"is at ({got}) m in the camera frame instead of ({want}) m"
 
 
 def _apart(a: RigidTransform, b: RigidTransform) -> tuple[float, float]:
@@ -170,7 +171,7 @@ def _apart(a: RigidTransform, b: RigidTransform) -> tuple[float, float]:
 
 
 def _by_other(pose: WrittenPose, other: RigidTransform) -> CheckResult:
-    """Compare with a pose known to be right: small differences are two calibrations, large ones want an explanation."""
+    """Compare with a pose known to be right: two calibrations differ a little; a large difference needs an explanation."""
 
     def miss(candidate: RigidTransform) -> float:
         angle, distance_m = _apart(candidate, other)
@@ -178,24 +179,27 @@ def _by_other(pose: WrittenPose, other: RigidTransform) -> CheckResult:
 
     missed = miss(pose.camera_from_radar())
     angle, distance_m = _apart(pose.camera_from_radar(), other)
-    before = f"{shown(np.degrees(angle))} deg and {shown(distance_m)} m from the other calibration"
-    exact = explain(pose, miss, _NO_COINCIDENCE * missed) if missed > _ROUNDING else None
-    if exact is not None:  # the same calibration but for a slip, however little the slip moves
-        return explained(exact, before)
-    suspected = explain(pose, miss, min(1.0, _CLEARLY_BETTER * missed))
-    if missed <= _CLEARLY_BETTER or (missed <= 1.0 and suspected is None):
-        return CheckResult("good", "agrees", f"agrees: {before}")
-    if suspected is not None:
-        found = explained(suspected, before)
+    difference = f"{shown(np.degrees(angle))} deg and {shown(distance_m)} m from the other calibration"
+    exact = explain(pose, miss, _EXACT_FIT * missed) if missed > _ROUNDING else None
+    if exact is not None:  # the same calibration except for a slip, however small its effect
+        return explained(exact, difference)
+    undone = explain(pose, miss, min(1.0, _CLEARLY_BETTER * missed))
+    if missed <= _CLEARLY_BETTER or (missed <= 1.0 and undone is None):
+        return CheckResult("good", "agrees", f"agrees: {difference}")
+    if undone is not None:
+        found = explained(undone, difference)
         level: Literal["warning", "error"] = "error" if missed > 1.0 else "warning"
         return CheckResult(level, found.code, found.message, found.hint)
     return CheckResult(
-        "error", "disagrees", f"{before}, and no slip explains it", "the sensors moved, or one of the two is wrong"
+        "error",
+        "disagrees",
+        f"{difference}, and no known slip explains it",
+        "the sensors moved, or one of the two is wrong",
     )
 
 
 def _by_its_pairs(imported: ImportedCalibration) -> list[CheckResult]:
-    """Recompute what a calibration-1 file says about its pairs."""
+    """Recompute the pair results that a calibration-1 file states."""
     file = imported.file
     pairs = [pair for pair in file.calibration.pairs if np.isfinite(pair.projected_px).all()] if file else []
     if file is None or not pairs:
@@ -205,23 +209,20 @@ def _by_its_pairs(imported: ImportedCalibration) -> list[CheckResult]:
     wrong = [pair.id for pair, px in zip(pairs, apart, strict=True) if not px <= _CLOSE_PX]
     if wrong:
         named = ", ".join(wrong[:5]) + (", ..." if len(wrong) > 5 else "")
-        hint = "pose, camera or pairs were changed after solving: solve again"
-        return [
-            CheckResult(
-                "error", "pairs-disagree", f"{len(wrong)} of {len(pairs)} pairs project elsewhere ({named})", hint
-            )
-        ]
+        message = f"{len(wrong)} of {len(pairs)} pairs do not project where the file says ({named})"
+        hint = "pose, camera or pairs were changed after solving; solve again"
+        return [CheckResult("error", "pairs-disagree", message, hint)]
     results = [CheckResult("good", "pairs", f"all {len(pairs)} pairs project where the file says")]
     inliers = [pair.distance_px for pair in pairs if pair.inlier]
     aed_px = file.calibration.metrics.aed_px
     if inliers and np.isfinite(aed_px) and abs(np.mean(inliers) - aed_px) > _CLOSE_PX:
-        message = f"aed_px says {aed_px:.3f}, the inliers average {np.mean(inliers):.3f} px"
+        message = f"aed_px is {aed_px:.3f}, but the inliers average {np.mean(inliers):.3f} px"
         results.append(CheckResult("error", "metrics-disagree", message, "solve again"))
     return results
 
 
 def _by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
-    """Look for what no pair of forward-looking sensors on one vehicle has; a warning, since others exist."""
+    """Warn about poses that two forward-looking sensors on one vehicle do not have; other rigs may have them."""
     results = []
     camera_from_radar = pose.camera_from_radar()
     distance_m = float(np.linalg.norm(camera_from_radar.translation_m))
@@ -230,10 +231,14 @@ def _by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
         results.append(CheckResult("warning", "far-apart", message, "is the translation in millimetres?"))
     off = _off_forward(camera_from_radar)
     if off > _SIDEWAYS_RAD and not verified:
-        likely = [s for s in suspected_slips(pose) if len(s.slips) == 1 and _is_forward(s.pose)]
-        hint = "is that so, or perhaps " + ", or ".join(dict.fromkeys(s.slips[0].message for s in likely)) + "?"
-        message = f"the camera looks {np.degrees(off):.0f} deg away from the radar"
-        results.append(CheckResult("warning", "looks-elsewhere", message, hint if likely else "is that so?"))
+        likely = [s for s in undone_slips(pose) if len(s.slips) == 1 and _is_forward(s.pose)]
+        hint = "if it is not mounted like that, perhaps " + ", or ".join(
+            dict.fromkeys(s.slips[0].message for s in likely)
+        )
+        message = f"the camera points {np.degrees(off):.0f} deg away from the radar's x axis"
+        results.append(
+            CheckResult("warning", "looks-elsewhere", message, hint if likely else "is it mounted like that?")
+        )
     return results
 
 
@@ -243,7 +248,7 @@ def _off_forward(camera_from_radar: RigidTransform) -> float:
 
 
 def _is_forward(pose: WrittenPose) -> bool:
-    """Tell whether the camera looks along the radar's x axis, upright."""
+    """Return whether the camera is upright and looks along the radar's x axis."""
     try:
         camera_from_radar = pose.camera_from_radar()
     except ValueError:

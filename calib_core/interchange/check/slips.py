@@ -1,4 +1,4 @@
-"""The slips by which a right calibration becomes a wrong file, each as the edit that undoes it."""
+"""The slips that turn a right calibration into a wrong file, each with the edit that undoes it."""
 
 import dataclasses
 from collections.abc import Callable, Iterator
@@ -10,7 +10,7 @@ import numpy as np
 from calib_core.geometry import matrix_from_quaternion_wxyz, quaternion_wxyz_from_matrix
 from calib_core.interchange.imported import Direction, Form, WrittenPose
 
-__all__ = ["SLIPS", "Slip", "SuspectedSlips", "suspected_slips"]
+__all__ = ["SLIPS", "Slip", "UndoneSlips", "undone_slips"]
 
 _ROUNDED = 1.001
 
@@ -21,9 +21,9 @@ class Slip:
 
     Attributes:
         code: one word for programs.
-        message: what is wrong, to stand after "it fits once ... is undone".
+        message: what is wrong, as a clause.
         hint: what to do about it.
-        undo: returns the pose as it should have been written, or nothing where the slip is impossible.
+        undo: returns the pose as it should have been written, in each possible way; empty if the slip is impossible.
     """
 
     code: str
@@ -33,8 +33,8 @@ class Slip:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SuspectedSlips:
-    """One or two slips that may have happened together.
+class UndoneSlips:
+    """One or two slips and the pose with them undone.
 
     Attributes:
         slips: the slips.
@@ -59,7 +59,7 @@ def _transpose(pose: WrittenPose) -> tuple[WrittenPose, ...]:
 
 
 def _reorder_quaternion(pose: WrittenPose) -> tuple[WrittenPose, ...]:
-    """Take the four numbers in the other order, also where somebody made a matrix or angles of them."""
+    """Reorder the four numbers, also if they have since been converted to a matrix or to angles."""
     if pose.form in ("quaternion_xyzw", "quaternion_wxyz"):
         other: Form = "quaternion_wxyz" if pose.form == "quaternion_xyzw" else "quaternion_xyzw"
         return (dataclasses.replace(pose, form=other),)
@@ -72,7 +72,7 @@ def _degrees(pose: WrittenPose) -> tuple[WrittenPose, ...]:
 
 
 def _radians(pose: WrittenPose) -> tuple[WrittenPose, ...]:
-    """Take small angles for radians that were converted once too often, or that stand where degrees are wanted."""
+    """Convert small angles to degrees, as if radians were converted twice or given instead of degrees."""
     small = pose.form == "rpy" and np.abs(pose.rotation).max() <= np.radians(np.pi) * _ROUNDED
     return (dataclasses.replace(pose, rotation=np.degrees(pose.rotation)),) if small else ()
 
@@ -98,56 +98,61 @@ SLIPS: tuple[Slip, ...] = (
     Slip(
         "swapped-direction",
         "the direction is swapped: the numbers are those of the inverse transform",
-        "write the inverse, or exchange parent and child",
+        "write the inverse, or swap parent and child",
         _swap_direction,
     ),
     Slip(
         "transposed-rotation",
-        "the rotation is transposed (or the quaternion conjugated) while the translation is not",
+        "the rotation is transposed (or the quaternion conjugated), but the translation is unchanged",
         "transpose the rotation",
         _transpose,
     ),
     Slip(
         "quaternion-order",
-        "the quaternion's order is wrong: w stands first where the format wants it last, or the other way round",
+        "the quaternion order is wrong: w is first where the format expects it last, or vice versa",
         "reorder the four numbers",
         _reorder_quaternion,
     ),
-    Slip("degrees-for-radians", "the angles are in degrees, the format wants radians", "convert the angles", _degrees),
+    Slip(
+        "degrees-for-radians",
+        "the angles are in degrees, but the format expects radians",
+        "convert the angles",
+        _degrees,
+    ),
     Slip(
         "radians-for-degrees",
-        "the angles are in radians where the format wants degrees, or were turned into radians twice",
+        "the angles are in radians where the format expects degrees, or were converted to radians twice",
         "convert the angles",
         _radians,
     ),
     Slip(
         "angle-order",
-        "the angles stand in the order yaw, pitch, roll where the format wants roll, pitch, yaw (or the other way round)",
+        "the angles are in the order yaw, pitch, roll where the format expects roll, pitch, yaw (or vice versa)",
         "reverse the three angles",
         _reverse_angles,
     ),
     Slip(
         "optical-for-link",
-        "the camera's axes are exchanged: optical (z forward) for body (x forward), or the other way round",
-        "use the pose of the frame that is named; camera_link and its optical frame differ by a fixed rotation",
+        "the camera has the wrong axes: optical (z forward) instead of body (x forward), or vice versa",
+        "use the pose of the named frame; camera_link and its optical frame differ by a fixed rotation",
         _swap_axes,
     ),
     Slip("millimetres", "the translation is in millimetres", "divide the translation by 1000", _millimetres),
     Slip(
         "position-for-translation",
-        "the translation is the position of the source's origin the wrong way round: t = -R c was left out",
-        "write t = -R c, c being the position",
+        "the translation is the position c of the target frame's origin in the source frame, not t = -R c",
+        "write t = -R c",
         _position,
     ),
 )
 
 
-def suspected_slips(pose: WrittenPose) -> Iterator[SuspectedSlips]:
-    """Yield every single slip undone, then every two."""
+def undone_slips(pose: WrittenPose) -> Iterator[UndoneSlips]:
+    """Yield the pose with each single slip undone, then with each two."""
     for slip in SLIPS:
         for undone in slip.undo(pose):
-            yield SuspectedSlips((slip,), undone)
+            yield UndoneSlips((slip,), undone)
     for first, second in combinations(SLIPS, 2):
         for once in first.undo(pose):
             for undone in second.undo(once):
-                yield SuspectedSlips((first, second), undone)
+                yield UndoneSlips((first, second), undone)

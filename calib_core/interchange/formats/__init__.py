@@ -1,1 +1,1 @@
-"""Calibrations in the formats of other tools, reader beside writer, and the registry of them."""
+"""The calibration formats of other tools, each with writer and reader in one module, and their registry."""

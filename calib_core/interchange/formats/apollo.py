@@ -1,4 +1,4 @@
-"""Apollo's extrinsics, a stamped transform; so is what `ros2 topic echo /tf_static` prints."""
+"""Apollo's extrinsics: a stamped transform, which is also what `ros2 topic echo /tf_static` prints."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,7 +16,7 @@ from calib_core.interchange.formats.statement import (
     stated_frames,
     statement,
 )
-from calib_core.interchange.formats.transform_choice import Ends, the_one_between
+from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.content import Content
@@ -26,7 +26,7 @@ __all__ = ["APOLLO"]
 
 
 def _write(file: CalibrationFile) -> str:
-    """Write Apollo's extrinsics file; any reader of a stamped transform takes it too."""
+    """Write Apollo's extrinsics file; any reader of stamped transforms accepts it."""
     radar_from_camera = file.calibration.camera_from_radar.inverse()
     quaternion = quaternion_xyzw_from_matrix(radar_from_camera.rotation)
     frames = file.frames
@@ -53,13 +53,13 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     """Read a stamped transform: Apollo's file, or what `ros2 topic echo /tf_static` prints.
 
     Raises:
-        InputError: a frame's name or a number is missing.
+        InputError: a frame name or a number is missing.
     """
     one, text = content.mapping, content.text
     listed = one.get("transforms")
     if isinstance(listed, list) and listed:
         stamped = [entry if isinstance(entry, Mapping) else {} for entry in listed]
-        one = stamped[the_one_between([_ends(entry) for entry in stamped], stated_frames(text), source=source)]
+        one = stamped[choose_transform([_ends(entry) for entry in stamped], stated_frames(text), source=source)]
     header, transform = one.get("header"), one.get("transform")
     if not isinstance(header, Mapping) or not isinstance(transform, Mapping):
         raise InputError(f"{source}: a stamped transform needs header.frame_id, child_frame_id and transform; add them")

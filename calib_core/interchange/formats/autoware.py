@@ -31,7 +31,7 @@ from calib_core.interchange.syntax.yaml_text import number_text, quoted
 __all__ = ["AUTOWARE"]
 
 _NOTES = (
-    "poses are in sensor_kit_base_link; the radar is put at the kit's origin (parent_from_radar places it elsewhere)",
+    "poses are in sensor_kit_base_link; the radar is at the kit's origin unless parent_from_radar places it elsewhere",
     POSE_ONLY,
 )
 _KIT = "sensor_kit_base_link"
@@ -44,7 +44,7 @@ def _write(file: CalibrationFile) -> str:
 
 
 def _write_in_kit(file: CalibrationFile, kit_from_radar: RigidTransform) -> str:
-    """Write sensor_kit_calibration.yaml with the radar where it sits in the kit."""
+    """Write sensor_kit_calibration.yaml with the radar at its pose in the kit."""
     frames = file.frames
     kit_from_link = kit_from_radar @ file.calibration.camera_from_radar.inverse() @ LINK_FROM_OPTICAL.inverse()
     meaning = (
@@ -70,10 +70,10 @@ def _recognizes(content: Content) -> bool:
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read a kit that holds one radar and one camera.
+    """Read a kit that contains one radar and one camera.
 
     Raises:
-        InputError: it holds others, or a number is missing.
+        InputError: it contains more or fewer sensors, or a number is missing.
     """
     kit_name, kit = next(((str(key), value) for key, value in content.mapping.items() if _is_kit(value)), ("", {}))
     stated = stated_frames(content.text)
@@ -82,7 +82,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     cameras = [name for name in kit if name not in radars and (stated or looks_like_camera(name))]
     if len(radars) != 1 or len(cameras) != 1:
         raise InputError(
-            f"{source}: {kit_name}: holds {len(radars)} radars and {len(cameras)} cameras by name; keep one of each"
+            f"{source}: {kit_name}: contains {len(radars)} radars and {len(cameras)} cameras by name; keep one of each"
         )
     radar, camera = radars[0], cameras[0]
     roles = posed_between(radar, camera, stated)

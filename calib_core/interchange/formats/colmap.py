@@ -1,4 +1,4 @@
-"""A COLMAP text model of one image, whose world frame is the radar's."""
+"""A COLMAP text model of one image, with the radar frame as world frame."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from calib_core.lens_models.naming import lenses_named, names_in, written_lens
 __all__ = ["COLMAP"]
 
 _NOTES = (
-    "unpack it into a folder: cameras.txt, images.txt and points3D.txt; the world frame is the radar's; "
+    "unpack it into a folder: cameras.txt, images.txt and points3D.txt; the world frame is the radar frame; "
     "COLMAP puts the centre of the top-left pixel at (0.5, 0.5), so the principal point is half a pixel larger",
 )
 _HALF_PIXEL = 0.5
@@ -35,13 +35,13 @@ def _write(file: CalibrationFile) -> bytes:
     name, parameters = _colmap_camera(calibration.camera)
     pose = calibration.camera_from_radar
     numbers = (*quaternion_wxyz_from_matrix(pose.rotation), *pose.translation_m)
-    said = hash_comment(statement(file, "QW QX QY QZ TX TY TZ carry radar points into the camera"))
+    comment = hash_comment(statement(file, "QW QX QY QZ TX TY TZ carry radar points into the camera"))
     size = f"{calibration.camera.width_px} {calibration.camera.height_px}"
     image = "".join("_" if character.isspace() else character for character in file.frames.camera)
     texts = {
-        "cameras.txt": f"{said}# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n1 {name} {size} {numbers_text(parameters, ' ')}\n",
-        "images.txt": f"{said}# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n1 {numbers_text(numbers, ' ')} 1 {image}\n\n",
-        "points3D.txt": said,
+        "cameras.txt": f"{comment}# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n1 {name} {size} {numbers_text(parameters, ' ')}\n",
+        "images.txt": f"{comment}# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n1 {numbers_text(numbers, ' ')} 1 {image}\n\n",
+        "points3D.txt": comment,
     }
     return pack({name: text.encode() for name, text in texts.items()})
 
@@ -66,12 +66,12 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     """
     members = {name.rsplit("/", 1)[-1]: data for name, data in content.members.items()}
     if not {"cameras.txt", "images.txt"} <= set(members):
-        raise InputError(f"{source}: no cameras.txt and images.txt in it; give a zipped COLMAP text model")
+        raise InputError(f"{source}: cameras.txt or images.txt is missing; give a zipped COLMAP text model")
     text = members["images.txt"].decode("utf-8", errors="replace")
     rows = [line for line in text.splitlines() if not line.startswith("#")]  # two per image, the second may be empty
     count = sum(1 for line in rows[::2] if line.strip())
     if count > 1:
-        raise InputError(f"{source}: images.txt: holds {count} images; keep the one that is meant")
+        raise InputError(f"{source}: images.txt: contains {count} images; keep only the intended one")
     image, camera = _first_line(text), _first_line(members["cameras.txt"].decode("utf-8", errors="replace"))
     numbers = floats(image[1:8], source=source, place="images.txt", length=7)
     return ImportedCalibration(

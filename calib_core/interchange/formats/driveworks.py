@@ -19,8 +19,8 @@ __all__ = ["DRIVEWORKS"]
 
 _NOTES = (
     "nominalSensor2Rig_FLU is the sensor's pose in the rig: metres, roll-pitch-yaw in degrees about fixed axes, the camera with "
-    "body axes (x forward, y left, z up); the radar is the rig's origin (parent_from_radar places it elsewhere)",
-    "carries the pose only: copy the two poses into your rig, whose other fields are yours; JSON has no comments, so the check "
+    "body axes (x forward, y left, z up); the radar is at the rig's origin unless parent_from_radar places it elsewhere",
+    "contains the pose only: copy the two poses into your own rig file; JSON has no comments, so the check "
     "point is only in calibration.json",
 )
 _POSE = "nominalSensor2Rig_FLU"
@@ -54,10 +54,10 @@ def _recognizes(content: Content) -> bool:
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read a rig that holds one radar and one camera, by their protocols.
+    """Read a rig that contains one radar and one camera, by protocol.
 
     Raises:
-        InputError: it holds others, a number is missing, or a pose has corrections beside it.
+        InputError: it contains more or fewer sensors, a number is missing, or a pose has separate corrections.
     """
     listed = content.mapping["rig"]["sensors"]
     sensors = [sensor for sensor in listed if isinstance(sensor, Mapping)] if isinstance(listed, list) else []
@@ -70,7 +70,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             f"{source}: rig.sensors: {len(radars)} radars and {len(cameras)} cameras by protocol; keep one of each"
         )
     rig_from_radar, rig_from_link = (_posed(sensor, source=source) for sensor in (radars[0], cameras[0]))
-    pose, notes = rig_from_link, ["the format takes the camera's axes for body axes (x forward, y left, z up)"]
+    pose, notes = rig_from_link, ["the format defines the camera axes as body axes (x forward, y left, z up)"]
     if np.abs(rig_from_radar.as_written().as_matrix() - np.eye(4)).max() > 0:
         radar_from_link = rig_from_radar.as_written().inverse() @ rig_from_link.as_written()
         pose = WrittenPose(
@@ -83,10 +83,10 @@ def _posed(sensor: Mapping[str, Any], *, source: str) -> WrittenPose:
     place = f"rig.sensors {sensor.get('name')!r}"
     for key in _CORRECTIONS:
         if key in sensor and any(_numbers(sensor[key])):
-            raise InputError(f"{source}: {place}: {key} is not zero; put the correction into {_POSE} first")
+            raise InputError(f"{source}: {place}: {key} is not zero; apply the correction to {_POSE} first")
     pose = sensor.get(_POSE)
     if not isinstance(pose, Mapping):
-        raise InputError(f"{source}: {place}: no {_POSE}; give its pose in the rig")
+        raise InputError(f"{source}: {place}: no {_POSE}; add the sensor's pose in the rig")
     angles_deg = floats(pose.get("roll-pitch-yaw"), source=source, place=f"{place}.roll-pitch-yaw", length=3)
     position_m = floats(pose.get("t"), source=source, place=f"{place}.t", length=3)
     return WrittenPose("rpy", np.deg2rad(angles_deg), np.array(position_m), "radar_from_camera", "link")

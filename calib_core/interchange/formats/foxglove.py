@@ -21,15 +21,15 @@ __all__ = ["FOXGLOVE"]
 
 _NOTES = (
     "FrameTransform is the pose of the child (camera, optical) in the parent (radar), rotation named x y z w; "
-    "a message holds no comment, so the check point is only in calibration.json",
+    "messages have no comments, so the check point is only in calibration.json",
 )
 
 
 def _write(file: CalibrationFile) -> str:
-    """Write one object with both messages, to publish as they are.
+    """Write one object with both messages, ready to publish.
 
     Raises:
-        InputError: CameraCalibration has no place for skew, which this camera has, or no name for its lens.
+        InputError: CameraCalibration cannot store this camera's skew, or has no name for its lens.
     """
     refuse_skew(file.calibration.camera, "Foxglove's CameraCalibration has")
     radar_from_camera = file.calibration.camera_from_radar.inverse()
@@ -65,10 +65,10 @@ def _recognizes(content: Content) -> bool:
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read a FrameTransform, alone or beside a CameraCalibration.
+    """Read a FrameTransform, alone or with a CameraCalibration.
 
     Raises:
-        InputError: a frame's name or a number is missing.
+        InputError: a frame name or a number is missing.
     """
     messages = content.mapping
     message = messages.get("FrameTransform", messages)

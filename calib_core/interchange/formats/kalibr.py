@@ -1,4 +1,4 @@
-"""Kalibr's camera chain, with our key T_cam_radar: Kalibr itself has none for radars."""
+"""Kalibr's camera chain with our own key T_cam_radar; Kalibr has none for radars."""
 
 from collections.abc import Mapping
 
@@ -17,11 +17,11 @@ from calib_core.lens_models.naming import written_lens
 
 __all__ = ["KALIBR"]
 
-_NOTES = ("T_cam_radar is our key: Kalibr itself has none for radars",)
+_NOTES = ("T_cam_radar is our own key; Kalibr has none for radars",)
 
 
 def _write(file: CalibrationFile) -> str:
-    """Write a camera chain of one camera, with T_cam_radar beside Kalibr's own keys.
+    """Write a camera chain of one camera, with T_cam_radar in addition to Kalibr's own keys.
 
     Raises:
         InputError: Kalibr has no model for this lens.
@@ -51,16 +51,16 @@ def _recognizes(content: Content) -> bool:
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read the camera of a chain that holds T_cam_radar.
+    """Read the camera with T_cam_radar in a chain.
 
     Raises:
-        InputError: a number is missing, or several cameras hold one.
+        InputError: a number is missing, or several cameras have T_cam_radar.
     """
     chain = content.mapping
     key, *others = [key for key, value in chain.items() if isinstance(value, Mapping) and "T_cam_radar" in value]
     if others:
         raise InputError(
-            f"{source}: T_cam_radar stands in {key}, {', '.join(map(str, others))}; keep the camera that is meant"
+            f"{source}: T_cam_radar appears in {key}, {', '.join(map(str, others))}; keep only the intended camera"
         )
     matrix = floats(chain[key]["T_cam_radar"], source=source, place=f"{key}.T_cam_radar", length=16)
     rows = np.reshape(matrix, (4, 4))

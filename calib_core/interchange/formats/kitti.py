@@ -1,4 +1,4 @@
-"""KITTI's object calibration, for rectified images; View-of-Delft keeps its keys for its radar."""
+"""KITTI's object calibration, for rectified images; View-of-Delft uses the same keys for its radar."""
 
 import numpy as np
 
@@ -13,14 +13,14 @@ from calib_core.interchange.syntax.yaml_text import numbers_text
 __all__ = ["KITTI"]
 
 _NOTES = (
-    "Tr_velo_to_cam carries radar points into the camera: p_camera = R p_radar + t (View-of-Delft keeps this key too)",
-    "a comment would break its readers, so the check point is only in calibration.json",
+    "Tr_velo_to_cam maps radar points to the camera frame: p_camera = R p_radar + t (as in View-of-Delft)",
+    "a comment would break KITTI readers, so the check point is only in calibration.json",
 )
 _POSE_KEYS = ("Tr_velo_to_cam", "Tr_radar_to_cam", "Tr_velo_cam")
 
 
 def _write(file: CalibrationFile) -> str:
-    """Write the seven lines of KITTI's object calibration, in the order some readers count on."""
+    """Write the seven lines of KITTI's object calibration, in the order that some readers rely on."""
     calibration = file.calibration
     projection = numbers_text(np.hstack([calibration.camera.matrix_px, np.zeros((3, 1))]).ravel(), " ")
     identity = numbers_text(np.eye(3, 4).ravel(), " ")
@@ -40,7 +40,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     """Read a KITTI or View-of-Delft calibration: P2, R0_rect and Tr_velo_to_cam.
 
     Raises:
-        InputError: a line is missing or has another number of numbers.
+        InputError: a line is missing or has too few or too many numbers.
     """
     lines = dict(line.split(":", 1) for line in content.text.splitlines() if ":" in line and not line.startswith("#"))
     key = next((key for key in _POSE_KEYS if key in lines), None)
@@ -53,11 +53,11 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         rotation = np.reshape(floats(lines["R0_rect"].split(), source=source, place="R0_rect", length=9), (3, 3))
         if np.abs(rotation - np.eye(3)).max() > 0:
             pose = rotation @ pose
-            notes.append("R0_rect was applied: the camera is the rectified one")
+            notes.append("R0_rect was applied; the camera is the rectified one")
     if "P2" in lines:
         offset = np.reshape(floats(lines["P2"].split(), source=source, place="P2", length=12), (3, 4))[:, 3]
         if offset.any():
-            notes.append("P2 holds an offset between cameras, which was left out: the camera is the reference one")
+            notes.append("P2 contains an offset between cameras, which was ignored; the camera is the reference one")
     return ImportedCalibration(
         "kitti", WrittenPose("matrix", pose[:, :3], pose[:, 3], "camera_from_radar"), notes=tuple(notes)
     ).checked(source)

@@ -20,13 +20,14 @@ __all__ = ["NUSCENES"]
 
 _NOTES = (
     "translation and rotation (w x y z) are the sensor's pose in the ego frame, camera optical; "
-    "the radar's frame is taken for the ego frame (parent_from_radar places it elsewhere)",
-    "tokens are made from the frames' names: put yours in; JSON has no comments, so the check point is only in calibration.json",
+    "the ego frame is the radar frame unless parent_from_radar places the radar elsewhere",
+    "tokens are derived from the frame names; replace them with yours; JSON has no comments, so the check point is only in "
+    "calibration.json",
 )
 
 
 def _write(file: CalibrationFile) -> str:
-    """Write calibrated_sensor.json with the radar's frame for the ego frame."""
+    """Write calibrated_sensor.json with the radar frame as the ego frame."""
     return _write_in_ego(file, RigidTransform.identity())
 
 
@@ -59,7 +60,7 @@ def _recognizes(content: Content) -> bool:
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read the camera's record, and the radar's where there is one; without it the ego frame is taken for the radar's.
+    """Read the camera's record and the radar's, if there is one; otherwise assume that the ego frame is the radar frame.
 
     Raises:
         InputError: not exactly one record with camera_intrinsic, or more than one without.
@@ -75,7 +76,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     camera_pose = _posed(cameras[0], source=source)
     notes = ["the format names no frames and assumes undistorted images"]
     if not radars:
-        notes.append("no record of a radar; took the ego frame for the radar's")
+        notes.append("no radar record; assumed that the ego frame is the radar frame")
         return ImportedCalibration("nuscenes", camera_pose, notes=tuple(notes)).checked(source)
     ego_from_radar = _posed(radars[0], source=source).as_written()
     if np.abs(ego_from_radar.as_matrix() - np.eye(4)).max() > 0:

@@ -1,4 +1,4 @@
-"""OpenCV's FileStorage YAML with camera, R and T; its keys say what comments would."""
+"""OpenCV's FileStorage YAML with camera, R and T; frames and check point are in keys as well as in comments."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -24,7 +24,7 @@ def _write(file: CalibrationFile) -> str:
     """Write a file that cv::FileStorage of OpenCV 3, 4 and 5 reads.
 
     Raises:
-        InputError: the camera has skew, which OpenCV's projectPoints leaves out without a word, or a lens OpenCV does not name.
+        InputError: the camera has skew, which OpenCV's projectPoints silently ignores, or a lens OpenCV has no name for.
     """
     calibration = file.calibration
     camera, pose = calibration.camera, calibration.camera_from_radar
@@ -63,7 +63,7 @@ def _recognizes(content: Content) -> bool:
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read R and T, and the camera where there is one.
+    """Read R and T, and the camera if there is one.
 
     Raises:
         InputError: a number is missing.
@@ -76,7 +76,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     frames = stated_frames(content.text)
     if values.get("radar_frame") and values.get("camera_frame"):
         frames = FrameNames(str(values["radar_frame"]), str(values["camera_frame"]))
-    notes = () if frames else ("the file does not name its frames; took R and T as p_camera = R p_radar + T",)
+    notes = () if frames else ("the file does not name its frames; assumed p_camera = R p_radar + T",)
     return ImportedCalibration(
         "opencv",
         WrittenPose("matrix", np.reshape(rotation, (3, 3)), np.array(translation_m), "camera_from_radar"),

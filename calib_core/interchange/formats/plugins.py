@@ -1,4 +1,4 @@
-"""Formats of other installed packages (entry points cocalib.formats): checked when loaded, guarded when called."""
+"""Formats of other installed packages (entry points cocalib.formats), checked when loaded and guarded when called."""
 
 import re
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from calib_core.errors import CalibrationError, InputError
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.syntax.content import Content
-from calib_core.plugins import Plugin, load_plugins, warn_left_out
+from calib_core.plugins import Plugin, load_plugins, warn_skipped
 
 __all__ = ["GROUP", "plugin_formats"]
 
@@ -20,19 +20,19 @@ _NAME = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 
 @cache
 def plugin_formats(reserved: frozenset[str]) -> tuple[Format, ...]:
-    """Return the formats that installed packages add; loaded once, when somebody first asks.
+    """Return the formats that installed packages add, loaded once, on first use.
 
     Args:
-        reserved: names that are taken.
+        reserved: names that are already taken.
     """
     taken = set(reserved)
     formats = []
     for plugin in load_plugins(GROUP, Format):
         name = plugin.value.name
         if not _NAME.fullmatch(name):
-            warn_left_out(plugin.distribution, f"the name {name!r} of its format is not of a-z, 0-9 and single hyphens")
+            warn_skipped(plugin.distribution, f"the format name {name!r} may contain only a-z, 0-9 and single hyphens")
         elif name in taken:
-            warn_left_out(plugin.distribution, f"there is a format {name!r} already; its own needs another name")
+            warn_skipped(plugin.distribution, f"the format name {name!r} is already taken")
         else:
             taken.add(name)
             formats.append(_guarded(plugin))
@@ -40,7 +40,7 @@ def plugin_formats(reserved: frozenset[str]) -> tuple[Format, ...]:
 
 
 def _guarded(plugin: Plugin[Format]) -> Format:
-    """Return a format whose functions fail in words that name the package."""
+    """Return a format whose functions fail with an error that names the package."""
     added = plugin.value
     owner = f"the format {added.name} of the package {plugin.distribution}"
 
@@ -59,7 +59,7 @@ def _guarded(plugin: Plugin[Format]) -> Format:
 
 @dataclass(frozen=True, slots=True)
 class _Guarded:
-    """A function of a package: what it raises and what it returns is made an error in words."""
+    """A function of a package; what it raises, or returns with the wrong type, becomes an InputError."""
 
     owner: str
     call: Callable[..., Any]
@@ -71,15 +71,17 @@ class _Guarded:
         except CalibrationError:
             raise
         except Exception as error:  # a package's code may raise anything
-            raise InputError(f"{self.owner} failed ({type(error).__name__}: {error}); tell its authors") from error
+            raise InputError(
+                f"{self.owner} failed ({type(error).__name__}: {error}); report it to its authors"
+            ) from error
         if not isinstance(result, self.returns):
-            raise InputError(f"{self.owner} failed (it returned {type(result).__name__}); tell its authors")
+            raise InputError(f"{self.owner} failed (it returned {type(result).__name__}); report it to its authors")
         return result
 
 
 @dataclass(frozen=True, slots=True)
 class _GuardedRecognizer:
-    """A package's word on whether a file is its own; where it fails, the file is not."""
+    """A package's recognizer; if it fails, the file counts as not recognized."""
 
     distribution: str
     call: Callable[[Content], bool]
@@ -88,5 +90,5 @@ class _GuardedRecognizer:
         try:
             return bool(self.call(content))
         except Exception as error:  # noqa: BLE001  the same
-            warn_left_out(self.distribution, f"it cannot tell its files ({type(error).__name__}: {error})")
+            warn_skipped(self.distribution, f"its recognizer failed ({type(error).__name__}: {error})")
             return False

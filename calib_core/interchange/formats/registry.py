@@ -1,4 +1,4 @@
-"""Every format in one table; one line here, and a file beside the others, add one."""
+"""Every format in one table. To add one: write its module, and add a line here."""
 
 from collections.abc import Iterator
 from difflib import get_close_matches
@@ -46,36 +46,36 @@ FORMATS: tuple[Format, ...] = (
     NUMPY,
     MATRIX,
 )
-"""Our formats that are written, in the order in which people see them."""
+"""Our formats that can be written, in display order."""
 
-# Content that fits several formats is of the first one that recognizes it. Most fit one, and are asked in the order above;
-# where two could fit, the narrower one is asked first.
-_ASKED_FIRST = (
-    *(CALIBRATION_1, TRUTH, DRIVEWORKS, FOXGLOVE, NUSCENES),  # only in JSON, in which the next four may stand too
+# Content is read as the first format that recognizes it. Most content fits only one, and the formats are tried in the
+# order above; where two could fit, the more specific one is tried first.
+_TRIED_FIRST = (
+    *(CALIBRATION_1, TRUTH, DRIVEWORKS, FOXGLOVE, NUSCENES),  # JSON only; the next four may be JSON, too
     *(OPENCV, APOLLO, KALIBR, AUTOWARE),
-    TF2_LAUNCH_PY,  # names the publisher, as TF2 does
+    TF2_LAUNCH_PY,  # mentions the publisher, as TF2 does
 )
-_ASKED_LAST = (MATLAB, NUMPY)  # take any mat file and any archive, to say what is wrong with it
+_TRIED_LAST = (MATLAB, NUMPY)  # accept any mat file and any archive, to report what is wrong with it
 _RESERVED = frozenset({"list", TRUTH.name, *(known.name for known in FORMATS)})
 
 
 def written_formats() -> tuple[Format, ...]:
-    """Return every format that can be written: ours, then those that installed packages add."""
+    """Return every format that can be written: ours, then those of installed packages."""
     return tuple(_written())
 
 
 def readers() -> Iterator[Reads]:
-    """Yield how each format is read, in the order in which they are asked; packages are looked for after most of ours."""
-    ours = [known for known in FORMATS if known not in (*_ASKED_FIRST, *_ASKED_LAST)]
-    yield from _reads(*_ASKED_FIRST, *ours)
-    yield from _reads(*plugin_formats(_RESERVED), *_ASKED_LAST)
+    """Yield the reader of each format in the order in which they are tried; packages come after most of ours."""
+    ours = [known for known in FORMATS if known not in (*_TRIED_FIRST, *_TRIED_LAST)]
+    yield from _reads(*_TRIED_FIRST, *ours)
+    yield from _reads(*plugin_formats(_RESERVED), *_TRIED_LAST)
 
 
 def format_named(name: str) -> Format:
     """Return a format that can be written by its name.
 
     Raises:
-        InputError: there is none of that name.
+        InputError: there is no format of that name.
     """
     for known in _written():
         if known.name == name:
@@ -83,7 +83,9 @@ def format_named(name: str) -> Format:
     names = [known.name for known in written_formats()]
     near = get_close_matches(name, names, n=1)
     raise InputError(
-        f"no format {name!r}; did you mean {near[0]}?" if near else f"no format {name!r}; there are {', '.join(names)}"
+        f"unknown format {name!r}; did you mean {near[0]}?"
+        if near
+        else f"unknown format {name!r}; known: {', '.join(names)}"
     )
 
 

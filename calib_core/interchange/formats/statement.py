@@ -1,4 +1,4 @@
-"""What every file that may hold comments says in words: both frames, the equation, the order, the check point."""
+"""The comment in every file that allows comments: both frames, the equation, the order, the check point."""
 
 import json
 import re
@@ -11,8 +11,8 @@ from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 
 __all__ = ["POSE_ONLY", "hash_comment", "stated_check_point", "stated_frames", "statement", "xml_comment"]
 
-POSE_ONLY = "carries the pose only: keep your camera_info, or export opencv too, which carries the camera"
-"""A note of every format that holds nothing of the camera."""
+POSE_ONLY = "contains the pose only: keep your camera_info, or also export opencv, which contains the camera"
+"""A note for every format that stores nothing of the camera."""
 
 _STRING = r'"(?:[^"\\]|\\.)*"'
 _FRAMES = re.compile(rf"radar frame ({_STRING}) \(.*?\), camera frame ({_STRING}) \(")
@@ -22,11 +22,11 @@ _CHECK_POINT = re.compile(
 
 
 def statement(file: CalibrationFile, meaning: str) -> tuple[str, ...]:
-    """Return the lines a file opens with.
+    """Return the lines of the comment at the top of a file.
 
     Args:
         file: what is exported.
-        meaning: what the numbers of this format are, with the quaternion's or the angles' order.
+        meaning: what the numbers of this format mean, with the order of the quaternion or the angles.
     """
     frames = file.frames
     lines = [
@@ -41,7 +41,7 @@ def statement(file: CalibrationFile, meaning: str) -> tuple[str, ...]:
             f"check point: p_radar [{numbers_text(check.radar_m)}] m -> p_camera [{numbers_text(point_camera_m[0])}] m"
             f" -> pixel [{numbers_text(check.pixel_px)}] px"
         )
-    # A file may hold any text for the version; the frames' names are checked and stay as they are, spaces and all.
+    # The version in a file may be any text; the frame names are checked and kept unchanged, including spaces.
     version = " ".join((file.provenance.version or "").split())
     lines.append(f"cocalib{f' {version}' if version else ''}: read it back with: cocalib check THIS_FILE")
     return tuple(lines)
@@ -53,13 +53,13 @@ def hash_comment(lines: tuple[str, ...]) -> str:
 
 
 def xml_comment(lines: tuple[str, ...]) -> str:
-    """Return lines as one XML comment, in which no two hyphens may stand together; in the names, JSON reads the second again."""
+    """Return lines as one XML comment, which must not contain two adjacent hyphens; JSON decodes the second one in the names."""
     body = "\n     ".join(lines).replace("--", "-\\u002d")
     return f"<!-- {body} -->\n"
 
 
 def stated_frames(text: str) -> FrameNames | None:
-    """Find the two frames' names in a file's words."""
+    """Find the two frame names in a file's comment."""
     match = _FRAMES.search(text)
     try:
         return FrameNames(json.loads(match[1]), json.loads(match[2])) if match else None
@@ -68,7 +68,7 @@ def stated_frames(text: str) -> FrameNames | None:
 
 
 def stated_check_point(text: str) -> StatedCheckPoint | None:
-    """Find the check point in a file's words."""
+    """Find the check point in a file's comment."""
     match = _CHECK_POINT.search(text)
     if match is None:
         return None

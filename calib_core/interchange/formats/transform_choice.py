@@ -1,4 +1,4 @@
-"""Which of several transforms in a file is the one between the radar and the camera: one is, or the file is refused."""
+"""Choose the transform between the radar and the camera among several in a file, or refuse the file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,27 +7,27 @@ from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.imported import looks_like_camera, looks_like_radar
 
-__all__ = ["Ends", "the_one_between"]
+__all__ = ["Ends", "choose_transform"]
 
 
 @dataclass(frozen=True, slots=True)
 class Ends:
-    """The two frames that a transform stands between."""
+    """The two frames of a transform."""
 
     parent: str
     child: str
 
 
-def the_one_between(transforms: Sequence[Ends], stated: FrameNames | None, *, source: str) -> int:
-    """Return the index of the transform between the radar and the camera; of a single one nothing is asked.
+def choose_transform(transforms: Sequence[Ends], stated: FrameNames | None, *, source: str) -> int:
+    """Return the index of the transform between the radar and the camera; a single one is taken as it is.
 
     Args:
         transforms: the frames of each, at least one.
-        stated: what the file says in words about its frames, if it does.
-        source: what to call the file in an error.
+        stated: the frames that the file states in a comment, if it does.
+        source: the name of the file in error messages.
 
     Raises:
-        InputError: none of several stands between a radar and a camera by its names, or more than one does.
+        InputError: of several, none is between a radar and a camera by its frame names, or more than one is.
     """
     if len(transforms) == 1:
         return 0
@@ -36,8 +36,8 @@ def the_one_between(transforms: Sequence[Ends], stated: FrameNames | None, *, so
         return fitting[0]
     named = ", ".join(f"{ends.parent} to {ends.child}" for ends in transforms[:6])
     raise InputError(
-        f"{source}: holds {len(transforms)} transforms ({named}), {len(fitting)} of them between a radar and a camera by name; "
-        "keep the one that is meant"
+        f"{source}: contains {len(transforms)} transforms ({named}), {len(fitting)} of them between a radar and a camera by "
+        "name; keep only the intended one"
     )
 
 

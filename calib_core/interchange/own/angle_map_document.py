@@ -10,7 +10,7 @@ __all__ = ["angle_map_document", "angle_map_of"]
 
 
 def angle_map_document(angle_map: AngleMap | None) -> AngleMapDocument | None:
-    """Return what a file says of an angle map."""
+    """Return the document of an angle map."""
     if angle_map is None:
         return None
     add, sigma = angle_map.correction_rad + 0.0, angle_map.sigma_rad
@@ -27,10 +27,10 @@ def angle_map_document(angle_map: AngleMap | None) -> AngleMapDocument | None:
 
 
 def angle_map_of(document: AngleMapDocument | None, *, source: str) -> AngleMap | None:
-    """Return the angle map a file carries.
+    """Return the angle map in a document.
 
     Raises:
-        InputError: its tables have another shape than its lines say, or its lines do not ascend.
+        InputError: the tables do not fit the grid lines, or the grid lines do not ascend.
     """
     if document is None:
         return None

@@ -1,4 +1,4 @@
-"""calibration-1 as one format among the others: read so that a check can tell which part of a file is wrong."""
+"""calibration-1 as a format of the registry, read so that a check can report which part of a file is wrong."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def _recognizes(content: Content) -> bool:
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read calibration-1 with its contradictions as faults."""
+    """Read calibration-1 and return its contradictions as faults."""
     document = parse_document(content.text, CalibrationDocument, source=source)
     stated = document.camera_from_radar
     bare = TransformDocument(stated.rotation, stated.translation_m)
@@ -35,14 +35,14 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     try:
         transform_of(stated, source=source, place="camera_from_radar")
     except InputError:
-        faults.append("camera_from_radar.quaternion_wxyz is another rotation than camera_from_radar.rotation")
+        faults.append("camera_from_radar.quaternion_wxyz and camera_from_radar.rotation are different rotations")
     if document.radar_from_camera is not None:
         try:
             inverse = transform_of(document.radar_from_camera, source=source, place="radar_from_camera").inverse()
             if np.abs(inverse.as_matrix() - pose.as_matrix()).max() > AGREEMENT:
                 faults.append("radar_from_camera is not the inverse of camera_from_radar")
         except InputError:
-            faults.append("radar_from_camera holds two rotations, or none")
+            faults.append("radar_from_camera has contradictory rotations, or an invalid one")
     file = calibration_file_of(document, pose, source=source)
     kept = kept_results(content.text, source=source)
     return replace(imported(replace(file, unknown=kept)), faults=tuple(faults))

@@ -1,4 +1,4 @@
-"""calibration-1: a solved calibration as a file, and back."""
+"""Write and read calibration-1, the file of a solved calibration."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -46,7 +46,7 @@ COVARIANCE_CONVENTION = (
     "in camera axes: t = t_hat + dt, R = Exp(dtheta) R_hat"
 )
 AGREEMENT = 1e-5
-"""How far two statements of one transform may be apart, in any entry of their matrices."""
+"""The largest difference allowed between two statements of one transform, in any matrix entry."""
 
 
 def calibration_text(
@@ -56,13 +56,13 @@ def calibration_text(
     *,
     clicks: Iterable[ReflectorClick] = (),
 ) -> str:
-    """Write a solved calibration as calibration-1 text: the same input gives the same bytes, and never NaN.
+    """Write a solved calibration as calibration-1 text; the same input gives the same bytes, never NaN.
 
     Args:
         calibration: what the solver returned.
-        frames: the names of the two frames; None takes "radar" and "camera_optical".
+        frames: the names of the two frames; None uses "radar" and "camera_optical".
         provenance: where it comes from.
-        clicks: where the pairs carry no stamp of their frame, it is taken from the click of the same id.
+        clicks: for pairs without a frame stamp, the stamp of the click with the same id is used.
     """
     return write_calibration(calibration_file(calibration, frames, provenance, clicks=clicks))
 
@@ -90,7 +90,7 @@ def calibration_file(
 
 
 def write_calibration(file: CalibrationFile) -> str:
-    """Write the content of a calibration-1 file; reading it back and writing it again gives the same bytes."""
+    """Write the content of a calibration-1 file; reading and writing it again gives the same bytes."""
     calibration = file.calibration
     sigma = np.sqrt(np.where(np.diag(calibration.covariance) >= 0, np.diag(calibration.covariance), np.nan)).tolist()
     check = file.check_point
@@ -133,10 +133,10 @@ _KEY_ORDER = (
 
 
 def read_calibration(content: str | bytes, source: str = "calibration") -> CalibrationFile:
-    """Read calibration-1. Results may carry more keys than we know; the camera and the options may not.
+    """Read calibration-1. Results may contain unknown keys; the camera and the options may not.
 
     Raises:
-        InputError: the file, the place in it and what to do; also when its two transforms or a quaternion disagree.
+        InputError: invalid content, or transforms that disagree; the message names the file, the place and what to do.
     """
     text = decoded(content, source=source)
     document = parse_document(text, documents.CalibrationDocument, source=source)
@@ -146,24 +146,24 @@ def read_calibration(content: str | bytes, source: str = "calibration") -> Calib
         if np.abs(inverse.as_matrix() - camera_from_radar.as_matrix()).max() > AGREEMENT:
             raise InputError(
                 f"{source}: radar_from_camera: is not the inverse of camera_from_radar; "
-                "cocalib check tells which is wrong: correct it or remove radar_from_camera"
+                "cocalib check finds which is wrong; correct it or remove radar_from_camera"
             )
     file = calibration_file_of(document, camera_from_radar, source=source)
     return dataclasses.replace(file, unknown=kept_results(text, source=source))
 
 
 def kept_results(text: str, *, source: str) -> tuple[UnknownResult, ...]:
-    """Return what a calibration-1 file says beyond what this version knows."""
+    """Return the results in a calibration-1 file that this version does not know."""
     return unknown_results(json_object(text, source=source), documents.CalibrationDocument)
 
 
 def calibration_file_of(
     document: documents.CalibrationDocument, camera_from_radar: RigidTransform, *, source: str
 ) -> CalibrationFile:
-    """Return what a parsed calibration-1 file says, under a given pose.
+    """Return the content of a parsed calibration-1 file, with a given pose.
 
     Raises:
-        InputError: the camera or a frame's name cannot be like that.
+        InputError: the camera or a frame name is invalid.
     """
     check = document.check_point
     scale = document.noise_scale
@@ -195,19 +195,19 @@ def calibration_file_of(
 
 
 def transform_of(document: documents.TransformDocument, *, source: str, place: str) -> RigidTransform:
-    """Return the transform an object carries.
+    """Return the transform in a document.
 
     Raises:
-        InputError: the rotation is none (mirrored, or not orthonormal), or the quaternion is another one.
+        InputError: the rotation is invalid (mirrored, or not orthonormal), or the quaternion is a different rotation.
     """
     try:
         transform = RigidTransform(np.array(document.rotation), np.array(document.translation_m))
     except ValueError as error:
-        raise InputError(f"{source}: {place}.rotation: {error}; a rotation is needed") from None
+        raise InputError(f"{source}: {place}.rotation: {error}; give a proper rotation") from None
     if document.quaternion_wxyz is not None and not _same_rotation(document.quaternion_wxyz, transform):
         raise InputError(
-            f"{source}: {place}.quaternion_wxyz: is another rotation than {place}.rotation; "
-            "the order is w, x, y, z: correct one of the two"
+            f"{source}: {place}.quaternion_wxyz: is a different rotation from {place}.rotation; "
+            "the order is w, x, y, z; correct one of the two"
         )
     return transform
 

@@ -1,4 +1,4 @@
-"""A camera to and from the object that our files carry it in."""
+"""Convert a camera to and from its document in our files."""
 
 from typing import Any
 
@@ -10,30 +10,30 @@ __all__ = ["camera_document", "camera_of", "refuse_skew"]
 
 
 def refuse_skew(camera: Camera, whose: str) -> None:
-    """Refuse a camera whose pixel axes are not at right angles, for a format whose readers would leave that out.
+    """Refuse a camera with skew, for a format whose readers would ignore it.
 
     Args:
-        camera: what is to be written.
-        whose: whose model it is, to stand before "no skew", for example "COLMAP's models have".
+        camera: the camera to be written.
+        whose: the start of the message, before "no skew", such as "COLMAP's models have".
 
     Raises:
         InputError: it has skew.
     """
     if camera.matrix_px[0, 1] != 0.0:
-        raise InputError(f"{whose} no skew, this camera has; export with --to json, matlab or numpy instead")
+        raise InputError(f"{whose} no skew, but this camera has; export with --to json, matlab or numpy instead")
 
 
 def camera_document(camera: Camera) -> CameraDocument:
-    """Return the object that carries a camera."""
+    """Return the document of a camera."""
     matrix: Any = tuple(tuple(row) for row in camera.matrix_px.tolist())
     return CameraDocument(camera.model, camera.width_px, camera.height_px, matrix, camera.distortion.tolist())
 
 
 def camera_of(document: CameraDocument, *, source: str, place: str = "camera") -> Camera:
-    """Return the camera an object carries.
+    """Return the camera in a document.
 
     Raises:
-        InputError: a camera cannot be like that.
+        InputError: a parameter is invalid.
     """
     try:
         return Camera(

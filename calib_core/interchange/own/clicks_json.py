@@ -1,4 +1,4 @@
-"""clicks-1: the clicks of a session as a file."""
+"""Write and read clicks-1, the file of a session's clicks."""
 
 from collections.abc import Iterable, Sequence
 
@@ -14,14 +14,14 @@ __all__ = ["read_clicks", "refuse_repeated_ids", "write_clicks"]
 
 
 def read_clicks(text: str, source: str = "clicks") -> tuple[ReflectorClick, ...]:
-    """Read clicks-1 text; the clicks come back in order of time.
+    """Read clicks-1 text; the clicks are sorted by time.
 
     Args:
         text: the file's content.
-        source: what to call the file in an error.
+        source: the name of the file in error messages.
 
     Raises:
-        InputError: the file, the place in it and what to do.
+        InputError: invalid content; the message names the file, the place and what to do.
     """
     document = parse_document(text, ClicksDocument, source=source)
     refuse_repeated_ids([click.id for click in document.clicks], source=source, place="clicks")
@@ -41,7 +41,7 @@ def read_clicks(text: str, source: str = "clicks") -> tuple[ReflectorClick, ...]
 
 
 def write_clicks(clicks: Iterable[ReflectorClick]) -> str:
-    """Write clicks as clicks-1 text in order of time: the same clicks give the same bytes."""
+    """Write clicks as clicks-1 text, sorted by time; the same clicks give the same bytes."""
     documents = [
         ClickDocument(
             click.id,
@@ -56,10 +56,10 @@ def write_clicks(clicks: Iterable[ReflectorClick]) -> str:
 
 
 def refuse_repeated_ids(ids: Sequence[str], *, source: str, place: str) -> None:
-    """Refuse a list in which two entries have one id.
+    """Refuse a list in which two entries have the same id.
 
     Raises:
-        InputError: it names both places.
+        InputError: two entries have the same id; the message names both places.
     """
     first: dict[str, int] = {}
     for index, name in enumerate(ids):

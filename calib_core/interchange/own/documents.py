@@ -1,6 +1,6 @@
-"""What our three files look like on disk, key by key. JSON Schema is generated from these types (docs/schemas).
+"""The keys of our three file formats. JSON Schema is generated from these types (docs/schemas).
 
-Inputs and settings refuse keys they do not know; results may carry more.
+Inputs and settings refuse unknown keys; results may contain more.
 """
 
 from typing import Annotated, Final, Literal
@@ -39,7 +39,7 @@ CALIBRATION_SCHEMA: Final = "cocalib/calibration-1"
 
 
 def names_schema(text: str, schema: str) -> bool:
-    """Tell whether JSON text says that it follows a schema, without checking anything else of it."""
+    """Return whether JSON text names a schema, without checking anything else."""
     try:
         content = msgspec.json.decode(text)
     except msgspec.DecodeError:
@@ -48,7 +48,7 @@ def names_schema(text: str, schema: str) -> bool:
 
 
 Measured = Annotated[float, Meta(ge=-1e9, le=1e9)]
-"""No position, pixel or coefficient comes near the bound; it keeps what is computed from them finite."""
+"""The bound is far beyond any position, pixel or coefficient; it keeps what is computed from them finite."""
 Pixel = tuple[Measured, Measured]
 Position = tuple[Measured, Measured, Measured]
 Vector2 = tuple[float, float]
@@ -81,7 +81,7 @@ class ClickDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
 
 
 class ClicksDocument(Struct, frozen=True, forbid_unknown_fields=True):
-    """Clicks on recorded frames, named by the frames' stamps."""
+    """Clicks on recorded frames, identified by the frames' stamps."""
 
     schema: Literal["cocalib/clicks-1"]
     clicks: list[ClickDocument]
@@ -159,14 +159,14 @@ class SigmaDocument(Struct, frozen=True):
 
 
 class CheckPointDocument(Struct, frozen=True):
-    """A radar point and the pixel it must come out at."""
+    """A radar point and the pixel it must project to."""
 
     radar_m: Position
     pixel_px: Pixel
 
 
 class MetricsDocument(Struct, frozen=True):
-    """Figures over the inlier pairs; null where there is none."""
+    """Figures over the inlier pairs; null if unknown."""
 
     aed_px: float | None = None
     cdsd_px: float | None = None
@@ -181,7 +181,7 @@ class MetricsDocument(Struct, frozen=True):
 class CandidateDocument(Struct, frozen=True):
     """A radar position that may be the reflector.
 
-    sigma_polar holds the standard deviations of range [m], azimuth and elevation [rad]; null where no noise is assumed.
+    sigma_polar holds the standard deviations of range [m], azimuth and elevation [rad]; null if no noise is assumed.
     """
 
     radar_m: Position
@@ -195,7 +195,7 @@ class CandidateDocument(Struct, frozen=True):
 class SolvedPairDocument(Struct, frozen=True):
     """One pair under the solved pose; residual_px is projected_px minus pixel_px, distance_px its length.
 
-    sigma_px, radar_time and candidates are what the pair was solved from: with them it can be solved again.
+    sigma_px, radar_time and candidates are the data the pair was solved from; with them it can be solved again.
     """
 
     id: Name
@@ -226,7 +226,7 @@ class UnpairedDocument(Struct, frozen=True):
 
 
 class WarningDocument(Struct, frozen=True):
-    """Something a person must know before using the result."""
+    """Something to know before using the result."""
 
     code: str
     message: str
@@ -234,7 +234,7 @@ class WarningDocument(Struct, frozen=True):
 
 
 class InputDocument(Struct, frozen=True):
-    """A file that went in."""
+    """An input file."""
 
     name: str
     size_bytes: Count
@@ -250,7 +250,7 @@ class TopicsDocument(Struct, frozen=True):
 
 
 class ClocksDocument(Struct, frozen=True):
-    """Which stamp each topic was timed by: "header" or "receive"."""
+    """Which stamps each topic uses: "header" or "receive"."""
 
     radar: str | None = None
     image: str | None = None
@@ -268,7 +268,7 @@ class ProvenanceDocument(Struct, frozen=True):
 
 
 class NoiseScaleDocument(Struct, frozen=True):
-    """Estimated over assumed standard deviations."""
+    """Ratios of estimated to assumed standard deviations."""
 
     click: float = 1.0
     range: float = 1.0
@@ -284,9 +284,9 @@ class PaperDocument(Struct, frozen=True):
 
 
 class AngleMapDocument(Struct, frozen=True):
-    """The radar's own smooth angle errors: what to add to a measured azimuth and elevation before the pose is applied.
+    """The radar's own smooth angle errors: what to add to a measured azimuth and elevation before applying the pose.
 
-    Rows go with elevation_rad, columns with azimuth_rad; in between linear, beyond the edge as at the edge.
+    Rows correspond to elevation_rad, columns to azimuth_rad; interpolate linearly, and use the edge value beyond the edge.
     """
 
     azimuth_rad: list[float]
@@ -300,7 +300,7 @@ class AngleMapDocument(Struct, frozen=True):
 
 
 class CalibrationDocument(Struct, frozen=True):
-    """A solved extrinsic calibration, and how far to trust it."""
+    """A solved extrinsic calibration with its uncertainty."""
 
     schema: Literal["cocalib/calibration-1"]
     camera_from_radar: TransformDocument

@@ -1,4 +1,4 @@
-"""Numbers of results as JSON carries them: what is not finite is null, and arrays are nested tuples."""
+"""Convert numbers for JSON: non-finite values become null, and arrays become nested tuples."""
 
 from typing import Any
 
@@ -13,12 +13,12 @@ def finite_or_none(value: float) -> float | None:
 
 
 def nan_if_none(value: float | None) -> float:
-    """Return the number a file holds, NaN for null."""
+    """Return the number in a file, NaN for null."""
     return float("nan") if value is None else value
 
 
 def nested(array: np.ndarray) -> Any:
-    """Return an array as nested tuples; None when any of it is unknown."""
+    """Return an array as nested tuples; None if any entry is not finite."""
     if not np.isfinite(array).all():
         return None
     return tuple(map(tuple, array.tolist())) if array.ndim == 2 else tuple(array.tolist())

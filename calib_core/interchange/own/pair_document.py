@@ -1,4 +1,4 @@
-"""A solved pair to and from the object that calibration-1 carries it in, with what it takes to solve it again."""
+"""Convert a solved pair to and from its document in calibration-1, including the data to solve it again."""
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from calib_core.results import PairResult
 __all__ = ["SOLVED_FROM_KEYS", "solved_pair_document", "solved_pair_of"]
 
 SOLVED_FROM_KEYS = ("sigma_px", "radar_time", "candidates")
-"""What a pair was solved from; left out where it is not known, as in files of other tools."""
+"""The data a pair was solved from; omitted if unknown, as in files from other tools."""
 
 
 def solved_pair_document(pair: PairResult) -> documents.SolvedPairDocument:
-    """Return the object that carries a solved pair."""
+    """Return the document of a solved pair."""
     measured = pair.measured
     return documents.SolvedPairDocument(
         id=pair.id,
@@ -38,7 +38,7 @@ def solved_pair_document(pair: PairResult) -> documents.SolvedPairDocument:
 
 
 def solved_pair_of(document: documents.SolvedPairDocument) -> PairResult:
-    """Return the solved pair that an object carries."""
+    """Return the solved pair in a document."""
     return PairResult(
         id=document.id,
         pixel_px=np.array(document.pixel_px),

@@ -1,4 +1,4 @@
-"""pairs-1: ready-made pairs as a file, for scripts that pair on their own."""
+"""Write and read pairs-1, the file of ready-made pairs, for scripts that do their own pairing."""
 
 import dataclasses
 import math
@@ -30,15 +30,15 @@ __all__ = ["PairsFile", "read_pairs", "write_pairs"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairsFile:
-    """What a pairs-1 file says.
+    """The content of a pairs-1 file.
 
     Attributes:
         camera: the camera the pixels were clicked in.
-        pairs: as many as the file has, in its order; each candidate carries the noise of the file or of the options.
-        sigma_range_m: of one radar position [m]; None where the file says nothing.
+        pairs: all pairs of the file, in its order; each candidate has the noise of the file or of the options.
+        sigma_range_m: of one radar position [m]; None if the file does not state it.
         sigma_azimuth_rad: the same for its azimuth [rad].
         sigma_elevation_rad: the same for its elevation [rad].
-        camera_position: the tape-measured camera centre; None where the file has none.
+        camera_position: the tape-measured camera centre; None if the file has none.
     """
 
     camera: Camera
@@ -49,7 +49,7 @@ class PairsFile:
     camera_position: CameraPositionPrior | None = None
 
     def options(self, given: CalibrationOptions) -> CalibrationOptions:
-        """Lay what the file says over the options: the file wins."""
+        """Return the options, overridden by what the file states."""
         noise = given.noise
         if self.sigma_range_m is not None:
             noise = dataclasses.replace(noise, sigma_range_m=self.sigma_range_m)
@@ -68,11 +68,11 @@ def read_pairs(text: str, source: str = "pairs", *, noise: NoiseOptions | None =
 
     Args:
         text: the file's content.
-        source: what to call the file in an error.
-        noise: assumed where the file says nothing; None takes the defaults.
+        source: the name of the file in error messages.
+        noise: used where the file states none; None uses the defaults.
 
     Raises:
-        InputError: the file, the place in it and what to do.
+        InputError: invalid content; the message names the file, the place and what to do.
     """
     document = parse_document(text, PairsDocument, source=source)
     refuse_repeated_ids([pair.id for pair in document.pairs], source=source, place="pairs")
@@ -93,7 +93,7 @@ def read_pairs(text: str, source: str = "pairs", *, noise: NoiseOptions | None =
 
 
 def write_pairs(pairs_file: PairsFile) -> str:
-    """Write pairs-1 text: the same pairs give the same bytes."""
+    """Write pairs-1 text; the same pairs give the same bytes."""
     sigmas = (pairs_file.sigma_range_m, pairs_file.sigma_azimuth_rad, pairs_file.sigma_elevation_rad)
     prior = pairs_file.camera_position
     document = PairsDocument(
@@ -118,12 +118,12 @@ def _sigma_polar(radar: RadarDocument, noise: NoiseOptions) -> Vector3:
 
 
 def _pair(document: PairDocument, sigma_polar: Vector3, *, source: str, place: str) -> Pair:
-    """Return a pair whose positions are equally plausible, because the file does not weigh them."""
+    """Return a pair whose positions are equally likely, because the file does not weight them."""
     positions = np.array([document.radar_m, *document.alternatives_radar_m])
     for index, position in enumerate(positions):
         if not position.any():
             where = f"{place}.alternatives_radar_m[{index - 1}]" if index else f"{place}.radar_m"
-            raise InputError(f"{source}: {where}: lies at the radar itself, which is no return; remove it")
+            raise InputError(f"{source}: {where}: is at the radar itself, so it cannot be a return; remove it")
     covariances = covariance_from_sigma_polar(positions, np.broadcast_to(sigma_polar, positions.shape))
     return Pair(
         id=document.id,

@@ -1,4 +1,4 @@
-"""Where a calibration comes from, in a calibration-1 file."""
+"""Convert the provenance of a calibration to and from its document in calibration-1."""
 
 from calib_core.interchange.calibration_file import Provenance
 from calib_core.interchange.own import documents
@@ -8,7 +8,7 @@ __all__ = ["provenance_document", "provenance_of"]
 
 
 def provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
-    """Return what a file says of it."""
+    """Return the document of a provenance."""
     return documents.ProvenanceDocument(
         inputs=[documents.InputDocument(f.name, f.size_bytes, f.sha256) for f in provenance.inputs],
         topics=documents.TopicsDocument(provenance.radar_topic, provenance.image_topic, provenance.camera_info_topic),
@@ -20,7 +20,7 @@ def provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
 
 
 def provenance_of(document: documents.ProvenanceDocument) -> Provenance:
-    """Return what a file has said of it."""
+    """Return the provenance in a document."""
     return Provenance(
         inputs=tuple(InputFile(f.name, f.size_bytes, f.sha256) for f in document.inputs),
         radar_topic=document.topics.radar,

@@ -26,13 +26,13 @@ _DOCUMENTS: dict[str, Any] = {
 
 
 def schema_texts() -> dict[str, str]:
-    """Return the JSON Schema (2020-12) of each of our files, by the name of the schema's own file."""
+    """Return the JSON Schema (2020-12) of each of our files, keyed by the file name of the schema."""
     texts = {}
     for name, document in _DOCUMENTS.items():
         head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": name}
         schema = {**head, **msgspec.json.schema(document)}
         for part, definition in schema["$defs"].items():
-            if part.endswith(("Options", "Prior")):  # settings: the reader refuses what it does not know
+            if part.endswith(("Options", "Prior")):  # settings: the reader refuses unknown keys
                 definition["additionalProperties"] = False
         texts[f"{name.removeprefix('cocalib/')}.schema.json"] = json_text(_null_last(schema))
     return texts

@@ -1,4 +1,4 @@
-"""What a simulation holds for true (truth-1), read to compare a calibration with; only the simulator writes it."""
+"""The ground truth of a simulation (truth-1), read for comparison with a calibration; only the simulator writes it."""
 
 from collections.abc import Mapping
 
@@ -35,7 +35,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
 
 TRUTH = Format(
     name=TRUTH_FORMAT,
-    title="truth-1 of a simulation",
+    title="ground truth of a simulation (truth-1)",
     numbers="camera_from_radar as matrix, translation and quaternion w x y z",
     file_name="truth.json",
     camera="lens",

@@ -1,4 +1,4 @@
-"""Results that a later version wrote and this one does not know: found beside the types, kept, and put back when written."""
+"""Results written by a later version and unknown to this one: found, kept, and put back when the file is written again."""
 
 import json
 from collections.abc import Iterator
@@ -11,17 +11,17 @@ __all__ = ["unknown_results", "with_unknown"]
 
 
 def unknown_results(content: Any, document: Any) -> tuple[UnknownResult, ...]:
-    """Return every key of parsed JSON that a document type does not have, wherever it stands.
+    """Return every key of parsed JSON that a document type does not have, at any depth.
 
     Args:
         content: parsed JSON that the type has accepted.
-        document: the type to hold it against.
+        document: the type to compare with.
     """
     return tuple(_unknown(content, document, ()))
 
 
 def with_unknown(content: dict[str, Any], kept: tuple[UnknownResult, ...]) -> dict[str, Any]:
-    """Return written results with the unknown ones back in their places; what has lost its place is left out."""
+    """Put the unknown results back in their places; those whose place is gone are dropped."""
     for result in kept:
         owner: Any = content
         for step in result.place[:-1]:

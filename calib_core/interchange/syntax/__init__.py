@@ -1,1 +1,1 @@
-"""The syntaxes under the formats: strict JSON, YAML, XML, zip and mat files. No meaning, no geometry."""
+"""The syntaxes that the formats use: strict JSON, YAML, XML, zip and mat files. No semantics, no geometry."""

@@ -1,4 +1,4 @@
-"""What a file holds, its syntax parsed once: every format looks at this, none at bytes."""
+"""The content of a file, its syntax parsed once; every format reads this instead of bytes."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -15,21 +15,21 @@ from calib_core.interchange.syntax.zip_archives import unpack
 __all__ = ["Content", "Syntax", "decoded", "readings"]
 
 Syntax = Literal["archive", "mat", "bytes", "json", "xml", "lines", "yaml"]
-"""zip archive, MATLAB's mat, other bytes that are no text, JSON, XML, text by its lines, text as YAML."""
+"""zip archive, MATLAB's mat, bytes that are not text, JSON, XML, text by its lines, text as YAML."""
 
 _NO_XML = Element("")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Content:
-    """A file's content, parsed; what the syntax does not have is empty.
+    """A file's parsed content; fields that the syntax does not have are empty.
 
     Attributes:
         syntax: how it was parsed.
-        text: all of it, unless it is binary; lines end with a line feed.
-        data: all of it, where the syntax is "bytes".
-        members: of an archive, by their names.
-        variables: of a mat file, by their names: arrays, str, and dicts of them.
+        text: the whole text, unless the file is binary; lines end with a line feed.
+        data: all bytes, if the syntax is "bytes".
+        members: of an archive, by name.
+        variables: of a mat file, by name: arrays, str, and dicts of them.
         value: of JSON, of YAML, or of OpenCV's FileStorage XML.
         root: of XML.
         lines: of text, without comments (#) and empty lines.
@@ -46,24 +46,24 @@ class Content:
 
     @property
     def mapping(self) -> Mapping[str, Any]:
-        """The value, where it is one of keys; else an empty one."""
+        """The value if it is a mapping, otherwise an empty mapping."""
         return self.value if isinstance(self.value, dict) else {}
 
     @property
     def json_mapping(self) -> Mapping[str, Any]:
-        """The same of JSON only, for formats that exist in no other syntax."""
+        """The same for JSON only, for formats that exist in no other syntax."""
         return self.mapping if self.syntax == "json" else {}
 
 
 def readings(content: str | bytes, *, source: str) -> Iterator[Content]:
-    """Yield what a file holds, parsed. Text without a syntax of its own comes twice: by its lines, and then as YAML.
+    """Yield the parsed content of a file. Text in no other syntax is yielded twice: as lines, then as YAML.
 
     Args:
         content: of the file.
-        source: what to call it in an error.
+        source: the name of the file in error messages.
 
     Raises:
-        InputError: its beginning promises a syntax that the rest does not follow.
+        InputError: it starts like one of the syntaxes but does not follow it.
     """
     if isinstance(content, bytes) and content.startswith(b"PK"):
         yield Content("archive", members=unpack(content, source=source))
@@ -79,7 +79,7 @@ def readings(content: str | bytes, *, source: str) -> Iterator[Content]:
 
 
 def decoded(content: str | bytes, *, source: str) -> str:
-    """Return text of UTF-8, or of UTF-16 as Windows' shell writes what is sent to a file.
+    """Decode UTF-8, or UTF-16 as written by output redirection in the Windows shell.
 
     Raises:
         InputError: it is neither.

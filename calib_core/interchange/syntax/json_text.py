@@ -1,4 +1,4 @@
-"""JSON out: the same value gives the same bytes, short things stay on one line, and what is not finite is null."""
+"""Write JSON: the same value gives the same bytes, short values stay on one line, non-finite numbers become null."""
 
 import json
 import math
@@ -11,9 +11,9 @@ _INDENT = "  "
 
 
 def json_text(content: Any) -> str:
-    """Write dicts, lists, strings and numbers as JSON that people can read and diff; ends with a line feed.
+    """Write dicts, lists, strings and numbers as JSON that is easy to read and diff; ends with a line feed.
 
-    Keys keep their order; floats are written by repr, so that they come back bit for bit.
+    Keys keep their order; floats are written with repr, so they read back bit for bit.
     """
     return _lines(_finite(content), 0) + "\n"
 
@@ -29,7 +29,7 @@ def _finite(value: Any) -> Any:
 
 
 def _lines(value: Any, depth: int) -> str:
-    """Lay a value out: on one line where it fits, otherwise one entry a line. Long rows of numbers stay whole."""
+    """Format a value on one line if it fits, otherwise one entry per line. Long lists of numbers are not broken."""
     compact = json.dumps(value, allow_nan=False)
     whole = len(compact) + depth * len(_INDENT) <= _WIDTH or not isinstance(value, dict | list)
     if whole or (isinstance(value, list) and all(isinstance(item, int | float) for item in value)):

@@ -1,6 +1,6 @@
-"""A small reader of MATLAB's level 5 mat files: numbers, text and structs of them.
+"""A small reader for MATLAB's level 5 mat files: numbers, text and structs of them.
 
-SciPy's reader is compiled and can crash on a damaged file; a file from somebody else is not to be trusted with that.
+SciPy's reader is compiled and can crash on a damaged file, which must not happen with a file of unknown origin.
 The layout is MathWorks' "MAT-File Format", level 5: elements of a tag (type, length) and data, padded to 8 bytes.
 """
 
@@ -48,10 +48,10 @@ class _Element:
 
 
 def load_mat(data: bytes, *, source: str) -> dict[str, Any]:
-    """Return the variables of a mat file: arrays, text as str, and structs as dicts of them. Others are left out.
+    """Return the variables of a mat file: arrays, text as str, and structs as dicts of them. Other variables are skipped.
 
     Raises:
-        InputError: it is broken, or of another level than 5 (MATLAB: save with -v7 or -v6).
+        InputError: it is damaged, or not of level 5 (MATLAB: save with -v7 or -v6).
     """
     endian = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if endian is None:
@@ -68,7 +68,7 @@ def load_mat(data: bytes, *, source: str) -> dict[str, Any]:
 
 
 def _elements(data: bytes, endian: str) -> list[_Element]:
-    """Split bytes into elements; a small one keeps its data in the tag."""
+    """Split bytes into elements; a small one has its data in the tag."""
     elements, at = [], 0
     while at + 8 <= len(data):
         kind, length = struct.unpack_from(f"{endian}II", data, at)
@@ -91,7 +91,7 @@ def _inflated(element: _Element, endian: str) -> _Element:
     inflater = zlib.decompressobj()
     data = inflater.decompress(element.data, _MAX_BYTES)
     if inflater.unconsumed_tail:
-        raise _LayoutError("it unpacks to more than a calibration holds")
+        raise _LayoutError("it unpacks to more data than a calibration contains")
     inner = _elements(data, endian)
     if len(inner) != 1 or inner[0].kind == _COMPRESSED:
         raise _LayoutError("a compressed element does not hold one variable")
@@ -99,7 +99,7 @@ def _inflated(element: _Element, endian: str) -> _Element:
 
 
 def _variable(element: _Element, endian: str, depth: int) -> tuple[str, Any]:
-    """Return a matrix element's name and value; None where it is of a class we have no use for."""
+    """Return a matrix element's name and value; None if its class is not supported."""
     if element.kind != _MATRIX or depth > _MAX_DEPTH:
         raise _LayoutError("a variable was expected")
     parts = _elements(element.data, endian)

@@ -11,7 +11,7 @@ _MAX_CHARACTERS = 4 * 1024 * 1024
 
 
 def parse_xml(text: str, *, source: str) -> ElementTree.Element:
-    """Parse XML without a document type, so that nothing in it expands.
+    """Parse XML that has no document type, so no entity in it expands.
 
     Raises:
         InputError: it is not XML, or declares entities.
@@ -30,7 +30,7 @@ def load_opencv_xml(text: str, *, source: str) -> dict[str, Any]:
     """Return a FileStorage XML's values: matrices become mappings with rows, cols and data, as in its YAML.
 
     Raises:
-        InputError: it is other XML.
+        InputError: it is some other XML.
     """
     root = parse_xml(text, source=source)
     if not is_file_storage(root):
@@ -39,12 +39,12 @@ def load_opencv_xml(text: str, *, source: str) -> dict[str, Any]:
 
 
 def is_file_storage(root: ElementTree.Element) -> bool:
-    """Tell whether XML is OpenCV's FileStorage."""
+    """Return whether XML is OpenCV's FileStorage."""
     return root.tag == "opencv_storage"
 
 
 def opencv_values(root: ElementTree.Element) -> dict[str, Any]:
-    """Return the values of FileStorage XML that is parsed already."""
+    """Return the values of parsed FileStorage XML."""
     return {child.tag: _value(child) for child in root}
 
 

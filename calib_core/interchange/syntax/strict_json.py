@@ -1,4 +1,4 @@
-"""JSON in, checked: every fault is one line that names the file, the place in it and what to do."""
+"""Read and check JSON; every error is one line that names the file, the place in it and what to do."""
 
 import dataclasses
 import json
@@ -18,16 +18,16 @@ __all__ = ["checked", "fields_of", "item_type", "json_object", "json_value", "pa
 Document = TypeVar("Document")
 
 MAX_CHARACTERS = 256 * 1024 * 1024
-"""No file of ours comes near it; it keeps a wrong file (a recording) from filling the memory."""
+"""Far more than any of our files; keeps a wrong file (a recording) from filling the memory."""
 
 
 def parse_document(text: str, document: type[Document], *, source: str) -> Document:
-    """Parse JSON text into a document type, refusing what it does not know.
+    """Parse JSON text into a document type, refusing unknown keys.
 
     Args:
         text: the file's content.
         document: a msgspec Struct whose key "schema" names the format.
-        source: what to call the file in an error.
+        source: the name of the file in error messages.
 
     Raises:
         InputError: not JSON, another format, an unknown or repeated key, a value of the wrong type, NaN or Infinity.
@@ -46,8 +46,8 @@ def checked(content: Mapping[str, Any], document: type[Document], *, source: str
     Args:
         content: parsed values.
         document: a msgspec Struct.
-        source: what to call the file in an error.
-        place: where in the file the values stand.
+        source: the name of the file in error messages.
+        place: where the values are in the file.
 
     Raises:
         InputError: an unknown key, a value of the wrong type, NaN or Infinity.
@@ -57,7 +57,7 @@ def checked(content: Mapping[str, Any], document: type[Document], *, source: str
     try:
         return msgspec.convert(content, document)
     except (msgspec.ValidationError, OverflowError) as error:
-        raise InputError(f"{source}: {_in_our_words(str(error), place)}") from None
+        raise InputError(f"{source}: {_from_msgspec(str(error), place)}") from None
 
 
 def json_object(text: str, *, source: str) -> dict[str, Any]:
@@ -68,7 +68,9 @@ def json_object(text: str, *, source: str) -> dict[str, Any]:
     """
     content = json_value(text, source=source)
     if not isinstance(content, dict):
-        raise InputError(f"{source}: expected an object in braces, found {_shown(content)}; give a file of cocalib's")
+        raise InputError(
+            f"{source}: expected an object in braces, found {_shown(content)}; give a file in a format of cocalib"
+        )
     return content
 
 
@@ -79,7 +81,9 @@ def json_value(text: str, *, source: str) -> Any:
         InputError: it is not JSON.
     """
     if len(text) > MAX_CHARACTERS:
-        raise InputError(f"{source}: {len(text):,} characters is too large for this kind of file; is it the right one?")
+        raise InputError(
+            f"{source}: {len(text):,} characters is too large for this kind of file; is it the right file?"
+        )
     try:
         return json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_without_repeats)
     except json.JSONDecodeError as error:
@@ -95,7 +99,7 @@ def _without_repeats(items: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(content) != len(items):
         keys = [key for key, _ in items]
         twice = next(key for index, key in enumerate(keys) if key in keys[:index])
-        raise ValueError(f"the key {twice!r} stands twice in one object; keep one")
+        raise ValueError(f"the key {twice!r} appears twice in one object; keep one")
     return content
 
 
@@ -113,24 +117,24 @@ def _shown(value: Any) -> str:
 
 
 def _faults(value: Any, annotation: Any, place: str) -> Iterator[tuple[str, str]]:
-    """Walk a value beside its type: yield the place and the fault of each unknown key and each number that is none."""
+    """Walk a value along with its type: yield the place and the fault of each unknown key and non-finite number."""
     if isinstance(value, float) and not math.isfinite(value):
-        yield place, f"{value} is not a number to calculate with; give its value or remove the entry"
+        yield place, f"{value} is not a valid number; give its value or remove the entry"
     elif isinstance(value, str) and get_origin(annotation) is Literal and value not in get_args(annotation):
-        yield place, _unfamiliar(f"unknown value {value!r}", value, list(get_args(annotation)), "it can be")
+        yield place, _unknown_word(f"unknown value {value!r}", value, list(get_args(annotation)), "known values:")
     elif isinstance(value, dict):
         fields = fields_of(annotation)
         for key, item in value.items():
             inner = f"{place}.{key}" if place else key
             if fields is not None and key not in fields and _refuses_unknown(annotation):
-                yield inner, _unfamiliar("unknown key", key, list(fields), "the keys here are")
+                yield inner, _unknown_word("unknown key", key, list(fields), "known keys:")
             yield from _faults(item, (fields or {}).get(key), inner)
     elif isinstance(value, list):
         for index, item in enumerate(value):
             yield from _faults(item, item_type(annotation), f"{place}[{index}]")
 
 
-def _unfamiliar(what: str, word: str, known: list[str], these: str) -> str:
+def _unknown_word(what: str, word: str, known: list[str], these: str) -> str:
     near = get_close_matches(word, known, n=1, cutoff=0.6)
     return f"{what}; did you mean {near[0]}?" if near else f"{what}; {these} {', '.join(known)}"
 
@@ -142,7 +146,7 @@ def _variants(annotation: Any) -> list[Any]:
 
 
 def fields_of(annotation: Any) -> dict[str, Any] | None:
-    """Return the keys of a type that stands for a JSON object, each with its own type; None for other types."""
+    """Return the keys of a type that represents a JSON object, each with its own type; None for other types."""
     for part in _variants(annotation):
         if isinstance(part, type) and issubclass(part, msgspec.Struct):
             hints = get_type_hints(part)
@@ -154,7 +158,7 @@ def fields_of(annotation: Any) -> dict[str, Any] | None:
 
 
 def _refuses_unknown(annotation: Any) -> bool:
-    """Tell a type of input or setting, where an unknown key is a slip, from one of results, which may grow."""
+    """Return whether a type refuses unknown keys: inputs and settings do, results may grow."""
     return all(
         part.__struct_config__.forbid_unknown_fields if issubclass(part, msgspec.Struct) else True
         for part in _variants(annotation)
@@ -163,7 +167,7 @@ def _refuses_unknown(annotation: Any) -> bool:
 
 
 def item_type(annotation: Any) -> Any:
-    """Return the type of the items of a type that stands for a JSON list; None for other types."""
+    """Return the item type of a type that represents a JSON list; None for other types."""
     for part in _variants(annotation):
         items = [item for item in get_args(part) if item is not Ellipsis]
         if get_origin(part) in (tuple, list) and items:
@@ -171,7 +175,7 @@ def item_type(annotation: Any) -> Any:
     return None
 
 
-def _in_our_words(message: str, outer: str) -> str:
+def _from_msgspec(message: str, outer: str) -> str:
     """Turn msgspec's "text - at `$.path`" into "path: text"."""
     match = re.fullmatch(r"(.*?)(?: - at `\$\.?(.*?)`)?", message, flags=re.DOTALL)
     text, inner = (match.group(1), match.group(2)) if match else (message, None)

@@ -1,4 +1,4 @@
-"""YAML in by the safe loader only, OpenCV's dialect included; and numbers and names out that every YAML reader takes."""
+"""Read YAML with the safe loader only, including OpenCV's dialect; write numbers and names for every YAML reader."""
 
 import json
 import re
@@ -13,7 +13,7 @@ _OPENCV_TAG = "tag:yaml.org,2002:opencv-matrix"
 
 
 def load_yaml(text: str, *, source: str) -> Any:
-    """Parse YAML of plain values; OpenCV's header and its matrices (as mappings with rows, cols, data) are understood.
+    """Parse YAML of plain values; OpenCV's header and matrices (as mappings with rows, cols, data) are supported.
 
     Raises:
         InputError: it is not YAML, or too large to be a calibration.
@@ -25,12 +25,12 @@ def load_yaml(text: str, *, source: str) -> Any:
     from ruamel.yaml.error import YAMLError
 
     class Constructor(SafeConstructor):
-        """The safe constructor, and OpenCV's matrix tag."""
+        """The safe constructor with OpenCV's matrix tag."""
 
     Constructor.add_constructor(_OPENCV_TAG, lambda self, node: self.construct_mapping(node, deep=True))
     loader = YAML(typ="safe", pure=True)
     loader.Constructor = Constructor
-    # OpenCV before 5 writes "%YAML:1.0", which is no YAML directive, and may leave out the "---" after it.
+    # OpenCV before 5 writes "%YAML:1.0", which is not a YAML directive, and may omit the "---" after it.
     plain = re.sub(r"\A\ufeff?%YAML[: ][\d.]+[^\n]*\n(---[^\n]*\n)?", "", text)
     try:
         return loader.load(plain)
@@ -47,7 +47,7 @@ def _problem(error: Exception) -> str:
 
 
 def number_text(value: float) -> str:
-    """Write a float so that it comes back bit for bit, also through readers of YAML 1.1, which want a point in 1.0e-05."""
+    """Write a float so that it reads back bit for bit, also in YAML 1.1 readers, which need a point in 1.0e-05."""
     text = repr(float(value) + 0.0)
     if "e" in text and "." not in text:
         text = text.replace("e", ".0e")
@@ -55,7 +55,7 @@ def number_text(value: float) -> str:
 
 
 def numbers_text(values: Any, separator: str = ", ") -> str:
-    """Write numbers one after another."""
+    """Write numbers with a separator between them."""
     return separator.join(number_text(value) for value in values)
 
 

@@ -1,4 +1,4 @@
-"""Zip archives whose bytes depend on their content only, and a reader that lets none grow."""
+"""Write zip archives whose bytes depend only on their content, and read them with a size limit."""
 
 import io
 import struct
@@ -16,7 +16,7 @@ _DAMAGED = (EOFError, LookupError, NotImplementedError, OSError, RuntimeError, V
 
 
 def pack(members: Mapping[str, bytes]) -> bytes:
-    """Return a zip archive of the members in their order, stored, without today's date."""
+    """Return a zip archive of the members in their order, uncompressed, without today's date."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
         for name, data in members.items():
@@ -28,12 +28,12 @@ def unpack(data: bytes, *, source: str) -> dict[str, bytes]:
     """Return the members of a small zip archive.
 
     Raises:
-        InputError: it is broken, or unpacks to more than any calibration holds.
+        InputError: it is damaged, or unpacks to more data than any calibration contains.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             if sum(member.file_size for member in archive.infolist()) > _MAX_BYTES:
-                raise InputError(f"{source}: unpacks to more than a calibration holds; is it the right file?")
+                raise InputError(f"{source}: unpacks to more data than a calibration contains; is it the right file?")
             return {member.filename: archive.read(member)[:_MAX_BYTES] for member in archive.infolist()}
     except (*_DAMAGED, zipfile.BadZipFile) as error:
-        raise InputError(f"{source}: not a whole zip archive ({error}); export it again") from None
+        raise InputError(f"{source}: a damaged zip archive ({error}); export it again") from None

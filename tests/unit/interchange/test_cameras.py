@@ -1,4 +1,4 @@
-"""A camera is read from whatever file people have, or refused in words that say what was looked for."""
+"""A camera is read from every supported kind of file, or refused with an error that says what was looked for."""
 
 import json
 from pathlib import Path
@@ -82,7 +82,7 @@ KALIBR = """cam0:
         "pairs",
     ],
 )
-def test_the_same_camera_comes_out_of_every_kind_of_file(text):
+def test_every_kind_of_file_gives_the_same_camera(text):
     camera = read_camera(text)
 
     assert (camera.model, camera.width_px, camera.height_px) == ("plumb_bob", 640, 480)
@@ -90,16 +90,16 @@ def test_the_same_camera_comes_out_of_every_kind_of_file(text):
     np.testing.assert_array_equal(camera.distortion, D)
 
 
-def test_kalibr_s_camera_is_read_and_of_several_the_named_one():
+def test_kalibr_s_camera_is_read_or_the_named_one_of_several():
     assert read_camera(KALIBR).distortion.tolist() == [-0.3, 0.1, 0.001, -0.002]
 
     two = KALIBR + KALIBR.replace("cam0", "cam1").replace("radtan", "equidistant")
     assert read_camera(two, name="cam1").model == "equidistant"
     with pytest.raises(
-        InputError, match=r"chain\.yaml: holds 2 cameras; say which: chain\.yaml#cam0, chain\.yaml#cam1"
+        InputError, match=r"chain\.yaml: contains 2 cameras; choose one: chain\.yaml#cam0, chain\.yaml#cam1"
     ):
         read_camera(two, "chain.yaml")
-    with pytest.raises(InputError, match="no camera 'cam7' in it; it holds cam0, cam1"):
+    with pytest.raises(InputError, match="no camera 'cam7' in it; it contains cam0, cam1"):
         read_camera(two, name="cam7")
 
 
@@ -133,11 +133,11 @@ def test_the_lens_model_follows_from_name_and_number_of_coefficients(model, coef
         ("a: [1\n", "line 2: not YAML"),
         ("a: &x [*x, *x]\nK: *x\n", "K: "),
         ("!!python/object/apply:os.system ['true']\n", "not YAML"),
-        (ROS.replace("500.5", ".nan"), "camera_matrix: 'nan' is not a number to calculate with"),
-        (ROS.replace("500.5", "fx"), "camera_matrix: 'fx' is not a number"),
+        (ROS.replace("500.5", ".nan"), "camera_matrix: 'nan' is not a valid number"),
+        (ROS.replace("500.5", "fx"), "camera_matrix: 'fx' is not a valid number"),
         (ROS.replace("500.5, ", ""), "camera_matrix: expected 9 numbers, found 8"),
         (ROS.replace("500.5", "0"), "the focal lengths must be positive"),
-        (ROS.replace("image_width: 640\n", ""), "does not tell the image's size; add image_width and image_height"),
+        (ROS.replace("image_width: 640\n", ""), "the image size is missing; add image_width and image_height"),
         (ROS.replace("plumb_bob", "omni"), "the lens model 'omni' is not supported; known: none, pinhole"),
         (ROS.replace(COEFFICIENTS, "1, 2, 3"), "plumb_bob takes 4 or 5 distortion coefficients, found 3"),
         (ROS + "binning_x: 2\n", "binning or a region of interest is set"),
@@ -149,7 +149,7 @@ def test_the_lens_model_follows_from_name_and_number_of_coefficients(model, coef
         ("<opencv_storage>", "not XML"),
     ],
 )
-def test_what_is_no_camera_is_refused_in_one_line(text, words):
+def test_a_file_without_a_valid_camera_is_refused_in_one_line(text, words):
     with pytest.raises(InputError, match=words) as refusal:
         read_camera(text, "camera.yml")
 

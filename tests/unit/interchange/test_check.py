@@ -1,4 +1,4 @@
-"""A check finds the slip that made a right calibration into a wrong file, and names it."""
+"""A check finds and names the slip that turned a right calibration into a wrong file."""
 
 import dataclasses
 import io
@@ -136,7 +136,7 @@ def test_millimetres_are_found(file):
     assert codes(text) == ["millimetres"]
 
 
-def test_a_camera_position_written_for_the_translation_is_found(file):
+def test_a_camera_position_written_as_the_translation_is_found(file):
     text = text_of(file, "kalibr")
     position = file.calibration.camera_from_radar.inverse().translation_m.tolist()
     for old, new in zip(file.calibration.camera_from_radar.translation_m.tolist(), position, strict=True):
@@ -155,7 +155,7 @@ def test_two_slips_at_once_are_found(file):
     assert found == ["swapped-direction+millimetres"]
 
 
-def test_a_mirrored_axis_is_refused_in_words(file):
+def test_a_mirrored_axis_is_refused_with_a_clear_error(file):
     text = text_of(file, "matrix")
     first_row = next(line for line in text.splitlines() if not line.startswith("#"))
     mirrored = " ".join(repr(-float(number)) for number in first_row.split())
@@ -188,14 +188,14 @@ def test_a_left_handed_rotation_is_refused_in_every_format_of_matrices(file, nam
         read_any(data, "file")
 
 
-def test_numbers_changed_without_a_known_slip_are_called_so(file):
+def test_numbers_changed_without_a_known_slip_are_reported_as_such(file):
     text = text_of(file, "matrix").replace("-0.0608874", "0.4391126")
 
     report = check(read_any(text))
 
     assert [result.code for result in report.results if result.level == "error"] == ["check-point-missed"]
     assert not report.ok
-    assert any(line.startswith("WRONG: the check point (5, 1, -0.5) m comes out at") for line in report.lines())
+    assert any(line.startswith("WRONG: the check point (5, 1, -0.5) m is at") for line in report.lines())
 
 
 def test_pairs_that_were_changed_after_solving_are_found(file):
@@ -218,7 +218,7 @@ def test_a_bare_matrix_that_looks_sideways_is_a_warning_with_a_guess(file):
     assert "the direction is swapped" in result.hint
 
 
-def test_a_check_point_in_pixels_needs_a_camera_or_says_so(file):
+def test_a_check_point_in_pixels_without_a_camera_is_reported_as_unused(file):
     text = text_of(file, "opencv").replace("image_width: 640\n", "")
     text = without_comments(text)
 
@@ -277,7 +277,7 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
         ("{}", "no pose of a camera and a radar in it"),
         ("[]", "0 records with camera_intrinsic"),
         (b"\xff\xfe\x00", "neither text nor an archive"),
-        (b"PK\x03\x04broken", "not a whole zip archive"),
+        (b"PK\x03\x04broken", "a damaged zip archive"),
         (b"MATLAB 5.0 MAT-file", "not a mat file of level 5; save it with -v7 or -v6"),
         ("1 0 0 0\n0 1 0 0\n", "expected 12 or 16 finite numbers, found 8"),
         ("1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 2\n", "the last row must be 0 0 0 1"),
@@ -285,7 +285,7 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
         ("ros2 run tf2_ros static_transform_publisher --x 1\n", "a frame's name is missing"),
         ("ros2 run tf2_ros static_transform_publisher 1 2 3\n", "no static_transform_publisher with a pose"),
         ("static_transform_publisher --qx 1 --qy 1 --frame-id radar --child-frame-id cam", "has length 1.732, not 1"),
-        ("static_transform_publisher --x inf --frame-id radar --child-frame-id cam", "'inf' is not a number"),
+        ("static_transform_publisher --x inf --frame-id radar --child-frame-id cam", "'inf' is not a valid number"),
         ("<launch/>", "no <node> that runs static_transform_publisher"),
         ("<robot/>", "no joint between a radar and a camera"),
         ("<html/>", "expected OpenCV's <opencv_storage>"),
@@ -298,7 +298,7 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
         ("R: [1, 0, 0]\nT: [0, 0, 0]\n", "R: expected 9 numbers, found 3"),
     ],
 )
-def test_what_is_no_calibration_is_refused_in_one_line(content, words):
+def test_content_without_a_valid_calibration_is_refused_in_one_line(content, words):
     with pytest.raises(InputError, match=words) as refusal:
         read_any(content, "file")
 
@@ -317,7 +317,7 @@ def test_a_launch_file_is_read_without_running_it(tmp_path):
     assert not marker.exists()
 
 
-def test_a_known_pose_in_the_vehicle_moves_the_exports_and_comes_out_again(file):
+def test_a_known_pose_in_the_vehicle_changes_the_exports_and_is_removed_when_they_are_read(file):
     parent_from_radar = RigidTransform.identity().perturbed(np.array([3.5, 0.1, 0.6, 0.0, 0.02, 0.3]))
     for name in ("autoware", "nuscenes"):
         rectified = format_named(name).is_for_rectified
@@ -327,16 +327,18 @@ def test_a_known_pose_in_the_vehicle_moves_the_exports_and_comes_out_again(file)
         pose = read_any(moved.data).camera_from_radar
         np.testing.assert_allclose(pose.as_matrix(), file.calibration.camera_from_radar.as_matrix(), atol=1e-12)
 
-    with pytest.raises(InputError, match=r"the format tf2 has no third frame .*; those that have: autoware, nuscenes"):
+    with pytest.raises(
+        InputError, match=r"the format tf2 has no third frame .*; formats that have one: autoware, nuscenes"
+    ):
         export(file, "tf2", parent_from_radar=parent_from_radar)
 
 
-def test_a_format_that_does_not_exist_is_refused_with_the_nearest(file):
-    with pytest.raises(InputError, match=r"no format 'autowear'; did you mean autoware\?"):
+def test_an_unknown_format_is_refused_with_a_suggestion(file):
+    with pytest.raises(InputError, match=r"unknown format 'autowear'; did you mean autoware\?"):
         export(file, "autowear")
 
 
-def test_formats_that_cannot_hold_the_lens_say_so(file):
+def test_formats_that_cannot_store_the_lens_refuse_it(file):
     rational = read_camera(
         json.dumps(
             {
@@ -358,7 +360,7 @@ def test_formats_that_cannot_hold_the_lens_say_so(file):
         (
             skewed,
             "opencv",
-            "OpenCV's camera models have no skew, this camera has; export with --to json, matlab or numpy",
+            "OpenCV's camera models have no skew, but this camera has; export with --to json, matlab or numpy",
         ),
         (skewed, "foxglove", "Foxglove's CameraCalibration has no skew"),
     ]
@@ -433,14 +435,14 @@ def test_the_shell_gets_a_strange_frame_name_as_one_word(file, tmp_path):
     assert not (tmp_path / "was_run").exists()
 
 
-def test_a_comparison_says_whose_uncertainty_it_counts(file):
+def test_a_comparison_says_how_many_covariances_it_includes(file):
     both = compare(imported(file), imported(file))
     one = compare(imported(file), read_any(text_of(file, "tf2")))
     none = compare(read_any(text_of(file, "tf2")), read_any(text_of(file, "tf2")))
 
     assert (both.covariances, one.covariances, none.covariances) == (2, 1, 0)
     assert both.rotation_sigma_deg == pytest.approx(np.sqrt(2) * one.rotation_sigma_deg)
-    assert "the other's alone" in one.lines()[-1]
+    assert "from that one alone" in one.lines()[-1]
     assert not any("alone" in line or "standard deviation" in line for line in (*both.lines()[3:], *none.lines()))
 
 
@@ -448,7 +450,7 @@ def test_a_comparison_says_whose_uncertainty_it_counts(file):
     ("radar", "camera"), [("ti_mmwave_0", "camera_optical_frame"), ("front_ars540", "rgb_optical")]
 )
 @pytest.mark.parametrize("name", ["autoware", "urdf", "tf2", "apollo"])
-def test_sensors_are_told_by_the_names_people_give_them_where_no_words_do(file, name, radar, camera):
+def test_without_comments_sensors_are_recognized_by_common_frame_names(file, name, radar, camera):
     text = text_of(dataclasses.replace(file, frames=FrameNames(radar, camera)), name)
     bare = re.sub(r"<!--.*?-->", "", without_comments(text), flags=re.DOTALL)
 
@@ -457,7 +459,7 @@ def test_sensors_are_told_by_the_names_people_give_them_where_no_words_do(file, 
 
 
 @pytest.mark.parametrize("name", [known.name for known in FORMATS if known.name not in ("colmap", "matlab", "numpy")])
-def test_a_text_that_went_through_windows_is_read_the_same(file, name):
+def test_text_saved_on_windows_is_read_the_same(file, name):
     data = export(file, name, rectified=format_named(name).is_for_rectified).data
     right = read_any(data).camera_from_radar.as_matrix()
 
@@ -479,11 +481,11 @@ TWO_MORE = {
 }
 
 
-@pytest.mark.parametrize("with_words", [True, False])
+@pytest.mark.parametrize("with_comments", [True, False])
 @pytest.mark.parametrize("name", TWO_MORE)
-def test_among_other_transforms_the_one_between_radar_and_camera_is_read(file, name, with_words):
+def test_among_other_transforms_the_one_between_radar_and_camera_is_read(file, name, with_comments):
     text = text_of(file, name)
-    if not with_words:
+    if not with_comments:
         text = re.sub(r"<!--.*?-->", "", without_comments(text), flags=re.DOTALL)
     for start in ("ros2 run", "<launch>", '<robot name="radar_camera">', "def generate"):
         if start in text:
@@ -493,23 +495,23 @@ def test_among_other_transforms_the_one_between_radar_and_camera_is_read(file, n
     assert check(read_any(text.lstrip()), against=imported(file)).verdict == "right"
 
 
-def test_several_transforms_that_may_be_meant_are_refused_with_their_names(file):
+def test_several_possible_transforms_are_refused_with_their_names(file):
     text = without_comments(text_of(file, "tf2"))
     left, right = text.replace("camera_optical", "cam_left"), text.replace("camera_optical", "cam_right")
 
     with pytest.raises(
-        InputError, match=r"file: holds 2 transforms \(radar to cam_left, radar to cam_right\), 2 of them"
+        InputError, match=r"file: contains 2 transforms \(radar to cam_left, radar to cam_right\), 2 of them"
     ):
         read_any(left + right, "file")
     joint = '<joint name="j" type="fixed"><parent link="radar"/><child link="cam_{}"/></joint>'
-    with pytest.raises(InputError, match="holds 2 transforms"):
+    with pytest.raises(InputError, match="contains 2 transforms"):
         read_any(f"<robot>{joint.format(1)}{joint.format(2)}</robot>", "file")
     chain = text_of(file, "kalibr")
-    with pytest.raises(InputError, match="T_cam_radar stands in cam0, cam1; keep the camera that is meant"):
+    with pytest.raises(InputError, match="T_cam_radar appears in cam0, cam1; keep only the intended camera"):
         read_any(chain + chain[chain.index("cam0:") :].replace("cam0", "cam1"))
     members = unpack(export(file, "colmap").data, source="")
     members["images.txt"] += b"2 1 0 0 0 0 0 0 1 other\n\n"
-    with pytest.raises(InputError, match="holds 2 images"):
+    with pytest.raises(InputError, match="contains 2 images"):
         read_any(pack(members))
     with pytest.raises(InputError, match="0 of them between a radar and a camera"):
         read_any("transforms:\n- {child_frame_id: a}\n- {child_frame_id: b}\n", "file")

@@ -1,4 +1,4 @@
-"""Formats of other installed packages: written, read, listed; and left out in one line where they are broken."""
+"""Formats of other installed packages are written, read and listed, or skipped with one line if they are broken."""
 
 import logging
 import subprocess
@@ -49,7 +49,7 @@ PARAMETERS = '''
 
     PARAMETERS = Format(
         name="acme-params", title="ROS 2 parameters", numbers="rows of camera_from_radar", file_name="params.yaml",
-        camera="none", comment="none", write=write, reads=Reads(recognizes, read), notes=("carries the pose only",),
+        camera="none", comment="none", write=write, reads=Reads(recognizes, read), notes=("contains the pose only",),
     )
 '''
 
@@ -88,7 +88,7 @@ def file(project_root: Path) -> CalibrationFile:
 
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """Return what installs a package that adds a format; afterwards it is as if it had never been there."""
+    """Return what installs a package that adds a format; undone after the test."""
     folder = tmp_path / "site-packages"
     folder.mkdir()
     monkeypatch.syspath_prepend(folder)
@@ -120,7 +120,7 @@ def test_a_format_of_an_installed_package_is_written_read_and_checked(
     assert check(read_any(written.data), against=imported(file)).verdict == "right"
 
 
-def test_it_stands_behind_ours_in_the_list_of_the_command_and_of_the_page(
+def test_it_is_listed_after_ours_by_the_command_and_on_the_page(
     installed: Install, file: CalibrationFile, capsys: pytest.CaptureFixture[str]
 ) -> None:
     installed()
@@ -141,7 +141,7 @@ def test_one_entry_point_may_name_several(installed: Install) -> None:
     assert [known.name for known in written_formats()[-2:]] == ["acme-params", "two"]
 
 
-def test_a_binary_format_is_told_by_its_bytes_and_previewed_by_its_size(
+def test_a_binary_format_is_recognized_by_its_bytes_and_previewed_by_its_size(
     installed: Install, file: CalibrationFile
 ) -> None:
     installed(BINARY, "BINARY")
@@ -160,23 +160,31 @@ def test_a_binary_format_is_told_by_its_bytes_and_previewed_by_its_size(
         ("X = (", "X", "cannot be loaded (SyntaxError"),
         ("", "X", "cannot be loaded (AttributeError"),
         ("X = 3", "X", "acme_params:X is neither a Format nor a tuple of them"),
-        (PARAMETERS.replace('"acme-params", title', '"tf2", title'), "PARAMETERS", "there is a format 'tf2' already"),
-        (PARAMETERS.replace('"acme-params", title', '"list", title'), "PARAMETERS", "there is a format 'list' already"),
+        (
+            PARAMETERS.replace('"acme-params", title', '"tf2", title'),
+            "PARAMETERS",
+            "the format name 'tf2' is already taken",
+        ),
+        (
+            PARAMETERS.replace('"acme-params", title', '"list", title'),
+            "PARAMETERS",
+            "the format name 'list' is already taken",
+        ),
         (
             PARAMETERS.replace('"acme-params", title', '"a/b", title'),
             "PARAMETERS",
-            "the name 'a/b' of its format is not",
+            "the format name 'a/b' may contain only a-z, 0-9",
         ),
     ],
 )
-def test_a_broken_package_is_left_out_in_one_line_that_names_it(
+def test_a_broken_package_is_skipped_with_one_line_that_names_it(
     installed: Install, file: CalibrationFile, caplog: pytest.LogCaptureFixture, module: str, value: str, words: str
 ) -> None:
     installed(module=module, value=value)
 
     assert written_formats() == FORMATS
     assert read_any(export(file, "tf2").data).format == "tf2"
-    assert only_line(caplog).startswith("cocalib: left out what the package acme-params 1.2 adds: ")
+    assert only_line(caplog).startswith("cocalib: skipped a plug-in of the package acme-params 1.2: ")
     assert words in only_line(caplog)
     assert only_line(caplog).endswith("; update or uninstall it")
 
@@ -188,7 +196,7 @@ def test_a_broken_package_is_left_out_in_one_line_that_names_it(
         ("return 3 #", "failed (it returned int)"),
     ],
 )
-def test_a_writer_that_fails_is_an_error_in_words(
+def test_a_writer_that_fails_gives_a_clear_error(
     installed: Install, file: CalibrationFile, broken: str, words: str
 ) -> None:
     installed(module=PARAMETERS.replace("return f", "return unknown + f" if "Name" in words else broken))
@@ -196,10 +204,12 @@ def test_a_writer_that_fails_is_an_error_in_words(
     with pytest.raises(InputError) as refusal:
         export(file, "acme-params")
 
-    assert str(refusal.value) == f"the format acme-params of the package acme-params 1.2 {words}; tell its authors"
+    assert (
+        str(refusal.value) == f"the format acme-params of the package acme-params 1.2 {words}; report it to its authors"
+    )
 
 
-def test_a_reader_that_fails_is_an_error_in_words_and_a_recognizer_that_fails_takes_nothing(
+def test_a_reader_that_fails_gives_a_clear_error_and_a_recognizer_that_fails_recognizes_nothing(
     installed: Install, file: CalibrationFile, caplog: pytest.LogCaptureFixture
 ) -> None:
     installed(module=PARAMETERS.replace("import numpy as np", ""))
@@ -209,10 +219,10 @@ def test_a_reader_that_fails_is_an_error_in_words_and_a_recognizer_that_fails_ta
     with pytest.raises(InputError, match="file: no pose of a camera and a radar in it"):
         read_any("/radar_camera: 3", "file")
 
-    assert "left out what the package acme-params 1.2 adds: it cannot tell its files (TypeError" in only_line(caplog)
+    assert "skipped a plug-in of the package acme-params 1.2: its recognizer failed (TypeError" in only_line(caplog)
 
 
-def test_nothing_is_loaded_before_somebody_asks_nor_for_what_is_ours(
+def test_nothing_is_loaded_before_first_use_nor_for_our_own_formats(
     installed: Install, file: CalibrationFile, caplog: pytest.LogCaptureFixture
 ) -> None:
     installed(module="raise RuntimeError('loaded')")
@@ -220,12 +230,12 @@ def test_nothing_is_loaded_before_somebody_asks_nor_for_what_is_ours(
     assert format_named("tf2").name == "tf2"
     assert read_any(export(file, "json").data).format == "json"
     assert caplog.records == []
-    with pytest.raises(InputError, match="no format 'tf3'; did you mean tf2"):
+    with pytest.raises(InputError, match="unknown format 'tf3'; did you mean tf2"):
         format_named("tf3")
     assert "RuntimeError: loaded" in only_line(caplog)
 
 
-def test_a_package_in_the_current_folder_is_not_looked_at(
+def test_a_package_in_the_current_folder_is_ignored(
     installed: Install, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     installed()
@@ -245,7 +255,7 @@ def test_a_module_in_the_current_folder_does_not_take_the_place_of_the_package_s
 
     assert written_formats() == FORMATS
     assert (
-        "acme_params lies in the current folder, from which nothing is loaded; start the program in another"
+        "acme_params is in the current folder, from which nothing is loaded; start the program in a different"
         in only_line(caplog)
     )
 
@@ -259,6 +269,6 @@ def test_a_broken_package_says_so_on_stderr_and_the_command_goes_on(installed: I
 
     assert (done.returncode, done.stdout.split()[0]) == (0, "json")
     assert done.stderr == (
-        "cocalib: left out what the package acme-params 1.2 adds: acme_params:PARAMETERS cannot be loaded "
+        "cocalib: skipped a plug-in of the package acme-params 1.2: acme_params:PARAMETERS cannot be loaded "
         "(RuntimeError: worn out); update or uninstall it\n"
     )

@@ -1,4 +1,4 @@
-"""The published schemas and the page about formats say what the code does."""
+"""The published schemas and the formats page match the code."""
 
 import re
 from dataclasses import replace
@@ -22,13 +22,13 @@ from calib_core.interchange.own.schemas import schema_texts
 
 
 @pytest.mark.parametrize("name", ["clicks-1.schema.json", "pairs-1.schema.json", "calibration-1.schema.json"])
-def test_the_published_schema_is_the_one_the_types_give(project_root: Path, name):
+def test_the_published_schema_is_generated_from_the_types(project_root: Path, name):
     published = (project_root / "docs/schemas" / name).read_text(encoding="utf-8")
 
     assert published == schema_texts()[name], "run: python -m calib_core.interchange.own.schemas docs/schemas"
 
 
-def test_the_page_lists_every_format_with_its_file_what_it_holds_of_the_camera_and_what_its_numbers_are(
+def test_the_page_lists_every_format_with_its_file_name_its_camera_content_and_its_numbers(
     project_root: Path,
 ):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
@@ -55,7 +55,7 @@ def test_the_examples_on_the_page_are_read(project_root: Path):
     assert len(read) == 3
 
 
-def test_formats_are_named_once_and_each_says_what_it_lacks(project_root: Path):
+def test_formats_are_named_once_and_each_notes_what_it_lacks(project_root: Path):
     names = [known.name for known in FORMATS]
     assert len(set(names)) == len(names)
     assert len({known.file_name for known in FORMATS}) == len(names)
@@ -63,7 +63,7 @@ def test_formats_are_named_once_and_each_says_what_it_lacks(project_root: Path):
     file = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
     for known in FORMATS:
         notes = export(file, known.name, rectified=known.is_for_rectified).notes
-        assert (known.camera == "none") == any("carries the pose only" in note for note in notes)
+        assert (known.camera == "none") == any("contains the pose only" in note for note in notes)
         assert known.comment != "none" or any("calibration.json" in note for note in notes)
 
 

@@ -1,4 +1,4 @@
-"""clicks-1, pairs-1 and calibration-1: what they hold comes back, and what they cannot hold is refused in words."""
+"""clicks-1, pairs-1 and calibration-1: their content reads back, and invalid content is refused with a clear error."""
 
 import dataclasses
 import json
@@ -58,10 +58,10 @@ def test_clicks_come_back_in_order_of_time_with_every_nanosecond():
         ({"radar_mm": [5, 1, 0]}, "pairs[0].radar_mm: unknown key; did you mean radar_m?"),
         ({"radar_m": [5, 1]}, "pairs[0].radar_m: expected array of length 3, got 2"),
         ({"radar_m": [5, 1, None]}, "pairs[0].radar_m[2]: is null, expected float; give its value or remove the entry"),
-        ({"radar_m": [5, 1, math.nan]}, "pairs[0].radar_m[2]: nan is not a number to calculate with"),
-        ({"pixel_px": [math.inf, 1]}, "pairs[0].pixel_px[0]: inf is not a number to calculate with"),
-        ({"radar_m": [0, 0, 0]}, "pairs[0].radar_m: lies at the radar itself"),
-        ({"alternatives_radar_m": [[0, 0, 0]]}, "pairs[0].alternatives_radar_m[0]: lies at the radar itself"),
+        ({"radar_m": [5, 1, math.nan]}, "pairs[0].radar_m[2]: nan is not a valid number"),
+        ({"pixel_px": [math.inf, 1]}, "pairs[0].pixel_px[0]: inf is not a valid number"),
+        ({"radar_m": [0, 0, 0]}, "pairs[0].radar_m: is at the radar itself"),
+        ({"alternatives_radar_m": [[0, 0, 0]]}, "pairs[0].alternatives_radar_m[0]: is at the radar itself"),
         ({"sigma_px": 0}, "pairs[0].sigma_px: expected float > 0.0"),
         ({"sigma_px": "2"}, "pairs[0].sigma_px: expected float | null, got str"),
         ({"id": ""}, "pairs[0].id: expected str of length >= 1"),
@@ -84,7 +84,7 @@ def test_a_fault_in_a_pair_is_named_with_its_place_and_what_to_do(change, words)
         ("", "line 1, column 1: not JSON"),
         ("[1]", "expected an object in braces, found a list"),
         ('{"schema": "cocalib/pairs-1",}', "line 1, column 30: not JSON"),
-        ('{"schema": "cocalib/pairs-1", "a": 1, "a": 2}', "the key 'a' stands twice in one object"),
+        ('{"schema": "cocalib/pairs-1", "a": 1, "a": 2}', "the key 'a' appears twice in one object"),
         ("[" * 100_000, "nested too deeply"),
         ('{"schema": "cocalib/clicks-1"}', "schema: expected 'cocalib/pairs-1', found \"cocalib/clicks-1\""),
         ('{"pairs": []}', "schema: expected 'cocalib/pairs-1', found none"),
@@ -96,8 +96,8 @@ def test_a_fault_in_a_pair_is_named_with_its_place_and_what_to_do(change, words)
         (pairs_text(camera={**CAMERA, "distortions": []}), "camera.distortions: unknown key; did you mean distortion?"),
         (pairs_text(camera={**CAMERA, "distortion": [1, 2]}), "camera: pinhole takes 0 distortion coefficients, got 2"),
         (pairs_text(radar={"sigma_range": 1}), "radar.sigma_range: unknown key; did you mean sigma_range_m?"),
-        (pairs_text(zebra=1), "zebra: unknown key; the keys here are schema, camera, pairs, radar,"),
-        (pairs_text().replace("212.9", "1e999"), "pairs[0].pixel_px[0]: inf is not a number to calculate with"),
+        (pairs_text(zebra=1), "zebra: unknown key; known keys: schema, camera, pairs, radar,"),
+        (pairs_text().replace("212.9", "1e999"), "pairs[0].pixel_px[0]: inf is not a valid number"),
     ],
 )
 def test_a_fault_in_a_file_is_named_with_its_place(text, words):
@@ -107,7 +107,7 @@ def test_a_fault_in_a_file_is_named_with_its_place(text, words):
     assert str(refusal.value).startswith(f"p.json: {words}")
 
 
-def test_two_entries_of_one_id_are_refused():
+def test_two_entries_with_the_same_id_are_refused():
     pair = {"id": "p1", "radar_m": [5, 1, -0.5], "pixel_px": [212.9, 239.4]}
     with pytest.raises(InputError, match=r"pairs\[0\] and pairs\[2\]: both have the id 'p1'; give each its own"):
         read_pairs(pairs_text(pairs=[pair, {**pair, "id": "p2"}, pair]))
@@ -118,14 +118,14 @@ def test_two_entries_of_one_id_are_refused():
 
 
 @pytest.mark.parametrize("stamp", [{"sec": 1, "nanosec": 1_000_000_000}, {"sec": -1, "nanosec": 0}, {"sec": 1}, 1.5])
-def test_a_stamp_that_is_none_is_refused(stamp):
+def test_an_invalid_stamp_is_refused(stamp):
     click = {"id": "c1", "image_time": stamp, "pixel_px": [1, 2]}
 
     with pytest.raises(InputError, match=r"clicks\[0\]\.image_time"):
         read_clicks(json.dumps({"schema": "cocalib/clicks-1", "clicks": [click]}))
 
 
-def test_a_pairs_file_overrules_the_options_where_it_says_something():
+def test_what_a_pairs_file_states_overrides_the_options():
     position = {"position_m": [0.1, 0.2, 0.3], "sigma_m": 0.02}
     text = pairs_text(radar={"sigma_range_m": 0.1, "sigma_azimuth_rad": 0.02}, camera_position_in_radar=position)
 
@@ -182,7 +182,7 @@ def test_what_is_unknown_is_null_and_never_nan(golden_text):
     assert again["pairs"][0]["distance_px"] is None
 
 
-def test_results_may_hold_more_keys_but_settings_may_not(golden_text):
+def test_results_may_have_more_keys_but_settings_may_not(golden_text):
     content = json.loads(golden_text)
     content["metrics"]["median_px"] = 3.0
     content["remarks"] = {"weather": "dry"}
@@ -215,7 +215,7 @@ def test_a_mirrored_rotation_is_refused(golden_text):
 def test_transforms_that_disagree_are_refused(golden_text):
     content = json.loads(golden_text)
     content["camera_from_radar"]["quaternion_wxyz"].reverse()
-    with pytest.raises(InputError, match="quaternion_wxyz: is another rotation"):
+    with pytest.raises(InputError, match="quaternion_wxyz: is a different rotation"):
         read_calibration(json.dumps(content))
 
     content = json.loads(golden_text)
@@ -230,7 +230,7 @@ def test_a_frame_name_that_could_do_harm_is_refused(name):
         FrameNames(name, "camera")
 
 
-def test_frame_names_lose_their_leading_slash_and_tell_apart():
+def test_frame_names_lose_their_leading_slash_and_must_differ():
     assert FrameNames("/ti_mmwave_0", "camera_optical").radar == "ti_mmwave_0"
     with pytest.raises(InputError, match="both frames are called"):
         FrameNames("sensor", "/sensor")

@@ -1,4 +1,4 @@
-"""COLMAP's camera models: which lens each becomes, and no coefficient lost on the way."""
+"""COLMAP's camera models: each becomes the right lens, and no coefficient is lost."""
 
 import io
 import zipfile
@@ -37,7 +37,7 @@ def read(project_root: Path):
         ("OPENCV_FISHEYE", (0.1, 0.2, 0.3, 0.4), "equidistant", [0.1, 0.2, 0.3, 0.4]),
     ],
 )
-def test_each_camera_model_becomes_the_smallest_lens_that_holds_it(read, model, coefficients, lens, kept):
+def test_each_camera_model_becomes_the_smallest_lens_that_fits_it(read, model, coefficients, lens, kept):
     camera = read(model, *coefficients)
     assert (camera.model, camera.distortion.tolist()) == (lens, kept)
 

@@ -1,4 +1,4 @@
-"""Evidence from outside the file tells what a bare matrix cannot: pairs, and the truth of a simulation."""
+"""A bare matrix is tested against data from outside the file: pairs, and the ground truth of a simulation."""
 
 import json
 from collections.abc import Callable
@@ -32,7 +32,7 @@ def file(text: str) -> CalibrationFile:
 
 @pytest.fixture
 def pairs(file: CalibrationFile) -> Callable[[int], str]:
-    """Return pairs-1 of so many exact pairs."""
+    """Return a function that writes pairs-1 with a given number of exact pairs."""
 
     def written(count: int) -> str:
         rng = np.random.default_rng(8)
@@ -59,13 +59,13 @@ def matrix_text(matrix: np.ndarray) -> str:
     return "\n".join(" ".join(map(repr, row)) for row in matrix.tolist())
 
 
-def test_pairs_prove_a_bare_matrix_and_name_its_slip(file, pairs):
+def test_pairs_confirm_a_bare_matrix_or_name_its_slip(file, pairs):
     right = file.calibration.camera_from_radar.as_matrix()
     millimetres = right.copy()
     millimetres[:3, 3] *= 1000
     transposed = right.copy()
     transposed[:3, :3] = right[:3, :3].T
-    evidence = read_check_pairs(pairs(12))
+    check_pairs = read_check_pairs(pairs(12))
 
     for matrix, codes, verdict in (
         (right, ["pairs-fit"], "right"),
@@ -73,7 +73,7 @@ def test_pairs_prove_a_bare_matrix_and_name_its_slip(file, pairs):
         (millimetres, ["millimetres"], "wrong"),
         (transposed, ["transposed-rotation"], "wrong"),
     ):
-        report = check(read_any(matrix_text(matrix)), pairs=evidence)
+        report = check(read_any(matrix_text(matrix)), pairs=check_pairs)
         assert [result.code for result in report.results] == codes
         assert report.verdict == verdict
 
@@ -87,7 +87,7 @@ def test_pairs_of_other_sensors_disagree_without_a_slip(file, pairs):
     assert report.verdict == "wrong"
 
 
-def test_the_pairs_of_a_calibration_are_evidence_too(file, text, tmp_path):
+def test_the_pairs_of_a_calibration_serve_as_well(file, text, tmp_path):
     document = json.loads(text)
     document["pairs"] = document["pairs"] * 2
     for index, pair in enumerate(document["pairs"]):
@@ -102,7 +102,7 @@ def test_the_pairs_of_a_calibration_are_evidence_too(file, text, tmp_path):
 
 
 def test_too_few_pairs_and_files_of_something_else_are_refused(pairs, tmp_path):
-    with pytest.raises(InputError, match="holds 3 pairs; at least 4"):
+    with pytest.raises(InputError, match="contains 3 pairs; a check needs at least 4"):
         read_check_pairs(pairs(3))
     with pytest.raises(InputError, match="schema"):
         read_check_pairs('{"schema": "cocalib/clicks-1", "clicks": []}')
@@ -113,7 +113,7 @@ def test_too_few_pairs_and_files_of_something_else_are_refused(pairs, tmp_path):
         read_check_pairs_file(tmp_path / "binary.json")
 
 
-def test_without_evidence_a_bare_matrix_is_unproven_and_one_that_looks_sideways_doubtful(file):
+def test_with_nothing_to_test_it_against_a_bare_matrix_is_unproven_and_a_sideways_one_doubtful(file):
     right = file.calibration.camera_from_radar.as_matrix()
 
     plausible, sideways = (check(read_any(matrix_text(matrix))) for matrix in (right, np.linalg.inv(right)))
@@ -124,7 +124,7 @@ def test_without_evidence_a_bare_matrix_is_unproven_and_one_that_looks_sideways_
     assert all("--pairs FILE" in report.lines()[-1] for report in (plausible, sideways))
 
 
-def test_a_calibration_is_compared_with_the_truth_of_a_simulation_and_none_is_made_of_it(file):
+def test_a_calibration_is_compared_with_the_truth_of_a_simulation_which_is_not_imported(file):
     truth = json.dumps(
         {
             "schema": "cocalib/truth-1",
@@ -142,7 +142,7 @@ def test_a_calibration_is_compared_with_the_truth_of_a_simulation_and_none_is_ma
     assert report.verdict == "right"
     assert report.comparison is not None
     assert report.comparison.rotation_deg == pytest.approx(0, abs=1e-9)
-    with pytest.raises(InputError, match="what a simulation holds for true"):
+    with pytest.raises(InputError, match="is the ground truth of a simulation"):
         adopt(read_any(truth), "truth.json")
     with pytest.raises(InputError, match=r"camera_from_radar\.rotation: missing"):
         read_any('{"schema": "cocalib/truth-1"}')

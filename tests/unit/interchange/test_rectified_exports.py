@@ -1,4 +1,4 @@
-"""Formats that hold a camera matrix alone: a distorted lens is refused until the pictures are said to be rectified."""
+"""Formats that store only a camera matrix refuse a distorted lens unless the pictures are declared rectified."""
 
 import dataclasses
 import json
@@ -44,7 +44,7 @@ def through(file: CalibrationFile, model: str, distortion: list[float]) -> Calib
 
 
 @pytest.mark.parametrize("known", FORMATS, ids=[known.name for known in FORMATS])
-def test_the_registry_says_what_of_the_camera_is_in_the_file(file, known):
+def test_the_registry_says_how_much_of_the_camera_is_in_the_file(file, known):
     text = contents_text(export(file, known.name, rectified=known.is_for_rectified))
 
     assert ("554.42" in text) == (known.camera != "none")
@@ -53,16 +53,16 @@ def test_the_registry_says_what_of_the_camera_is_in_the_file(file, known):
 
 @pytest.mark.parametrize("model", LENSES)
 @pytest.mark.parametrize("name", MATRIX_ONLY)
-def test_a_distorted_lens_is_refused_in_one_sentence_that_names_formats_which_hold_it(file, name, model):
+def test_a_distorted_lens_is_refused_with_one_line_that_names_formats_which_store_it(file, name, model):
     distorted = through(file, model, LENSES[model])
 
     with pytest.raises(InputError) as refused:
         export(distorted, name)
 
     said = str(refused.value)
-    assert f"{name} holds a camera matrix but has no place for the distortion of this {model} lens" in said
-    assert "wrong on the pictures as taken; choose a format that has one, opencv or numpy for example" in said
-    assert "rectified, undistorted with this same camera matrix (--rectified; on the page, the tick box)" in said
+    assert f"{name} stores a camera matrix but not the distortion of this {model} lens" in said
+    assert "wrong for pictures as taken; use a format that stores it, such as opencv or numpy" in said
+    assert "undistorted with this same camera matrix, say so with --rectified (on the page, tick the box)" in said
     assert "\n" not in said
     for other in ("opencv", "numpy"):
         again = read_any(export(distorted, other).data).camera
@@ -72,7 +72,7 @@ def test_a_distorted_lens_is_refused_in_one_sentence_that_names_formats_which_ho
 
 @pytest.mark.parametrize("name", MATRIX_ONLY)
 @pytest.mark.parametrize(("model", "distortion"), [("pinhole", []), ("plumb_bob", [0.0] * 5)])
-def test_a_lens_without_distortion_is_written_without_a_word(file, name, model, distortion):
+def test_a_lens_without_distortion_is_written_without_a_note(file, name, model, distortion):
     plain = through(file, model, distortion)
 
     written = export(plain, name)
@@ -90,10 +90,8 @@ def test_for_rectified_pictures_it_is_written_and_a_note_says_so(file, name):
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_a_format_whose_file_rectified_pictures_would_contradict_refuses_the_word(file, name):
-    with pytest.raises(
-        InputError, match=rf"without a place for distortion \(kitti, nuscenes\), and {name} is none of them"
-    ):
+def test_a_format_that_is_not_for_rectified_pictures_refuses_the_option(file, name):
+    with pytest.raises(InputError, match=rf"that cannot store distortion \(kitti, nuscenes\), not to {name}"):
         export(file, name, rectified=True)
 
 
@@ -106,7 +104,7 @@ def matrix_in(name: str, text: str) -> np.ndarray:
 
 @pytest.mark.parametrize("model", ["plumb_bob", "equidistant"])
 @pytest.mark.parametrize("name", MATRIX_ONLY)
-def test_its_numbers_bring_the_check_point_to_the_pixel_that_rectifying_the_picture_brings_it_to(file, name, model):
+def test_its_numbers_project_the_check_point_to_its_pixel_in_the_rectified_picture(file, name, model):
     distorted = through(file, model, [-0.39, 0.17, -0.004, 0.002])
     check_point, camera = distorted.check_point, distorted.calibration.camera
     assert check_point is not None
@@ -130,8 +128,8 @@ def test_its_numbers_bring_the_check_point_to_the_pixel_that_rectifying_the_pict
 def test_an_address_may_say_that_the_pictures_are_rectified(file):
     assert exported(file, "kitti", "rectified=1").data == export(file, "kitti", rectified=True).data
     for query, words in (
-        ("", "tick box"),
-        ("rectified=0", "tick box"),
+        ("", "tick the box"),
+        ("rectified=0", "tick the box"),
         ("rectified=", "1"),
         ("rectified=yes", "'yes'"),
     ):
@@ -139,7 +137,7 @@ def test_an_address_may_say_that_the_pictures_are_rectified(file):
             exported(file, "kitti", query)
 
 
-def test_the_page_is_told_where_the_word_is_asked_for(file):
+def test_the_page_knows_which_formats_ask_for_it(file):
     assert [row.key for row in format_rows() if row.takes_rectified] == MATRIX_ONLY
     said = export_preview(file, "nuscenes", "parent_from_radar=1,0,0,0,0,0,1&rectified=1", "drive")
     assert said.is_for_rectified

@@ -1,4 +1,4 @@
-"""The table of formats: a reader beside every writer, and one order in which they are asked."""
+"""The table of formats: every writer has a reader, and the readers are tried in one order."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def test_what_a_format_writes_it_recognizes_and_reads_itself(file: CalibrationFi
     assert next(reader for reader in readers() if reader.recognizes(recognized)) == known.reads
 
 
-def test_every_reader_is_asked() -> None:
+def test_every_reader_is_tried() -> None:
     assert {known.reads for known in FORMATS} < set(readers())
 
 
@@ -42,7 +42,7 @@ def test_every_reader_is_asked() -> None:
         ("", ["lines", "yaml"]),
     ],
 )
-def test_the_syntax_is_told_by_the_first_bytes(content: str | bytes, syntaxes: list[str]) -> None:
+def test_the_syntax_is_determined_by_the_first_bytes(content: str | bytes, syntaxes: list[str]) -> None:
     assert [reading.syntax for reading in readings(content, source="file")] == syntaxes
 
 
@@ -68,7 +68,7 @@ def test_what_a_syntax_does_not_have_is_empty() -> None:
         ("R: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nT: [0, 0, 0]\nchild_frame_id: camera\n", "opencv"),
     ],
 )
-def test_content_that_fits_two_formats_is_of_the_narrower_one(content: str, name: str) -> None:
+def test_content_that_fits_two_formats_is_read_as_the_more_specific_one(content: str, name: str) -> None:
     if name == "tf2-launch-py":
         content = content.replace("arguments", "static_transform_publisher(arguments") + ")"
 

@@ -1,4 +1,4 @@
-"""The published schemas, in the hands of a validator that is not ours: they take what we write and read, and refuse the rest."""
+"""The published schemas in an independent validator: they accept what we write and read, and refuse the rest."""
 
 import copy
 import json

@@ -1,4 +1,4 @@
-"""What the solvers return goes through the file unharmed: pairs in, a file out that passes its own check."""
+"""Solved pairs become a file that reads back unchanged and passes its own check."""
 
 import dataclasses
 import json
@@ -120,7 +120,7 @@ def test_a_file_of_the_required_keys_alone_is_read(project_root: Path):
             read_calibration(json.dumps({key: value for key, value in required.items() if key != missing}))
 
 
-def test_the_radars_angle_errors_travel_with_the_calibration_where_correcting_them_pays():
+def test_the_radars_angle_errors_are_stored_with_the_calibration_if_correcting_them_helps():
     simulated = simulate_pairs(30, rng=np.random.default_rng(7), noise=NoiseProfile(0.008, 0.1, 0.25))
     pairs = []
     for pair in simulated.pairs:

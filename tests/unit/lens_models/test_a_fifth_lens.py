@@ -103,7 +103,7 @@ def test_opencv_solves_it_from_undistorted_points_and_does_not_project_through_i
         project_points(simulated.points_radar_m, solution.camera_from_radar, camera)
 
 
-def test_files_and_formats_that_have_a_name_for_it_carry_it(camera: Camera, file: CalibrationFile) -> None:
+def test_files_and_formats_that_have_a_name_for_it_store_it(camera: Camera, file: CalibrationFile) -> None:
     again = read_camera(camera_info_text(camera))
     assert (again.model, again.distortion.tolist()) == ("division", [-0.2])
     k = camera.matrix_px.ravel().tolist()
@@ -131,11 +131,11 @@ def test_a_recording_needs_a_name_for_it_in_camera_info(
     assert not (tmp_path / "unnamed").exists()
 
 
-def test_a_format_without_a_name_for_it_refuses_it_in_words(file: CalibrationFile) -> None:
+def test_a_format_without_a_name_for_it_refuses_it_with_a_clear_error(file: CalibrationFile) -> None:
     for name, title in (("kalibr", "Kalibr"), ("opencv", "OpenCV"), ("foxglove", "Foxglove")):
         with pytest.raises(
             InputError, match=f"{title} has no name for the lens model division; json, matlab and numpy"
         ):
             export(file, name)
-    with pytest.raises(InputError, match="no place for the distortion of this division lens"):
+    with pytest.raises(InputError, match="not the distortion of this division lens"):
         export(file, "kitti")

@@ -14,7 +14,7 @@ from calib_core.lens_models.lens_model import TypicalLens
         ({"counts": ()}, "plumb_bob: counts must ascend"),
         ({"counts": (5, 4)}, "counts must ascend"),
         ({"counts": (-1, 5)}, "counts must ascend"),
-        ({"counts": (4,)}, "5 coefficients are named, counts end at 4"),
+        ({"counts": (4,)}, "5 coefficients are named, but counts ends at 4"),
         ({"typical": TypicalLens((0.1,))}, "the typical lens has 1 coefficient"),
     ],
 )

@@ -1,4 +1,4 @@
-"""What other formats call a lens, and how many coefficients they get."""
+"""The name of a lens in other formats, and how many coefficients are written."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ D = [-0.3, 0.1, 0.001, -0.002, 0.01, 0.2, 0.03, 0.004]
         ("equidistant", D[:4], "foxglove", "kannala_brandt", D[:4]),
     ],
 )
-def test_a_lens_is_written_in_the_words_of_the_format(
+def test_a_lens_is_written_with_the_name_the_format_uses(
     model: str, distortion: list[float], where: Elsewhere, name: str, coefficients: list[float]
 ) -> None:
     written = written_lens(LENS_MODELS[model], np.array(distortion), where)
@@ -38,7 +38,9 @@ def test_a_lens_is_written_in_the_words_of_the_format(
 @pytest.mark.parametrize(
     ("model", "distortion", "missing"), [("plumb_bob", D[:5], "k3"), ("rational_polynomial", D, "k3 to k6")]
 )
-def test_a_coefficient_that_has_no_place_is_never_dropped(model: str, distortion: list[float], missing: str) -> None:
+def test_a_coefficient_that_cannot_be_stored_is_never_dropped(
+    model: str, distortion: list[float], missing: str
+) -> None:
     with pytest.raises(InputError) as refusal:
         written_lens(LENS_MODELS[model], np.array(distortion), "kalibr")
     assert str(refusal.value) == (
@@ -57,5 +59,5 @@ def test_a_name_may_stand_for_several_lenses() -> None:
     ("count", "model"),
     [(0, "pinhole"), (1, "plumb_bob"), (5, "plumb_bob"), (6, "rational_polynomial"), (14, "rational_polynomial")],
 )
-def test_opencv_tells_its_lenses_by_the_number_of_coefficients(count: int, model: str) -> None:
+def test_opencv_distinguishes_its_lenses_by_the_number_of_coefficients(count: int, model: str) -> None:
     assert opencv_lens(count).name == model

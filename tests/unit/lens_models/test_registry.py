@@ -1,4 +1,4 @@
-"""What every registered lens model must be: its own names tell it, and its flags say what its mathematics does."""
+"""What every registered lens model must satisfy: unambiguous names, and flags that match its mathematics."""
 
 from dataclasses import fields
 from typing import get_args
@@ -28,8 +28,8 @@ def test_names_are_keys_and_no_other_lens_is_read_from_them() -> None:
     assert [name for name in in_files + in_messages if name != name.lower()] == []
 
 
-def test_the_command_line_and_the_files_take_what_is_registered() -> None:
-    """The published schemas follow: test_formats_page.py says how to write them again."""
+def test_the_command_line_and_the_files_accept_what_is_registered() -> None:
+    """The published schemas follow; test_formats_page.py says how to regenerate them."""
     (camera_model,) = (field for field in fields(SimulationFlags) if field.name == "camera_model")
     for taken in (CameraModel, camera_model.type, CameraDocument.__annotations__["model"]):
         assert get_args(taken) == CAMERA_MODELS == tuple(LENS_MODELS)
@@ -40,7 +40,7 @@ def test_a_lens_is_read_by_its_own_name_and_by_those_we_write(lens: LensModel) -
     assert lens.name in lens.names_in_files
     known = {name: other for other in LENSES for name in other.names_in_files}
     read = {row.where: known[row.name] for row in lens.names_elsewhere if row.where != "colmap"}
-    # OpenCV's models are told apart by the number of coefficients, so a name may be shared among them
+    # OpenCV's models are distinguished by the number of coefficients, so a name may be shared among them
     assert all(other is lens or other.opencv == lens.opencv == "projectPoints" for other in read.values())
 
 
@@ -50,7 +50,7 @@ def test_a_typical_lens_is_distorted_unless_it_cannot_be(lens: LensModel) -> Non
 
 
 @each_lens
-def test_the_camera_info_we_write_images_points_where_the_camera_does(lens: LensModel) -> None:
+def test_the_camera_info_we_write_projects_points_as_the_camera_does(lens: LensModel) -> None:
     camera, points = typical_camera(lens.name), np.array([[0.3, -0.2, 2.0]])
     if any(row.where == "camera_info" for row in lens.names_elsewhere):
         np.testing.assert_array_equal(read_camera(camera_info_text(camera)).project(points), camera.project(points))
@@ -71,7 +71,7 @@ def test_without_distortion_a_ray_lands_where_its_angle_says(lens: LensModel) ->
 
 
 @each_lens
-def test_the_image_plane_and_its_rays_belong_together(lens: LensModel) -> None:
+def test_unprojecting_the_image_plane_gives_the_original_rays(lens: LensModel) -> None:
     distortion = np.array(lens.typical.distortion)
     points = np.random.default_rng(2).uniform([-2.0, -2.0, 3.0], [2.0, 2.0, 5.0], (30, 3))
     plane, _ = lens.project(np.ascontiguousarray(points.T), distortion)

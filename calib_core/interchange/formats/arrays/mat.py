@@ -61,10 +61,10 @@ def _recognizes(content: Content) -> bool:
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read a mat file that holds camera_from_radar as a struct with A, or as a 4x4 matrix.
+    """Read a mat file that contains camera_from_radar as a struct with A, or as a 4x4 matrix.
 
     Raises:
-        InputError: it holds neither.
+        InputError: it contains neither.
     """
     variables = content.variables
     arrays: dict[str, Any] = {}

@@ -1,4 +1,4 @@
-"""A calibration from arrays with names, as npz and mat files hold them."""
+"""Read a calibration from named arrays, as npz and mat files contain them."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,15 +14,15 @@ __all__ = ["from_arrays"]
 
 
 def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> ImportedCalibration:
-    """Return the calibration in arrays that hold camera_from_radar, or R and t.
+    """Return the calibration in arrays that include camera_from_radar, or R and t.
 
     Args:
-        arrays: by their names.
+        arrays: by name.
         name: of the format.
-        source: what to call the file in an error.
+        source: the name of the file in error messages.
 
     Raises:
-        InputError: they hold neither, or no rotation.
+        InputError: they include neither, or no valid rotation.
     """
     try:
         if "camera_from_radar" in arrays:
@@ -44,7 +44,7 @@ def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> Importe
             camera=_camera(arrays),
             frames=FrameNames(str(arrays["radar_frame"]), str(arrays["camera_frame"])) if named else None,
             check_point=check,
-            notes=() if named else ("the file names no frames; took it as p_camera = R p_radar + t",),
+            notes=() if named else ("the file does not name its frames; assumed p_camera = R p_radar + t",),
         ).checked(source)
     except (KeyError, ValueError, TypeError, IndexError) as error:
         raise InputError(f"{source}: needs camera_from_radar (4x4), or R and t ({error}); export it again") from None

@@ -49,10 +49,10 @@ def _recognizes(content: Content) -> bool:
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read an npz that holds camera_from_radar, or R and t.
+    """Read an npz that contains camera_from_radar, or R and t.
 
     Raises:
-        InputError: it holds neither, or Python objects.
+        InputError: it contains neither, or Python objects.
     """
     arrays: dict[str, np.ndarray] = {}
     for name, data in content.members.items():

@@ -22,7 +22,7 @@ _LARGEST = 1e9
 
 
 def _write(file: CalibrationFile) -> str:
-    """Write the 4x4 matrix that carries radar points into the camera; numpy.loadtxt and MATLAB's load read it."""
+    """Write the 4x4 matrix that maps radar points to the camera frame; numpy.loadtxt and MATLAB's load read it."""
     meaning = "the rows of the 4x4 matrix that carries homogeneous radar points into the camera"
     rows = file.calibration.camera_from_radar.as_matrix()
     return hash_comment(statement(file, meaning)) + "".join(f"{numbers_text(row, ' ')}\n" for row in rows)
@@ -43,7 +43,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     """Read 12 or 16 numbers as the rows of a 3x4 or 4x4 matrix.
 
     Raises:
-        InputError: there is another number of numbers, or something else among them.
+        InputError: there are too few or too many numbers, or something else among them.
     """
     words = [word for line in content.text.splitlines() for word in _words(line.partition("#")[0])]
     try:
@@ -61,7 +61,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         WrittenPose("matrix", rows[:3, :3], rows[:3, 3], "camera_from_radar"),
         frames=frames,
         check_point=stated_check_point(content.text),
-        notes=() if frames else ("no word says what the matrix does; took it as p_camera = R p_radar + t",),
+        notes=() if frames else ("the file does not say what the matrix is; assumed p_camera = R p_radar + t",),
     ).checked(source)
 
 

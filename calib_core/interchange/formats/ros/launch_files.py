@@ -1,4 +1,4 @@
-"""Launch files with a static transform: of ROS 2 in Python and in XML, and of ROS 1. One reader takes both kinds of XML."""
+"""Launch files with a static transform: ROS 2 in Python and XML, and ROS 1. One reader handles both kinds of XML."""
 
 import ast
 import shlex
@@ -68,10 +68,10 @@ def _recognizes_python(content: Content) -> bool:
 
 
 def _read_python(content: Content, source: str) -> ImportedCalibration:
-    """Read the arguments out of a ROS 2 launch file in Python, without running it.
+    """Read the arguments in a ROS 2 launch file in Python, without running it.
 
     Raises:
-        InputError: there are none, or they are not plain text.
+        InputError: there are none, or they are not plain strings.
     """
     try:
         tree = ast.parse(content.text)
@@ -105,7 +105,7 @@ def _read_xml(content: Content, source: str) -> ImportedCalibration:
     try:
         found = [shlex.split(node.get("args", "")) for node in publishers]
     except ValueError as error:
-        raise InputError(f"{source}: args cannot be split ({error}); correct its quotes") from None
+        raise InputError(f"{source}: args cannot be split ({error}); correct the quotes") from None
     name = "tf2-launch-xml" if publishers[0].get("exec") else "tf1-launch"
     return from_publishers(found, content.text, source=source, name=name)
 

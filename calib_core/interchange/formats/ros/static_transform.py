@@ -1,4 +1,4 @@
-"""The arguments of tf2's static_transform_publisher, in every form people write them: the pose of the child in the parent."""
+"""The arguments of tf2's static_transform_publisher, in all its forms: the pose of the child in the parent."""
 
 import re
 import shlex
@@ -9,7 +9,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.formats.statement import stated_check_point, stated_frames
-from calib_core.interchange.formats.transform_choice import Ends, the_one_between
+from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.imported import Form, ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.yaml_text import number_text
@@ -22,7 +22,7 @@ NUMBERS = "pose of the child (camera, optical) in the parent (radar); quaternion
 
 
 def meaning(file: CalibrationFile) -> str:
-    """Say what the numbers are, for the statement a file opens with."""
+    """Return what the numbers mean, for the comment at the top of a file."""
     parent, child = file.frames.radar, file.frames.camera
     return f"the numbers are the pose of the child {child} in the parent {parent}; quaternion order x y z w"
 
@@ -35,16 +35,16 @@ def pose_numbers(file: CalibrationFile) -> list[str]:
 
 
 def from_publishers(found: list[list[str]], text: str, *, source: str, name: str) -> ImportedCalibration:
-    """Return the calibration that one of several publishers states: the one between the radar and the camera.
+    """Return the calibration of the one publisher that is between the radar and the camera.
 
     Args:
         found: the arguments of each publisher.
-        text: of the file, which may name the frames in words.
-        source: what to call the file in an error.
+        text: of the file, which may name the frames in a comment.
+        source: the name of the file in error messages.
         name: of the format.
 
     Raises:
-        InputError: there is none, more than one, or its arguments are no pose between two frames.
+        InputError: there is none, or more than one, or its arguments are not a pose between two frames.
     """
     return _from_arguments(_chosen(found, text, source=source), text, source=source, name=name)
 
@@ -53,7 +53,7 @@ def _chosen(found: list[list[str]], text: str, *, source: str) -> list[str]:
     """Return the arguments of the one publisher that is between the radar and the camera."""
     if not found:
         return []
-    return found[the_one_between([_ends(words) for words in found], stated_frames(text), source=source)]
+    return found[choose_transform([_ends(words) for words in found], stated_frames(text), source=source)]
 
 
 def _ends(arguments: list[str]) -> Ends:
@@ -112,7 +112,7 @@ def _by_name(flags: dict[str, str], *, source: str) -> tuple[Form, tuple[float, 
 
 
 def _by_place(arguments: list[str], *, source: str) -> tuple[Form, tuple[float, ...], tuple[float, ...], str, str]:
-    """Read the positional form: x y z, then yaw pitch roll (this order) or qx qy qz qw, the frames, perhaps a period."""
+    """Read the positional form: x y z, then yaw pitch roll (this order) or qx qy qz qw, the frames, and possibly a period."""
     words = [word for word in arguments if ":=" not in word]
     angles = len(words) == 8 or (len(words) == 9 and not _is_number(words[6]))
     count = 6 if angles else 7

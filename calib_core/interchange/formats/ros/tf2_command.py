@@ -48,7 +48,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     try:
         found = [shlex.split(line.partition(PUBLISHER)[2], comments=True) for line in lines]
     except ValueError as error:
-        raise InputError(f"{source}: the command cannot be split ({error}); correct its quotes") from None
+        raise InputError(f"{source}: the command cannot be split ({error}); correct the quotes") from None
     return from_publishers(found, text, source=source, name="tf2")
 
 

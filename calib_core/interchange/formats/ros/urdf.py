@@ -1,4 +1,4 @@
-"""URDF: the camera's body frame in the radar frame, and the optical frame on it."""
+"""URDF: the camera's body frame in the radar frame, and the optical frame attached to it."""
 
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
@@ -17,7 +17,7 @@ from calib_core.interchange.formats.statement import (
     statement,
     xml_comment,
 )
-from calib_core.interchange.formats.transform_choice import Ends, the_one_between
+from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.imported import (
     ImportedCalibration,
     WrittenPose,
@@ -38,7 +38,7 @@ __all__ = ["URDF"]
 
 
 def _write(file: CalibrationFile) -> str:
-    """Write a robot of three links; copy its two joints into yours."""
+    """Write a robot of three links, whose two joints can be copied into another URDF."""
     frames = file.frames
     radar_from_camera = file.calibration.camera_from_radar.inverse()
     radar_from_link = radar_from_camera @ LINK_FROM_OPTICAL.inverse()
@@ -73,7 +73,7 @@ def _recognizes(content: Content) -> bool:
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read the joint between radar and camera, and the optical joint on it where there is one.
+    """Read the joint between radar and camera, and the optical joint attached to it, if there is one.
 
     Raises:
         InputError: no such joint, or it is not fixed.
@@ -82,17 +82,19 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     stated = stated_frames(content.text)
     between = [joint for joint in joints if _is_between(joint, stated)]
     if not between:
-        raise InputError(f"{source}: no joint between a radar and a camera in it; name its links so, for example radar")
-    joint = between[the_one_between([Ends(*_ends(one)) for one in between], stated, source=source)]
+        raise InputError(
+            f"{source}: no joint between a radar and a camera in it; name its links accordingly, for example radar"
+        )
+    joint = between[choose_transform([Ends(*_ends(one)) for one in between], stated, source=source)]
     if joint.get("type") != "fixed":
-        raise InputError(f"{source}: the joint {joint.get('name')!r} is not fixed; a calibration is one fixed joint")
+        raise InputError(f"{source}: the joint {joint.get('name')!r} is not fixed; a calibration needs a fixed joint")
     parent, child = _ends(joint)
     roles = posed_between(parent, child, stated)
     camera_end = child if roles.direction == "radar_from_camera" else parent
     optical = next((j for j in joints if _ends(j)[0] == camera_end and "optical" in _ends(j)[1]), None)
     frames, axes, notes = roles.frames, roles.axes, roles.notes
     if optical is not None:
-        _refuse_odd_optical(optical, source=source)
+        _refuse_nonstandard_optical(optical, source=source)
         frames, axes, notes = FrameNames(roles.frames.radar, _ends(optical)[1]), "link", ()
     translation_m, rpy_rad = _origin(joint, source=source)
     return ImportedCalibration(
@@ -128,7 +130,7 @@ def _origin(joint: Element, *, source: str) -> tuple[tuple[float, ...], tuple[fl
     return xyz, rpy
 
 
-def _refuse_odd_optical(joint: Element, *, source: str) -> None:
+def _refuse_nonstandard_optical(joint: Element, *, source: str) -> None:
     translation_m, rpy_rad = _origin(joint, source=source)
     rotation = matrix_from_rpy(np.array(rpy_rad))
     if any(translation_m) or np.abs(rotation - LINK_FROM_OPTICAL.rotation).max() > 1e-4:

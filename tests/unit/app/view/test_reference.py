@@ -127,9 +127,9 @@ def test_every_format_becomes_calibration_1_and_stays_the_same_calibration(file,
 
 def test_what_cannot_be_adopted_is_refused_with_a_clear_error(file, tmp_path):
     text = export(file, "tf2").data.decode()
-    with pytest.raises(InputError, match="tf2 carries no camera"):
+    with pytest.raises(InputError, match="tf2 contains no camera"):
         adopt(read_any(text), "x.sh")
-    with pytest.raises(InputError, match="leave the other camera out"):
+    with pytest.raises(InputError, match="omit the other camera"):
         adopt(read_any(write_calibration(file)), "x.json", camera=file.calibration.camera)
     swapped = dataclasses.replace(
         file,

@@ -64,8 +64,8 @@ def test_a_layout_of_an_installed_package_decodes_its_messages(installed: Instal
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (('"ACME echoes"', '"RIO cloud"'), "the radar layout 'RIO cloud' has the name of another"),
-        (('"list"', '"lists"'), "is of the kind 'lists'; there are cloud, channels, list, arrays, point"),
+        (('"ACME echoes"', '"RIO cloud"'), "the radar layout 'RIO cloud' has the same name as another"),
+        (('"list"', '"lists"'), "has the unknown kind 'lists'; known: cloud, channels, list, arrays, point"),
         (('polar=("slant", "squint"), ', ""), "has no position"),
         (('("slant", "squint", "closing", "loudness")', '"slant squint closing loudness"'), "are tuples of names"),
         (('"closing", "loudness")', '"loudness")'), "closing must be among its fields"),
@@ -87,7 +87,7 @@ def test_a_broken_layout_is_left_out_in_one_line_that_names_its_package(
 
     assert all_decoders() == DECODERS
     (record,) = caplog.records
-    assert record.getMessage().startswith("cocalib: left out what the package acme-radar 1.2 adds: ")
+    assert record.getMessage().startswith("cocalib: skipped a plug-in of the package acme-radar 1.2: ")
     assert words in record.getMessage()
 
 
