@@ -69,7 +69,7 @@ def json_object(text: str, *, source: str) -> dict[str, Any]:
     content = json_value(text, source=source)
     if not isinstance(content, dict):
         raise InputError(
-            f"{source}: expected an object in braces, found {_shown(content)}; give a file in a format of cocalib"
+            f"{source}: expected an object in braces, found {_shown(content)}; give a file in one of cocalib's formats"
         )
     return content
 
