@@ -5,7 +5,7 @@ import signal
 import sys
 from types import FrameType
 
-# Our matrices are small: threads inside one product only take the time of the server beside it. Set before NumPy loads.
+# Our matrices are small: threads inside one product only take time from the server. Set before NumPy loads.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from app.cli import run

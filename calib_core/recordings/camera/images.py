@@ -193,7 +193,7 @@ class ImageLayout:
             raise self._refused(str(error)) from error
         kind = "qoi" if data.startswith(b"qoif") else said or data[:4].hex() or "nothing"
         raise self._refused(
-            f"the encoding '{kind}' cannot be read; record in jpeg or png, or convert to them; {READABLE}"
+            f"the encoding '{kind}' is not supported; record in jpeg or png, or convert to them; {READABLE}"
         )
 
     def _png(self, data: bytes, said: str) -> EncodedImage:

@@ -14,7 +14,7 @@ MessageKind = Literal["cloud", "channels", "list", "arrays", "point"]
 """sensor_msgs/PointCloud2, sensor_msgs/PointCloud, a header with one list, arrays side by side, or one return each."""
 
 _RADIANS = "rad, azimuth positive to the left, elevation upwards"
-_BESIDE = "beside the position, not used"
+_UNUSED = "not used, since the message has positions"
 _NONE = "none"
 _AWAY = "positive moving away"
 
@@ -95,11 +95,11 @@ _CLOUDS = (
     ),
     Decoder(
         "positions, intensity and speed", "ti_mmwave_rospkg, radar_scan_pcl with speed; RIO's ti_mmwave", "cloud",
-        _f("x y z intensity velocity"), note="several forks leave the stamp 0: receive times are taken then",
+        _f("x y z intensity velocity"), note="several forks leave the stamp 0: receive times are then used",
     ),
     Decoder(
         "TI mmWave cloud with bearing", "ti_mmwave_rospkg of leicheng5 and its forks, radar_scan_pcl", "cloud",
-        _f("x y z intensity velocity range bearing doppler_bin"), angles=f"deg, positive to the left; {_BESIDE}",
+        _f("x y z intensity velocity range bearing doppler_bin"), angles=f"deg, positive to the left; {_UNUSED}",
         note="range and bearing may be left at 0",
     ),
     Decoder(
@@ -108,13 +108,13 @@ _CLOUDS = (
     ),
     Decoder(
         "ARS548 detections, 8 fields", "ars548_driver of robotics-upo, DetectionList", "cloud",
-        _f("x y z v r RCS azimuth elevation"), angles=f"{_RADIANS}; {_BESIDE}", amplitude="dBsm",
+        _f("x y z v r RCS azimuth elevation"), angles=f"{_RADIANS}; {_UNUSED}", amplitude="dBsm",
     ),
     Decoder(
         "ARS548 detections, 18 fields", "nebula, continental_ars548 detections", "cloud",
         _f("x y z azimuth azimuth_std elevation elevation_std range range_std range_rate range_rate_std rcs measurement_id "
            "positive_predictive_value classification multi_target_probability object_id ambiguity_flag"),
-        angles=f"{_RADIANS}; {_BESIDE}", amplitude="dBsm", noise="standard deviations of range, azimuth and elevation",
+        angles=f"{_RADIANS}; {_UNUSED}", amplitude="dBsm", noise="standard deviations of range, azimuth and elevation",
     ),
     Decoder(
         "positions and velocities", "ars548_driver of robotics-upo, ObjectList; other trackers", "cloud", _f("x y z vx vy"),
@@ -123,7 +123,7 @@ _CLOUDS = (
     Decoder(
         "smartmicro targets", "smartmicro_ros2_radars (UMRR), targets", "cloud",
         _f("x y z radial_speed power rcs noise snr azimuth_angle elevation_angle range"),
-        angles=f"{_RADIANS}; {_BESIDE}", note="stamps are the sensor's own clock, in microseconds",
+        angles=f"{_RADIANS}; {_UNUSED}", note="stamps are the sensor's own clock, in microseconds",
     ),
     Decoder(
         "smartmicro objects", "smartmicro_ros2_radars (UMRR), objects", "cloud",
@@ -133,8 +133,8 @@ _CLOUDS = (
     Decoder(
         "CARLA radar", "carla_ros_bridge, radar", "cloud",
         _f("x y z Range Velocity AzimuthAngle ElevationAngle"),
-        angles=f"rad, azimuth positive to the right, against y; {_BESIDE}", amplitude=_NONE,
-        note="ElevationAngle lies at byte 28 and not 24: offsets are read as declared",
+        angles=f"rad, azimuth positive to the right, against y; {_UNUSED}", amplitude=_NONE,
+        note="ElevationAngle is at byte 28, not 24: offsets are read as declared",
     ),
     Decoder(
         "nuScenes radar", "nuScenes samples/RADAR_*, .pcd (binary, version 0.7)", "cloud",
@@ -155,7 +155,7 @@ _CHANNELS = (
     Decoder(
         "Oculii cloud, unnamed channels", "the same from drivers that name no channel", "channels",
         _f("x y z channel0 channel1 channel2"), doppler="channel0", amplitude_field="channel2",
-        assumed="the channels have no names; the first is taken for the speed and the third for the power, as Oculii orders them",
+        assumed="the channels have no names; the first is assumed to be the speed and the third the power, as in Oculii's order",
     ),
 )  # fmt: skip
 
@@ -179,18 +179,18 @@ _LISTS = (
         "UniBw detections", "UniBw radar_msgs/DetectionRecord", "list",
         _f("range.value azimuth.value elevation.value radial_speed.value"), angles=_RADIANS, amplitude=_NONE,
         polar=_f("range.value azimuth.value elevation.value"), doppler="radial_speed.value",
-        assumed="the definition states neither the unit of the angles nor which way they count; "
-        "radians, azimuth positive to the left and elevation upwards are taken",
+        assumed="the definition states neither the unit nor the sign of the angles; "
+        "assumed radians, azimuth positive to the left and elevation upwards",
     ),
     Decoder(
         "Ainstein targets", "ainstein_radar_msgs/RadarTargetArray", "list",
         _f("target_id snr range speed azimuth elevation"), angles=_RADIANS.replace("rad", "deg", 1), degrees=True,
-        note="the definition gives no unit; Ainstein's own tools take degrees",
+        note="the definition gives no unit; Ainstein's own tools use degrees",
     ),
     Decoder(
         "Continental detections", "continental_msgs and nebula detection lists with validity flags", "list",
         _f("azimuth_angle invalid_azimuth range range_rate"), angles=_RADIANS, amplitude="dBsm where there is an rcs",
-        note="what a flag calls invalid is left out",
+        note="values flagged as invalid are skipped",
     ),
     Decoder(
         "derived objects", "AutonomouStuff derived_object_msgs/ObjectArray", "list",
@@ -205,27 +205,27 @@ _LISTS = (
     ),
 )  # fmt: skip
 
-_CLOCKWISE = "azimuth is taken as positive to the right, as it is on the sensor's bus"
+_CLOCKWISE = "azimuth positive to the right, as on the sensor's bus"
 _POINTS = (
     Decoder(
         "TI mmWave returns", "ti_mmwave_rospkg of radar-lab, radar_scan", "point",
         _f("point_id x y z range velocity doppler_bin bearing intensity"),
-        angles=f"deg, positive to the left; {_BESIDE}", amplitude="dB; 0 means unknown",
-        note="range, bearing and intensity are left at 0 by the stock driver; point_id falls where a scan begins",
+        angles=f"deg, positive to the left; {_UNUSED}", amplitude="dB; 0 means unknown",
+        note="range, bearing and intensity are left at 0 by the stock driver; point_id drops where a scan begins",
     ),
     Decoder(
         "TI mmWave returns with frame numbers", "ti_mmwave_rospkg of leicheng5 and its forks, radar_scan", "point",
         _f("radar_frame_idx point_id x y z range velocity bearing intensity noise"), amplitude_scale=0.1,
-        angles=f"deg, positive to the left; {_BESIDE}", amplitude="0.1 dB, read as dB; 0 means unknown",
-        note="radar_frame_idx tells scans apart",
+        angles=f"deg, positive to the left; {_UNUSED}", amplitude="0.1 dB, read as dB; 0 means unknown",
+        note="radar_frame_idx separates the scans",
     ),
     Decoder(
         "Delphi ESR tracks", "AutonomouStuff delphi_esr_msgs/EsrTrack", "point",
         _f("canmsg id lat_rate status angle range range_accel range_rate"), polar=_f("range angle"), doppler="range_rate",
         degrees=True,
         azimuth_sign=-1, angles="deg, azimuth positive to the right (assumed); no elevation", amplitude=_NONE,
-        needed=("status",), point_number="id", note="tracks of status 0 are left out",
-        assumed=f"the definition states neither the unit of angle nor which way it counts; degrees are taken, and {_CLOCKWISE}",
+        needed=("status",), point_number="id", note="tracks of status 0 are skipped",
+        assumed=f"the definition states neither the unit nor the sign of angle; assumed degrees, {_CLOCKWISE}",
     ),
     Decoder(
         "Delphi SRR detections", "AutonomouStuff delphi_srr_msgs/SrrTrack", "point",
@@ -233,13 +233,13 @@ _POINTS = (
         polar=_f("can_tx_detect_range can_tx_detect_angle"), doppler="can_tx_detect_range_rate",
         amplitude_field="can_tx_detect_amplitude", degrees=True, azimuth_sign=-1, needed=("can_tx_detect_status",),
         angles="deg, azimuth positive to the right (assumed); no elevation", amplitude="dBsm",
-        assumed=f"the definition does not state which way the angle counts; {_CLOCKWISE}",
+        assumed=f"the definition does not state the sign of the angle; assumed {_CLOCKWISE}",
     ),
     Decoder(
         "Delphi MRR detections", "AutonomouStuff delphi_mrr_msgs/MrrDetection", "point",
         _f("detection_id confid_azimuth azimuth range range_rate amplitude"), azimuth_sign=-1,
         angles="rad, azimuth positive to the right (assumed); no elevation", amplitude="dBsm",
-        assumed=f"the definition states neither the unit of azimuth nor which way it counts; radians are taken, and {_CLOCKWISE}",
+        assumed=f"the definition states neither the unit nor the sign of azimuth; assumed radians, {_CLOCKWISE}",
     ),
 )  # fmt: skip
 
@@ -248,7 +248,7 @@ _ARRAYS = (
         "Delphi ESR targets", "AutonomouStuff delphi_esr_msgs/EsrEthTx", "arrays",
         _f("target_report_range target_report_range_rate target_report_theta target_report_amplitude pos_x pos_y"),
         doppler="target_report_range_rate", amplitude_field="target_report_amplitude", count_field="target_report_count",
-        assumed="the definition does not state the axes of pos_x and pos_y; x forward and y to the left are taken",
+        assumed="the definition does not state the axes of pos_x and pos_y; assumed x forward and y to the left",
     ),
 )  # fmt: skip
 

@@ -95,4 +95,4 @@ def test_a_png_is_described_as_png_whatever_its_message_says(ros, write):
 def test_what_cannot_be_read_is_explained(ros1, write):
     message = ros1.compressed(START_NS, b"qoif" + bytes(30), "qoi")
     with inspect_recording(write(ros1, [("/camera/qoi", START_NS, message)])) as recording:
-        assert "topic /camera/qoi: the encoding 'qoi' cannot be read" in describe(recording)
+        assert "topic /camera/qoi: the encoding 'qoi' is not supported" in describe(recording)
