@@ -1,13 +1,9 @@
-"""From clicks to a calibration: the function shared by page and command line, and the worker that runs it for the page."""
+"""From clicks or pairs to an answer and its file: the functions that the page and the command line share."""
 
 import dataclasses
 import hashlib
 import logging
-import threading
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -15,11 +11,11 @@ import numpy as np
 
 from app.option_changes import checked_options
 from app.resources import version
-from app.session import Outcome, Solved
+from app.session import Outcome
 from calib_core.association.pairing import pair_clicks
 from calib_core.calibration import calibrate, calibrate_pairs, solve_again
 from calib_core.camera import Camera
-from calib_core.errors import CalibrationError, InputError
+from calib_core.errors import InputError
 from calib_core.interchange import (
     CALIBRATION_SCHEMA,
     FrameNames,
@@ -37,7 +33,6 @@ from calib_core.results import Calibration, InputFile, PairResult
 
 __all__ = [
     "RadarSource",
-    "SolverWorker",
     "calibration_text",
     "calibration_text_of_pairs",
     "camera_for",
@@ -221,86 +216,3 @@ def calibration_text_of_pairs(calibration: Calibration, text: str, name: str) ->
         provenance = dataclasses.replace(file.provenance, inputs=(origin,), version=version())
         return interchange_text(calibration, file.frames, provenance)
     return interchange_text(calibration, provenance=Provenance(inputs=(origin,), version=version()))
-
-
-@dataclass(frozen=True, slots=True)
-class _Request:
-    revision: int
-    clicks: tuple[ReflectorClick, ...]
-    options: CalibrationOptions
-    when_done: Callable[[Solved], None]
-
-
-class SolverWorker:
-    """Solves in its own thread; of several waiting requests, only the newest is solved."""
-
-    def __init__(self, recording: RadarSource, camera: Camera | None, reference: Calibration | None = None) -> None:
-        self._recording = recording
-        self._camera = camera
-        self._reference = reference
-        self._lock = threading.Lock()
-        self._newest_revision = -1
-        self._closed = False
-        self._executor = ThreadPoolExecutor(max_workers=1, thread_name_prefix="solver")
-
-    def request(
-        self,
-        revision: int,
-        clicks: Sequence[ReflectorClick],
-        options: CalibrationOptions,
-        when_done: Callable[[Solved], None],
-    ) -> None:
-        """Solve this revision and drop older requests; returns immediately, and does nothing after `close`.
-
-        Args:
-            revision: echoed in the answer; larger means newer.
-            clicks: of this revision.
-            options: of this revision.
-            when_done: called with the answer, without any lock held; not called when a newer request came in time.
-        """
-        request = _Request(revision, tuple(clicks), options, when_done)
-        with self._lock:
-            if self._closed or revision <= self._newest_revision:
-                return
-            self._newest_revision = revision
-            future = self._executor.submit(self._answer, request)
-        future.add_done_callback(partial(_deliver, request))
-
-    def close(self) -> None:
-        """Stop: the current solve is finished, and no answer comes after this returns."""
-        with self._lock:
-            self._closed = True
-            self._newest_revision += 1
-        self._executor.shutdown(wait=True, cancel_futures=True)
-
-    def _answer(self, request: _Request) -> Solved | None:
-        if request.revision != self._newest_revision:
-            return None
-        outcome = solve_clicks(self._recording, request.clicks, self._camera, request.options)
-        checked: tuple[PairResult, ...] = ()
-        if isinstance(outcome, Unsolvable) and self._reference is not None:
-            checked = check_clicks(self._recording, request.clicks, self._reference, request.options)
-        return Solved(request.revision, outcome, checked)
-
-
-def _deliver(request: _Request, future: "Future[Solved | None]") -> None:
-    """Deliver the answer. A failure is an answer too: it is shown to the user, and logged if it is a bug."""
-    if future.cancelled():
-        return
-    error = future.exception()
-    solved = future.result() if error is None else Solved(request.revision, _failure(error))
-    if solved is not None:
-        request.when_done(solved)
-
-
-def _failure(error: BaseException) -> Unsolvable:
-    if isinstance(error, CalibrationError):
-        return Unsolvable(
-            "unreadable", str(error), "the clicks are kept; fix the problem, then change any click to try again"
-        )
-    _log.error("the solver failed", exc_info=error)
-    return Unsolvable(
-        "internal-error",
-        f"the solver failed: {type(error).__name__}: {error}",
-        "this is a bug in cocalib, not a problem with your data; the clicks are kept, and the log has details for a bug report",
-    )

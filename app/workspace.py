@@ -8,7 +8,7 @@ from typing import Protocol, TypeAlias
 
 from app.session import ClicksImported, History, RecordingFacts, Redo, Session, Solved, Step, Undo, advance, settled
 from app.session.file import Restored, open_session_file
-from app.solving import SolverWorker
+from app.solver_worker import SolverWorker
 from app.view import Reference, View, view
 from calib_core.camera import Camera
 from calib_core.errors import InputError
@@ -33,7 +33,7 @@ class Journal(Protocol):
 
 
 class Solver(Protocol):
-    """Solves revisions: app.solving.SolverWorker, or a fake in a test."""
+    """Solves revisions: app.solver_worker.SolverWorker, or a fake in a test."""
 
     def request(
         self,

@@ -1,7 +1,6 @@
 """From clicks to a calibration: the shared function, the calibration's text, and the worker."""
 
 import json
-import logging
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -12,9 +11,8 @@ import numpy as np
 import pytest
 
 from app.resources import version
-from app.session import ClicksImported, OptionsChanged, Solved
+from app.session import ClicksImported, OptionsChanged
 from app.solving import (
-    SolverWorker,
     calibration_text,
     calibration_text_of_pairs,
     camera_for,
@@ -24,7 +22,7 @@ from app.solving import (
 )
 from app.workspace import open_workspace
 from calib_core.camera import Camera
-from calib_core.errors import InputError, OptionError, RecordingError
+from calib_core.errors import InputError, OptionError
 from calib_core.interchange import camera_info_text, read_calibration, read_clicks
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, LocatingOptions
@@ -225,98 +223,6 @@ def test_too_few_pairs_in_a_file_are_an_answer_and_no_file_of_pairs_is_an_error(
     assert isinstance(outcome, Unsolvable)
     with pytest.raises(InputError, match=r"pairs\.json"):
         solve_pairs("{}", "pairs.json", CalibrationOptions())
-
-
-class Gate:
-    """A radar that blocks reads until it is opened."""
-
-    def __init__(self) -> None:
-        self.entered, self.open = threading.Event(), threading.Event()
-
-    def __call__(self) -> RadarScans:
-        self.entered.set()
-        assert self.open.wait(60)
-        return RadarScans()
-
-
-class Answers:
-    """Collects answers and lets a test wait for them."""
-
-    def __init__(self) -> None:
-        self.all: list[Solved] = []
-        self._some = threading.Semaphore(0)
-
-    def __call__(self, solved: Solved) -> None:
-        self.all.append(solved)
-        self._some.release()
-
-    def wait(self) -> Solved:
-        assert self._some.acquire(timeout=60)
-        return self.all[-1]
-
-
-def test_of_several_waiting_requests_only_the_newest_is_solved() -> None:
-    gate, answers = Gate(), Answers()
-    radar = Radar(gate)
-    worker = SolverWorker(radar, CAMERA)
-    worker.request(1, [CLICK], CalibrationOptions(), answers)
-    assert gate.entered.wait(60)
-    for revision in (2, 3, 5, 4):
-        worker.request(revision, [CLICK], CalibrationOptions(), answers)
-    gate.open.set()
-    while answers.wait().revision != 5:
-        pass
-    worker.close()
-    assert [solved.revision for solved in answers.all] == [1, 5]
-    assert len(radar.asked) == 2
-
-
-def test_a_recording_that_cannot_be_read_is_reported_as_the_answer() -> None:
-    def broken() -> RadarScans:
-        raise RecordingError("radar.bag: chunk 7 is damaged; copy the file again")
-
-    answers = Answers()
-    worker = SolverWorker(Radar(broken), CAMERA)
-    worker.request(1, [CLICK], CalibrationOptions(), answers)
-    outcome = answers.wait().outcome
-    worker.close()
-    assert isinstance(outcome, Unsolvable)
-    assert (outcome.code, outcome.reason) == ("unreadable", "radar.bag: chunk 7 is damaged; copy the file again")
-
-
-def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(caplog: pytest.LogCaptureFixture) -> None:
-    faults = iter([True])
-
-    def faulty() -> RadarScans:
-        if next(faults, False):
-            raise ZeroDivisionError("by zero")
-        return RadarScans()
-
-    answers = Answers()
-    worker = SolverWorker(Radar(faulty), CAMERA)
-    with caplog.at_level(logging.ERROR):
-        worker.request(1, [CLICK], CalibrationOptions(), answers)
-        outcome = answers.wait().outcome
-    assert isinstance(outcome, Unsolvable)
-    assert (outcome.code, outcome.reason) == ("internal-error", "the solver failed: ZeroDivisionError: by zero")
-    assert "ZeroDivisionError" in caplog.text
-    worker.request(2, [CLICK], CalibrationOptions(), answers)
-    assert answers.wait().revision == 2
-    worker.close()
-
-
-def test_after_close_nothing_is_answered() -> None:
-    gate, answers = Gate(), Answers()
-    worker = SolverWorker(Radar(gate), CAMERA)
-    worker.request(1, [CLICK], CalibrationOptions(), answers)
-    assert gate.entered.wait(60)
-    worker.request(2, [CLICK], CalibrationOptions(), answers)
-    gate.open.set()
-    worker.close()
-    count = len(answers.all)
-    worker.request(3, [CLICK], CalibrationOptions(), answers)
-    assert len(answers.all) == count
-    assert all(solved.revision == 1 for solved in answers.all)
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
