@@ -1,1 +1,1 @@
-"""What touches a person: command line, server, session."""
+"""The application: command line, server, session."""

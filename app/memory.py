@@ -1,4 +1,4 @@
-"""How the process deals with memory that was freed."""
+"""How the process handles freed memory."""
 
 import ctypes
 import sys
@@ -11,13 +11,13 @@ _LARGEST_BYTES = 32 << 20
 
 
 def keep_freed_memory() -> bool:
-    """Have the C library keep up to 64 MB of freed memory instead of handing them back at once.
+    """Make the C library keep up to 64 MB of freed memory instead of returning it to the system at once.
 
-    A picture's pixels are megabytes that are asked for and freed again with every frame. Fetching them from the system
-    anew each time, page by page, takes as long as decoding the picture.
+    A picture's pixels take megabytes that are allocated and freed with every frame. Getting them from the system each time,
+    page by page, takes as long as decoding the picture.
 
     Returns:
-        False where the C library cannot be told (it is not glibc).
+        False if the C library has no such setting (it is not glibc).
     """
     if not sys.platform.startswith("linux"):
         return False

@@ -1,4 +1,4 @@
-"""Freed memory stays with the process."""
+"""The process keeps freed memory."""
 
 import platform
 import subprocess
@@ -24,6 +24,6 @@ print(faults())
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is not glibc")
-def test_pictures_are_put_where_the_last_ones_were() -> None:
+def test_pictures_reuse_the_memory_of_earlier_ones() -> None:
     answer = subprocess.run([sys.executable, "-c", _FAULTS, "keep"], check=True, capture_output=True, text=True)
     assert int(answer.stdout) < 1000  # 20 pictures of two sizes are over 60 000 pages

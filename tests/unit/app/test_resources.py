@@ -1,4 +1,4 @@
-"""Where the program's own files are, and whether it is installed alone."""
+"""Where the program's own files are, and whether another package overwrites it."""
 
 import importlib.metadata
 from pathlib import Path
@@ -16,7 +16,7 @@ from app.resources import (
 )
 
 
-def test_a_checkout_has_its_files_beside_the_package(project_root: Path) -> None:
+def test_a_checkout_has_its_files_next_to_the_package(project_root: Path) -> None:
     assert static_folder() == project_root / "static"
     assert sample_folder() == project_root / "sample_data"
 
@@ -24,14 +24,14 @@ def test_a_checkout_has_its_files_beside_the_package(project_root: Path) -> None
 def test_an_installed_package_has_its_files_inside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = tmp_path / "site-packages" / "app"
     (package / "static").mkdir(parents=True)
-    (tmp_path / "site-packages" / "static").mkdir()  # somebody else's
+    (tmp_path / "site-packages" / "static").mkdir()  # another package's
     monkeypatch.setattr(resources, "_PACKAGE_FOLDER", package)
     assert static_folder() == package / "static"
 
 
-def test_missing_files_are_told_with_the_places_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_files_are_reported_with_the_folders_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(resources, "_PACKAGE_FOLDER", tmp_path / "app")
-    with pytest.raises(InstallationError, match="the folder sample_data is not in"):
+    with pytest.raises(InstallationError, match="the folder sample_data is neither in"):
         sample_folder()
 
 
