@@ -1,4 +1,4 @@
-# People and CI type the same commands. Needs python3 (3.11 to 3.14) with its venv module, and make.
+# Developers and CI run the same commands. Needs python3 (3.11 to 3.14) with its venv module, and make.
 PYTHON ?= python3
 LOWEST_PYTHON ?= python3.11
 VENV := .venv
@@ -9,12 +9,12 @@ FAST := tests/architecture tests/golden tests/paper tests/properties $(wildcard 
 
 .PHONY: help env dev demo test test-fast test-lowest test-newest check lock bench bench-accuracy sample picture clean
 
-help:  ## Say what can be typed.
+help:  ## List the targets.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
 
-env: $(VENV)/.runtime  ## Make .venv with the program in it.
+env: $(VENV)/.runtime  ## Create .venv with the program.
 
-dev: $(VENV)/.dev  ## The same, with what the tests and checks need.
+dev: $(VENV)/.dev  ## The same, with the tools for tests and checks.
 
 $(BIN)/python:
 	@PYTHON="$(PYTHON)" VENV="$(VENV)" sh .ci/make_venv
@@ -35,7 +35,7 @@ $(VENV)/.bench: requirements/bench.txt $(VENV)/.dev
 demo: env  ## Open the sample recording in the browser.
 	$(BIN)/cocalib demo
 
-check: dev  ## Style, types, layers, frame names, spelling.
+check: dev  ## Check style, types, layers, frame names, spelling.
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -44,35 +44,35 @@ check: dev  ## Style, types, layers, frame names, spelling.
 	$(BIN)/pytest -q tests/architecture
 	@$(BIN)/python .ci/installed_size
 
-test: dev  ## Every test, the browser ones included.
+test: dev  ## Run all tests, including those in the browser.
 	@$(BIN)/python tests/find_browser.py --install
 	$(BIN)/pytest $(PARALLEL)
 
-test-fast: dev  ## The core's laws, in under a minute of processor time.
+test-fast: dev  ## Run the core's tests, in under a minute of processor time.
 	$(BIN)/pytest -q -m "not slow and not real" $(FAST)
 
-test-lowest:  ## A part of the tests with the lowest versions that pyproject.toml allows (needs python3.11 and the package index).
+test-lowest:  ## Run part of the tests with the lowest versions that pyproject.toml allows (needs python3.11 and the package index).
 	@$(LOWEST_PYTHON) .ci/test_bounds lowest
 
-test-newest:  ## The same with the newest versions that it allows.
+test-newest:  ## The same with the newest allowed versions.
 	@$(PYTHON) .ci/test_bounds newest
 
-bench: dev  ## Speed, as ratios within one run; writes docs/speed.md. BENCH=--large opens 5 GB and 100 GB as well.
+bench: dev  ## Measure speed, as ratios within one run; write docs/speed.md. BENCH=--large also opens 5 GB and 100 GB.
 	@$(BIN)/python tests/find_browser.py --install
 	$(BIN)/python -m benchmarks.speed $(BENCH)
 
-bench-accuracy: $(VENV)/.bench  ## Accuracy against the bound and other estimators; writes docs/accuracy.md (an hour or two).
+bench-accuracy: $(VENV)/.bench  ## Measure accuracy against the bound and other estimators; write docs/accuracy.md (an hour or two).
 	$(BIN)/python -m benchmarks.accuracy $(ACCURACY)
 
-sample: env  ## Make sample_data/ again, bit for bit.
+sample: env  ## Regenerate sample_data/, bit for bit.
 	$(BIN)/python -m calib_core.synthetic.sample sample_data
 
-picture: dev  ## Take the README's picture again.
+picture: dev  ## Retake the README's pictures.
 	@$(BIN)/python tests/find_browser.py --install
 	$(BIN)/python docs/take_pictures.py
 
-lock: dev  ## Pin every dependency again, with hashes and without addresses (needs uv).
+lock: dev  ## Update all pins, with hashes and without index URLs (needs uv).
 	@sh .ci/lock
 
-clean:  ## Remove what make env and the tests left.
+clean:  ## Remove the files created by make and the tests.
 	rm -rf $(VENV) $(VENV)-lowest $(VENV)-newest .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache dist

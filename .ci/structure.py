@@ -1,8 +1,8 @@
 """Count and draw the structure of the packages from their imports: `python .ci/structure.py [count|draw] [CHECKOUT]`.
 
-`count` prints, for each folder that has rooms, how many rooms it has, on how many floors they stand (a room stands above all
-that it imports) and how many imports run between them. `draw` prints the layers that pyproject.toml promises, as
-ARCHITECTURE.md shows them. Nothing is imported: the sources are read as text.
+A room is a module or package of a folder. `count` prints, for each folder, the number of its rooms, the number of floors (a
+room is on a floor above all rooms that it imports) and the number of imports between rooms. `draw` prints the layers declared
+in pyproject.toml, as shown in ARCHITECTURE.md. Nothing is imported: the sources are read as text.
 """
 
 import ast
@@ -16,7 +16,7 @@ WIDTH = 118
 
 
 def modules(root: Path) -> dict[str, Path]:
-    """Return every module of the packages by its dotted name, packages by their own."""
+    """Return the path of every module by its dotted name; a package is listed under its own name."""
     found = {}
     for package in PACKAGES:
         for path in sorted((root / package).rglob("*.py")):
@@ -26,7 +26,7 @@ def modules(root: Path) -> dict[str, Path]:
 
 
 def imports(root: Path) -> dict[str, set[str]]:
-    """Return which module imports which, those that a package hands on included."""
+    """Return the modules that each module imports, including modules re-exported by a package."""
     known = modules(root)
     graph: dict[str, set[str]] = {}
     for name, path in known.items():
@@ -42,7 +42,7 @@ def imports(root: Path) -> dict[str, set[str]]:
 
 
 def between_rooms(graph: Mapping[str, set[str]], folder: str) -> dict[str, set[str]]:
-    """Return which room of a folder imports which: its modules, and its packages as one room each."""
+    """Return the rooms that each room of a folder imports: a room is a module, or a package as a whole."""
 
     def room(module: str) -> str | None:
         head, _, rest = module.partition(f"{folder}.")
@@ -57,22 +57,22 @@ def between_rooms(graph: Mapping[str, set[str]], folder: str) -> dict[str, set[s
 
 
 def floors(rooms: Mapping[str, set[str]]) -> dict[str, int]:
-    """Return the floor of each room, 0 for those that import no other; a circle of imports is an error.
+    """Return the floor of each room, 0 for rooms that import no other; circular imports are an error.
 
     Raises:
-        ValueError: rooms import each other in a circle.
+        ValueError: rooms import each other circularly.
     """
     floor: dict[str, int] = {}
     while len(floor) < len(rooms):
         ready = {name for name, below in rooms.items() if name not in floor and below <= floor.keys()}
         if not ready:
-            raise ValueError("a circle among " + ", ".join(sorted(rooms.keys() - floor.keys())))
+            raise ValueError("circular imports among " + ", ".join(sorted(rooms.keys() - floor.keys())))
         floor |= {name: 1 + max((floor[other] for other in rooms[name]), default=-1) for name in ready}
     return floor
 
 
 def counted(root: Path) -> Iterator[str]:
-    """Yield a line per folder with rooms, then the totals."""
+    """Yield one line per folder with rooms, then the totals."""
     graph = imports(root)
     folders = sorted({name.rpartition(".")[0] for name in graph} - {""})
     yield f"{'folder':<42}{'rooms':>6}{'floors':>8}{'imports between rooms':>23}"
@@ -85,7 +85,7 @@ def counted(root: Path) -> Iterator[str]:
 
 
 def drawn(root: Path) -> Iterator[str]:
-    """Yield the layers of every contract in pyproject.toml, the uppermost first."""
+    """Yield the layers of every contract in pyproject.toml, the top layer first."""
     settings = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
     contracts = settings["tool"]["importlinter"]["contracts"]
     for contract in contracts:
@@ -106,7 +106,7 @@ def _wrapped(layers: list[str]) -> Iterator[str]:
 
 
 def main(arguments: list[str]) -> None:
-    """Print what was asked for."""
+    """Print the counts or the drawing."""
     what = arguments[0] if arguments else "count"
     root = Path(arguments[1]) if len(arguments) > 1 else Path(__file__).resolve().parents[1]
     print("\n".join((drawn if what == "draw" else counted)(root)))

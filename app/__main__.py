@@ -5,7 +5,7 @@ import signal
 import sys
 from types import FrameType
 
-# Our matrices are small: threads inside one product only take time from the server. Set before NumPy loads.
+# Our matrices are small: threads within one product only slow down the server. Must be set before NumPy loads.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from app.cli import run
@@ -15,14 +15,14 @@ __all__ = ["main"]
 
 
 def main() -> None:
-    """Run the command that was typed and leave with its exit code."""
+    """Run the command given on the command line and exit with its code."""
     keep_freed_memory()
     signal.signal(signal.SIGTERM, _interrupt)
     sys.exit(run(sys.argv[1:]))
 
 
 def _interrupt(number: int, _: FrameType | None) -> None:
-    """Take SIGTERM as Ctrl+C: a server started in the background of a script ignores SIGINT, and must close its session too."""
+    """Treat SIGTERM like Ctrl+C: a server that a script starts in the background ignores SIGINT, but must close its session."""
     raise KeyboardInterrupt(number)
 
 

@@ -1,7 +1,7 @@
-"""The command's first module, installed under a name of its own, cocalib_launcher: `app` is a name that others use too.
+"""The entry point of the command, installed as cocalib_launcher because other projects also use the name `app`.
 
-A folder on PYTHONPATH that holds an `app.py` comes before ours; so the packages are loaded from where this program is
-installed before anything else can take their names. Nothing here may import them in the ordinary way.
+A folder on PYTHONPATH that contains an `app.py` comes before our packages on the path. This module therefore loads them
+from where the program is installed before anything else can take their names. It must not import them with a plain `import`.
 """
 
 import importlib.util
@@ -14,7 +14,7 @@ _PACKAGES = ("app", "calib_core")
 
 
 def main() -> None:
-    """Load our packages, then run the command that was typed."""
+    """Load our packages, then run the command."""
     home = _home()
     for name in _PACKAGES:
         _load(name, home / name)
@@ -24,15 +24,15 @@ def main() -> None:
 
 
 def _home() -> Path:
-    """Return the folder that holds our packages: this file's own, or that of the checkout where one is installed."""
+    """Return the folder that contains our packages: this file's folder, or the checkout of an editable install."""
     for folder in (Path(__file__).resolve().parent, *map(Path, sys.path)):
         if (folder / "app" / "cli" / "commands.py").is_file() and (folder / "calib_core" / "__init__.py").is_file():
             return folder
-    sys.exit("cocalib: its packages, app and calib_core, are not where they were installed; install cocalib again")
+    sys.exit("cocalib: the packages app and calib_core are missing from the installation; reinstall cocalib")
 
 
 def _load(name: str, folder: Path) -> None:
-    """Import a package from its folder, whatever else on the path has its name."""
+    """Import a package from its folder, even if something else on the path has the same name."""
     spec = importlib.util.spec_from_file_location(
         name, folder / "__init__.py", submodule_search_locations=[str(folder)]
     )

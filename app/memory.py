@@ -13,11 +13,11 @@ _LARGEST_BYTES = 32 << 20
 def keep_freed_memory() -> bool:
     """Make the C library keep up to 64 MB of freed memory instead of returning it to the system at once.
 
-    Every frame allocates and frees megabytes of pixels. Getting them from the system each time, page by page, takes as
-    long as decoding the picture.
+    A picture's pixels take megabytes that are allocated and freed with every frame. Getting them from the system each time,
+    page by page, takes as long as decoding the picture.
 
     Returns:
-        False if the C library does not support this (it is not glibc).
+        False if the C library has no such setting (it is not glibc).
     """
     if not sys.platform.startswith("linux"):
         return False

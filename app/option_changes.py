@@ -1,4 +1,4 @@
-"""Options by name: parsed, checked for range and described in one place, for the page, the journal and the command line.
+"""Options by name: parsing, range checks and descriptions, for the page, the journal and the command line.
 
 An option's name is its path in CalibrationOptions, such as "gating.max_range_m".
 """
@@ -39,7 +39,7 @@ _UNITS = {"_mps": "m/s", "_px": "px", "_deg": "deg", "_rad": "rad", "_db": "dB",
 
 @dataclass(frozen=True, slots=True)
 class OptionChange:
-    """One option and what it is to be.
+    """One option and its new value.
 
     Attributes:
         path: the option's name, such as "noise.sigma_px".
@@ -52,18 +52,18 @@ class OptionChange:
 
 @dataclass(frozen=True, slots=True)
 class OptionDescription:
-    """What a person needs to know to set one option.
+    """What a user needs to know to set one option.
 
     Attributes:
         path: the option's name, such as "noise.sigma_px".
-        label: the same in words, without the unit.
-        unit: "" where it has none.
-        hint: one sentence, as the option's field has it.
-        kind: which field to draw.
-        choices: of a "choice".
-        low: smallest value; None where there is none.
-        high: largest value; None where there is none.
-        default: the value when nobody sets it.
+        label: the name as words, without the unit.
+        unit: "" if it has none.
+        hint: one sentence, from the option's field.
+        kind: which input field to draw.
+        choices: the values of a "choice".
+        low: smallest allowed value; None if unlimited.
+        high: largest allowed value; None if unlimited.
+        default: the value if it is not set.
     """
 
     path: str
@@ -79,12 +79,12 @@ class OptionDescription:
 
 @dataclass(frozen=True, slots=True)
 class OptionGroup:
-    """Options that belong together; the first group has no name and holds the method.
+    """Related options; the first group has no name and contains the method.
 
     Attributes:
-        name: such as "noise"; "" for the top.
+        name: such as "noise"; "" for the top level.
         hint: one sentence, from the group's docstring.
-        options: in the order of the source.
+        options: in source order.
     """
 
     name: str
@@ -110,7 +110,7 @@ def changes_from_tree(tree: object) -> tuple[OptionChange, ...]:
 
 
 def options_from_tree(tree: object) -> CalibrationOptions:
-    """Parse a nested JSON object of options; what it leaves out has its default.
+    """Parse a nested JSON object of options; missing ones get their defaults.
 
     Raises:
         OptionError: an option is unknown, of the wrong type or out of range.
@@ -119,7 +119,7 @@ def options_from_tree(tree: object) -> CalibrationOptions:
 
 
 def changed_options(options: CalibrationOptions, changes: Sequence[OptionChange]) -> CalibrationOptions:
-    """Set some options and leave the others.
+    """Set some options and leave the others unchanged.
 
     Raises:
         OptionError: an option is unknown or out of range.
@@ -136,26 +136,26 @@ def changed_options(options: CalibrationOptions, changes: Sequence[OptionChange]
 
 
 def checked_options(options: CalibrationOptions) -> CalibrationOptions:
-    """Return the options as they are if every value makes sense.
+    """Return the options unchanged if every value is valid.
 
     Raises:
-        OptionError: a number is not finite or out of its range, a choice is none of the choices, or two options contradict.
+        OptionError: a number is not finite or out of range, a choice is unknown, or two options contradict each other.
     """
     for leaf in _leaves().values():
         group = leaf.path.rpartition(".")[0]
         value = getattr(getattr(options, group) if group else options, leaf.field.name)
         if _kind(leaf) == "choice" and value not in typing.get_args(leaf.type):
             choices = " or ".join(typing.get_args(leaf.type))
-            raise OptionError(f"option {leaf.path}: '{value}' is not one of its values; choose {choices}")
+            raise OptionError(f"option {leaf.path}: unknown value '{value}'; choose {choices}")
         for name, number in _numbers(leaf.path, value):
             low, high = RANGES[name]
             if not (math.isfinite(number) and low <= number <= high):
                 raise OptionError(
-                    f"option {name}: {number:g} is out of range; give {low:g} to {high:g}{_unit_of(name)}"
+                    f"option {name}: {number:g} is out of range; allowed: {low:g} to {high:g}{_unit_of(name)}"
                 )
     if options.gating.min_range_m >= options.gating.max_range_m:
         raise OptionError(
-            f"option gating.min_range_m: {options.gating.min_range_m:g} m leaves nothing below "
+            f"option gating.min_range_m: {options.gating.min_range_m:g} m is not below "
             f"gating.max_range_m, {options.gating.max_range_m:g} m; make it smaller"
         )
     return options
@@ -163,7 +163,7 @@ def checked_options(options: CalibrationOptions) -> CalibrationOptions:
 
 @cache
 def option_groups() -> tuple[OptionGroup, ...]:
-    """Describe every option once: labels and units from the names, hints and ranges from the fields."""
+    """Describe every option: label and unit from its name, hint and range from its field."""
     groups: dict[str, list[OptionDescription]] = {}
     owners: dict[str, type] = {}
     for leaf in _leaves().values():
@@ -216,7 +216,7 @@ def _unknown(path: str) -> OptionError:
 
 @cache
 def _leaves() -> Mapping[str, _Leaf]:
-    """Every option that can be set on its own, by path; a camera position is set as a whole."""
+    """Return every option that can be set on its own, by path; a camera position is set as a whole."""
     leaves: dict[str, _Leaf] = {}
     top = typing.get_type_hints(CalibrationOptions)
     for field in dataclasses.fields(CalibrationOptions):
@@ -232,7 +232,7 @@ def _leaves() -> Mapping[str, _Leaf]:
 
 
 def _ranges() -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield the range of every number, by the name that `_numbers` gives it."""
+    """Yield the range of every number, under the name that `_numbers` gives it."""
     for leaf in _leaves().values():
         if _kind(leaf) in ("number", "integer"):
             yield leaf.path, (leaf.field.metadata["low"], leaf.field.metadata["high"])
@@ -250,7 +250,7 @@ def _kind(leaf: _Leaf) -> OptionKind:
 
 
 def _numbers(path: str, value: object) -> Iterator[tuple[str, float]]:
-    """Yield the numbers of an option's value, each with the name its range goes by."""
+    """Yield the numbers in an option's value, each with the name of its range."""
     if isinstance(value, CameraPositionPrior):
         for number in value.position_m:
             yield f"{path}.position_m", number
@@ -274,4 +274,4 @@ def _label(name: str) -> str:
 
 
 RANGES: Mapping[str, tuple[float, float]] = dict(_ranges())
-"""The smallest and largest value of each number, both allowed, as the options' fields have them."""
+"""The smallest and largest allowed value of each number, from the options' fields."""

@@ -1,4 +1,4 @@
-"""Where the installed program finds its files and keeps its state, and whether another package conflicts with it."""
+"""Where the program finds its own files and keeps its state, and whether another package overwrites it."""
 
 import importlib.metadata
 import os
@@ -26,7 +26,7 @@ class InstallationError(CalibrationError):
 
 
 def static_folder() -> Path:
-    """Return the folder of the page's files: inside the installed package, else next to it in the checkout.
+    """Return the folder of the page's files: inside the installed package, or next to it in a checkout.
 
     Raises:
         InstallationError: it is in neither place.
@@ -35,7 +35,7 @@ def static_folder() -> Path:
 
 
 def sample_folder() -> Path:
-    """Return the folder of the sample recordings: inside the installed package, else next to it in the checkout.
+    """Return the folder of the sample recordings: inside the installed package, or next to it in a checkout.
 
     Raises:
         InstallationError: it is in neither place.
@@ -44,12 +44,12 @@ def sample_folder() -> Path:
 
 
 def state_folder() -> Path:
-    """Return the folder in which the program keeps its state for this user; it may not exist yet."""
+    """Return the folder for this user's program state; it may not exist yet."""
     return _system_state_folder() / _DISTRIBUTION
 
 
 def version() -> str:
-    """Return the version of the installed program; "0+unknown" when it runs from a checkout that is not installed."""
+    """Return the version of the installed program; "0+unknown" if it runs from a checkout that is not installed."""
     try:
         return importlib.metadata.version(_DISTRIBUTION)
     except importlib.metadata.PackageNotFoundError:
@@ -57,12 +57,12 @@ def version() -> str:
 
 
 def installed_app_owners() -> tuple[str, ...]:
-    """Return the names of the installed distributions that bring a top-level package called `app`."""
+    """Return the names of the installed distributions that contain a top-level package `app`."""
     return tuple(sorted(set(importlib.metadata.packages_distributions().get("app", ()))))
 
 
 def check_installation() -> None:
-    """Refuse to start if another distribution has installed its own `app` over ours.
+    """Refuse to start if another distribution also installs a package `app`.
 
     Raises:
         InstallationError: more than one distribution owns `app`.
@@ -71,7 +71,7 @@ def check_installation() -> None:
     if others:
         raise InstallationError(
             f"another package, {' and '.join(others)}, is installed here with the same import name, app, "
-            f"and one has overwritten the other; install {_DISTRIBUTION} in its own environment, "
+            f"so one of them has overwritten the other; install {_DISTRIBUTION} into its own environment "
             f"with `uv tool install {_DISTRIBUTION}` or `pipx install {_DISTRIBUTION}`"
         )
 
@@ -81,7 +81,7 @@ def _folder(name: str) -> Path:
         if folder.is_dir():
             return folder
     raise InstallationError(
-        f"the folder {name} is neither in {_PACKAGE_FOLDER} nor next to it; install {_DISTRIBUTION} again"
+        f"the folder {name} is neither in {_PACKAGE_FOLDER} nor next to it; reinstall {_DISTRIBUTION}"
     )
 
 

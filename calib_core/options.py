@@ -1,4 +1,4 @@
-"""Every option of the core, once: these are the flags, the page's fields and the provenance in the exported file."""
+"""All options of the core. They define the flags, the page's fields and the provenance in exported files."""
 
 import math
 from dataclasses import dataclass, field
@@ -20,13 +20,13 @@ Method = Literal["default", "paper"]
 
 
 def option(default: Any, text: str, *, low: float = -math.inf, high: float = math.inf) -> Any:
-    """Make the field of an option; what is said of it is kept in the field's metadata.
+    """Make the field of an option; its text and range are kept in the field's metadata.
 
     Args:
-        default: the value when nobody sets it.
-        text: one sentence for people: the help of the flag and the hint on the page. Its unit is in the field's name.
-        low: the smallest number allowed.
-        high: the largest number allowed.
+        default: the value if it is not set.
+        text: one sentence for users: the help of the flag and the hint on the page. The unit is in the field's name.
+        low: the smallest allowed number.
+        high: the largest allowed number.
     """
     return field(default=default, metadata={"help": text, "low": low, "high": high})
 
@@ -49,25 +49,27 @@ class LocatingOptions:
     window_s: float = option(
         3.0, "Length of the window centred on the scan nearest to the click [s] (paper: 3 s).", low=0.01, high=60.0
     )
-    max_candidates: int = option(6, "How many candidates a click keeps.", low=1, high=50)
+    max_candidates: int = option(6, "Largest number of candidates per click.", low=1, high=50)
     max_time_gap_s: float = option(
-        1.5, "A click farther than this from any scan stays unpaired [s].", low=0.0, high=60.0
+        1.5, "A click farther than this from every scan stays unpaired [s].", low=0.0, high=60.0
     )
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseOptions:
-    """Standard deviations assumed where the message has none; the solver then estimates by how much they are off."""
+    """Standard deviations to use where the message gives none; the solver then estimates how far they are off."""
 
-    sigma_px: float = option(2.0, "Of a click, per axis [px].", low=0.01, high=1000.0)
-    sigma_range_m: float = option(0.03, "Of a placement's range [m].", low=1e-4, high=10.0)
+    sigma_px: float = option(2.0, "Standard deviation of a click, per axis [px].", low=0.01, high=1000.0)
+    sigma_range_m: float = option(0.03, "Standard deviation of a placement's range [m].", low=1e-4, high=10.0)
     sigma_azimuth_deg: float = option(
         0.5,
-        "Of a placement's azimuth [deg]; angle bins and calibration included: scatter in the window understates it.",
+        "Standard deviation of a placement's azimuth [deg], angle bins and calibration included; window scatter understates it.",
         low=1e-3,
         high=45.0,
     )
-    sigma_elevation_deg: float = option(1.0, "Of a placement's elevation [deg].", low=1e-3, high=45.0)
+    sigma_elevation_deg: float = option(
+        1.0, "Standard deviation of a placement's elevation [deg].", low=1e-3, high=45.0
+    )
     estimate_scale: bool = option(
         True, "Estimate the noise level from the residuals (variance components) once there are enough pairs."
     )
@@ -75,57 +77,57 @@ class NoiseOptions:
 
 @dataclass(frozen=True, slots=True)
 class CameraPositionPrior:
-    """A tape-measured camera position: the most valuable extra fact there is."""
+    """A tape-measured camera position; no other extra measurement helps as much."""
 
     position_m: tuple[float, float, float] = option(
         (0.0, 0.0, 0.0), "Camera centre in the radar frame: forward, left, up [m].", low=-100.0, high=100.0
     )
-    sigma_m: float = option(0.01, "How well it is known, per axis [m].", low=1e-4, high=10.0)
+    sigma_m: float = option(0.01, "Standard deviation of that position, per axis [m].", low=1e-4, high=10.0)
 
 
 @dataclass(frozen=True, slots=True)
 class SolvingOptions:
     """How pairs become a pose (default method)."""
 
-    camera_position: CameraPositionPrior | None = option(None, "Tape-measured camera position, if there is one.")
+    camera_position: CameraPositionPrior | None = option(None, "Tape-measured camera position, if known.")
     nominal_camera_distance_m: float = option(
         1.0,
-        "Rough distance between the sensors [m]: a wide prior that only tells a pose from its mirror image.",
+        "Rough distance between the sensors [m]: a wide prior, only to distinguish a pose from its mirror image.",
         low=0.01,
         high=100.0,
     )
-    seed: int = option(1, "Of every random draw; the same seed gives the same bytes.", low=0, high=2**32 - 1)
+    seed: int = option(1, "Seed of the random generator; the same seed gives the same bytes.", low=0, high=2**32 - 1)
 
 
 @dataclass(frozen=True, slots=True)
 class PaperOptions:
-    """What Algorithm 1 of the paper leaves open."""
+    """What Algorithm 1 of the paper does not specify."""
 
     z_score_threshold: float = option(
-        1.0, "Largest absolute z-score per axis of a return that is averaged; the authors use 1.", low=0.01, high=100.0
+        1.0, "Largest absolute z-score per axis of a return to be averaged; the authors use 1.", low=0.01, high=100.0
     )
     z_score_axes: Literal["separately", "in-turn"] = option(
         "separately",
-        "Each axis judged over the whole window, or as the authors do: y over what x left, z over what y left.",
+        "Filter each axis over the whole window, or as the authors do: y on the returns that x keeps, z on those that y keeps.",
     )
     window: Literal["centred", "whole-second"] = option(
         "centred",
-        "Centred on the nearest stamp as the paper prints, or the authors' 1 s to either side of that stamp's whole second.",
+        "Centred on the nearest stamp as in the paper, or as the authors do: 1 s on either side of that stamp's whole second.",
     )
     window_s: float = option(3.0, "Length of the centred window [s].", low=0.01, high=60.0)
     max_range_m: float = option(20.0, "Range filter of Algorithm 1 [m].", low=0.1, high=1000.0)
     max_speed_mps: float = option(
-        0.0, "Velocity filter of Algorithm 1 [m/s]: exactly 0 as printed.", low=0.0, high=100.0
+        0.0, "Velocity filter of Algorithm 1 [m/s]: exactly 0 in the paper.", low=0.0, high=100.0
     )
     ransac_threshold_px: float = option(
         8.0,
-        "Reprojection error of a RANSAC inlier [px]; the paper gives none, the authors use OpenCV's 8.",
+        "Largest reprojection error of a RANSAC inlier [px]; not in the paper, the authors use OpenCV's 8.",
         low=0.01,
         high=1000.0,
     )
     ransac_iterations: int = option(
         10_000,
-        "RANSAC iterations; the paper gives none, the authors use 10,000 for the iterative solver.",
+        "RANSAC iterations; not in the paper, the authors use 10,000 for the iterative solver.",
         low=1,
         high=1_000_000,
     )
@@ -134,7 +136,7 @@ class PaperOptions:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationOptions:
-    """Everything that steers a calibration."""
+    """All options of a calibration."""
 
     method: Method = option("default", "The robust estimator, or the paper's Algorithm 1 as printed.")
     gating: GatingOptions = field(default_factory=GatingOptions)

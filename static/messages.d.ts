@@ -64,7 +64,7 @@ export interface LocatingOptions {
   max_time_gap_s: number;
 }
 
-/** Standard deviations assumed where the message has none; the solver then estimates by how much they are off. */
+/** Standard deviations to use where the message gives none; the solver then estimates how far they are off. */
 export interface NoiseOptions {
   sigma_px: number;
   sigma_range_m: number;
@@ -73,7 +73,7 @@ export interface NoiseOptions {
   estimate_scale: boolean;
 }
 
-/** A tape-measured camera position: the most valuable extra fact there is. */
+/** A tape-measured camera position; no other extra measurement helps as much. */
 export interface CameraPositionPrior {
   position_m: [number, number, number];
   sigma_m: number;
@@ -86,7 +86,7 @@ export interface SolvingOptions {
   seed: number;
 }
 
-/** What Algorithm 1 of the paper leaves open. */
+/** What Algorithm 1 of the paper does not specify. */
 export interface PaperOptions {
   z_score_threshold: number;
   z_score_axes: "separately" | "in-turn";
@@ -99,7 +99,7 @@ export interface PaperOptions {
   ransac_confidence: number;
 }
 
-/** Everything that steers a calibration. */
+/** All options of a calibration. */
 export interface CalibrationOptions {
   method: "default" | "paper";
   gating: GatingOptions;
@@ -173,7 +173,7 @@ export interface SessionNote {
   note: string;
 }
 
-/** What a person needs to know to set one option. */
+/** What a user needs to know to set one option. */
 export interface OptionDescription {
   path: string;
   label: string;
@@ -186,7 +186,7 @@ export interface OptionDescription {
   default: boolean | number | string | CameraPositionPrior | null;
 }
 
-/** Options that belong together; the first group has no name and holds the method. */
+/** Related options; the first group has no name and contains the method. */
 export interface OptionGroup {
   name: string;
   hint: string;

@@ -1,7 +1,7 @@
-"""Find the browser that the tests drive, or install one: `python tests/find_browser.py [--install]` prints its path.
+"""Find the browser for the tests, or install one: `python tests/find_browser.py [--install]` prints its path.
 
-Order: $COCALIB_BROWSER, a Chrome or Chromium of the system that runs, Playwright's own build; with --install, Debian's or
-Ubuntu's chromium package as root, else Playwright's build. There is no skipping: without a browser the tests fail.
+Order: $COCALIB_BROWSER, a working Chrome or Chromium on the system, Playwright's own build; with --install, Debian's
+chromium package if run as root, else Playwright's build. The tests are not skipped: without a browser they fail.
 """
 
 import os
@@ -20,18 +20,18 @@ _PLACES = (
     r"C:\Program Files\Google\Chrome\Application\chrome.exe",
     r"C:\Program Files (x86)\Microsoft\Edge\Application\msedge.exe",
 )
-_ADVICE = "no browser runs here; type: python tests/find_browser.py --install"
+_ADVICE = "no working browser found; run: python tests/find_browser.py --install"
 
 
 class BrowserMissingError(RuntimeError):
-    """No browser runs on this machine."""
+    """There is no working browser on this machine."""
 
 
 def find_browser() -> Path:
-    """Return a browser that answers to --version: Ubuntu's package can be a stub that does not.
+    """Return a browser that answers --version; Ubuntu's package can be a stub that does not.
 
     Raises:
-        BrowserMissingError: there is none; the text is the line to type.
+        BrowserMissingError: there is none; the message has the command to run.
     """
     chosen = os.environ.get("COCALIB_BROWSER")
     if chosen:
@@ -52,7 +52,7 @@ def _candidates() -> Iterator[str]:
 
 
 def _runs(path: str) -> bool:
-    if sys.platform == "win32":  # prints nothing there, and opens a window
+    if sys.platform == "win32":  # there, --version prints nothing and opens a window
         return Path(path).is_file()
     try:
         answer = subprocess.run([path, "--version"], capture_output=True, text=True, timeout=60, check=False)
@@ -62,7 +62,7 @@ def _runs(path: str) -> bool:
 
 
 def _playwright_build() -> str:
-    """Return where Playwright keeps its Chromium; "" when its driver does not start."""
+    """Return the path of Playwright's Chromium; "" if its driver does not start."""
     code = "from playwright.sync_api import sync_playwright as s\nwith s() as p: print(p.chromium.executable_path)"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
     return answer.stdout.strip() if answer.returncode == 0 else ""
@@ -87,13 +87,13 @@ def _installed() -> bool:
 
 
 def _is_ubuntu() -> bool:
-    """Tell whether chromium is only a stub for a snap here."""
+    """Return whether this is Ubuntu, where the chromium package is only a stub for a snap."""
     release = Path("/etc/os-release")
     return release.is_file() and "ubuntu" in release.read_text(encoding="utf-8").lower()
 
 
 def main() -> int:
-    """Print the browser's path; install one first if asked to and if there is none."""
+    """Print the browser's path; with --install, install one if there is none."""
     try:
         print(find_browser())
     except BrowserMissingError as error:
@@ -105,7 +105,7 @@ def main() -> int:
             print(find_browser())
         except BrowserMissingError:
             print(
-                "no browser could be installed; install Chrome or Chromium and set COCALIB_BROWSER to its path",
+                "cannot install a browser; install Chrome or Chromium and set COCALIB_BROWSER to its path",
                 file=sys.stderr,
             )
             return 1

@@ -1,8 +1,8 @@
-"""The command line: reads what was typed, runs it, and turns every refusal into one line and an exit code.
+"""The command line: parses the arguments, runs the command, and turns each error into one line and an exit code.
 
-Exit codes: 0 done; 1 the data cannot give a calibration; 2 wrong usage or unreadable input; 130 stopped by
+Exit codes: 0 done; 1 no calibration possible from the data; 2 wrong usage or unreadable input; 130 stopped by
 Ctrl+C, 143 by SIGTERM.
-Only what the typed command needs is imported: the version and the overview come without NumPy and tyro.
+A command imports only what it needs: `--version` and `--help` need neither NumPy nor tyro.
 """
 
 import os
@@ -21,7 +21,7 @@ def run(arguments: Sequence[str]) -> int:
     """Run one command.
 
     Args:
-        arguments: what was typed after `cocalib`.
+        arguments: the command-line arguments after `cocalib`.
 
     Returns:
         The exit code.
@@ -30,18 +30,18 @@ def run(arguments: Sequence[str]) -> int:
         return _run(*arguments)
     except CalibrationError as error:
         return refuse(str(error))
-    except BrokenPipeError:  # whoever read our output has seen enough
+    except BrokenPipeError:  # the reader of our output has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
         return refuse(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
-    except KeyboardInterrupt as stop:  # with the number of the signal, where it was not Ctrl+C
+    except KeyboardInterrupt as stop:  # carries the signal number if it was not Ctrl+C
         print(file=sys.stderr)
         return 128 + int(stop.args[0] if stop.args else signal.SIGINT)
 
 
 def refuse(reason: str) -> int:
-    """Say on stderr, in one line, why a command cannot run; return exit code 2."""
+    """Print one line to stderr that says why a command cannot run; return exit code 2."""
     print(f"{PROGRAM}: {' '.join(reason.split())}", file=sys.stderr)
     return 2
 
@@ -63,8 +63,8 @@ def _run(first: str = "--help", *others: str) -> int:
 
 
 def _unknown(first: str) -> str:
-    """Say that what was typed first is no command, and what may have been meant."""
+    """Say that the first argument is not a command, and suggest one."""
     if first.startswith("-"):
-        return f"unknown option {first.split('=')[0]}; a command comes first: {', '.join(COMMANDS)}"
+        return f"unknown option {first.split('=')[0]}; give a command first: {', '.join(COMMANDS)}"
     near = get_close_matches(first, COMMANDS, n=1)
     return f"unknown command '{first}'; " + (f"did you mean '{near[0]}'?" if near else f"known: {', '.join(COMMANDS)}")

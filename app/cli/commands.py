@@ -1,4 +1,4 @@
-"""The commands, in one table: what the overview prints, what may be typed, and where each is written.
+"""The table of commands: each one's name, the summary that the overview prints, and the class that implements it.
 
 A test compares every summary with the first sentence of the command's own docstring.
 """
@@ -12,15 +12,15 @@ from typing import Protocol, cast
 __all__ = ["COMMANDS", "PROGRAM", "Command", "Runnable", "overview"]
 
 PROGRAM = "cocalib"
-_DESCRIPTION = "Radar-camera calibration: click the corner reflector, get camera_from_radar and how far to trust it."
+_DESCRIPTION = "Radar-camera calibration: click the corner reflector, get camera_from_radar and its uncertainty."
 _WIDTH = 80
 
 
 class Runnable(Protocol):
-    """A command whose arguments are read."""
+    """A command whose arguments have been parsed."""
 
     def run(self) -> int:
-        """Do what was asked for; return the exit code."""
+        """Run the command; return the exit code."""
         ...
 
 
@@ -29,9 +29,9 @@ class Command:
     """One command.
 
     Attributes:
-        name: as it is typed.
-        where: its module and class, such as "app.cli.info:Info"; imported only when this command is typed.
-        summary: the first paragraph of the class's docstring, in one line.
+        name: as typed.
+        where: its module and class, such as "app.cli.info:Info"; imported only when this command is used.
+        summary: the first paragraph of the class's docstring, on one line.
     """
 
     name: str
@@ -52,38 +52,37 @@ COMMANDS: Mapping[str, Command] = {
         Command(
             "info",
             "app.cli.info:Info",
-            "Say what a recording holds: files, topics, types, rates, stamps, overlap, camera, warnings.",
+            "Show what a recording contains: files, topics, types, rates, stamps, overlap, camera, warnings.",
         ),
         Command(
             "solve",
             "app.cli.solve:Solve",
-            "Solve a calibration from a recording and its clicks, or from a file of pairs.",
+            "Compute a calibration from a recording and its clicks, or from a file of pairs.",
         ),
         Command(
             "export",
             "app.cli.export:Export",
-            "Write a calibration as another stack reads it; `--to list` names the formats.",
+            "Write a calibration in the format of another tool; `--to list` lists the formats.",
         ),
         Command(
             "check",
             "app.cli.export:Check",
-            "Read a calibration back, say what is wrong with it, or compare two. "
-            "Exit code 1: wrong; 3: looks wrong, not proven.",
+            "Check a calibration file for errors, or compare two. Exit code 1: wrong; 3: looks wrong, not proven.",
         ),
         Command(
             "import",
             "app.cli.import_file:Import",
-            "Turn a calibration of any known format into cocalib/calibration-1 JSON.",
+            "Convert a calibration from any known format to cocalib/calibration-1 JSON.",
         ),
         Command(
             "video",
             "app.cli.video:Video",
-            "Write the camera's frames into a video, each at its recorded time; recorded JPEG is not encoded again.",
+            "Write the camera's frames to a video, each at its recorded time; recorded JPEG is not re-encoded.",
         ),
         Command(
             "simulate",
             "app.cli.simulate:Simulate",
-            "Record a scene that was never there: radar, camera, and the truth about both (truth.json).",
+            "Simulate a recording: radar, camera, and the ground truth (truth.json).",
         ),
     )
 }
@@ -100,13 +99,15 @@ def overview() -> str:
         *_columns({command.name: command.summary for command in COMMANDS.values()}),
         "",
         "options:",
-        *_columns({"-h, --help": "Show this; after a command, its arguments.", "--version": "Print the version."}),
+        *_columns(
+            {"-h, --help": "Show this help; after a command, show its options.", "--version": "Print the version."}
+        ),
     ]
     return "\n".join(lines)
 
 
 def _columns(rows: Mapping[str, str]) -> Iterator[str]:
-    """Lay out names and what they mean, the meaning wrapped in a column of its own."""
+    """Lay out names and their texts in two columns, with the texts wrapped."""
     width = max(map(len, rows)) + 4
     for name, text in rows.items():
         indent = f"{f'  {name}':<{width}}"

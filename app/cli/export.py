@@ -1,4 +1,4 @@
-"""`cocalib export` and `cocalib check`: a calibration in the words of another stack, and the proof that it was read right."""
+"""`cocalib export` and `cocalib check`: write a calibration in another tool's format, and check a calibration file."""
 
 import sys
 from dataclasses import dataclass
@@ -19,22 +19,22 @@ __all__ = ["Check", "Export"]
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """Write a calibration as another stack reads it; `--to list` names the formats."""
+    """Write a calibration in the format of another tool; `--to list` lists the formats."""
 
     calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("CALIBRATION.json")] = ()
-    """A calibration that cocalib wrote (cocalib/calibration-1 JSON)."""
+    """A calibration written by cocalib (cocalib/calibration-1 JSON)."""
     to: Annotated[str, tyro.conf.arg(metavar="FORMAT")] = "list"
-    """The format: tf2, urdf, ...; "list" names them all."""
+    """Output format: tf2, urdf, ...; "list" lists them all."""
     out: File = None
-    """Where it goes, a file or a folder; without it, text goes to stdout."""
+    """Output file or folder; without it, text formats go to stdout."""
     parent_from_radar: Annotated[
         tuple[float, float, float, float, float, float, float] | None,
         called("X Y Z QX QY QZ QW"),
     ] = None
-    """Pose of the radar in the third frame of autoware (kit), driveworks (rig), nuscenes (ego): metres, quaternion, w last."""
+    """Pose of the radar in the parent frame of autoware (kit), driveworks (rig) or nuscenes (ego): metres, quaternion, w last."""
 
     rectified: Switch = False
-    """Your pictures are rectified: undistorted with this same camera matrix. kitti and nuscenes take a distorted lens only so."""
+    """Your pictures are rectified (undistorted, same camera matrix). kitti and nuscenes need this if the lens has distortion."""
 
     def run(self) -> int:
         """Write the export; return the exit code."""
@@ -58,7 +58,7 @@ class Export:
             write_whole(target, written.data)
             print(f"written to {target}")
         elif isinstance(written.content, bytes):
-            raise InputError(f"{self.to} is a binary format; say where it goes: --out {written.file_name}")
+            raise InputError(f"{self.to} is a binary format and needs a file: --out {written.file_name}")
         else:
             print(written.content, end="")
         return 0
@@ -71,7 +71,7 @@ def _own_calibration(path: Path) -> "CalibrationFile":
     found = read_any(data, str(path))
     if found.file is None:
         raise InputError(
-            f"{path}: is {found.format}, and export takes calibration-1; make one of it first: "
+            f"{path}: is {found.format}, but export takes calibration-1; convert it first: "
             f"cocalib import {path.name} --out calibration.json"
         )
     return read_calibration(data, str(path))
@@ -79,19 +79,19 @@ def _own_calibration(path: Path) -> "CalibrationFile":
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Read a calibration back, say what is wrong with it, or compare two. Exit code 1: wrong; 3: looks wrong, not proven."""
+    """Check a calibration file for errors, or compare two. Exit code 1: wrong; 3: looks wrong, not proven."""
 
     calibration: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CALIBRATION")]
     """A calibration in any format that export writes."""
     against: File = None
-    """Another one to compare with: in degrees, centimetres, and pixels at 5, 20 and 60 m."""
+    """Another calibration to compare with: in degrees, centimetres, and pixels at 5, 20 and 60 m."""
     camera: File = None
-    """Intrinsics, where the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     pairs: File = None
-    """Pairs to hold it against: pairs-1, or a calibration-1 file whose pairs are taken."""
+    """Pairs to test it with: a pairs-1 file, or a calibration-1 file with pairs."""
 
     def run(self) -> int:
-        """Print the results; return 0 when nothing is wrong, 1 when something is, 3 when it looks wrong and cannot be told."""
+        """Print the results; return 0 if nothing is wrong, 1 if something is, 3 if it looks wrong but that is not proven."""
         from calib_core.interchange import check, read_any_file, read_camera_file, read_check_pairs_file
 
         other = read_any_file(self.against) if self.against else None

@@ -1,4 +1,4 @@
-"""Flags that several commands share, and how values are called in the help."""
+"""Flags that several commands share, and the names of values in the help."""
 
 import dataclasses
 from pathlib import Path
@@ -10,12 +10,12 @@ __all__ = ["File", "Folder", "NewFile", "Switch", "called", "same"]
 
 
 def called(metavar: str | None = None) -> object:
-    """Name a value in the help; a default of None or False tells nobody anything, so it is left out."""
+    """Name a value in the help, and omit its default: None or False would say nothing."""
     return tyro.conf.arg(metavar=metavar, help_behavior_hint="")
 
 
 def same(options: type[Any], name: str) -> Any:
-    """Return a field with the default and the text of one in a class of options, for a subclass that names its value."""
+    """Copy an option's default and text to a field of a subclass, which names the value in the help."""
     (found,) = (field for field in dataclasses.fields(options) if field.name == name)
     return dataclasses.field(default=found.default, metadata=found.metadata)
 

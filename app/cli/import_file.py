@@ -1,4 +1,4 @@
-"""`cocalib import`, and the calibration that `cocalib open --calibration` shows: a calibration that somebody else wrote."""
+"""`cocalib import`, and reading the calibration that `cocalib open --calibration` shows."""
 
 import hashlib
 import sys
@@ -21,14 +21,14 @@ __all__ = ["Import", "camera_in", "reference_from"]
 
 @dataclass(frozen=True, slots=True)
 class Import:
-    """Turn a calibration of any known format into cocalib/calibration-1 JSON."""
+    """Convert a calibration from any known format to cocalib/calibration-1 JSON."""
 
     calibration: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A calibration in any format that export writes, whoever wrote it."""
+    """A calibration in any format that export writes, from any program."""
     out: NewFile
-    """Where the calibration-1 JSON goes."""
+    """Output file (calibration-1 JSON)."""
     camera: File = None
-    """Intrinsics, where the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
 
     def run(self) -> int:
         """Write the calibration; return the exit code."""
@@ -49,10 +49,10 @@ class Import:
 
 
 def camera_in(path: Path, width_px: int, height_px: int) -> "Camera | None":
-    """Return the camera in a calibration file if it is one of this image size, else None.
+    """Return the camera in a calibration file if it has this image size, else None.
 
     Raises:
-        InputError: the file holds no calibration.
+        InputError: the file contains no calibration.
     """
     from calib_core.interchange import read_any_file
 
@@ -62,14 +62,14 @@ def camera_in(path: Path, width_px: int, height_px: int) -> "Camera | None":
 
 
 def reference_from(path: Path, camera: "Camera | None") -> "Reference":
-    """Return the calibration in a file, to be looked at through the camera of the recording.
+    """Return the calibration in a file, to be shown with the recording's camera.
 
     Raises:
-        InputError: it holds no calibration, contradicts itself or misses its own check point.
+        InputError: it contains no calibration, contradicts itself or fails its own check point.
     """
     from app.view import Reference
     from calib_core.interchange import adopted_calibration, read_any_file
 
     if camera is None:
-        raise InputError(f"{path}: there are no intrinsics to look at this calibration through; give --camera FILE")
+        raise InputError(f"{path}: showing this calibration needs intrinsics; give --camera FILE")
     return Reference(path.name, adopted_calibration(read_any_file(path), str(path), camera=camera))

@@ -1,4 +1,4 @@
-"""`cocalib info`: what is in a recording."""
+"""`cocalib info`: show what is in a recording."""
 
 from dataclasses import dataclass, field
 
@@ -10,12 +10,12 @@ __all__ = ["Info"]
 
 @dataclass(frozen=True, slots=True)
 class Info:
-    """Say what a recording holds: files, topics, types, rates, stamps, overlap, camera, warnings."""
+    """Show what a recording contains: files, topics, types, rates, stamps, overlap, camera, warnings."""
 
     recording: Recordings
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     json: Switch = False
-    """Print the same as JSON on stdout."""
+    """Print JSON instead of text."""
     topics: Topics = field(default_factory=TopicFlags)
 
     def run(self) -> int:

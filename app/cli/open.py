@@ -1,4 +1,4 @@
-"""`cocalib demo` and `cocalib open`: the page."""
+"""`cocalib demo` and `cocalib open`: calibrate in the browser."""
 
 import dataclasses
 import hashlib
@@ -27,23 +27,23 @@ __all__ = ["Demo", "Open"]
 
 _RECORDING_SUFFIXES = (".bag", ".mcap", ".db3")
 _LARGE_BYTES = 1_000_000_000
-"""Files of this size together are hardly open before the page is: it comes first."""
+"""If the files are this large in total, the page is served before they are opened."""
 _SOON_S = 0.2
-"""Smaller ones are usually open after this, and then the page never sees them opened [s]."""
+"""Smaller files are usually open within this time, and the page then shows no waiting screen [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class ServingFlags:
-    """Where the page is served."""
+    """Where to serve the page."""
 
     host: Annotated[str, tyro.conf.arg(metavar="ADDRESS")] = "127.0.0.1"
-    """Address to bind; anything but loopback lets other machines in, who then need the token."""
+    """Address to bind; any other than loopback admits other machines, which then need the token."""
     port: int = 8080
-    """Port; the next free one when it is taken, and 0 takes any."""
+    """Port; if it is taken, the next free one; 0 for any free port."""
     token: Annotated[str | None, called("TOKEN")] = None
-    """The token to ask for; without it, one is made and printed in the link."""
+    """Token that the link must contain; generated and printed if omitted."""
     no_browser: Switch = False
-    """Print the link and do not open a browser."""
+    """Print the link, do not open a browser."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +51,9 @@ class Demo:
     """Open the sample recording in the browser."""
 
     session: Folder = None
-    """Folder of the session; without it, one in your user folder, kept from run to run."""
+    """Session folder; by default, one in your user folder that is kept between runs."""
     fresh: Switch = False
-    """Begin without the clicks of the last time; they are kept beside."""
+    """Start without the previous clicks (a backup is kept)."""
     serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
 
     def run(self) -> int:
@@ -73,7 +73,7 @@ class Demo:
 
 
 def _digest(files: Sequence[Path]) -> str:
-    """Return a few letters that tell one sample from that of another version: a session belongs to one recording."""
+    """Return a short hash that identifies the version of the sample: a session belongs to one recording."""
     content = hashlib.sha256()
     for file in files:
         content.update(file.read_bytes())
@@ -85,17 +85,17 @@ class Open:
     """Calibrate your own recording in the browser."""
 
     recording: Recordings
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     camera: File = None
-    """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    """Intrinsics to use if the recording has none, or instead of its own: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     calibration: File = None
-    """A calibration to look at, in any format: shown until the clicks give one of their own, then compared with it."""
+    """A calibration to show, in any format: drawn until the clicks give a new one, then compared with it."""
     clicks: File = None
-    """Clicks that a new session begins with (cocalib/clicks-1 JSON)."""
+    """Clicks to start a new session with (cocalib/clicks-1 JSON)."""
     session: Folder = None
-    """Folder of the session; without it, beside the recording where that can be written, else in your user folder."""
+    """Session folder; by default, next to the recording if that is writable, else in your user folder."""
     fresh: Switch = False
-    """Begin without the clicks of the last time; they are kept beside."""
+    """Start without the previous clicks (a backup is kept)."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
@@ -157,7 +157,7 @@ def _serve(
         camera = _camera(recording, camera_file, calibration_file)
         reference = reference_from(calibration_file, camera) if calibration_file else None
         if fresh and (kept := set_aside(session)) is not None:
-            print(f"The session of the last time is kept in {kept}")
+            print(f"The previous session is kept in {kept}")
         workspace = open_workspace(recording, camera=camera, session_folder=session, name=name, reference=reference)
         stack.callback(workspace.close)
         for warning in workspace.restored.warnings:
@@ -167,13 +167,13 @@ def _serve(
         if clicks_file is not None and workspace.restored.steps == 0:
             workspace.import_clicks(read_text(clicks_file), source=str(clicks_file))
         elif clicks_file is not None:
-            print(f"The session goes on as it was; {clicks_file} was not taken in again (--fresh begins anew)")
+            print(f"Continuing the existing session; {clicks_file} was not imported (start over with --fresh)")
         service.serve(workspace, recording)
     return 0
 
 
 def _service(paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str) -> "Service":
-    """Return what serves; a large recording is served, to be waited for, before it is open."""
+    """Return the service; it serves the page of a large recording before the recording is open."""
     from app.web.messages import Opening
     from app.web.port.server import ServerOptions
     from app.web.port.serving import Service
@@ -190,17 +190,17 @@ def _service(paths: Sequence[Path], topics: RecordingOptions, serving: ServingFl
 
 
 def _size_bytes(path: Path) -> int:
-    """Return the size of a file, or of the recording files in a folder; 0 where that cannot be told."""
+    """Return the size of a file, or of the recording files in a folder; 0 if that is unknown."""
     try:
         if path.is_dir():
             return sum(inside.stat().st_size for inside in path.iterdir() if inside.suffix in _RECORDING_SUFFIXES)
         return path.stat().st_size
-    except OSError:  # opening the recording tells what is wrong
+    except OSError:  # opening the recording reports the error
         return 0
 
 
 def _require_given(*files: Path | None) -> None:
-    """Refuse files that are not there before anything is read or served.
+    """Refuse missing files before anything is read or served.
 
     Raises:
         InputError: a file is missing.
@@ -211,7 +211,7 @@ def _require_given(*files: Path | None) -> None:
 
 
 def _camera(recording: Recording, camera_file: Path | None, calibration_file: Path | None) -> Camera:
-    """Return the intrinsics: the file's, else the recording's, else those in the calibration that is to be looked at.
+    """Return the intrinsics: from the file, else from the recording, else from the calibration to show.
 
     Raises:
         InputError: there are none.

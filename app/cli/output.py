@@ -1,4 +1,4 @@
-"""What commands share: reading and writing files, and what a recording must bring."""
+"""Shared by the commands: reading and writing files, required intrinsics, progress."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -27,7 +27,7 @@ _MAX_TEXT_BYTES = 64 * 1024 * 1024
 
 
 def explain_unsolvable(outcome: "Unsolvable") -> int:
-    """Say on stderr why the data cannot give a calibration, what would help, and which clicks found no radar; return 1."""
+    """Print to stderr why there is no calibration, what would help, and which clicks are unpaired; return 1."""
     from app.view import sentence
 
     print(f"cocalib: no calibration: {sentence(outcome.reason)} {sentence(outcome.hint)}", file=sys.stderr)
@@ -37,14 +37,16 @@ def explain_unsolvable(outcome: "Unsolvable") -> int:
 
 
 def read_text(path: Path) -> str:
-    """Read a text file whole.
+    """Read a text file.
 
     Raises:
         InputError: it is missing, a folder, unreadable, too large or not text.
     """
     try:
         if path.stat().st_size > _MAX_TEXT_BYTES:
-            raise InputError(f"{path}: larger than {_MAX_TEXT_BYTES // 2**20} MB, which no file of clicks or pairs is")
+            raise InputError(
+                f"{path}: larger than {_MAX_TEXT_BYTES // 2**20} MB, too large for clicks or pairs; check the path"
+            )
         return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; check the path") from None
@@ -55,7 +57,7 @@ def read_text(path: Path) -> str:
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file so that it is either the old one or the new one, never a part.
+    """Write a file atomically: a reader finds the old or the new content, never a part.
 
     Raises:
         InputError: the folder is missing or not writable.
@@ -67,7 +69,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 
 def required_camera(recording: "Recording", camera_file: Path | None) -> "Camera":
-    """Return the intrinsics: the file's where one is given, else the recording's.
+    """Return the intrinsics: from the file if one is given, else from the recording.
 
     Raises:
         InputError: there are none.
@@ -77,7 +79,7 @@ def required_camera(recording: "Recording", camera_file: Path | None) -> "Camera
     camera = camera_for(recording, camera_file)
     if camera is None:
         found = (
-            f"{recording.camera_info_topic} holds none that can be used"
+            f"{recording.camera_info_topic} has none that can be used"
             if recording.camera_info_topic
             else "it has no CameraInfo topic"
         )
@@ -90,13 +92,13 @@ def required_camera(recording: "Recording", camera_file: Path | None) -> "Camera
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar on stderr while something long goes on; nothing where stderr is not a terminal.
+    """Show a progress bar on stderr; nothing if stderr is not a terminal.
 
     Args:
-        label: what is going on.
+        label: what is being done.
 
     Yields:
-        the function to tell how much is done, and of how much.
+        a function that takes the amount done and the total.
     """
     from rich.console import Console
     from rich.progress import Progress

@@ -18,7 +18,7 @@ Recordings: TypeAlias = Annotated[tuple[Path, ...], tyro.conf.Positional, called
 
 @dataclass(frozen=True, slots=True)
 class TopicFlags(RecordingOptions):
-    """RecordingOptions with their values named; what each means is told there."""
+    """RecordingOptions with names for their values in the help; their texts are defined there."""
 
     radar_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "radar_topic")
     image_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "image_topic")
@@ -32,15 +32,15 @@ Topics: TypeAlias = Annotated[TopicFlags, tyro.conf.arg(name="")]
 
 @dataclass(frozen=True, slots=True)
 class MeasuredCamera:
-    """A tape-measured camera position: the most valuable extra fact there is."""
+    """A tape-measured camera position; no other extra measurement helps as much."""
 
     camera_position_m: Annotated[tuple[float, float, float] | None, called("X Y Z")] = None
-    """Where the camera's lens sits in the radar frame: forward, left, up [m]."""
+    """Measured position of the camera's lens in the radar frame: forward, left, up [m]."""
     camera_position_sigma_m: float = 0.01
-    """How well that is known, per axis [m]."""
+    """Standard deviation of that position, per axis [m]."""
 
     def over(self, options: CalibrationOptions) -> CalibrationOptions:
-        """Lay the measured position over the options."""
+        """Return the options with the measured position, if there is one."""
         if self.camera_position_m is None:
             return options
         prior = CameraPositionPrior(self.camera_position_m, self.camera_position_sigma_m)
@@ -48,7 +48,7 @@ class MeasuredCamera:
 
 
 CameraPosition: TypeAlias = Annotated[MeasuredCamera, tyro.conf.arg(name="")]
-# The camera position has flags of its own; here it would become a sub-command.
+# The camera position has its own flags; here it would become a subcommand.
 Options: TypeAlias = Annotated[
     CalibrationOptions, tyro.conf.arg(name=""), tyro.conf.AvoidSubcommands, tyro.conf.FlagConversionOff
 ]

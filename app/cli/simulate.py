@@ -1,4 +1,4 @@
-"""`cocalib simulate`: recordings whose truth is known."""
+"""`cocalib simulate`: recordings with known truth."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +16,7 @@ __all__ = ["Simulate"]
 
 @dataclass(frozen=True, slots=True)
 class SimulationFlags(SimulationOptions):
-    """SimulationOptions with a value named; what each means is told there."""
+    """SimulationOptions with a name for a value in the help; the texts are defined there."""
 
     field_of_view_deg: Annotated[float | None, called("FLOAT")] = same(SimulationOptions, "field_of_view_deg")
 
@@ -26,12 +26,12 @@ Simulation: TypeAlias = Annotated[SimulationFlags, tyro.conf.arg(name=""), tyro.
 
 @dataclass(frozen=True, slots=True)
 class Simulate:
-    """Record a scene that was never there: radar, camera, and the truth about both (truth.json)."""
+    """Simulate a recording: radar, camera, and the ground truth (truth.json)."""
 
     out: Annotated[Path, tyro.conf.arg(metavar="FOLDER")]
-    """Folder to write to; made when missing, and must be empty."""
+    """Output folder; created if missing, must be empty."""
     containers: tuple[Container, ...] = ("ros1",)
-    """What to write: ros1 (radar.bag and camera.bag), mcap, db3."""
+    """Files to write: ros1 (radar.bag and camera.bag), mcap, db3."""
     options: Simulation = field(default_factory=SimulationFlags)
 
     def run(self) -> int:
@@ -39,7 +39,7 @@ class Simulate:
         from calib_core.synthetic import simulate, write_recording
 
         if self.out.exists() and (not self.out.is_dir() or any(self.out.iterdir())):
-            raise InputError(f"{self.out}: not an empty folder; nothing was written")
+            raise InputError(f"{self.out}: not an empty folder; choose an empty or a new one")
         with progress_bar("rendering frames") as progress:
             paths = write_recording(simulate(self.options), self.out, containers=self.containers, progress=progress)
         print("\n".join(str(path) for path in paths))

@@ -1,4 +1,4 @@
-"""`cocalib solve`: a calibration without a browser."""
+"""`cocalib solve`: calibrate without a browser."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -25,21 +25,21 @@ __all__ = ["Solve"]
 
 @dataclass(frozen=True, slots=True)
 class Solve:
-    """Solve a calibration from a recording and its clicks, or from a file of pairs.
+    """Compute a calibration from a recording and its clicks, or from a file of pairs.
 
-    The same clicks give the same bytes as the page's download.
+    The same clicks give the same file as the page's download, byte for byte.
     """
 
     recording: Recordings = ()
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     clicks: File = None
     """Clicks in this recording (cocalib/clicks-1 JSON)."""
     pairs: File = None
-    """Pairs of radar positions and pixels (cocalib/pairs-1 JSON), or a calibration to solve again, instead of a recording."""
+    """Instead of a recording: radar positions and pixels (cocalib/pairs-1 JSON), or a calibration to solve again."""
     camera: File = None
-    """Intrinsics, where the recording has none or others are wanted: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    """Intrinsics to use if the recording has none, or instead of its own: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     out: File = None
-    """Where the calibration goes (cocalib/calibration-1 JSON); without it, to stdout."""
+    """Output file (cocalib/calibration-1 JSON); stdout if omitted."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
@@ -47,7 +47,7 @@ class Solve:
     def run(self) -> int:
         """Solve, write the calibration, print its summary; return the exit code."""
         if self.pairs is not None and (self.recording or self.clicks):
-            raise InputError("solve takes a recording with --clicks, or --pairs, not both")
+            raise InputError("solve takes either a recording with --clicks, or --pairs, not both")
         if self.pairs is not None:
             return self._solve_pairs(self.pairs)
         if not self.recording:
@@ -89,21 +89,21 @@ class Solve:
 
 
 def _require_inside(clicks: Sequence[ReflectorClick], recording: "Recording", camera: Camera, *, source: Path) -> None:
-    """Refuse clicks that cannot have been made in this recording.
+    """Refuse clicks that cannot belong to this recording.
 
     Raises:
-        InputError: names the first such click.
+        InputError: a click is outside the recording or the image; the first one is named.
     """
     first, last = int(recording.image_times[0]), int(recording.image_times[-1])
     for click in clicks:
         if not first <= click.image_time <= last:
             raise InputError(
-                f"{source}: click {click.id} at {seconds_text(click.image_time)} lies outside the recording, "
+                f"{source}: click {click.id} at {seconds_text(click.image_time)} is outside the recording, "
                 f"whose frames run from {seconds_text(TimeNs(first))} to {seconds_text(TimeNs(last))}; "
                 "give the clicks of this recording"
             )
         if not camera.in_image(np.array([[click.u_px, click.v_px]]))[0]:
             raise InputError(
-                f"{source}: click {click.id} at ({click.u_px:g}, {click.v_px:g}) px lies outside the image of "
-                f"{camera.width_px} x {camera.height_px} px"
+                f"{source}: click {click.id} at ({click.u_px:g}, {click.v_px:g}) px is outside the image of "
+                f"{camera.width_px} x {camera.height_px} px; give the clicks of this recording"
             )

@@ -1,7 +1,7 @@
-"""tyro, and all that is private to it: the events by which it says why a command line makes no sense.
+"""All use of tyro's private API: the events that say why a command line is invalid.
 
-tyro's public API can only print such a reason, in several lines of its own, and exit. A tyro whose private events have
-changed costs the wording and nothing else: `missing_parts` finds that out, and tyro then answers in its own words.
+With its public API, tyro can only print the reason itself, on several lines, and exit. If a new tyro has changed these
+private events, only our wording is lost: `missing_parts` detects it, and tyro then prints its own message.
 """
 
 import dataclasses
@@ -44,8 +44,8 @@ class Argument:
     """An argument of a command.
 
     Attributes:
-        name: as it is typed, such as `--out`, or `RECORDING...`.
-        value: what follows an option, such as `FILE`; "" for an argument that is no option.
+        name: as typed, such as `--out`, or `RECORDING...`.
+        value: what follows an option, such as `FILE`; "" for a positional argument.
     """
 
     name: str
@@ -54,28 +54,28 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class UnknownArgument:
-    """Something was typed that the command does not know."""
+    """The command does not know this argument."""
 
     token: str
 
 
 @dataclass(frozen=True, slots=True)
 class MissingArguments:
-    """Arguments that the command needs were not given."""
+    """Required arguments are missing."""
 
     arguments: tuple[Argument, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class MissingValue:
-    """An option was given without its value."""
+    """An option has no value."""
 
     argument: Argument
 
 
 @dataclass(frozen=True, slots=True)
 class WrongChoice:
-    """An option was given a value that is none of its choices."""
+    """An option has a value that is not one of its choices."""
 
     argument: Argument
     value: str
@@ -84,10 +84,10 @@ class WrongChoice:
 
 @dataclass(frozen=True, slots=True)
 class BadValue:
-    """A value cannot be read as what its option takes.
+    """An option has a value of the wrong type.
 
     Attributes:
-        typed: the value; None where it is not known.
+        typed: the value; None if unknown.
     """
 
     argument: Argument
@@ -98,16 +98,16 @@ Fault: TypeAlias = UnknownArgument | MissingArguments | MissingValue | WrongChoi
 
 
 def parse(kind: type[Parsed], arguments: Sequence[str], *, program: str, refuse: Callable[[Fault], None]) -> Parsed:
-    """Read the arguments of one command.
+    """Parse the arguments of one command.
 
     Args:
         kind: the command's dataclass.
-        arguments: what was typed after the command.
-        program: the program and the command, as the help shows them.
-        refuse: is told why the arguments make no sense, and raises; where it does not, tyro says so and exits.
+        arguments: the command-line arguments after the command.
+        program: the program and command names, as shown in the help.
+        refuse: called with the fault if the arguments are invalid; raises. If it returns, tyro prints its message and exits.
 
     Raises:
-        SystemExit: help was asked for and is printed, or tyro has said what is wrong.
+        SystemExit: the help was requested and printed, or tyro printed an error.
     """
 
     def read() -> Parsed:
@@ -125,7 +125,7 @@ def parse(kind: type[Parsed], arguments: Sequence[str], *, program: str, refuse:
 
 
 def missing_parts() -> tuple[str, ...]:
-    """Name the private parts of tyro that are used here and that the installed tyro does not have."""
+    """Return the private parts of tyro used here that the installed version lacks."""
     try:
         events = importlib.import_module(_PRIVATE)
     except ImportError:
@@ -145,14 +145,14 @@ def flags_of(kind: type[Any], prefix: str = "") -> Iterator[str]:
         annotated = typing.get_origin(hints[field.name]) is typing.Annotated
         value, *notes = typing.get_args(hints[field.name]) if annotated else (hints[field.name],)
         if dataclasses.is_dataclass(value):
-            unnamed = any(getattr(note, "name", None) == "" for note in notes)  # as tyro.conf.arg(name="") leaves it
+            unnamed = any(getattr(note, "name", None) == "" for note in notes)  # set by tyro.conf.arg(name="")
             yield from flags_of(typing.cast(type, value), prefix if unnamed else f"{prefix}{field.name}.")
         elif tyro.conf.Positional not in notes and not any(map(dataclasses.is_dataclass, typing.get_args(value))):
             yield f"--{prefix}{field.name}".replace("_", "-")
 
 
 def _fault(event: Any) -> Fault | None:
-    """Translate an event of tyro; None for one that only tyro can word."""
+    """Translate a tyro event; None for one whose message is left to tyro."""
     match type(event).__name__:
         case "UnrecognizedArgs":
             return UnknownArgument(event.tokens[0])

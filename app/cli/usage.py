@@ -1,4 +1,4 @@
-"""What was typed, read into a command; what makes no sense is answered in one line that says what would."""
+"""Parse a command's arguments; report wrong usage in one line that suggests a correction."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -24,15 +24,15 @@ _NUMBERS = {"INT": "a whole number", "FLOAT": "a number"}
 
 
 def read_command(command: Command, arguments: Sequence[str]) -> Runnable:
-    """Read the arguments of a command.
+    """Parse the arguments of a command.
 
     Args:
-        command: which.
-        arguments: what was typed after it.
+        command: from the table of commands.
+        arguments: the command-line arguments after it.
 
     Raises:
-        InputError: they make no sense.
-        SystemExit: help was asked for and is printed.
+        InputError: they are invalid.
+        SystemExit: the help was requested and printed.
     """
     kind, program = command.load(), f"{PROGRAM} {command.name}"
 
@@ -43,7 +43,7 @@ def read_command(command: Command, arguments: Sequence[str]) -> Runnable:
 
 
 def _reason(fault: Fault, kind: type[Runnable]) -> str:
-    """Say what is wrong."""
+    """Return what is wrong."""
     match fault:
         case UnknownArgument(token):
             return _unknown(token, kind)
@@ -57,11 +57,11 @@ def _reason(fault: Fault, kind: type[Runnable]) -> str:
             what = _NUMBERS.get(argument.value, argument.value)
             if typed is not None and argument.value in _NUMBERS:
                 return f"{argument.name} takes {what}, not '{typed}'"
-            return f"{argument.name} takes {what}, and something else was given"
+            return f"{argument.name} takes {what}; the given value is invalid"
 
 
 def _typed(argument: Argument) -> str:
-    """Return an argument as it is typed: `--out FILE`, or `RECORDING...`."""
+    """Return an argument as typed: `--out FILE`, or `RECORDING...`."""
     return f"{argument.name} {argument.value}".rstrip()
 
 
@@ -70,9 +70,9 @@ def _alternatives(words: Sequence[str]) -> str:
 
 
 def _unknown(token: str, kind: type[Runnable]) -> str:
-    """Say that something is unknown, and what may have been meant."""
+    """Return a message about an unknown argument, with suggestions."""
     if not token.startswith("-"):
-        return f"'{token}' is one argument too many"
+        return f"unexpected argument '{token}'"
     flag = token.split("=")[0].replace("_", "-")
     known = sorted({"--help", *flags_of(kind)})
     near = [other for other in known if flag.strip("-") and other.endswith(flag.lstrip("-"))]

@@ -1,4 +1,4 @@
-"""`cocalib video`: the camera of a recording as a video file."""
+"""`cocalib video`: write a recording's camera frames to a video file."""
 
 from dataclasses import dataclass, field
 
@@ -11,12 +11,12 @@ __all__ = ["Video"]
 
 @dataclass(frozen=True, slots=True)
 class Video:
-    """Write the camera's frames into a video, each at its recorded time; recorded JPEG is not encoded again."""
+    """Write the camera's frames to a video, each at its recorded time; recorded JPEG is not re-encoded."""
 
     recording: Recordings
-    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several together are one recording."""
+    """Bags (.bag, .mcap, .db3, folders), or folders of pictures, radar CSV, videos; several are read as one recording."""
     out: NewFile
-    """Video to write: .mp4 or .mov (times to a microsecond), or .mkv (to a millisecond)."""
+    """Output video: .mp4 or .mov (times to a microsecond), or .mkv (to a millisecond)."""
     topics: Topics = field(default_factory=TopicFlags)
 
     def run(self) -> int:
@@ -30,7 +30,7 @@ class Video:
             written = write_video(recording, self.out, progress=progress)
         print(f"{self.out}: {written.frames} frames, {written.duration_s:.3f} s, from {seconds_text(written.start)}")
         if written.other_size:
-            print(f"{written.other_size} frames of another size than the first are left out")
+            print(f"{written.other_size} frames are left out: their size differs from the first frame's")
         if written.unreadable:
-            print(f"{written.unreadable} frames cannot be read and are left out: {written.fault}")
+            print(f"{written.unreadable} frames are left out because they cannot be read: {written.fault}")
         return 0

@@ -24,21 +24,22 @@ _NOT_PICTURES = ("depth", "disparity", "mask", "infra", "debug")
 class RecordingOptions:
     """How to open a recording."""
 
-    radar_topic: str | None = option(None, "The radar's topic; guessed when not given.")
-    image_topic: str | None = option(None, "The camera's image topic; guessed when not given.")
+    radar_topic: str | None = option(None, "The radar's topic; chosen automatically if not given.")
+    image_topic: str | None = option(None, "The camera's image topic; chosen automatically if not given.")
     camera_info_topic: str | None = option(
-        None, "The topic with the camera's intrinsics; the one beside the images when not given."
+        None, "The topic with the camera's intrinsics; by default, the one next to the image topic."
     )
     radar_axes: str | None = option(
         None,
-        "Where the radar message's x, y and z point, such as forward,right,up; add degrees or radians for its angles.",
+        "Directions of the radar message's x, y and z, such as forward,right,up; add degrees or radians for its angles.",
     )
     video_start: str | None = option(
         None,
-        "When a video's first frame was taken: seconds since 1970, or a date such as 2024-05-01T12:00:00.25+02:00.",
+        "Time of a video's first frame: seconds since 1970, or a date such as 2024-05-01T12:00:00.25+02:00.",
     )
     clock: Clock = option(
-        "auto", "Times to go by: stamps in the messages, receive times, or auto: stamps unless they cannot be right."
+        "auto",
+        "Times to use: stamps in the message headers, receive times, or auto: stamps unless they cannot be right.",
     )
 
 

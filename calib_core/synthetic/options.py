@@ -1,4 +1,4 @@
-"""Every option of a simulated recording: these are the flags of `cocalib simulate`."""
+"""All options of a simulated recording. They define the flags of `cocalib simulate`."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -19,47 +19,47 @@ Container = Literal["ros1", "mcap", "db3"]
 
 @dataclass(frozen=True, slots=True)
 class SimulationOptions:
-    """The options of a simulated recording; the same options give the same bytes."""
+    """What to simulate; the same options give the same bytes."""
 
     scene: SceneName = option(
         "rooftop",
-        "Where it happens: a rooftop, an open field, a narrow aisle between shelves, a yard with a checkerboard wall.",
+        "Scene: a rooftop, an open field, a narrow aisle between shelves, or a yard with a checkerboard wall.",
     )
-    radar: RadarName = option("awr1843", "A TI AWR1843 with its bins, or a finer imaging radar.")
-    placements: int = option(20, "How often the reflector is put down.")
-    dwell_s: float = option(6.0, "How long it stays each time, from being released to being picked up again [s].")
-    heights: bool = option(False, "Put it on a tripod of varying height instead of on the ground.")
+    radar: RadarName = option("awr1843", "Radar: a TI AWR1843 with its bins, or a finer imaging radar.")
+    placements: int = option(20, "Number of placements of the reflector.")
+    dwell_s: float = option(6.0, "How long the reflector stays at each placement, from release to pick-up [s].")
+    heights: bool = option(False, "Put the reflector on a tripod of varying height instead of on the ground.")
     clutter: Clutter = option(
-        "scene", "Static radar returns: none, what the scene shows, or also strong objects nobody sees."
+        "scene", "Static radar returns: none, from the visible scene, or also from strong invisible objects."
     )
-    person: bool = option(True, "Whether a person carries the reflector; without, it is simply there.")
+    person: bool = option(True, "Have a person carry the reflector; otherwise it just appears at each placement.")
     camera_model: CameraModel = option("plumb_bob", "Lens model.")
     field_of_view_deg: float | None = option(
-        None, "Horizontal field of view before distortion [deg]; without it 75, for equidistant 110."
+        None, "Horizontal field of view before distortion [deg]; by default 75, or 110 for equidistant."
     )
-    width_px: int = option(1280, "Columns of the image.")
-    height_px: int = option(720, "Rows of the image.")
+    width_px: int = option(1280, "Image width in pixels.")
+    height_px: int = option(720, "Image height in pixels.")
     camera_rate_hz: float = option(5.0, "Frames per second.")
     radar_rate_hz: float = option(10.0, "Scans per second.")
     angle_bins: bool = option(
-        True, "Report azimuths on the lattice of the radar's angle bins; otherwise the peak is interpolated."
+        True, "Report azimuths on the grid of the radar's angle bins; otherwise interpolate the peak."
     )
     radar_message: RadarMessage = option(
         "filled",
-        'In ROS 1 bags: one RadarScan message per return, all fields filled ("filled") or range, bearing, Doppler bin and '
-        'intensity left zero as the stock driver does ("stock"), or one PointCloud2 per scan ("cloud").',
+        'In ROS 1 bags: one RadarScan message per return with all fields filled ("filled"), or with range, bearing, Doppler '
+        'bin and intensity zero as in the stock driver ("stock"), or one PointCloud2 per scan ("cloud").',
     )
     raw_images: bool = option(False, "Write sensor_msgs/Image instead of JPEG.")
     jpeg_quality: int = option(85, "JPEG quality, 1 to 100.")
     sensor_noise_grey: float = option(
-        0.0, "Standard deviation of the camera's noise [grey levels of 255]; costs JPEG bytes."
+        0.0, "Standard deviation of the camera's noise [grey levels of 255]; makes JPEG larger."
     )
-    stamp_jitter_s: float = option(0.002, "Standard deviation of both sensors' timing [s].")
-    dropped_share: float = option(0.01, "Share of frames and of scans that never arrive.")
-    clock_offset_s: float = option(0.0, "By how much the radar's stamps are ahead of the camera's clock [s].")
+    stamp_jitter_s: float = option(0.002, "Standard deviation of the timing of both sensors [s].")
+    dropped_share: float = option(0.01, "Fraction of frames and scans that are lost.")
+    clock_offset_s: float = option(0.0, "How far the radar's stamps are ahead of the camera's clock [s].")
     click_sigma_px: float = option(0.7, "Standard deviation of the example clicks, per axis [px].")
-    start_s: int = option(1_760_000_000, "When the recording starts [s since 1970].")
-    seed: int = option(1, "Of every random draw.")
+    start_s: int = option(1_760_000_000, "Start of the recording [s since 1970].")
+    seed: int = option(1, "Seed of the random generator.")
     rig: RigOptions = option(RigOptions(), "How the sensors are mounted.")
 
     def __post_init__(self) -> None:

@@ -1,15 +1,15 @@
 """A checker of frame names: in `a_from_b @ c_from_d`, b and c must be the same word.
 
-It reads source text, runs nothing, and understands only names:
+It reads source text, runs nothing, and uses only names:
 
 - `camera_from_radar` is a transform into `camera` from `radar`; words before and after (`nominal_camera_from_radar_start`)
   do not matter. `.inverse()` and `.T` swap the two, `.rotation` and `.perturbed(...)` keep them;
   `.translation_m` is a point of the target frame.
-- `points_radar_m`, `position_radar_m`, `ray_camera` and the like are points of the frame that is named.
-- A parameter of a role (`ego_from_sensor`, `parent_from_child`) takes any frame in that role's place.
-- Whatever has no frame in its name is not judged.
+- `points_radar_m`, `position_radar_m`, `ray_camera` and the like are points in the named frame.
+- A parameter named by role (`ego_from_sensor`, `parent_from_child`) accepts any frame for that role.
+- Names without a frame are not checked.
 
-It then compares every product, sum, assignment, return and argument. What it does not know, it lets pass.
+It then compares every product, sum, assignment, return and argument. Expressions it does not understand are accepted.
 """
 
 import ast
@@ -24,7 +24,7 @@ FRAMES = frozenset(
     | {"radar", "reflector", "rig", "sensor", "source", "target", "vehicle", "world"}
 )
 GENERIC_FRAMES = frozenset({"child", "parent", "sensor", "source", "target"})
-"""Roles that any frame may play when it is passed to a function."""
+"""Roles that any frame can have when it is passed to a function."""
 
 _TRANSFORM = re.compile(r"(?:^|_)([a-z]+)_from_([a-z]+)(?:_|$)")
 _POINTS = re.compile(
@@ -39,7 +39,7 @@ _PASSES_THROUGH = frozenset({"array", "asarray", "ascontiguousarray", "atleast_2
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """One file: its name for messages, and its text."""
+    """One file: its name, used in messages, and its text."""
 
     name: str
     text: str
@@ -86,7 +86,7 @@ class _Points:
 
 @dataclass(frozen=True, slots=True)
 class _Moved:
-    """What a known transform made of something unknown: points of its target, or a transform into it."""
+    """A known transform applied to something unknown: points in its target frame, or a transform into it."""
 
     target: str
 
@@ -98,7 +98,7 @@ _Kind = _Transform | _Points | _Moved | None
 
 
 def check_sources(sources: Iterable[Source]) -> list[Finding]:
-    """Check files together, so that positional arguments are compared with the parameters of functions in other files."""
+    """Check several files together, so that positional arguments are compared with parameters of functions in other files."""
     trees = [(source.name, ast.parse(source.text)) for source in sources]
     parameters = _parameters_by_function(tree for _, tree in trees)
     findings: list[Finding] = []
@@ -123,7 +123,7 @@ def _parameters_by_function(trees: Iterable[ast.Module]) -> dict[str, list[str]]
 
 
 def _named(identifier: str) -> _Kind:
-    """Read a name."""
+    """Return the kind that a name states."""
     words = _TRANSFORM.search(identifier)
     if words and words[1] in FRAMES and words[2] in FRAMES:
         return _Transform(words[1], words[2])
@@ -138,7 +138,7 @@ def _identifier(node: ast.AST) -> str | None:
 
 
 def _without_roles(kind: _Kind) -> _Kind:
-    """Forget the frames of a parameter that any frame may stand for."""
+    """Replace role frames of a parameter, which accept any frame, by None."""
     if isinstance(kind, _Transform):
         target, source = (None if frame in GENERIC_FRAMES else frame for frame in (kind.target, kind.source))
         return _Transform(target, source)
@@ -146,7 +146,7 @@ def _without_roles(kind: _Kind) -> _Kind:
 
 
 def _innermost(node: ast.expr) -> ast.expr:
-    """Peel `.inverse()`, `.rotation` and `.T` off."""
+    """Strip `.inverse()`, `.rotation` and `.T`."""
     while True:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "inverse":
             node = node.func.value
@@ -157,7 +157,7 @@ def _innermost(node: ast.expr) -> ast.expr:
 
 
 def _fits(declared: _Kind, found: _Kind) -> bool:
-    """Tell whether what was found may carry the declared name."""
+    """Return whether the kind found agrees with the declared one."""
     if declared is None or found is None:
         return True
     if isinstance(found, _Moved):
@@ -169,7 +169,7 @@ def _fits(declared: _Kind, found: _Kind) -> bool:
 
 
 class _Checker(ast.NodeVisitor):
-    """Walks one file. `_kind` infers what an expression is; the visit methods compare it with names."""
+    """Visits one file. `_kind` infers the kind of an expression; the visit methods compare it with names."""
 
     def __init__(self, source: str, parameters: Mapping[str, list[str]]) -> None:
         self.findings: list[Finding] = []
@@ -181,7 +181,7 @@ class _Checker(ast.NodeVisitor):
         if finding not in self.findings:
             self.findings.append(finding)
 
-    # What an expression is
+    # The kind of an expression
 
     def _kind(self, node: ast.AST | None) -> _Kind:
         if isinstance(node, ast.Name):
@@ -262,9 +262,7 @@ class _Checker(ast.NodeVisitor):
             words = _TRANSFORM.search(_identifier(_innermost(side)) or "")
             if words and not {words[1], words[2]} <= FRAMES:
                 unknown = ", ".join(sorted({words[1], words[2]} - FRAMES))
-                self._report(
-                    side, f"'{unknown}' is no frame this checker knows: add it to FRAMES, or choose another name"
-                )
+                self._report(side, f"unknown frame '{unknown}': add it to FRAMES, or choose another name")
 
     def _product(self, node: ast.BinOp, left: _Kind, right: _Kind) -> _Kind:
         if isinstance(left, _Transform):
@@ -284,7 +282,7 @@ class _Checker(ast.NodeVisitor):
             return _Points(right.source) if right.source else None
         return None
 
-    # Where a name is given to it
+    # Where an expression gets a name
 
     def _compare(self, node: ast.AST, declared: str | None, value: ast.AST | None, verb: str) -> None:
         if declared is None or value is None:
@@ -355,7 +353,7 @@ class _Checker(ast.NodeVisitor):
 
 
 def _own_returns(function: ast.FunctionDef) -> Iterator[ast.Return]:
-    """Yield the return statements of a function, not those of functions within it."""
+    """Yield the return statements of a function, without those of nested functions."""
     waiting: list[ast.AST] = list(function.body)
     while waiting:
         node = waiting.pop()

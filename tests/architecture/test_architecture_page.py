@@ -1,4 +1,4 @@
-"""ARCHITECTURE.md draws the layers that pyproject.toml promises, and names folders that exist."""
+"""ARCHITECTURE.md draws the layers declared in pyproject.toml, and names folders that exist."""
 
 import importlib.util
 import re
@@ -23,7 +23,7 @@ def page(project_root: Path) -> str:
     return (project_root / "ARCHITECTURE.md").read_text(encoding="utf-8")
 
 
-def test_the_drawing_is_the_one_the_contracts_give(structure: ModuleType, page: str, project_root: Path) -> None:
+def test_the_drawing_matches_the_contracts(structure: ModuleType, page: str, project_root: Path) -> None:
     drawing = page.partition("## Layers")[2].split("```\n")[1]
     assert drawing.splitlines() == list(structure.drawn(project_root)), "python .ci/structure.py draw"
 
@@ -36,11 +36,11 @@ def test_every_folder_with_rooms_has_a_contract(structure: ModuleType, project_r
     assert {folder for folder, inside in rooms.items() if any(inside.values())} - drawn == set()
 
 
-def test_rooms_import_each_other_in_no_circle(structure: ModuleType, project_root: Path) -> None:
+def test_rooms_have_no_circular_imports(structure: ModuleType, project_root: Path) -> None:
     graph = structure.imports(project_root)
     for folder in {name.rpartition(".")[0] for name in graph} - {""}:
         structure.floors(structure.between_rooms(graph, folder))
-    with pytest.raises(ValueError, match="a circle among a, b"):
+    with pytest.raises(ValueError, match="circular imports among a, b"):
         structure.floors({"a": {"b"}, "b": {"a"}, "c": set()})
 
 

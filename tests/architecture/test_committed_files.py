@@ -1,4 +1,4 @@
-"""What must never be in a committed file, and what must."""
+"""What committed files must and must not contain."""
 
 import re
 import subprocess
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-# Written in two halves, so that this file does not hold what it looks for.
+# Written in two halves, so that this file does not contain what it looks for.
 _INDEX_HOSTS = ("pypi" + ".org", "python" + "hosted.org", "npmjs" + ".org", "files.python" + "hosted")
 _PIN = re.compile(r"^[A-Za-z0-9][A-Za-z0-9._-]*(\[[a-z,]+\])?==[^\s;]+( ; [^\\]+)? \\$")
 _HASH = re.compile(r"^    --hash=sha256:[0-9a-f]{64}( \\)?$")
@@ -30,21 +30,21 @@ def committed_texts(project_root: Path) -> dict[str, str]:
 
 
 def test_no_committed_file_names_a_package_index(committed_texts: dict[str, str]) -> None:
-    guilty = [name for name, text in committed_texts.items() if any(host in text for host in _INDEX_HOSTS)]
-    assert guilty == []
+    found = [name for name, text in committed_texts.items() if any(host in text for host in _INDEX_HOSTS)]
+    assert found == []
 
 
-def test_no_committed_file_names_a_folder_of_the_machine_it_was_written_on(
+def test_no_committed_file_names_a_folder_of_the_developers_machine(
     committed_texts: dict[str, str], project_root: Path
 ) -> None:
     here = re.escape(str(project_root.parent))
     pattern = re.compile(rf"(?<![\w.]){here}/\w|/home/\w+/|/Users/\w+/")
-    guilty = [
+    found = [
         name
         for name, text in committed_texts.items()
         if pattern.search(text) and name != "tests/architecture/" + Path(__file__).name
     ]
-    assert guilty == []
+    assert found == []
 
 
 @pytest.mark.parametrize("name", ["runtime.txt", "dev.txt"])
@@ -52,12 +52,12 @@ def test_pins_are_exact_hashed_and_without_addresses(name: str, project_root: Pa
     lines = (project_root / "requirements" / name).read_text().splitlines()
     pins = [line for line in lines if line and not line.startswith((" ", "#"))]
     assert len(pins) > 20
-    strange = [
+    unexpected = [
         line
         for line in lines
         if line and not _PIN.match(line) and not _HASH.match(line) and not re.match(r"^ *# ", line)
     ]
-    assert strange == []
+    assert unexpected == []
     assert not any("://" in line for line in lines)
 
 
@@ -71,7 +71,7 @@ def test_the_tests_run_on_the_runtime_pins(project_root: Path) -> None:
         }
 
     runtime, dev = pins("runtime.txt"), pins("dev.txt")
-    # dev may need a pin on more platforms than the program does
+    # dev may need a pin on more platforms than the program
     everywhere = {name: dev.get(name, dev.get(name.split()[0])) for name in runtime}
     assert everywhere == runtime
 
@@ -89,7 +89,7 @@ def test_the_tests_run_on_the_runtime_pins(project_root: Path) -> None:
         ".ci/run",
     ],
 )
-def test_the_house_has_its_papers(name: str, project_root: Path) -> None:
+def test_the_projects_standard_files_exist(name: str, project_root: Path) -> None:
     assert (project_root / name).stat().st_size > 100
 
 
@@ -97,9 +97,9 @@ def test_nothing_in_the_code_unpickles_or_evaluates(committed_texts: dict[str, s
     pattern = re.compile(
         r"\bimport pickle\b|\bpickle\.loads?\b|allow_pickle=True|(?<![\w.])eval\(|(?<![\w.])exec\(|yaml\.load\(|typ=.unsafe"
     )
-    guilty = [
+    found = [
         name
         for name, text in committed_texts.items()
         if name.endswith(".py") and name.startswith(("app/", "calib_core/", "benchmarks/")) and pattern.search(text)
     ]
-    assert guilty == []
+    assert found == []

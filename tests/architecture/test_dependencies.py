@@ -1,4 +1,4 @@
-"""What is imported is declared, and what is declared is imported."""
+"""Every imported dependency is declared, and every declared one is imported."""
 
 import ast
 import importlib.metadata
@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-AWAITED = {"rerun-sdk": "`record-rrd`, which writes recordings of rerun, is to come"}
-"""Dependencies that are declared and not imported yet, and why."""
+AWAITED = {"rerun-sdk": "planned: `record-rrd`, which writes rerun recordings"}
+"""Dependencies that are declared but not imported yet, and why."""
 
 OWN = {"app", "calib_core"}
 
 
 def imported_modules(root: Path) -> dict[str, set[str]]:
-    """Return every third-party module that our packages import, and the files that do."""
+    """Return every third-party module that our packages import, and the files that import it."""
     found: dict[str, set[str]] = {}
     for path in sorted(file for package in OWN for file in (root / package).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -27,14 +27,14 @@ def imported_modules(root: Path) -> dict[str, set[str]]:
                 names = [node.module]
             for name in names:
                 top = name.split(".")[0]
-                # compression came with Python 3.14; before, backports-zstd stands in for it
+                # compression is new in Python 3.14; before that, backports-zstd replaces it
                 if top not in OWN | {"compression"} | sys.stdlib_module_names:
                     found.setdefault(top, set()).add(str(path.relative_to(root)))
     return found
 
 
 def distributions_of(module: str) -> set[str]:
-    """Return the installed distributions that bring a top-level module, by their normalised names."""
+    """Return the normalised names of the installed distributions that contain a top-level module."""
     names = importlib.metadata.packages_distributions().get(module, [])
     return {re.sub(r"[-_.]+", "-", name).lower() for name in names}
 
@@ -53,13 +53,13 @@ def test_every_module_that_is_imported_comes_with_a_declared_dependency(project_
     undeclared = {
         module: sorted(files) for module, files in modules.items() if distributions_of(module).isdisjoint(declared)
     }
-    assert undeclared == {}, "declare what brings these modules in pyproject.toml, or do not import them"
+    assert undeclared == {}, "declare the dependencies of these modules in pyproject.toml, or do not import them"
 
 
 def test_every_declared_dependency_is_imported(project_root: Path, declared: set[str]) -> None:
     modules = imported_modules(project_root)
     imported = {name for module in modules for name in distributions_of(module)}
-    assert declared - imported == set(AWAITED), "remove what nobody imports from pyproject.toml"
+    assert declared - imported == set(AWAITED), "remove unused dependencies from pyproject.toml"
 
 
 def test_every_dependency_has_a_lowest_and_an_upper_bound(project_root: Path) -> None:

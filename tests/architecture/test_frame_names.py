@@ -1,4 +1,4 @@
-"""Frame names fit together in every line of the program, and the checker that says so finds what is wrong."""
+"""Frame names agree in the whole program, and the checker finds those that do not."""
 
 import importlib.util
 import sys
@@ -9,7 +9,7 @@ import pytest
 
 
 def load_checker() -> ModuleType:
-    """Load the checker beside this file: tests are no package."""
+    """Load the checker from this folder, which is not a package."""
     name = "frame_names"
     spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
     assert spec is not None

@@ -1,4 +1,4 @@
-"""The glossary can be looked things up in."""
+"""The glossary is complete and sorted, and the convention pages have valid links."""
 
 import re
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 _ENTRY = re.compile(r"^\*\*(.+?)\*\*", re.MULTILINE)
 
 
-def test_every_term_says_what_to_avoid_and_stands_in_its_place(project_root: Path) -> None:
+def test_every_term_says_what_to_avoid_and_is_in_alphabetical_order(project_root: Path) -> None:
     entries = [
         block
         for block in (project_root / "GLOSSARY.md").read_text(encoding="utf-8").split("\n\n")

@@ -1,4 +1,4 @@
-"""Heavy libraries are imported when they are needed, not when the package is: `cocalib --help` must not wait for OpenCV."""
+"""Heavy libraries are imported only when needed, not with the package: `cocalib --help` must not wait for OpenCV."""
 
 import subprocess
 import sys
@@ -10,7 +10,7 @@ HEAVY = ("viser", "cv2", "rosbags", "rerun", "scipy", "websockets", "tyro", "jax
 
 
 def heavy_modules_after(statement: str) -> str:
-    """Run a statement in a fresh interpreter and name the heavy packages it has pulled in."""
+    """Run a statement in a fresh interpreter and return the heavy packages that it imports."""
     program = f"{statement}\nimport sys\nprint(*sorted(set({HEAVY!r}) & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -30,8 +30,8 @@ def test_the_mathematics_imports_nothing_heavy(project_root: Path) -> None:
     assert heavy_modules_after("".join(f"import {module}\n" for module in modules)) == ""
 
 
-def test_numpy_draws_no_random_numbers_before_they_are_asked_for() -> None:
-    """NumPy imports its random part, and OpenSSL with it, when it is first named: a quoted annotation does not name it."""
+def test_numpy_random_is_not_imported_before_it_is_needed() -> None:
+    """NumPy imports `numpy.random`, and OpenSSL with it, on first access; a quoted annotation does not access it."""
     code = "import calib_core.calibration, sys\nprint('numpy.random' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

@@ -1,4 +1,4 @@
-"""The notebook under docs/ is the one its script writes, and its cells still print what it shows."""
+"""The notebook in docs/ matches the script that writes it, and its cells still print the output it shows."""
 
 import importlib.util
 import json

@@ -1,4 +1,4 @@
-"""Every module says what it promises: `__all__`, sorted, and each name in it exists."""
+"""Every module has an `__all__` that is sorted and names only what exists."""
 
 import ast
 import importlib
@@ -16,7 +16,7 @@ MODULES = sorted(
 
 
 def defined_by(module: str) -> list[str]:
-    """Name the public classes and functions a module defines itself."""
+    """Return the public classes and functions that a module itself defines."""
     path = ROOT.joinpath(*module.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     body = ast.parse(file.read_text(encoding="utf-8")).body

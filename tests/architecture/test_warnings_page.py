@@ -1,4 +1,4 @@
-"""Every warning of a calibration is explained on the page about warnings, and has a sentence and something to do."""
+"""Every warning of a calibration is explained in docs/warnings.md, and has a message and a hint."""
 
 import ast
 import re
@@ -23,7 +23,7 @@ def test_the_page_explains_every_code_and_no_other(project_root: Path) -> None:
     assert explained == set(_warnings(project_root))
 
 
-def test_every_warning_has_a_code_a_sentence_and_something_to_do(project_root: Path) -> None:
+def test_every_warning_has_a_code_a_message_and_a_hint(project_root: Path) -> None:
     warnings = _warnings(project_root)
     assert len(warnings) > 10
     assert [code for code, calls in warnings.items() if any(len(call.args) != 3 for call in calls)] == []

@@ -1,4 +1,4 @@
-"""The wheel is built, installed into an empty environment and started there."""
+"""The wheel can be built, installed into an empty environment and run there."""
 
 import ast
 import json
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def wheel(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the wheel with the pinned build backend, without reaching the network."""
+    """Build the wheel with the pinned build backend, without network access."""
     folder = tmp_path_factory.mktemp("wheel")
     subprocess.run(
         [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)],
@@ -33,15 +33,15 @@ def wheel(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Install the wheel into an empty environment that borrows this one's dependencies; return its folder.
+    """Install the wheel into an empty environment that uses this one's dependencies; return its folder.
 
-    The dependencies are those of the lock, already installed here; a path file lends them, so that the test
-    needs no network and the checkout is not on the path.
+    The locked dependencies are already installed here; a .pth file makes them visible, so that the test needs no
+    network and the checkout is not on the path.
     """
     folder = tmp_path_factory.mktemp("environment")
     subprocess.run(
         [sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True
-    )  # this one's pip can install
+    )  # the pip of this environment can install into it
     python = folder / "bin" / "python"
     pip = [sys.executable, "-m", "pip", "--python", str(python), "--disable-pip-version-check"]
     subprocess.run([*pip, "install", "--quiet", "--no-index", "--no-deps", str(wheel)], check=True)
@@ -55,7 +55,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_wheel_carries_the_page_and_the_sample(wheel: Path) -> None:
+def test_the_wheel_contains_the_page_and_the_sample(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {"app/static/index.html", "app/sample_data/rooftop/radar.bag", "app/sample_data/rooftop/camera.bag"} <= names
     assert "calib_core/interchange/published/calibration-1.schema.json" in names
@@ -84,7 +84,7 @@ def test_another_module_called_app_does_not_stop_the_command(
     kind: str, rival: str, installed: Path, tmp_path: Path
 ) -> None:
     command = installed / "bin" / "cocalib" if kind == "wheel" else Path(sys.executable).with_name("cocalib")
-    assert command.is_file(), "cocalib is not installed into the environment of the tests: make dev"
+    assert command.is_file(), "cocalib is not installed in the test environment: run make dev"
     (tmp_path / rival).parent.mkdir(exist_ok=True)
     (tmp_path / rival).write_text("raise SystemExit('another program')\n")
     for path in (str(tmp_path), ".", ""):  # an empty entry is the current folder
@@ -99,7 +99,7 @@ def test_another_module_called_app_does_not_stop_the_command(
         assert done.returncode == 2
 
 
-def test_the_launcher_imports_nothing_of_ours_before_it_has_found_it(project_root: Path) -> None:
+def test_the_launcher_imports_only_the_standard_library_at_the_top(project_root: Path) -> None:
     tree = ast.parse((project_root / "app" / "launcher.py").read_text(encoding="utf-8"))
     at_the_top = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
     names = {name.name for node in at_the_top if isinstance(node, ast.Import) for name in node.names}

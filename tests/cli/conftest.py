@@ -1,4 +1,4 @@
-"""Small recordings that are either good or have one defect."""
+"""Small recordings, either good or wrong in exactly one way."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -29,7 +29,7 @@ SCAN_TIMES_S = 0.1
 
 @dataclass(frozen=True)
 class Made:
-    """A recording to make: six placements, four seconds each."""
+    """A recording to make: eight placements by default, four seconds each."""
 
     camera: Camera = field(
         default_factory=lambda: Camera(
@@ -55,7 +55,7 @@ class Made:
 
     @property
     def positions_radar_m(self) -> np.ndarray:
-        """The reflector's placements: spread over the view, some of them raised."""
+        """Reflector positions: spread over the view, some of them raised."""
         rng = np.random.default_rng(5)
         n = self.placements
         x = np.linspace(3.0, 11.0, n)
@@ -63,7 +63,7 @@ class Made:
         return np.stack([x, y, np.where(np.arange(n) % 2, -1.0, 0.4)], axis=1)
 
     def clicks(self) -> str:
-        """Write the clicks: each placement's pixel in the frame at the middle of its dwell."""
+        """Return the clicks as JSON: each placement's pixel in the frame at the middle of its dwell."""
         pixels = self.camera.project(self.camera_from_radar @ self.positions_radar_m)
         clicks = []
         for index, (u, v) in enumerate(pixels):
@@ -105,7 +105,7 @@ class Made:
 
 @dataclass(frozen=True)
 class Typed:
-    """The output of a command."""
+    """A command's exit code and output."""
 
     code: int
     out: str
@@ -130,7 +130,7 @@ def cocalib(capsys: pytest.CaptureFixture[str]) -> Callable[..., Typed]:
 
 @pytest.fixture
 def made(tmp_path: Path) -> Callable[..., Path]:
-    """Return a function that writes a recording with the given changes, and returns its path."""
+    """Return a function that writes a recording with the given changes and returns its path."""
 
     def write(name: str = "made", **changes: object) -> Path:
         return write_ros2(tmp_path / f"{name}.mcap", replace(Made(), **changes).messages(), container="mcap")  # type: ignore[arg-type]
@@ -148,7 +148,7 @@ def clicks_file(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def pairs_file(tmp_path: Path) -> Callable[..., Path]:
-    """Return a function that writes a file of exact pairs after changing its document."""
+    """Return a function that writes a file of exact pairs, optionally after changing its document."""
 
     def write(count: int = 8, change: Callable[[dict[str, object]], None] = lambda document: None) -> Path:
         recording = Made()

@@ -1,4 +1,4 @@
-"""Bad input: one clear error line, the right exit code, nothing written and nothing lost."""
+"""Bad input: one clear line, the right exit code, no file written or lost."""
 
 import json
 from collections.abc import Callable
@@ -15,11 +15,11 @@ MadeRecording = Callable[..., Path]
 
 @pytest.fixture
 def refused(cocalib: Cocalib, tmp_path: Path, clicks_file: Path) -> Callable[..., str]:
-    """Return a function that solves, expects an error of one line, and returns that line."""
+    """Return a function that runs solve, expects a one-line error, and returns that line."""
 
     def refuse(*recording: object, clicks: Path = clicks_file, code: int = 2) -> str:
         out = tmp_path / "calibration.json"
-        out.write_text("the calibration of yesterday")
+        out.write_text("an earlier calibration")
         before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
         answer = cocalib("solve", *recording, "--clicks", clicks, "--out", out)
         assert answer.code == code, answer
@@ -27,7 +27,7 @@ def refused(cocalib: Cocalib, tmp_path: Path, clicks_file: Path) -> Callable[...
         (line,) = answer.err.splitlines()
         assert line.startswith("cocalib: ")
         after = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
-        assert after == before, "a refused command must leave every file as it was"
+        assert after == before, "a refused command must leave every file unchanged"
         return line
 
     return refuse
@@ -39,7 +39,7 @@ def test_a_missing_file_is_named(refused: Callable[..., str], tmp_path: Path) ->
     assert "no such file" in line
 
 
-def test_a_file_that_is_not_a_recording_is_named_with_the_supported_formats(
+def test_a_file_that_is_not_a_recording_is_named_with_the_accepted_types(
     refused: Callable[..., str], tmp_path: Path
 ) -> None:
     path = tmp_path / "holiday.bag"
@@ -82,7 +82,7 @@ def test_a_topic_that_does_not_exist_gets_a_suggestion(
     assert "/radar/points" in answer.err
 
 
-def test_sensors_that_never_recorded_together_are_refused(refused: Callable[..., str], made: MadeRecording) -> None:
+def test_sensors_that_never_recorded_together_are_reported(refused: Callable[..., str], made: MadeRecording) -> None:
     line = refused(made(radar_late_s=3600))
     assert "3568.0 s apart" in line
     assert "/radar/points" in line
@@ -140,7 +140,7 @@ def test_clicks_that_are_not_json_are_refused(refused: Callable[..., str], made:
 def test_nan_returns_do_not_shift_the_clicks(
     cocalib: Cocalib, made: MadeRecording, clicks_file: Path, tmp_path: Path
 ) -> None:
-    """The authors' script drops NaN rows from the radar list only; here a click keeps its own returns."""
+    """The authors' script drops NaN rows from the radar list only; here each click keeps its returns."""
     whole, holed = tmp_path / "whole.json", tmp_path / "holed.json"
     assert cocalib("solve", made("whole"), "--clicks", clicks_file, "--out", whole).code == 0
     assert cocalib("solve", made("holed", nan_scans=3), "--clicks", clicks_file, "--out", holed).code == 0
@@ -198,20 +198,20 @@ def test_an_unwritable_folder_is_named(cocalib: Cocalib, pairs_file: Callable[..
         (["info"], "no recording given"),
         (["bogus"], "unknown command 'bogus'; known: demo, open"),
         (["infos", "a.bag"], "did you mean 'info'?"),
-        (["--json", "info"], "unknown option --json; a command comes first: demo, open"),
+        (["--json", "info"], "unknown option --json; give a command first: demo, open"),
         (["info", "a.bag", "--bogus"], "unknown option --bogus; see cocalib info --help"),
         (["info", "a.bag", "--topic", "/radar"], "did you mean --camera-info-topic, --image-topic or --radar-topic?"),
         (["solve", "a.bag", "--clicsk=b.json"], "unknown option --clicsk; did you mean --clicks"),
         (["solve", "--pairs"], "--pairs needs a value: --pairs FILE; see cocalib solve --help"),
         (["check"], "CALIBRATION is missing; see cocalib check --help"),
-        (["check", "a.json", "b.json"], "'b.json' is one argument too many"),
+        (["check", "a.json", "b.json"], "unexpected argument 'b.json'"),
         (["video", "a.bag"], "--out FILE is missing; see cocalib video --help"),
         (["info", "a.bag", "--clock", "wall"], "--clock takes auto, header or receive, not 'wall'"),
         (["open", "a.bag", "--port", "http"], "--port takes a whole number, not 'http'"),
         (["solve", "a.bag", "--camera-position-m", "0", "1", "up"], "--camera-position-m takes X Y Z"),
     ],
 )
-def test_wrong_usage_gives_a_clear_error(cocalib: Cocalib, arguments: list[str], expected: str) -> None:
+def test_wrong_usage_gets_a_clear_error(cocalib: Cocalib, arguments: list[str], expected: str) -> None:
     answer = cocalib(*arguments)
     assert answer.code == 2
     (line,) = answer.err.splitlines()

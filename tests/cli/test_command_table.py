@@ -1,4 +1,4 @@
-"""The table of commands says what the commands are, and the command line says no more than the table."""
+"""The table of commands agrees with the commands and with the command line."""
 
 import dataclasses
 import inspect
@@ -52,20 +52,20 @@ def test_the_options_of_a_command_are_those_its_help_shows(cocalib: Cocalib, com
 @pytest.mark.parametrize("command", ["open", "solve"])
 def test_the_help_has_the_text_of_every_option(cocalib: Cocalib, command: str) -> None:
     words = " ".join(re.sub("[│╭╮╰╯─]", " ", cocalib(command, "--help").out).split())
-    told = [description.hint for group in option_groups() for description in group.options]
-    told += [field.metadata["help"] for field in dataclasses.fields(RecordingOptions)]
-    assert len(told) > 25
-    assert [text for text in told if text not in words] == ["Tape-measured camera position, if there is one."]
+    texts = [description.hint for group in option_groups() for description in group.options]
+    texts += [field.metadata["help"] for field in dataclasses.fields(RecordingOptions)]
+    assert len(texts) > 25
+    assert [text for text in texts if text not in words] == ["Tape-measured camera position, if known."]
 
 
-def test_tyro_still_has_the_private_events_that_wrong_usage_is_worded_from() -> None:
+def test_tyro_still_has_the_private_events_that_our_usage_errors_need() -> None:
     assert tyro_hook.missing_parts() == (), (
         "this version of tyro has changed its private events; adapt app/cli/tyro_hook.py, or lower the upper bound of "
-        "tyro in pyproject.toml. Until then tyro words wrong usage itself."
+        "tyro in pyproject.toml. Until then tyro prints its own messages for wrong usage."
     )
 
 
-def test_a_tyro_without_those_events_still_runs_commands_and_refuses_in_its_own_words(
+def test_a_tyro_without_those_events_still_runs_commands_and_prints_its_own_errors(
     cocalib: Cocalib, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "tyro._errors_of_tomorrow", None)
@@ -78,7 +78,7 @@ def test_a_tyro_without_those_events_still_runs_commands_and_refuses_in_its_own_
 
 
 def imported_after(*arguments: str) -> set[str]:
-    """Run the command in a fresh interpreter and name what it has imported."""
+    """Run the command in a fresh interpreter and return what it imported."""
     code = (
         "import sys\nfrom app.cli import run\n"
         f"try:\n    run({list(arguments)!r})\nexcept SystemExit:\n    pass\n"
@@ -99,5 +99,5 @@ def test_what_needs_no_command_imports_none(arguments: list[str]) -> None:
 def test_a_command_imports_no_other_command(command: Command) -> None:
     mine = command.where.partition(":")[0]
     others = {other.where.partition(":")[0] for other in COMMANDS.values()} - {mine}
-    allowed = {"app.cli.import_file"} if mine == "app.cli.open" else set()  # it shows calibrations that were imported
+    allowed = {"app.cli.import_file"} if mine == "app.cli.open" else set()  # it shows imported calibrations
     assert imported_after(command.name, "--help") & others == allowed

@@ -21,7 +21,7 @@ Cocalib = Callable[..., Any]
 
 @pytest.fixture
 def calibration(cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path) -> Path:
-    """Return a calibration solved from a made recording."""
+    """Return a calibration solved from a recording made for the test."""
     out = tmp_path / "calibration.json"
     answer = cocalib("solve", made(), "--clicks", clicks_file, "--out", out)
     assert answer.code == 0, answer.err
@@ -125,18 +125,18 @@ def test_export_list_names_every_format(cocalib: Cocalib) -> None:
     assert {"tf2", "urdf", "json"} <= {line.split()[0] for line in answer.out.splitlines()}
 
 
-def test_export_of_another_stacks_file_says_how_to_come_to_a_calibration(
+def test_export_of_another_tools_file_says_how_to_convert_it(
     cocalib: Cocalib, calibration: Path, tmp_path: Path
 ) -> None:
     cocalib("export", calibration, "--to", "tf2", "--out", tmp_path / "old.sh")
     refused = cocalib("export", tmp_path / "old.sh", "--to", "urdf")
     assert refused.code == 2
-    assert "is tf2, and export takes calibration-1" in refused.err
+    assert "is tf2, but export takes calibration-1" in refused.err
     assert "cocalib import old.sh --out calibration.json" in refused.err
 
 
 @pytest.mark.parametrize("command", [["export", "--to", "urdf"], ["import"]], ids=["export", "import"])
-def test_a_file_is_read_once_so_a_pipe_will_do(
+def test_a_file_is_read_once_and_may_be_a_pipe(
     cocalib: Cocalib, calibration: Path, tmp_path: Path, command: list[str]
 ) -> None:
     out = tmp_path / "out"
@@ -184,7 +184,7 @@ def test_help_shows_every_command(cocalib: Cocalib, command: str) -> None:
     assert f"cocalib {command}" in answer.out
 
 
-def test_import_turns_another_stacks_file_into_a_calibration_again(
+def test_import_converts_another_tools_file_to_a_calibration(
     cocalib: Cocalib, calibration: Path, tmp_path: Path
 ) -> None:
     other, back = tmp_path / "calib.txt", tmp_path / "back.json"
@@ -195,7 +195,7 @@ def test_import_turns_another_stacks_file_into_a_calibration_again(
     assert "0 deg apart" in checked.out
 
 
-def test_a_format_that_cannot_store_distortion_needs_the_option_rectified(
+def test_a_format_without_a_place_for_distortion_requires_rectified_pictures(
     cocalib: Cocalib, calibration: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "calib.txt"
@@ -236,7 +236,7 @@ def test_export_poses_the_radar_in_the_kit(cocalib: Cocalib, calibration: Path, 
     assert "qw last" in wrong.err
 
 
-def test_a_bare_matrix_that_looks_wrong_has_its_own_exit_code_until_pairs_tell(
+def test_a_bare_matrix_that_looks_wrong_has_its_own_exit_code_until_pairs_prove_it(
     cocalib: Cocalib, calibration: Path, tmp_path: Path
 ) -> None:
     matrix = np.eye(4)
@@ -250,9 +250,9 @@ def test_a_bare_matrix_that_looks_wrong_has_its_own_exit_code_until_pairs_tell(
     unproven = cocalib("check", tmp_path / "right.txt")
     assert unproven.code == 0
     assert "not proven" in unproven.out
-    told = cocalib("check", tmp_path / "inverse.txt", "--pairs", calibration)
-    assert told.code == 1
-    assert "the direction is swapped" in told.out
+    proven = cocalib("check", tmp_path / "inverse.txt", "--pairs", calibration)
+    assert proven.code == 1
+    assert "the direction is swapped" in proven.out
 
 
 def test_check_takes_the_camera_that_the_file_lacks(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:

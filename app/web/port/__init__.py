@@ -1,1 +1,1 @@
-"""The one port: who may talk to it, what it answers, and how it is started."""
+"""The server's single port: access control, responses, and startup."""

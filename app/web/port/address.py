@@ -1,4 +1,4 @@
-"""Whether an address can be served from, found out before anything is opened for it."""
+"""Check the address, port and token of the server before anything is opened."""
 
 import socket
 
@@ -10,21 +10,21 @@ _LAST_PORT = 65535
 
 
 class AddressError(CalibrationError):
-    """An address, port or token that cannot be served with."""
+    """The server cannot use this address, port or token."""
 
 
 def require_address(host: str, port: int) -> None:
-    """Try whether an address can be bound; a port that is taken is no fault, for the next one is taken then.
+    """Check that an address can be bound; a port that is in use is not an error, since the next free one is used instead.
 
     Args:
-        host: a name or an address of this machine.
+        host: a name or address of this machine.
         port: 0 to 65535.
 
     Raises:
-        AddressError: the port is no port, or the address is none of this machine.
+        AddressError: the port is invalid, or the address does not belong to this machine.
     """
     if not 0 <= port <= _LAST_PORT:
-        raise AddressError(f"--port {port}: a port is 0 (any free one) to {_LAST_PORT}")
+        raise AddressError(f"--port {port}: not a valid port; give 0 (any free port) to {_LAST_PORT}")
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
             host, 0, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
@@ -33,16 +33,16 @@ def require_address(host: str, port: int) -> None:
             trial.bind(address)
     except OSError as error:
         raise AddressError(
-            f"--host {host}: cannot be served from ({(error.strerror or str(error)).lower()}); "
+            f"--host {host}: cannot serve on this address ({(error.strerror or str(error)).lower()}); "
             "give an address of this machine, such as 127.0.0.1, or 0.0.0.0 for all of them"
         ) from None
 
 
 def require_token(token: str | None) -> None:
-    """Refuse a token that protects nothing.
+    """Refuse an empty token, which would protect nothing.
 
     Raises:
         AddressError: it is empty.
     """
     if token is not None and not token.strip():
-        raise AddressError("--token: it is empty; leave the flag out, and a token is made and printed in the link")
+        raise AddressError("--token: the token is empty; omit the flag to have one generated and printed in the link")

@@ -1,7 +1,7 @@
-"""Who may talk to the port: Host allow-list, Origin check, one-time link, then a cookie.
+"""Access control for the port: Host allow-list, Origin check, one-time link, then a cookie.
 
-The port serves pictures and clicks of somebody's recording to whoever asks it properly. A web page from elsewhere, a rebound
-DNS name and another user of the machine must not be able to ask.
+The port serves the pictures and clicks of a recording, which may be confidential. Web pages from other sites, rebound DNS
+names and other users of the machine must not get access.
 """
 
 import hashlib
@@ -21,11 +21,11 @@ _LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What the guard looks at.
+    """The part of a request that the guard checks.
 
     Attributes:
         path: path and query as sent.
-        headers: every value of each header; names in lower case.
+        headers: all values of each header; names in lower case.
     """
 
     path: str
@@ -33,7 +33,7 @@ class Request:
 
     @property
     def is_websocket(self) -> bool:
-        """Whether the request asks to become a WebSocket."""
+        """Whether the request is a WebSocket upgrade."""
         return any("websocket" in value.lower() for value in self.headers.get("upgrade", ()))
 
 
@@ -44,7 +44,7 @@ class Allowed:
 
 @dataclass(frozen=True, slots=True)
 class Admitted:
-    """The link's token was right: set the cookie and send the browser to the clean address."""
+    """The link's token is correct: set the cookie and redirect to the address without the token."""
 
     set_cookie: str
     location: str
@@ -56,7 +56,7 @@ class Refused:
 
     Attributes:
         status: 400, 401, 403 or 421.
-        reason: one sentence for whoever sees the page.
+        reason: a short text shown in the browser.
     """
 
     status: Literal[400, 401, 403, 421]
@@ -67,7 +67,7 @@ Verdict = Allowed | Admitted | Refused
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether a bind address can only be reached from this machine."""
+    """Return whether a bind address can only be reached from this machine."""
     if host == "localhost":
         return True
     try:
@@ -77,20 +77,20 @@ def is_loopback(host: str) -> bool:
 
 
 class Guard:
-    """The doorkeeper of one server.
+    """Decides which requests a server answers.
 
-    A link printed in the terminal carries a token. A token made here opens the door once, then another takes its place; a token
-    the user chose stays. Whoever came in by a link carries a cookie, which outlives the process as its key does.
+    The link printed in the terminal contains a token. A generated token works once and is then replaced; a token chosen by
+    the user stays valid. A browser admitted by a link gets a cookie, which stays valid after a restart if the key is the same.
     """
 
     def __init__(self, *, host: str, key: bytes, token: str | None = None, more_hosts: Sequence[str] = ()) -> None:
-        """Set up the door.
+        """Set up the access control.
 
         Args:
-            host: the address the server binds.
-            key: secret the cookie is made from; the same key accepts the cookies of an earlier process.
-            token: the user's own token; None makes one-time tokens.
-            more_hosts: further names under which the server may be addressed.
+            host: the address that the server binds.
+            key: secret from which the cookie is derived; with the same key, cookies of an earlier process are accepted.
+            token: the user's own token; None generates one-time tokens.
+            more_hosts: further host names that requests may use.
         """
         self._names = {*_LOOPBACK_NAMES, host.lower(), *(name.lower() for name in more_hosts)}
         self._takes_addresses = not is_loopback(host)
@@ -100,16 +100,16 @@ class Guard:
 
     @property
     def token(self) -> str:
-        """The token that opens the door now."""
+        """The token that is currently valid."""
         return self._token
 
     @property
     def cookie(self) -> str:
-        """Name and value of the cookie, as a client sends it back."""
+        """Name and value of the cookie, as sent by a client."""
         return f"{COOKIE_NAME}={self._cookie}"
 
     def check(self, request: Request) -> Verdict:
-        """Judge one request before anything else looks at it."""
+        """Decide on a request before anything else handles it."""
         host = self._host_of(request)
         if isinstance(host, Refused):
             return host
@@ -119,24 +119,24 @@ class Guard:
         return self._admission(request)
 
     def _host_of(self, request: Request) -> str | Refused:
-        """Return the Host header; refuse names that are not ours, which is how DNS rebinding arrives."""
+        """Return the Host header; refuse names that are not ours, to prevent DNS rebinding."""
         hosts = request.headers.get("host", ())
         if len(hosts) != 1:
             return Refused(400, "A request needs exactly one Host header.")
         name = _without_port(hosts[0].strip().lower())
         if name in self._names or (self._takes_addresses and _is_address(name)):
             return hosts[0].strip().lower()
-        return Refused(421, "This server does not answer to that host name. Use the link that the terminal shows.")
+        return Refused(421, "This server does not accept that host name. Use the link shown in the terminal.")
 
     def _foreign_origin(self, request: Request, host: str) -> Refused | None:
         origins = request.headers.get("origin", ())
         if not origins:
             if request.is_websocket:
-                return Refused(403, "A WebSocket needs an Origin header.")
+                return Refused(403, "A WebSocket request needs an Origin header.")
             return None
         if [origin.lower() for origin in origins] in ([f"http://{host}"], [f"https://{host}"]):
             return None
-        return Refused(403, "Another site asked for this. Open the link that the terminal shows.")
+        return Refused(403, "This request came from another site. Open the link shown in the terminal.")
 
     def _admission(self, request: Request) -> Verdict:
         address = urlsplit(request.path)
@@ -150,7 +150,7 @@ class Guard:
                 self._token = secrets.token_urlsafe(24)
             return Admitted(self._set_cookie(), address.path)
         return Refused(
-            401, "Open the link that the terminal shows. A link works once; the terminal then shows a fresh one."
+            401, "Open the link shown in the terminal. Each link works once; the terminal then shows a new one."
         )
 
     def _set_cookie(self) -> str:
@@ -164,7 +164,7 @@ def _without_port(host: str) -> str:
 
 
 def _is_address(name: str) -> bool:
-    """Tell whether a host is an address rather than a name: no DNS server can rebind an address."""
+    """Return whether a host is an address rather than a name: DNS cannot rebind an address."""
     try:
         ipaddress.ip_address(name.strip("[]"))
     except ValueError:

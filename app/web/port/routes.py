@@ -1,4 +1,4 @@
-"""What the port answers to GET: the page's files, downloads, and viser's own page; nothing else exists."""
+"""Responses to GET: the page's files, downloads and viser's own page; any other path is a 404."""
 
 import asyncio
 import gzip
@@ -54,7 +54,7 @@ _VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
 
 
 class Surveyor(Protocol):
-    """Who knows the survey of the radar, once it is made."""
+    """Provides the radar survey once it is complete."""
 
     @property
     def survey(self) -> Survey | None: ...
@@ -62,11 +62,11 @@ class Surveyor(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """An HTTP answer.
+    """An HTTP response.
 
     Attributes:
         status: such as 200.
-        headers: all of them but the length.
+        headers: all except Content-Length.
         body: the content.
     """
 
@@ -88,12 +88,12 @@ def _reply(
 
 
 def refusal(status: int, reason: str) -> Reply:
-    """Refuse in plain text."""
+    """Return a refusal in plain text."""
     return _reply(f"{reason}\n".encode(), "text/plain; charset=utf-8", status=status)
 
 
 class Routes:
-    """Answers by path; every path that is served is known by name."""
+    """Answers GET requests by path; every path that is served is listed explicitly."""
 
     def __init__(self, static: Path) -> None:
         self._files = {f"/{path.name}": path for path in static.iterdir() if path.suffix in _TYPES and path.is_file()}
@@ -101,30 +101,30 @@ class Routes:
         self._made: Mapping[str, Callable[[str], Reply]] | None = None
 
     def admit(self, workspace: Workspace, recording: Recording, hub: Surveyor) -> None:
-        """Answer for this recording from now on."""
+        """Serve this recording from now on."""
         self._made = _Downloads(workspace, recording, hub).by_path()
 
     async def answer(self, address: str) -> Reply:
-        """Answer a GET; files and exports are made off the event loop.
+        """Answer a GET; files and exports are produced outside the event loop.
 
         Args:
             address: path and query, as sent.
         """
         path, _, query = address.partition("?")
         if path.startswith("/api/") and self._made is None:
-            return refusal(503, "The recording is still being opened; ask again in a moment.")
+            return refusal(503, "The recording is still being opened; try again in a moment.")
         make = self._made.get(path) if self._made is not None else None
         if path in self._files:
             make = lambda _query: _file(self._files[path])  # noqa: E731
         elif _VISER_PAGE.fullmatch(path):
             make = lambda _query: _viser_page()  # noqa: E731
         if make is None:
-            return refusal(404, "There is nothing here.")
+            return refusal(404, "Not found.")
         return await asyncio.get_running_loop().run_in_executor(None, make, query)
 
 
 class _Downloads:
-    """What is made of a recording's session when it is asked for."""
+    """Responses generated from the session of a recording."""
 
     def __init__(self, workspace: Workspace, recording: Recording, hub: Surveyor) -> None:
         self._workspace = workspace
@@ -132,7 +132,7 @@ class _Downloads:
         self._hub = hub
 
     def by_path(self) -> Mapping[str, Callable[[str], Reply]]:
-        """Return the makers of all answers, each given the query."""
+        """Return the function for each path; each takes the query."""
         formats = written_formats()
         return {
             "/api/calibration.json": self._calibration,
@@ -164,7 +164,7 @@ class _Downloads:
         return _reply(msgspec.json.encode(NoPreview(reply.body.decode().strip())), _TYPES[".json"])
 
     def _of_calibration(self, make: Callable[[str], Reply]) -> Reply:
-        """Make something of the calibration-1 text of now, or say why there is none; an older answer is never handed out."""
+        """Make a reply from the current calibration-1 text, or say why there is none; never from an outdated calibration."""
         session = self._workspace.session
         if not session.is_solved or not isinstance(session.outcome, Calibration):
             return refusal(409, _why_none(session))
@@ -179,7 +179,7 @@ class _Downloads:
     def _activity(self, _query: str) -> Reply:
         survey = self._hub.survey
         if survey is None:
-            return refusal(409, "The radar is still being read.")
+            return refusal(409, "The radar data are still being read.")
         return _reply(msgspec.json.encode(survey.activity), _TYPES[".json"])
 
 
@@ -202,7 +202,7 @@ def _file_of(text: str) -> CalibrationFile:
 
 @cache
 def _viser_page() -> Reply:
-    """Return viser's own client, its drawing paced (static/pace.js)."""
+    """Return viser's own client with a limited drawing rate (static/pace.js)."""
     page = client_page("../../pace.js")
     body = gzip.compress(page, mtime=0)
     return _reply(body, _TYPES[".html"], policy=_VISER_POLICY, more=(("Content-Encoding", "gzip"),))
@@ -210,7 +210,7 @@ def _viser_page() -> Reply:
 
 def _why_none(session: Session) -> str:
     if session.needs_solving and len(session.clicks) >= MIN_PAIRS:
-        return "The newest change is still being solved; in a moment the calibration is there."
+        return "The latest change is still being solved; try again in a moment."
     if session.is_solved and isinstance(session.outcome, Unsolvable):
         return f"{sentence(session.outcome.reason)} {sentence(session.outcome.hint)}"
-    return "There is no calibration yet: click the reflector in at least four placements."
+    return "There is no calibration yet. Click the reflector in at least four placements."

@@ -1,4 +1,4 @@
-"""The one port: the guard first, then our page and channel, and viser for the 3D view."""
+"""The server: every request passes the guard, then goes to our page, our channel, or viser's 3D view."""
 
 import asyncio
 import contextlib
@@ -18,7 +18,7 @@ from websockets.http11 import Request, Response
 from app.resources import state_folder, static_folder
 from app.web.channel.channel import Channel, Socket
 from app.web.channel.hub import Hub
-from app.web.port import guard as doors
+from app.web.port import guard
 from app.web.port.routes import Reply, Routes, refusal
 from app.web.port.viser_hook import path_of_client, start_viser, stop_viser
 from app.web.port.waiting import WaitingRoom
@@ -35,14 +35,14 @@ __all__ = ["RunningServer", "ServerOptions", "start"]
 
 @dataclass(frozen=True, slots=True)
 class ServerOptions:
-    """Where and to whom the page is served.
+    """Where the page is served, and who has access.
 
     Attributes:
         host: address to bind.
-        port: first port to try, then the next free one; 0 takes any.
-        token: to be asked for; None makes one-time tokens.
-        no_browser: print the link and do not open a browser.
-        more_hosts: further host names under which the server may be addressed.
+        port: first port to try, then the next free one; 0 for any free port.
+        token: token that the link must contain; None generates one-time tokens.
+        no_browser: print the link, do not open a browser.
+        more_hosts: further host names that requests may use.
     """
 
     host: str = "127.0.0.1"
@@ -53,11 +53,11 @@ class ServerOptions:
 
 
 class RunningServer:
-    """A server at work; `close` ends it. Pages may come at once; they wait until a recording is admitted."""
+    """A running server; `close` stops it. Pages can connect at once; they wait until a recording is admitted."""
 
     def __init__(self, options: ServerOptions, room: WaitingRoom) -> None:
         self._options = options
-        self._guard = doors.Guard(
+        self._guard = guard.Guard(
             host=options.host, key=_cookie_key(), token=options.token, more_hosts=options.more_hosts
         )
         self._executor = ThreadPoolExecutor(max_workers=3, thread_name_prefix="frames")
@@ -74,11 +74,11 @@ class RunningServer:
         self._viser.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         self._viser.initial_camera.position, self._viser.initial_camera.look_at = STAND_AT, LOOK_AT
         self._viser.initial_camera.fov = FIELD_OF_VIEW_RAD
-        self._viser.on_client_connect(self._space_came)
-        self._viser.on_client_disconnect(self._space_went)
+        self._viser.on_client_connect(self._view_opened)
+        self._viser.on_client_disconnect(self._view_closed)
 
     def admit(self, workspace: Workspace, recording: Recording) -> None:
-        """Serve this recording from now on; pages that wait go on with it."""
+        """Serve this recording from now on, also to the pages that are waiting."""
         hub = Hub(workspace, recording, self._executor)
 
         async def open_up() -> None:
@@ -90,7 +90,7 @@ class RunningServer:
         asyncio.run_coroutine_threadsafe(open_up(), self._viser.get_event_loop()).result()
 
     def show(self, picture: EncodedImage) -> None:
-        """Show pages that wait for the recording a picture of it.
+        """Show a picture of the recording on the pages that are waiting for it.
 
         Raises:
             RuntimeError: the server has stopped.
@@ -98,13 +98,13 @@ class RunningServer:
         self._viser.get_event_loop().call_soon_threadsafe(self._room.show, picture)
 
     def refuse(self, problem: str) -> None:
-        """Tell pages that wait why there will be no recording; does nothing once it was admitted, or after closing."""
+        """Tell the waiting pages why the recording cannot be opened; do nothing if it was admitted or the server is closed."""
         if self._hub is None and not self._is_closed:
             asyncio.run_coroutine_threadsafe(self._room.refuse(problem), self._viser.get_event_loop()).result()
 
     @property
     def port(self) -> int:
-        """The port that was bound."""
+        """The bound port."""
         return self._viser.get_port()
 
     @property
@@ -116,11 +116,11 @@ class RunningServer:
 
     @property
     def url(self) -> str:
-        """The link that opens the page; it works once, unless the user chose the token."""
+        """The link that opens the page; it works once unless the user chose the token."""
         return f"{self.origin}/?token={quote(self._guard.token)}"
 
     def close(self) -> None:
-        """Stop serving; the workspace and the recording stay open. Closing again does nothing."""
+        """Stop serving; the workspace and the recording stay open. Safe to call twice."""
         if self._is_closed:
             return
         self._is_closed = True
@@ -131,22 +131,22 @@ class RunningServer:
         self._executor.shutdown(wait=True, cancel_futures=True)
 
     def _wrap_request(self, _viser_files: object) -> ProcessRequest:
-        """Every request goes through the guard; viser's own file server is not used."""
+        """Send every request through the guard; viser's own file server is not used."""
 
         async def process(_connection: ServerConnection, request: Request) -> Response | None:
-            asked = doors.Request(request.path, _all_headers(request.headers))
+            asked = guard.Request(request.path, _all_headers(request.headers))
             link = self._guard.token
             verdict = self._guard.check(asked)
-            if isinstance(verdict, doors.Refused):
+            if isinstance(verdict, guard.Refused):
                 return _response(refusal(verdict.status, verdict.reason))
-            if isinstance(verdict, doors.Admitted):
+            if isinstance(verdict, guard.Admitted):
                 if self._guard.token != link:
                     self.on_new_link()
                 return _redirect(verdict)
             path = request.path.partition("?")[0]
             if asked.is_websocket:
                 known = path.startswith(("/ws/", "/viser/"))
-                return None if known else _response(refusal(404, "There is no WebSocket here."))
+                return None if known else _response(refusal(404, "No WebSocket at this address."))
             return _response(await self._routes.answer(request.path))
 
         return process
@@ -176,8 +176,8 @@ class RunningServer:
             if self._channels.get(tab) is channel:
                 del self._channels[tab]
 
-    async def _space_came(self, client: "viser.ClientHandle") -> None:
-        """A 3D view has opened: tie it to the page that carries it."""
+    async def _view_opened(self, client: "viser.ClientHandle") -> None:
+        """Connect a new 3D view to the page that contains it."""
         tab = _tab_of(self._viser, client.client_id)
         scene = TabScene(client)
         self._scenes[tab] = (client.client_id, scene)
@@ -186,7 +186,7 @@ class RunningServer:
             channel.scene = scene
             channel.refresh()
 
-    async def _space_went(self, client: "viser.ClientHandle") -> None:
+    async def _view_closed(self, client: "viser.ClientHandle") -> None:
         for tab, (client_id, _) in list(self._scenes.items()):
             if client_id == client.client_id:
                 del self._scenes[tab]
@@ -195,7 +195,7 @@ class RunningServer:
 
 
 def start(workspace: Workspace, recording: Recording, options: ServerOptions) -> RunningServer:
-    """Start to serve a recording; returns once the port answers."""
+    """Start serving a recording; return once the port accepts connections."""
     server = RunningServer(options, WaitingRoom())
     server.admit(workspace, recording)
     return server
@@ -210,19 +210,19 @@ def _response(reply: Reply) -> Response:
     return Response(reply.status.value, reply.status.phrase, headers, reply.body)
 
 
-def _redirect(admitted: doors.Admitted) -> Response:
+def _redirect(admitted: guard.Admitted) -> Response:
     location = admitted.location if admitted.location.startswith("/") and admitted.location[:2] != "//" else "/"
     return Response(303, "See Other", Headers([("Location", location), ("Set-Cookie", admitted.set_cookie),
                     ("Content-Length", "0"), ("Referrer-Policy", "no-referrer"), ("Connection", "close")]), b"")  # fmt: skip
 
 
 def _tab_of(server: "viser.ViserServer", client_id: int) -> str:
-    """Return the name of the tab that a 3D view belongs to: it is the last part of its address."""
+    """Return the name of the tab that a 3D view belongs to: the last part of its address."""
     return path_of_client(server, client_id).partition("?")[0].rstrip("/").rpartition("/")[2]
 
 
 def _cookie_key() -> bytes:
-    """Return the secret that cookies are made from, kept in the user's folder so that a restart does not shut pages out."""
+    """Return the secret for the cookies, stored in the user's state folder so that pages stay admitted after a restart."""
     path = state_folder() / "cookie.key"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
-"""From a command to a page that works, until Ctrl+C or SIGTERM.
+"""Serve the page of a recording until Ctrl+C or SIGTERM.
 
-Where opening takes long, the page is there before the recording is.
+If opening the recording takes long, the page is served before the recording is open.
 """
 
 import contextlib
@@ -27,9 +27,9 @@ _log = logging.getLogger(__name__)
 
 
 class Service:
-    """Serves a recording that is opened within `with`; when that takes longer than a moment, pages are let in to wait.
+    """Serves a recording that is opened inside the `with` block; if that takes long, pages can already connect and wait.
 
-    An error within `with` is told to the pages that wait, and goes on to the caller.
+    An error inside the `with` block is shown on the waiting pages and then raised to the caller.
     """
 
     def __init__(
@@ -40,14 +40,14 @@ class Service:
         *,
         let_in_after_s: float,
     ) -> None:
-        """Prepare; nothing is served yet.
+        """Set up the service; nothing is served yet.
 
         Args:
-            options: where and to whom.
-            opening: what pages that wait are told.
-            first_picture: reads what they see, in a thread of its own; None where there is nothing to show early.
-            let_in_after_s: how long nobody is let in; with 0, the link is out before anything is opened, so that opening and
-                the browser do not hold one another up [s].
+            options: where the page is served, and who has access.
+            opening: the message for waiting pages.
+            first_picture: reads the picture for waiting pages, in its own thread; returns None if there is none to show early.
+            let_in_after_s: delay before waiting pages are admitted [s]; with 0, the link is printed before anything is opened,
+                so that opening the recording and starting the browser do not slow each other down.
         """
         self._options = options
         self._opening = opening
@@ -72,10 +72,10 @@ class Service:
         self._end(error)
 
     def serve(self, workspace: Workspace, recording: Recording) -> None:
-        """Serve what has been opened until Ctrl+C or SIGTERM.
+        """Serve the opened recording until Ctrl+C or SIGTERM.
 
         Raises:
-            OSError: the port cannot be had.
+            OSError: no port can be bound.
         """
         self._is_settled.set()
         server = self._early.result() or self._start(WaitingRoom())
@@ -83,17 +83,17 @@ class Service:
             server.admit(workspace, recording)
             threading.Event().wait()
         except KeyboardInterrupt:
-            print("\nStopped; every click is kept.")
+            print("\nStopped; all clicks are saved.")
         finally:
             server.close()
 
     def _end(self, error: BaseException | None) -> None:
-        """Tell pages that wait what was wrong, and stop serving."""
+        """Show the error on the waiting pages, and stop serving."""
         self._is_settled.set()
         server = None if self._early.exception() else self._early.result()
         if server is not None:
             if isinstance(error, Exception):
-                server.refuse(_in_words(error))
+                server.refuse(_problem_text(error))
             server.close()
         self._threads.shutdown()
 
@@ -107,12 +107,12 @@ class Service:
         return server
 
     def _start(self, room: WaitingRoom) -> RunningServer:
-        """Start the server, and tell its link."""
+        """Start the server and print its link."""
         options, server = self._options, RunningServer(self._options, room)
         if not is_loopback(options.host):
             print(
-                f"Warning: bound to {options.host}: whoever has the link and reaches this machine sees the recording. "
-                "From another machine, put this machine's address into the link."
+                f"Warning: serving on {options.host}: anyone who has the link and can reach this machine sees the recording. "
+                "From another machine, use this machine's address in the link."
             )
         print(f"Open {server.url}", flush=True)
         if options.token is None:
@@ -123,15 +123,15 @@ class Service:
 
 
 def _show(server: RunningServer, picture: "Future[EncodedImage | None]") -> None:
-    """Show the first picture, if there is one; opening the recording tells what is wrong with it."""
+    """Show the first picture, if there is one; opening the recording reports any error in it."""
     if picture.exception() is not None:
         _log.warning("the first picture could not be read: %s", picture.exception())
     elif (found := picture.result()) is not None:
-        with contextlib.suppress(RuntimeError):  # the server has stopped meanwhile
+        with contextlib.suppress(RuntimeError):  # the server has stopped in the meantime
             server.show(found)
 
 
-def _in_words(error: Exception) -> str:
+def _problem_text(error: Exception) -> str:
     if isinstance(error, CalibrationError):
         return sentence(str(error))
-    return "The recording cannot be opened; the terminal says why."
+    return "The recording cannot be opened; see the terminal for the reason."

@@ -1,8 +1,8 @@
-"""viser, and all that is private to it: its server on our port, its connections, and its own page.
+"""All use of viser's private API: its server on our port, its connections, and its own page.
 
-viser has no public way to add routes, to forbid public tunnels, or to tell which page a client belongs to.
-`missing_parts` names what a new viser lacks; then nothing is served, for an unguarded port would be worse than none.
-tests/unit/app/web/port/test_viser_hook.py and test_server.py are the contract.
+viser has no public API to add routes, to disable public tunnels, or to find out which page a client belongs to.
+`missing_parts` names what a new viser lacks; in that case nothing is served, because the port would be unguarded.
+tests/unit/app/web/port/test_viser_hook.py and test_server.py test these parts.
 """
 
 import contextlib
@@ -38,53 +38,53 @@ def start_viser(
     wrap_request: Callable[[Any], ProcessRequest],
     wrap_handler: Callable[[SocketHandler], SocketHandler],
 ) -> "viser.ViserServer":
-    """Start viser with our request processing in front of its own.
+    """Start viser with our request processing wrapped around its own.
 
     Args:
         host: address to bind.
-        port: first port to try; viser takes the next free one. 0 takes any.
+        port: first port to try; viser takes the next free one. 0 for any free port.
         wrap_request: given viser's `process_request`, returns the one to use.
         wrap_handler: given viser's WebSocket handler, returns the one to use.
 
     Raises:
-        InstallationError: this viser starts its server in another way, or lacks a part that is needed.
+        InstallationError: this version of viser starts its server differently, or lacks a required part.
     """
     import viser
 
     with (
         wrapped_serve(wrap_request, wrap_handler) as used,
-        contextlib.redirect_stdout(io.StringIO()),  # viser prints an address that lacks the token
+        contextlib.redirect_stdout(io.StringIO()),  # viser prints an address without the token
     ):
         server = viser.ViserServer(host=host, port=port, verbose=False)
     if not used.is_set():
         stop_viser(server)
-        raise _unknown_viser("it does not start its server by websockets.asyncio.server.serve")
+        raise _unknown_viser("it does not start its server with websockets.asyncio.server.serve")
     if missing := missing_parts(server):
         stop_viser(server)
         raise _unknown_viser(f"it has no {', '.join(missing)}")
-    # Any client could ask viser to open a public tunnel; nobody can here.
+    # In viser, any client can request a public tunnel; disable that.
     for name in _TUNNEL_MESSAGES:
         server._websock_server.unregister_handler(getattr(viser._messages, name))
     return server
 
 
 def stop_viser(server: "viser.ViserServer") -> None:
-    """Stop a server of viser without its saying so."""
+    """Stop a viser server without its printed message."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
 
 
 def path_of_client(server: "viser.ViserServer", client_id: int) -> str:
-    """Return the path and query under which a client has connected; "" once it has left."""
+    """Return the path and query of a client's connection; "" if it has disconnected."""
     connection = server._websock_server._live_connections.get(client_id)
     return connection.request.path if connection is not None and connection.request is not None else ""
 
 
 def client_page(script: str) -> bytes:
-    """Return viser's own page, its panels hidden, for our page has them.
+    """Return viser's own page with its panels hidden: our page has its own.
 
     Args:
-        script: address of a script of ours that runs before viser's.
+        script: address of our script that runs before viser's.
     """
     page = _client_file().read_bytes()
     page = page.replace(b"<head>", f'<head><script src="{script}"></script>'.encode(), 1)
@@ -92,7 +92,7 @@ def client_page(script: str) -> bytes:
 
 
 def missing_parts(server: "viser.ViserServer") -> tuple[str, ...]:
-    """Name the private parts of viser that are used here and that a server of the installed viser does not have."""
+    """Return the private parts of viser used here that the installed version lacks."""
     from viser import _messages
 
     sockets = getattr(server, "_websock_server", None)
@@ -116,5 +116,5 @@ def _unknown_viser(what: str) -> InstallationError:
     import viser
 
     return InstallationError(
-        f"viser {viser.__version__} cannot be used: {what}; install cocalib again, with the viser that it asks for"
+        f"viser {viser.__version__} cannot be used: {what}; reinstall cocalib, with the viser version that it requires"
     )

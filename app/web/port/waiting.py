@@ -1,4 +1,4 @@
-"""Where pages wait while the recording is still being opened: they see its first picture, and what they say is kept for later."""
+"""Pages that wait while the recording is being opened: they show its first picture, and their messages are kept for later."""
 
 import asyncio
 from collections import deque
@@ -9,14 +9,14 @@ from calib_core.recordings import EncodedImage
 
 __all__ = ["WaitingRoom"]
 
-_MOST_HELD = 2000
-"""A page that says more than this before it can be answered is let go; it comes again and repeats what counts."""
-_FAREWELL_S = 3.0
-"""How long a page may take to read why the recording cannot be opened [s]."""
+_MAX_HELD = 2000
+"""A page that sends more messages than this before it can be answered is disconnected; it reconnects and repeats what matters."""
+_REFUSAL_TIMEOUT_S = 3.0
+"""How long to wait for a page to receive the reason why the recording cannot be opened [s]."""
 
 
 class WaitingRoom:
-    """Told once, in order, to every page that waits: what is going on, the first picture, the end. Lives on the event loop."""
+    """Sends to every waiting page, once and in order: what is being done, the first picture, the end. Runs on the event loop."""
 
     def __init__(self, opening: Opening | None = None) -> None:
         self._opening = opening
@@ -26,55 +26,55 @@ class WaitingRoom:
         self._waiting: set[asyncio.Task[None]] = set()
 
     def show(self, picture: EncodedImage) -> None:
-        """Show a picture. It is no frame yet: it has no place among them and no time."""
+        """Show a picture. It is not a frame yet: it has no index and no time."""
         header = FrameHeader(-1, 0, picture.width_px, picture.height_px, 1.0, picture.format)
         self._add(encode_frame(header, picture.data))
 
     def end(self) -> None:
-        """The recording is open: everybody may go on."""
+        """Let all pages continue: the recording is open."""
         self._over = True
         self._change()
 
     async def refuse(self, problem: str) -> None:
-        """Say why the recording cannot be opened; return once those who wait have heard it."""
+        """Send the reason why the recording cannot be opened; return once the waiting pages have received it."""
         name, doing = (self._opening.name, self._opening.doing) if self._opening else ("", "")
         self._add(encode(Opening(name, doing, problem)))
         self.end()
         if self._waiting:
-            await asyncio.wait(self._waiting, timeout=_FAREWELL_S)
+            await asyncio.wait(self._waiting, timeout=_REFUSAL_TIMEOUT_S)
 
     async def stay(self, socket: Socket) -> Socket:
-        """Let a page wait.
+        """Keep a page waiting until the recording is open.
 
         Returns:
-            The page's socket, which gives what the page has said meanwhile first.
+            The page's socket, which first returns the messages that the page sent while waiting.
 
         Raises:
-            BufferError: the page has said too much.
+            BufferError: the page sent too many messages.
         """
         held: deque[str | bytes] = deque()
         reading = asyncio.create_task(_hold(socket, held))
-        telling = asyncio.create_task(self._tell(socket))
-        self._waiting.add(telling)
+        sending = asyncio.create_task(self._send_news(socket))
+        self._waiting.add(sending)
         try:
-            await asyncio.wait({reading, telling}, return_when=asyncio.FIRST_COMPLETED)
-            for task in (telling, reading):
+            await asyncio.wait({reading, sending}, return_when=asyncio.FIRST_COMPLETED)
+            for task in (sending, reading):
                 if task.done():
                     task.result()
         finally:
-            self._waiting.discard(telling)
-            for task in (telling, reading):
+            self._waiting.discard(sending)
+            for task in (sending, reading):
                 task.cancel()
-            await asyncio.gather(telling, reading, return_exceptions=True)
+            await asyncio.gather(sending, reading, return_exceptions=True)
         return _ResumedSocket(socket, held)
 
-    async def _tell(self, socket: Socket) -> None:
-        told = 0
+    async def _send_news(self, socket: Socket) -> None:
+        sent = 0
         while True:
             changed = self._changed
-            while told < len(self._news):
-                await socket.send(self._news[told])
-                told += 1
+            while sent < len(self._news):
+                await socket.send(self._news[sent])
+                sent += 1
             if self._over:
                 return
             await changed.wait()
@@ -89,7 +89,7 @@ class WaitingRoom:
 
 
 class _ResumedSocket:
-    """A socket some of whose messages were read before."""
+    """A socket whose first messages have already been read."""
 
     def __init__(self, socket: Socket, held: deque[str | bytes]) -> None:
         self._socket = socket
@@ -103,6 +103,6 @@ class _ResumedSocket:
 
 
 async def _hold(socket: Socket, held: deque[str | bytes]) -> None:
-    while len(held) < _MOST_HELD:
+    while len(held) < _MAX_HELD:
         held.append(await socket.recv())
-    raise BufferError(f"the page has said {len(held)} things before it could be answered")
+    raise BufferError(f"the page sent {len(held)} messages before it could be answered")

@@ -1,7 +1,7 @@
-"""websockets, and what is ours to change in it: who answers its requests, and which of its log messages are worth reading.
+"""Our changes to websockets: who answers its requests, and which of its log messages are shown.
 
-viser starts its server by `websockets.asyncio.server.serve`, looked up at the moment of the call. While `wrapped_serve` lasts,
-that name leads here. tests/unit/app/web/port/test_websockets_hook.py fails in words when a new websockets changes its part.
+viser starts its server with `websockets.asyncio.server.serve`, looked up when it is called. Inside `wrapped_serve`, that name
+refers to our function. tests/unit/app/web/port/test_websockets_hook.py fails with a clear message if websockets changes this.
 """
 
 import logging
@@ -24,9 +24,9 @@ _one_at_a_time = threading.Lock()
 
 
 class _NoHandshakeNoise(logging.Filter):
-    """Drop what every port scan and every refused request would print; real failures of a handler pass.
+    """Drop the log messages of port scans and refused requests; real failures of a handler are kept.
 
-    A client that leaves in the middle of a request trips an assertion of websockets: that is no failure of ours either.
+    A client that disconnects in the middle of a request trips an assertion in websockets; that is not our failure either.
     """
 
     def filter(self, record: logging.LogRecord) -> bool:
@@ -39,14 +39,14 @@ class _NoHandshakeNoise(logging.Filter):
 def wrapped_serve(
     wrap_request: Callable[[Any], ProcessRequest], wrap_handler: Callable[[SocketHandler], SocketHandler]
 ) -> Iterator[threading.Event]:
-    """Put our request processing in front of that of every server which websockets starts meanwhile.
+    """Wrap the request processing of every server that websockets starts inside this context.
 
     Args:
         wrap_request: given the server's `process_request`, returns the one to use.
         wrap_handler: given the server's WebSocket handler, returns the one to use.
 
     Yields:
-        what is set once a server has been started in this way.
+        an event that is set once a server has been started this way.
     """
     original, used = websocket_server.serve, threading.Event()
 

@@ -1,4 +1,4 @@
-"""Freed memory is reused by the process."""
+"""The process keeps freed memory."""
 
 import platform
 import subprocess

@@ -1,4 +1,4 @@
-"""Options by name: what is understood, what is refused, and how each is described."""
+"""Options by name: what is accepted, what is refused, and how each is described."""
 
 import dataclasses
 import inspect
@@ -42,7 +42,7 @@ def test_all_options_come_back_from_their_own_tree() -> None:
     assert options_from_tree(msgspec.json.decode(text)) == options
 
 
-def test_a_camera_position_is_set_and_forgotten_as_a_whole() -> None:
+def test_a_camera_position_is_set_and_removed_as_a_whole() -> None:
     tree = {"solving": {"camera_position": {"position_m": [0.1, 0.2, 0.3], "sigma_m": 0.02}}}
     options = options_from_tree(tree)
     assert options.solving.camera_position == CameraPositionPrior((0.1, 0.2, 0.3), 0.02)
@@ -65,7 +65,7 @@ def test_a_camera_position_is_set_and_forgotten_as_a_whole() -> None:
         ({"solving": {"seed": 1.5}}, "option solving.seed"),
     ],
 )
-def test_what_is_not_understood_is_refused_in_words(tree, words: str) -> None:
+def test_what_is_not_understood_is_refused_with_a_clear_error(tree, words: str) -> None:
     with pytest.raises(OptionError) as refused:
         options_from_tree(tree)
     assert words in str(refused.value)
@@ -75,12 +75,12 @@ def test_what_is_not_understood_is_refused_in_words(tree, words: str) -> None:
 @pytest.mark.parametrize(
     ("tree", "words"),
     [
-        ({"noise": {"sigma_px": 0.0}}, "option noise.sigma_px: 0 is out of range; give 0.01 to 1000 px"),
+        ({"noise": {"sigma_px": 0.0}}, "option noise.sigma_px: 0 is out of range; allowed: 0.01 to 1000 px"),
         ({"noise": {"sigma_px": -2.0}}, "option noise.sigma_px"),
-        ({"locating": {"max_candidates": 0}}, "option locating.max_candidates: 0 is out of range; give 1 to 50"),
+        ({"locating": {"max_candidates": 0}}, "option locating.max_candidates: 0 is out of range; allowed: 1 to 50"),
         ({"solving": {"camera_position": {"sigma_m": 0.0}}}, "option solving.camera_position.sigma_m"),
         ({"solving": {"camera_position": {"position_m": [0, 0, 1e9]}}}, "option solving.camera_position.position_m"),
-        ({"gating": {"min_range_m": 70.0}}, "leaves nothing below gating.max_range_m, 60 m"),
+        ({"gating": {"min_range_m": 70.0}}, "70 m is not below gating.max_range_m, 60 m"),
     ],
 )
 def test_a_number_out_of_range_is_refused_with_the_range(tree, words: str) -> None:
@@ -96,9 +96,9 @@ def test_no_number_may_be_infinite_or_missing(path: str, value: float) -> None:
         changed_options(CalibrationOptions(), [OptionChange(path, value)])
 
 
-def test_a_choice_that_was_put_in_by_hand_is_checked_too() -> None:
+def test_a_choice_that_was_set_directly_is_checked_too() -> None:
     wrong = CalibrationOptions(method="best")  # type: ignore[arg-type]
-    with pytest.raises(OptionError, match="'best' is not one of its values; choose default or paper"):
+    with pytest.raises(OptionError, match="unknown value 'best'; choose default or paper"):
         checked_options(wrong)
 
 
@@ -117,7 +117,7 @@ def test_every_option_is_described_by_one_sentence() -> None:
     assert all(group.hint for group in option_groups())
 
 
-def test_a_field_that_is_an_option_says_what_it_is_and_no_text_is_read_from_the_source() -> None:
+def test_every_option_field_has_its_text_in_its_metadata() -> None:
     assert "inspect.getsource" not in inspect.getsource(option_changes)
     for kind in (CalibrationOptions, RecordingOptions, SimulationOptions, RigOptions):
         for field in dataclasses.fields(kind):
@@ -125,7 +125,7 @@ def test_a_field_that_is_an_option_says_what_it_is_and_no_text_is_read_from_the_
                 assert dataclasses.is_dataclass(field.default_factory), field.name  # a group of options
 
 
-def test_a_description_says_all_that_a_field_needs() -> None:
+def test_a_description_has_all_that_an_input_field_needs() -> None:
     option = DESCRIPTIONS["noise.sigma_azimuth_deg"]
     assert (option.label, option.unit, option.kind) == ("sigma azimuth", "deg", "number")
     assert (option.low, option.high, option.default) == (1e-3, 45.0, 0.5)

@@ -1,4 +1,4 @@
-"""Where the program's files are, and whether another package conflicts with it."""
+"""Where the program's own files are, and whether another package overwrites it."""
 
 import importlib.metadata
 from pathlib import Path
@@ -24,12 +24,12 @@ def test_a_checkout_has_its_files_next_to_the_package(project_root: Path) -> Non
 def test_an_installed_package_has_its_files_inside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = tmp_path / "site-packages" / "app"
     (package / "static").mkdir(parents=True)
-    (tmp_path / "site-packages" / "static").mkdir()  # of another package
+    (tmp_path / "site-packages" / "static").mkdir()  # another package's
     monkeypatch.setattr(resources, "_PACKAGE_FOLDER", package)
     assert static_folder() == package / "static"
 
 
-def test_missing_files_are_reported_with_the_places_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_files_are_reported_with_the_folders_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(resources, "_PACKAGE_FOLDER", tmp_path / "app")
     with pytest.raises(InstallationError, match="the folder sample_data is neither in"):
         sample_folder()

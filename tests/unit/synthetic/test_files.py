@@ -148,7 +148,7 @@ def test_truth_and_clicks_agree_with_the_simulation(recording: SimulatedRecordin
 
 
 def test_a_recording_is_never_overwritten(recording: SimulatedRecording, folder: Path) -> None:
-    with pytest.raises(RecordingError, match=r"radar\.bag exists already"):
+    with pytest.raises(RecordingError, match=r"radar\.bag already exists"):
         write_recording(recording, folder)
 
 

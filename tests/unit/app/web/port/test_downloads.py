@@ -1,4 +1,4 @@
-"""What the port hands out of a calibration, and what it refuses."""
+"""Downloads of a calibration: what the port returns and what it refuses."""
 
 import asyncio
 import dataclasses
@@ -46,7 +46,7 @@ def ask(project_root: Path) -> Callable[[Session, str], Reply]:
     return answer
 
 
-def test_a_calibration_that_answers_an_older_revision_is_not_handed_out(file, ask):
+def test_a_calibration_of_an_older_revision_cannot_be_downloaded(file, ask):
     solved = Session(CLICKS, revision=7, outcome=file.calibration, outcome_revision=7)
     changed = dataclasses.replace(solved, revision=8)
     for path in ("/api/calibration.json", "/api/export/tf2"):
@@ -56,7 +56,7 @@ def test_a_calibration_that_answers_an_older_revision_is_not_handed_out(file, as
     assert "still being solved" in json.loads(ask(changed, "/api/preview/tf2").body)["reason"]
 
 
-def test_why_there_is_none_is_said_in_words(ask):
+def test_a_missing_calibration_is_explained(ask):
     refused = Unsolvable("mirrored", "the axes are mirrored", "swap left and right")
     solved = Session(CLICKS, revision=3, outcome=refused, outcome_revision=3)
     assert ask(solved, "/api/export/urdf").body == b"The axes are mirrored. Swap left and right.\n"
@@ -93,7 +93,7 @@ def test_the_address_may_pose_the_radar_in_the_kit(file, ask):
     assert ask(solved, "/api/export/tf2?parent_from_radar=0,0,0,0,0,0,1").status == 409
 
 
-def test_binary_files_say_what_is_in_them(file):
+def test_the_contents_of_binary_files_are_listed(file):
     numpy, matlab, colmap = (contents_text(export(file, name)) for name in ("numpy", "matlab", "colmap"))
     assert "camera_from_radar  float64  4 x 4" in numpy
     assert "camera_from_radar.A  float64  4 x 4" in matlab

@@ -1,4 +1,4 @@
-"""The doorkeeper: every way in that is not the link is closed."""
+"""The guard: nobody gets access except through the link."""
 
 import pytest
 
@@ -23,7 +23,7 @@ def status(verdict: object) -> int:
     return verdict.status
 
 
-def test_the_link_admits_once_and_its_cookie_stays_good() -> None:
+def test_the_link_admits_once_and_its_cookie_stays_valid() -> None:
     door = guard()
     link = f"/?token={door.token}"
     admitted = door.check(request(link))
@@ -34,7 +34,9 @@ def test_the_link_admits_once_and_its_cookie_stays_good() -> None:
     assert status(door.check(request(link))) == 401
     cookie = admitted.set_cookie.partition(";")[0]
     assert door.check(request("/", cookie=cookie)) == Allowed()
-    assert isinstance(door.check(request(link, cookie=cookie)), Admitted), "a reload of the used link is no dead end"
+    assert isinstance(door.check(request(link, cookie=cookie)), Admitted), (
+        "reloading the used link must work with the cookie"
+    )
 
 
 def test_after_a_link_was_used_the_next_one_works() -> None:
@@ -45,7 +47,7 @@ def test_after_a_link_was_used_the_next_one_works() -> None:
     assert isinstance(door.check(request(f"/?token={door.token}")), Admitted)
 
 
-def test_a_token_of_the_user_stays_good() -> None:
+def test_a_token_chosen_by_the_user_stays_valid() -> None:
     door = guard(token="mine")
     assert isinstance(door.check(request("/?token=mine")), Admitted)
     assert isinstance(door.check(request("/?token=mine")), Admitted)
@@ -67,7 +69,7 @@ def test_a_token_does_not_open_a_websocket() -> None:
     door = guard()
     opening = request(f"/ws?token={door.token}", upgrade="websocket", origin="http://127.0.0.1:8080")
     assert status(door.check(opening)) == 401
-    assert isinstance(door.check(request(f"/?token={door.token}")), Admitted), "and is not used up by trying"
+    assert isinstance(door.check(request(f"/?token={door.token}")), Admitted), "the attempt must not use up the token"
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The port as a client meets it: the contract with viser's server, the attacks, and the words of the channel."""
+"""The port as seen by a client: the behaviour we need from viser's server, attacks, and the channel's messages."""
 
 import gzip
 import json
@@ -36,7 +36,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
 
 @pytest.fixture(scope="module")
 def cookie(server: RunningServer) -> str:
-    """Come in by the link."""
+    """Open the link and return the cookie."""
     return come_in(server)
 
 
@@ -63,7 +63,7 @@ def test_the_page_and_its_parts_are_served_with_their_types_and_no_inline_script
     assert get(server, "/", Cookie=cookie).body == (project_root / "static" / "index.html").read_bytes()
 
 
-def test_viser_still_starts_the_way_the_hook_takes(server: RunningServer, cookie: str) -> None:
+def test_viser_still_starts_its_server_as_the_hook_expects(server: RunningServer, cookie: str) -> None:
     import viser
 
     page = get(server, "/viser/tab1/", Cookie=cookie)
@@ -82,7 +82,7 @@ def test_viser_still_starts_the_way_the_hook_takes(server: RunningServer, cookie
 
 
 @pytest.mark.parametrize("path", ["/", "/main.js", "/api/clicks.json", "/viser/tab1/"])
-def test_without_a_cookie_there_is_nothing(server: RunningServer, path: str) -> None:
+def test_without_a_cookie_nothing_is_served(server: RunningServer, path: str) -> None:
     assert get(server, path).status == 401
 
 
@@ -184,7 +184,7 @@ def test_a_click_reaches_the_other_tab_and_undo_takes_it_from_both(server: Runni
         ({"type": "nonsense"}, "nonsense"),
     ],
 )
-def test_what_cannot_be_done_is_said_in_words_and_the_channel_lives_on(
+def test_an_invalid_message_gets_an_error_and_the_channel_stays_open(
     server: RunningServer, cookie: str, message: dict[str, Any], words: str
 ) -> None:
     with channel(server, cookie) as socket:
@@ -211,7 +211,7 @@ def test_a_frame_that_does_not_exist_is_refused_by_its_request(server: RunningSe
         assert wanted(socket, "error")["request"] == 12
 
 
-def test_a_page_that_stops_reading_slows_nobody(server: RunningServer, cookie: str) -> None:
+def test_a_page_that_stops_reading_does_not_slow_others(server: RunningServer, cookie: str) -> None:
     with channel(server, cookie, "/ws/stalled") as stalled, channel(server, cookie, "/ws/lively") as lively:
         for request in range(300):
             stalled.send(json.dumps({"type": "frame", "index": request % 5, "request": request}))
@@ -235,7 +235,7 @@ def test_the_clicks_can_be_downloaded_at_any_time(server: RunningServer, cookie:
     assert answer.headers["Content-Disposition"] == 'attachment; filename="clicks.json"'
 
 
-def test_after_closing_nobody_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_after_closing_no_connection_is_accepted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     recording = PictureRecording(grey_pictures(1))
     workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="one grey")
@@ -252,7 +252,7 @@ def test_after_closing_nobody_answers(tmp_path: Path, monkeypatch: pytest.Monkey
     assert (tmp_path / "cocalib" / "cookie.key").stat().st_mode & 0o077 == 0
 
 
-def test_the_terminal_is_told_of_failures_but_not_of_clients_that_leave(
+def test_failures_are_logged_but_disconnecting_clients_are_not(
     server: RunningServer, caplog: pytest.LogCaptureFixture
 ) -> None:
     port = logging.getLogger("cocalib.port")

@@ -1,4 +1,4 @@
-"""A recording that takes its time to open: pages are let in to wait, and end or go on with it."""
+"""A recording that opens slowly: pages connect and wait, then continue or end with it."""
 
 import json
 import os
@@ -28,7 +28,7 @@ from tests.port_client import channel, come_in, get, wanted
 OPENING = Opening("long.bag", "Opening long.bag")
 RECORDING = PictureRecording(grey_pictures(3))
 LONG_S = 60.0
-POSIX_SIGNALS = pytest.mark.skipif(sys.platform == "win32", reason="a signal to one process is a matter of POSIX")
+POSIX_SIGNALS = pytest.mark.skipif(sys.platform == "win32", reason="a signal to one process needs POSIX")
 
 
 @pytest.fixture(autouse=True)
@@ -48,14 +48,14 @@ def service(first_picture: Callable[[], Any] = lambda: None, *, let_in_after_s: 
 
 
 def early(opening: Service) -> RunningServer:
-    """Return the server that was started before the recording is open."""
+    """Return the server that was started before the recording was open."""
     server = opening._early.result(timeout=20)
     assert server is not None
     return server
 
 
 def picture(socket: ClientConnection) -> tuple[Any, bytes]:
-    """Read on until a picture comes: its header, its bytes."""
+    """Read until a picture arrives; return its header and its bytes."""
     while not isinstance(message := socket.recv(timeout=20), bytes):
         pass
     length = int.from_bytes(message[:4], "little")
@@ -72,8 +72,8 @@ def test_a_page_that_waits_sees_the_first_picture_and_is_greeted_once_the_record
         with channel(server, cookie, "/ws/tab1") as one, channel(server, cookie, "/ws/tab2") as two:
             for socket in (one, two):
                 socket.send('{"type":"hello"}')
-                told = wanted(socket, "opening")
-                assert (told["name"], told["doing"], told["problem"]) == ("long.bag", "Opening long.bag", "")
+                message = wanted(socket, "opening")
+                assert (message["name"], message["doing"], message["problem"]) == ("long.bag", "Opening long.bag", "")
                 header, data = picture(socket)
                 assert (header["index"], header["request"], header["width_px"]) == (-1, 0, 320)
                 assert data == RECORDING.image_bytes(0).data
@@ -83,7 +83,7 @@ def test_a_page_that_waits_sees_the_first_picture_and_is_greeted_once_the_record
                 assert wanted(socket, "view")["clicks"] == []
 
 
-def test_the_page_is_served_meanwhile_and_downloads_are_put_off(workspace: Workspace) -> None:
+def test_while_opening_the_page_is_served_and_downloads_are_refused(workspace: Workspace) -> None:
     with service() as opening:
         server = early(opening)
         assert get(server, "/").status == 401
@@ -98,7 +98,7 @@ def test_the_page_is_served_meanwhile_and_downloads_are_put_off(workspace: Works
         assert get(server, "/api/clicks.json", Cookie=cookie).status == 200
 
 
-def test_what_a_page_says_meanwhile_is_done_afterwards_and_in_order(workspace: Workspace) -> None:
+def test_messages_sent_while_waiting_are_handled_afterwards_in_order(workspace: Workspace) -> None:
     sec, nanosec = divmod(START, 10**9)
     place = {"type": "click_placed", "image_time": {"sec": sec, "nanosec": nanosec}}
     with service() as opening:
@@ -112,7 +112,7 @@ def test_what_a_page_says_meanwhile_is_done_afterwards_and_in_order(workspace: W
     assert [click.u_px for click in workspace.session.clicks] == [39]
 
 
-def test_a_page_that_leaves_while_waiting_disturbs_nobody(workspace: Workspace) -> None:
+def test_a_page_that_disconnects_while_waiting_does_not_affect_others(workspace: Workspace) -> None:
     with service() as opening:
         server = early(opening)
         cookie = come_in(server)
@@ -124,7 +124,7 @@ def test_a_page_that_leaves_while_waiting_disturbs_nobody(workspace: Workspace) 
             assert wanted(stays, "recording")["name"] == "three greys"
 
 
-def test_a_page_that_says_too_much_while_waiting_is_let_go() -> None:
+def test_a_page_that_sends_too_many_messages_while_waiting_is_disconnected() -> None:
     with service() as opening:
         server = early(opening)
         with channel(server, come_in(server)) as socket:
@@ -135,7 +135,7 @@ def test_a_page_that_says_too_much_while_waiting_is_let_go() -> None:
 
 
 def fail_to_open(error: BaseException, pages: ExitStack) -> None:
-    """Let a page in to wait, then fail; the page goes onto the stack of the test."""
+    """Let a page wait, then fail; the page is added to the test's exit stack."""
     with service() as opening:
         server = early(opening)
         socket = pages.enter_context(channel(server, come_in(server)))
@@ -145,7 +145,7 @@ def fail_to_open(error: BaseException, pages: ExitStack) -> None:
 
 
 def _end_of(server: RunningServer, socket: ClientConnection, error: BaseException) -> None:
-    """See what the page heard last, and that nobody serves any more."""
+    """Check the page's last message, and that the server has stopped."""
     if isinstance(error, RecordingError):
         assert wanted(socket, "opening")["problem"] == "No radar in it."
     with pytest.raises(ConnectionClosed):
@@ -161,10 +161,10 @@ def test_an_end_while_opening_reaches_the_page_and_the_caller(error: BaseExcepti
 
 
 def test_an_error_of_another_kind_is_left_to_the_terminal() -> None:
-    assert serving._in_words(OSError(5, "Input/output error")).endswith("the terminal says why.")
+    assert serving._problem_text(OSError(5, "Input/output error")).endswith("see the terminal for the reason.")
 
 
-def test_a_first_picture_that_cannot_be_read_harms_nothing(
+def test_a_first_picture_that_cannot_be_read_does_no_harm(
     workspace: Workspace, caplog: pytest.LogCaptureFixture
 ) -> None:
     def broken() -> Any:
@@ -179,7 +179,7 @@ def test_a_first_picture_that_cannot_be_read_harms_nothing(
     assert "odd" in caplog.text
 
 
-def test_a_recording_that_is_open_at_once_is_served_without_a_word_of_opening(
+def test_a_recording_that_opens_at_once_is_served_without_an_opening_message(
     workspace: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     admit, started = RunningServer.admit, []
@@ -199,24 +199,24 @@ def test_a_recording_that_is_open_at_once_is_served_without_a_word_of_opening(
     assert first == "recording"
     printed = capsys.readouterr().out
     assert "Opening" not in printed
-    assert "every click is kept" in printed
+    assert "all clicks are saved" in printed
     with pytest.raises(ConnectionRefusedError):
         get(server, "/")
 
 
-def test_an_error_at_once_is_served_to_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_immediate_error_starts_no_server(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serving, "RunningServer", None)
     with pytest.raises(RecordingError, match="empty"), service(let_in_after_s=LONG_S):
         raise RecordingError("empty")
 
 
-def test_a_port_that_cannot_be_had_is_told_before_anything_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_that_cannot_be_bound_is_reported_before_anything_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
     def taken(*_: object) -> None:
         raise OSError("no port is free")
 
     monkeypatch.setattr(serving, "RunningServer", taken)
     with pytest.raises(OSError, match="no port is free"), service():
-        pytest.fail("opened all the same")
+        pytest.fail("opened anyway")
 
 
 def test_a_late_error_is_one_line_and_exit_code_2(
@@ -252,7 +252,7 @@ SLOW_TO_OPEN = """
 import calib_core.recordings as recordings
 recordings.open_recording = lambda *_: threading.Event().wait()
 """
-TELLS_WHEN_IT_SERVES = """
+PRINTS_WHEN_IT_SERVES = """
 from app.web.port.server import RunningServer
 admit = RunningServer.admit
 RunningServer.admit = lambda *arguments: (admit(*arguments), print("serving"))
@@ -260,12 +260,12 @@ RunningServer.admit = lambda *arguments: (admit(*arguments), print("serving"))
 
 
 def started(arguments: Sequence[object], *, patch: str, sigint: str) -> subprocess.Popen[str]:
-    """Start the program in a process of its own, after a patch.
+    """Start the program in its own process, after a patch.
 
     Args:
-        arguments: what is typed after `cocalib`.
+        arguments: the arguments after `cocalib`.
         patch: statements that run first.
-        sigint: how the process takes SIGINT; it would inherit SIG_IGN where the tests run in the background of a script.
+        sigint: how the process handles SIGINT; it would inherit SIG_IGN if a script ran the tests in the background.
     """
     program = f"import signal, threading\nsignal.signal(signal.SIGINT, signal.{sigint})\n{patch}"
     return subprocess.Popen(
@@ -274,10 +274,10 @@ def started(arguments: Sequence[object], *, patch: str, sigint: str) -> subproce
     )  # fmt: skip
 
 
-def stopped(running: subprocess.Popen[str], *, once_it_says: str, by: signal.Signals) -> tuple[int, str, str]:
-    """Send a signal once the program has said something; return its exit code and what it said after that."""
+def stopped(running: subprocess.Popen[str], *, once_printed: str, by: signal.Signals) -> tuple[int, str, str]:
+    """Send a signal once the program has printed a text; return its exit code and what it printed after that."""
     assert running.stdout is not None
-    assert any(once_it_says in line for line in running.stdout)
+    assert any(once_printed in line for line in running.stdout)
     running.send_signal(by)
     out, err = running.communicate(timeout=30)
     return running.returncode, out, err
@@ -295,8 +295,8 @@ def test_a_signal_while_opening_ends_the_program_quietly(
     (tmp_path / "long.bag").write_bytes(b"")
     arguments = ["open", tmp_path / "long.bag", "--no-browser", "--port", 0]
     running = started(arguments, patch=SLOW_TO_OPEN, sigint=sigint)
-    returned, _, complaints = stopped(running, once_it_says="http://", by=sent)
-    assert (returned, complaints.strip()) == (code, "")
+    returned, _, errors = stopped(running, once_printed="http://", by=sent)
+    assert (returned, errors.strip()) == (code, "")
 
 
 @POSIX_SIGNALS
@@ -307,10 +307,10 @@ def test_a_signal_while_opening_ends_the_program_quietly(
 )
 def test_a_signal_while_serving_closes_the_session(tmp_path: Path, sigint: str, sent: signal.Signals) -> None:
     arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
-    running = started(arguments, patch=TELLS_WHEN_IT_SERVES, sigint=sigint)
-    code, said, complaints = stopped(running, once_it_says="serving", by=sent)
-    assert (code, complaints) == (0, "")
-    assert "every click is kept" in said
+    running = started(arguments, patch=PRINTS_WHEN_IT_SERVES, sigint=sigint)
+    code, printed, errors = stopped(running, once_printed="serving", by=sent)
+    assert (code, errors) == (0, "")
+    assert "all clicks are saved" in printed
     assert (tmp_path / "session" / "session.json").is_file()
 
 

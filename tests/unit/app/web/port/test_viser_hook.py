@@ -1,4 +1,4 @@
-"""What is private to viser is still there, and a viser that has changed it is refused before anything is served."""
+"""The private parts of viser that we use still exist, and a viser without them is refused before anything is served."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -12,7 +12,7 @@ from app.web.port import viser_hook
 from app.web.port.websockets_hook import ProcessRequest, SocketHandler
 
 CHANGED = (
-    "this version of viser has changed what is private to it; adapt app/web/port/viser_hook.py, or lower the upper bound "
+    "this version of viser has changed its private API; adapt app/web/port/viser_hook.py, or lower the upper bound "
     "of viser in pyproject.toml"
 )
 
@@ -49,7 +49,7 @@ def test_a_client_that_has_left_has_no_address(server: viser.ViserServer) -> Non
     assert viser_hook.path_of_client(server, 7) == ""
 
 
-def test_the_page_of_viser_takes_our_script_first_and_hides_its_panels() -> None:
+def test_visers_page_runs_our_script_first_and_hides_its_panels() -> None:
     page = viser_hook.client_page("../../pace.js").decode()
     head, _, rest = page.partition("</head>")
     scripts = re.findall(r"<script[^>]*>", page)
@@ -60,7 +60,7 @@ def test_the_page_of_viser_takes_our_script_first_and_hides_its_panels() -> None
 
 
 class StartedElsewhere:
-    """A viser that starts its server without websockets' `serve`."""
+    """A viser server that starts without websockets' `serve`."""
 
     def __init__(self, **_options: Any) -> None:
         self.stopped = False
@@ -87,7 +87,7 @@ def test_a_viser_without_a_part_is_stopped_and_the_part_is_named(
     stop: Callable[[viser.ViserServer], None] = viser_hook.stop_viser
     monkeypatch.setattr(viser_hook, "stop_viser", lambda server: (started.append(server), stop(server)))
     monkeypatch.setattr(viser_hook, "_TUNNEL_MESSAGES", ("ShareUrlRequest", "ShareEverything"))
-    with pytest.raises(InstallationError, match=r"it has no viser\._messages\.ShareEverything; install cocalib again"):
+    with pytest.raises(InstallationError, match=r"it has no viser\._messages\.ShareEverything; reinstall cocalib"):
         viser_hook.start_viser("127.0.0.1", 0, wrap_request=nobody, wrap_handler=unwrapped)
     assert len(started) == 1
     assert capsys.readouterr().out == ""

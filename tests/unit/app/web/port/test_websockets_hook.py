@@ -1,4 +1,4 @@
-"""websockets' server is wrapped for as long as asked, and says of clients that leave what the filter knows."""
+"""websockets' `serve` is wrapped only inside the context, and the filter matches its log messages for disconnecting clients."""
 
 import asyncio
 import logging
@@ -31,7 +31,7 @@ def kept(handler: SocketHandler) -> SocketHandler:
     return handler
 
 
-def test_serve_is_wrapped_while_asked_and_itself_again_afterwards() -> None:
+def test_serve_is_wrapped_inside_the_context_and_restored_afterwards() -> None:
     original = websocket_server.serve
     with wrapped_serve(lambda _given: serve_nobody, kept) as used:
         assert websocket_server.serve is not original
@@ -43,7 +43,7 @@ def test_serve_is_wrapped_while_asked_and_itself_again_afterwards() -> None:
 
 
 def behaviour(client: Callable[[int], None], caplog: pytest.LogCaptureFixture) -> list[str]:
-    """Serve, let a client misbehave, and return what the terminal would be told."""
+    """Serve, let a client misbehave, and return the log messages."""
 
     async def main() -> None:
         with wrapped_serve(lambda _given: serve_nobody, kept) as used:
@@ -77,7 +77,7 @@ def ask(port: int) -> None:
 
 
 @pytest.mark.parametrize("client", [scan, leave, ask])
-def test_scans_and_clients_that_leave_are_not_told_of(
+def test_port_scans_and_disconnecting_clients_are_not_logged(
     client: Callable[[int], None], caplog: pytest.LogCaptureFixture
 ) -> None:
     assert [text for text in behaviour(client, caplog) if "listening" not in text] in (

@@ -1,4 +1,4 @@
-"""What errors, hints and pages tell people to type exists: every command, and every option."""
+"""Every command and option named in errors, hints and pages exists."""
 
 import ast
 import re
@@ -11,10 +11,10 @@ from app.cli.commands import COMMANDS
 from app.cli.tyro_hook import flags_of
 
 PROSE = {"again", "cookie", "therefore", "wrote"}
-"""Words that follow the program's name in sentences that tell nobody to type anything."""
+"""Words that follow the program's name in sentences that do not name a command."""
 
 OTHER_PROGRAMS = {f"--{name}" for name in ("frame-id", "child-frame-id", "qx", "qy", "qz", "qw")}
-"""Options of programs that are not ours: of ROS's static_transform_publisher."""
+"""Options of other programs: ROS's static_transform_publisher."""
 
 _COMMAND = re.compile(r"(?<![\w/.-])cocalib[ \t]+(?P<command>[a-z][\w-]*)(?P<rest>[^\n`;()]*)")
 _FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9.-]*[a-z0-9]")
@@ -24,7 +24,7 @@ ANY_FLAG = set().union(*FLAGS.values(), {"--version"})
 
 
 def literals(path: Path) -> Iterator[str]:
-    """Yield every string of a module; what an f-string fills in becomes `{}`."""
+    """Yield every string of a module; an f-string's placeholders become `{}`."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     parts = {part for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
     for node in ast.walk(tree):
@@ -35,14 +35,14 @@ def literals(path: Path) -> Iterator[str]:
 
 
 def code_of(page: str) -> Iterator[str]:
-    """Yield what a page shows as code: fenced blocks line by line, and spans."""
+    """Yield a page's code: fenced blocks line by line, and spans."""
     for block in re.findall(r"^```[^\n]*\n(.*?)^```", page, re.MULTILINE | re.DOTALL):
         yield from (line.partition("#")[0] for line in block.splitlines())
     yield from re.findall(r"`([^`\n]+)`", re.sub(r"^```.*?^```", "", page, flags=re.MULTILINE | re.DOTALL))
 
 
-def mistakes(text: str, *, prose: set[str]) -> list[str]:
-    """Name the commands that do not exist, and the options that their command does not have."""
+def unknown_names(text: str, *, prose: set[str]) -> list[str]:
+    """Return the commands that do not exist, and the options that their command does not have."""
     found: list[str] = []
     for match in _COMMAND.finditer(text):
         name = match["command"]
@@ -59,34 +59,34 @@ def modules(root: Path) -> list[Path]:
 
 
 def test_every_command_that_the_program_names_exists(project_root: Path) -> None:
-    told = {
-        str(path.relative_to(project_root)): wrong
+    unknown = {
+        str(path.relative_to(project_root)): names
         for path in modules(project_root)
-        if (wrong := [each for text in literals(path) for each in mistakes(text, prose=PROSE)])
+        if (names := [each for text in literals(path) for each in unknown_names(text, prose=PROSE)])
     }
-    assert told == {}
+    assert unknown == {}
 
 
 def test_every_option_that_the_program_names_exists(project_root: Path) -> None:
-    told = {
-        str(path.relative_to(project_root)): wrong
+    unknown = {
+        str(path.relative_to(project_root)): names
         for path in modules(project_root)
-        if (wrong := {flag for text in literals(path) for flag in _FLAG.findall(text)} - ANY_FLAG - OTHER_PROGRAMS)
+        if (names := {flag for text in literals(path) for flag in _FLAG.findall(text)} - ANY_FLAG - OTHER_PROGRAMS)
     }
-    assert told == {}
+    assert unknown == {}
 
 
 def test_the_page_names_commands_that_exist(project_root: Path) -> None:
     for path in sorted((project_root / "static").glob("*.js")):
-        assert mistakes(path.read_text(encoding="utf-8"), prose=PROSE) == [], path.name
+        assert unknown_names(path.read_text(encoding="utf-8"), prose=PROSE) == [], path.name
 
 
 @pytest.mark.parametrize("page", ["README.md", "CONTRIBUTING.md", "ARCHITECTURE.md", "CHANGELOG.md", "docs"])
-def test_the_pages_promise_what_can_be_typed(page: str, project_root: Path) -> None:
+def test_the_pages_name_commands_that_exist(page: str, project_root: Path) -> None:
     path = project_root / page
     for file in sorted(path.glob("*.md")) if path.is_dir() else [path]:
         text = file.read_text(encoding="utf-8").replace(".venv/bin/cocalib", "cocalib")
-        assert [each for code in code_of(text) for each in mistakes(code, prose=set())] == [], file.name
+        assert [each for code in code_of(text) for each in unknown_names(code, prose=set())] == [], file.name
 
 
 @pytest.mark.parametrize(
@@ -99,5 +99,5 @@ def test_the_pages_promise_what_can_be_typed(page: str, project_root: Path) -> N
         ("cocalib export {} --to FORMAT [--out FILE]", []),
     ],
 )
-def test_a_command_that_does_not_exist_would_be_seen(text: str, expected: list[str]) -> None:
-    assert mistakes(text, prose=PROSE) == expected
+def test_a_command_that_does_not_exist_is_found(text: str, expected: list[str]) -> None:
+    assert unknown_names(text, prose=PROSE) == expected
