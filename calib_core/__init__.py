@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from calib_core.camera import Camera
     from calib_core.errors import CalibrationError, InputError, OptionError, RecordingError, UnsolvableError
     from calib_core.geometry import RigidTransform
-    from calib_core.interchange import CalibrationFile, CheckReport, FrameNames, PairsFile, Provenance
+    from calib_core.interchange import CalibrationFile, CheckReport, Export, FrameNames, PairsFile, Provenance
     from calib_core.interchange.files import (
         check,
         export,
@@ -59,6 +59,7 @@ __all__ = [
     "Candidate",
     "CheckReport",
     "DataWarning",
+    "Export",
     "FrameNames",
     "GatingOptions",
     "InputError",
@@ -112,7 +113,7 @@ _MODULES = {
     "camera": ("Camera",),
     "errors": ("CalibrationError", "InputError", "OptionError", "RecordingError", "UnsolvableError"),
     "geometry": ("RigidTransform",),
-    "interchange": ("CalibrationFile", "CheckReport", "FrameNames", "PairsFile", "Provenance"),
+    "interchange": ("CalibrationFile", "CheckReport", "Export", "FrameNames", "PairsFile", "Provenance"),
     "interchange.files": (
         *("check", "export", "read_calibration", "read_camera", "read_clicks", "read_pairs"),
         *("write_calibration", "write_clicks", "write_pairs"),

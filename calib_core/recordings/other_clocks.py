@@ -13,13 +13,13 @@ from calib_core.recordings.time.clocks import Stamps, choose_clock
 from calib_core.recordings.topics import join_topics
 from calib_core.recordings.usages import usage_of
 
-__all__ = ["spare_clocks"]
+__all__ = ["other_clocks"]
 
 _STAMP_BYTES = 12
 _KINDS = ("radar", "image")
 
 
-def spare_clocks(recording: Recording) -> Mapping[str, ClockDiagnosis]:
+def other_clocks(recording: Recording) -> Mapping[str, ClockDiagnosis]:
     """Diagnose the clocks of all other usable topics, reading their stamps in one pass.
 
     Topics whose messages cannot be read are skipped.

@@ -7,7 +7,7 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, Stamp, TimeNs
-from calib_core.recordings.other_clocks import spare_clocks
+from calib_core.recordings.other_clocks import other_clocks
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.topics import Rhythm, TopicSummary
 from calib_core.results import DataWarning
@@ -118,7 +118,7 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
 
 def recording_summary(recording: Recording) -> RecordingSummary:
     """Summarize an open recording; reads a few radar scans, one image, and the stamps of other usable topics."""
-    spare = spare_clocks(recording)
+    spare = other_clocks(recording)
     used = [topic for topic in recording.topics if topic.chosen and topic.kind in ("radar", "image")]
     timed = used or recording.topics
     start = min((topic.start.time for topic in timed if topic.start is not None), default=None)
