@@ -3,38 +3,31 @@
 An option's name is its path in CalibrationOptions, such as "gating.max_range_m".
 """
 
-import dataclasses
 import difflib
 import inspect
-import math
 import typing
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import msgspec
 
 from calib_core.errors import OptionError
+from calib_core.option_checks import RANGES, UNITS, OptionKind, checked_options, kind_of, option_fields, unit_of_name
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 
 __all__ = [
-    "RANGES",
     "OptionChange",
     "OptionDescription",
     "OptionGroup",
-    "OptionKind",
     "changed_options",
     "changes_from_tree",
-    "checked_options",
     "option_groups",
     "options_from_tree",
 ]
 
-OptionKind: TypeAlias = Literal["number", "integer", "yes-no", "choice", "camera-position"]
 OptionValue: TypeAlias = bool | int | float | str | CameraPositionPrior | None
-
-_UNITS = {"_mps": "m/s", "_px": "px", "_deg": "deg", "_rad": "rad", "_db": "dB", "_m": "m", "_s": "s"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,14 +85,6 @@ class OptionGroup:
     options: tuple[OptionDescription, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Leaf:
-    path: str
-    owner: type
-    field: dataclasses.Field[Any]
-    type: Any
-
-
 def changes_from_tree(tree: object) -> tuple[OptionChange, ...]:
     """Parse a partial, nested JSON object of options.
 
@@ -125,7 +110,7 @@ def changed_options(options: CalibrationOptions, changes: Sequence[OptionChange]
         OptionError: an option is unknown or out of range.
     """
     for change in changes:
-        if change.path not in _leaves():
+        if change.path not in option_fields():
             raise _unknown(change.path)
         group, _, name = change.path.rpartition(".")
         named: dict[str, Any] = {name: change.value}
@@ -135,38 +120,12 @@ def changed_options(options: CalibrationOptions, changes: Sequence[OptionChange]
     return checked_options(options)
 
 
-def checked_options(options: CalibrationOptions) -> CalibrationOptions:
-    """Return the options unchanged if every value is valid.
-
-    Raises:
-        OptionError: a number is not finite or out of range, a choice is unknown, or two options contradict each other.
-    """
-    for leaf in _leaves().values():
-        group = leaf.path.rpartition(".")[0]
-        value = getattr(getattr(options, group) if group else options, leaf.field.name)
-        if _kind(leaf) == "choice" and value not in typing.get_args(leaf.type):
-            choices = " or ".join(typing.get_args(leaf.type))
-            raise OptionError(f"option {leaf.path}: unknown value '{value}'; choose {choices}")
-        for name, number in _numbers(leaf.path, value):
-            low, high = RANGES[name]
-            if not (math.isfinite(number) and low <= number <= high):
-                raise OptionError(
-                    f"option {name}: {number:g} is out of range; allowed: {low:g} to {high:g}{_unit_of(name)}"
-                )
-    if options.gating.min_range_m >= options.gating.max_range_m:
-        raise OptionError(
-            f"option gating.min_range_m: {options.gating.min_range_m:g} m is not below "
-            f"gating.max_range_m, {options.gating.max_range_m:g} m; make it smaller"
-        )
-    return options
-
-
 @cache
 def option_groups() -> tuple[OptionGroup, ...]:
     """Describe every option: label and unit from its name, hint and range from its field."""
     groups: dict[str, list[OptionDescription]] = {}
     owners: dict[str, type] = {}
-    for leaf in _leaves().values():
+    for leaf in option_fields().values():
         group = leaf.path.rpartition(".")[0]
         owners[group] = leaf.owner
         low, high = RANGES.get(leaf.path, (None, None))
@@ -174,10 +133,10 @@ def option_groups() -> tuple[OptionGroup, ...]:
             OptionDescription(
                 path=leaf.path,
                 label=_label(leaf.field.name),
-                unit=_unit(leaf.field.name),
+                unit=unit_of_name(leaf.field.name),
                 hint=leaf.field.metadata["help"],
-                kind=_kind(leaf),
-                choices=typing.get_args(leaf.type) if _kind(leaf) == "choice" else (),
+                kind=kind_of(leaf),
+                choices=typing.get_args(leaf.type) if kind_of(leaf) == "choice" else (),
                 low=low,
                 high=high,
                 default=typing.cast(OptionValue, leaf.field.default),
@@ -190,14 +149,14 @@ def option_groups() -> tuple[OptionGroup, ...]:
 def _changes(tree: object, prefix: str) -> Iterator[OptionChange]:
     if not isinstance(tree, Mapping):
         raise OptionError(f"options{f' {prefix[:-1]}' if prefix else ''}: expected an object of names and values")
-    groups = {path.partition(".")[0] for path in _leaves() if "." in path}
+    groups = {path.partition(".")[0] for path in option_fields() if "." in path}
     for name, value in tree.items():
         path = f"{prefix}{name}"
         if not prefix and name in groups:
             yield from _changes(value, f"{path}.")
-        elif path in _leaves():
+        elif path in option_fields():
             try:
-                yield OptionChange(path, msgspec.convert(value, _leaves()[path].type))
+                yield OptionChange(path, msgspec.convert(value, option_fields()[path].type))
             except msgspec.ValidationError as error:
                 raise OptionError(f"option {path}: {str(error)[:1].lower()}{str(error)[1:]}") from error
         else:
@@ -205,7 +164,7 @@ def _changes(tree: object, prefix: str) -> Iterator[OptionChange]:
 
 
 def _unknown(path: str) -> OptionError:
-    known = sorted(_leaves())
+    known = sorted(option_fields())
     near = difflib.get_close_matches(path, known, n=1)
     if not near:
         by_name = {name.rpartition(".")[2]: name for name in known}
@@ -214,64 +173,6 @@ def _unknown(path: str) -> OptionError:
     return OptionError(f"unknown option '{path[:80]}'; {advice}")
 
 
-@cache
-def _leaves() -> Mapping[str, _Leaf]:
-    """Return every option that can be set on its own, by path; a camera position is set as a whole."""
-    leaves: dict[str, _Leaf] = {}
-    top = typing.get_type_hints(CalibrationOptions)
-    for field in dataclasses.fields(CalibrationOptions):
-        group = top[field.name]
-        if not dataclasses.is_dataclass(group):
-            leaves[field.name] = _Leaf(field.name, CalibrationOptions, field, group)
-            continue
-        hints = typing.get_type_hints(group)
-        for option in dataclasses.fields(group):
-            path = f"{field.name}.{option.name}"
-            leaves[path] = _Leaf(path, typing.cast(type, group), option, hints[option.name])
-    return leaves
-
-
-def _ranges() -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield the range of every number, under the name that `_numbers` gives it."""
-    for leaf in _leaves().values():
-        if _kind(leaf) in ("number", "integer"):
-            yield leaf.path, (leaf.field.metadata["low"], leaf.field.metadata["high"])
-        elif _kind(leaf) == "camera-position":
-            for part in dataclasses.fields(CameraPositionPrior):
-                yield f"{leaf.path}.{part.name}", (part.metadata["low"], part.metadata["high"])
-
-
-def _kind(leaf: _Leaf) -> OptionKind:
-    if typing.get_origin(leaf.type) is Literal:
-        return "choice"
-    if leaf.type == CameraPositionPrior | None:
-        return "camera-position"
-    return {bool: "yes-no", int: "integer", float: "number"}[leaf.type]  # type: ignore[return-value]
-
-
-def _numbers(path: str, value: object) -> Iterator[tuple[str, float]]:
-    """Yield the numbers in an option's value, each with the name of its range."""
-    if isinstance(value, CameraPositionPrior):
-        for number in value.position_m:
-            yield f"{path}.position_m", number
-        yield f"{path}.sigma_m", value.sigma_m
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield path, value
-
-
-def _unit(name: str) -> str:
-    return next((unit for suffix, unit in _UNITS.items() if name.endswith(suffix)), "")
-
-
-def _unit_of(path: str) -> str:
-    unit = _unit(path)
-    return f" {unit}" if unit else ""
-
-
 def _label(name: str) -> str:
-    suffix = next((suffix for suffix in _UNITS if name.endswith(suffix)), "")
+    suffix = next((suffix for suffix in UNITS if name.endswith(suffix)), "")
     return name.removesuffix(suffix).replace("_", " ")
-
-
-RANGES: Mapping[str, tuple[float, float]] = dict(_ranges())
-"""The smallest and largest allowed value of each number, from the options' fields."""

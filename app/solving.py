@@ -4,18 +4,18 @@ import dataclasses
 import hashlib
 import logging
 from collections.abc import Sequence
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from app.option_changes import checked_options
 from app.resources import version
 from app.session import Outcome
 from calib_core.association.pairing import pair_clicks
 from calib_core.calibration import calibrate, calibrate_pairs, solve_again
 from calib_core.camera import Camera
-from calib_core.errors import InputError
+from calib_core.errors import InputError, OptionError
 from calib_core.interchange import (
     CALIBRATION_SCHEMA,
     FrameNames,
@@ -27,6 +27,7 @@ from calib_core.interchange import (
 )
 from calib_core.interchange import calibration_text as interchange_text
 from calib_core.measurements import Pair, RadarScans, ReflectorClick, TimeNs, Unsolvable
+from calib_core.option_checks import checked_options
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording
 from calib_core.results import Calibration, InputFile, PairResult
@@ -113,46 +114,53 @@ def half_window_s(options: CalibrationOptions) -> float:
     return longest_s / 2 + options.locating.max_time_gap_s + 1.0
 
 
-def solve_pairs(text: str, source: str, options: CalibrationOptions) -> Outcome:
-    """Solve for camera_from_radar from the text of a pairs-1 file, or again from that of a calibration-1 file.
+_OPTIONS_OF_PAIRING = (
+    *("gating.max_speed_mps", "gating.min_range_m", "gating.max_range_m"),
+    *("locating.window_s", "locating.max_candidates", "locating.max_time_gap_s"),
+    *("paper.z_score_threshold", "paper.window_s", "paper.max_range_m", "paper.max_speed_mps"),
+)
+"""Options that choose radar returns: they cannot change pairs that exist already."""
 
-    What a pairs-1 file says about noise overrides the options. A calibration-1 file has its own options; of the given ones,
-    those that differ from the defaults override them.
+
+def solve_pairs(text: str, source: str, options: CalibrationOptions | None = None) -> Outcome:
+    """Solve for camera_from_radar from the text of a pairs-1 file, or again from that of a calibration-1 file.
 
     Args:
         text: the file's content.
         source: its name, for error messages.
-        options: of the calibration.
+        options: for the solver; None takes those of a calibration-1 file, and the defaults for a pairs-1 file, whose
+            own statements about noise replace the options.
 
     Raises:
         InputError: the text is neither, or a calibration without the candidates of its pairs.
-        OptionError: an option, or what the file says about noise, is out of range.
+        OptionError: an option, or what the file says about noise, is out of range or cannot apply.
     """
-    checked_options(options)
     if names_schema(text, CALIBRATION_SCHEMA):
         calibration = read_calibration(text, source).calibration
-        again = checked_options(_over(calibration.options, options))
+        if options is not None:
+            _require_same_pairing(calibration.options, options, source)
         try:
-            return solve_again(calibration, again)
+            return solve_again(calibration, options)
         except InputError as error:
             raise InputError(f"{source}: {error}") from None
+    options = checked_options(options or CalibrationOptions())
     pairs_file = read_pairs(text, source, noise=options.noise)
-    return calibrate_pairs(pairs_file.pairs, pairs_file.camera, checked_options(pairs_file.options(options)))
+    return calibrate_pairs(pairs_file.pairs, pairs_file.camera, pairs_file.options(options))
 
 
-def _over(base: CalibrationOptions, given: CalibrationOptions) -> CalibrationOptions:
-    """Override the base by those options that differ from the defaults."""
-    usual = CalibrationOptions()
-    changes: dict[str, Any] = {}
-    for group in dataclasses.fields(usual):
-        old, new, default = (getattr(options, group.name) for options in (base, given, usual))
-        if dataclasses.is_dataclass(default):
-            values = {one.name: getattr(new, one.name) for one in dataclasses.fields(default)}
-            chosen = {name: value for name, value in values.items() if value != getattr(default, name)}
-            changes[group.name] = dataclasses.replace(old, **chosen)
-        elif new != default:
-            changes[group.name] = new
-    return dataclasses.replace(base, **changes)
+def _require_same_pairing(kept: CalibrationOptions, given: CalibrationOptions, source: str) -> None:
+    """Refuse options that chose the radar returns of a calibration and now differ.
+
+    Raises:
+        OptionError: names the first such option.
+    """
+    for path in _OPTIONS_OF_PAIRING:
+        value_of = attrgetter(path)
+        if value_of(kept) != value_of(given):
+            raise OptionError(
+                f"{source}: {path} chooses radar returns, and the pairs of this calibration were made with "
+                f"{value_of(kept):g}; to change it, solve from the recording"
+            )
 
 
 def camera_for(recording: Recording, camera_file: Path | None) -> Camera | None:

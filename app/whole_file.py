@@ -1,5 +1,6 @@
 """Atomic writes: a reader finds the old file or the new one, never a part."""
 
+import errno
 import os
 import secrets
 from pathlib import Path
@@ -10,9 +11,19 @@ __all__ = ["write_whole"]
 def write_whole(path: Path, data: bytes) -> None:
     """Replace or create a file in one step, durable across a crash.
 
+    A symbolic link is followed. A device or a pipe is written to, never replaced.
+
     Raises:
         OSError: it cannot be written; the old file stays.
     """
+    path = path.resolve()
+    if path.exists() and not path.is_file() and not path.is_dir():
+        path.write_bytes(data)
+        return
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "is a folder; name a file in it", str(path))
+    if not path.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, f"the folder {path.parent} does not exist; create it", str(path))
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(6)}")
     try:
         with temporary.open("xb") as file:

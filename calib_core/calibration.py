@@ -25,6 +25,7 @@ from calib_core.estimation.measurement_model import PairMeasurements, pair_measu
 from calib_core.estimation.mirror_test import MIRRORED_GAIN, mirror_gain
 from calib_core.estimation.pair_results import excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
+from calib_core.option_checks import checked_options
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 
@@ -50,7 +51,7 @@ def calibrate(
         camera: the intrinsics.
         options: None takes the defaults; method "paper" is Algorithm 1 as printed.
     """
-    options = options or CalibrationOptions()
+    options = checked_options(options or CalibrationOptions())
     if options.method == "paper":
         from calib_core.paper.algorithm_1 import calibrate_as_printed
 
@@ -77,7 +78,7 @@ def calibrate_pairs(
         options: None takes the defaults; method "paper" is Algorithm 1 as printed, from its RANSAC on.
         excluded: ids of pairs that are shown, but not used.
     """
-    options = options or CalibrationOptions()
+    options = checked_options(options or CalibrationOptions())
     if options.method == "paper":
         from calib_core.paper.algorithm_1 import solve_pairs_as_printed
 
@@ -99,10 +100,12 @@ def solve_again(calibration: Calibration, options: CalibrationOptions | None = N
         InputError: the calibration does not contain the candidates of its pairs.
     """
     kept = [pair.measured for pair in calibration.pairs if pair.measured is not None]
-    if not kept or len(kept) < len(calibration.pairs):
+    if not calibration.pairs:
+        raise InputError("contains a pose but no pairs; solve from the recording and the clicks")
+    if len(kept) < len(calibration.pairs):
         raise InputError(
-            f"{len(calibration.pairs) - len(kept)} of {len(calibration.pairs)} pairs have no candidates, as in "
-            "files of version 0.1 and of other tools; solve from the recording and the clicks"
+            f"{len(calibration.pairs) - len(kept)} of {len(calibration.pairs)} pairs have no candidates, as in files that "
+            "older versions and other tools wrote; solve from the recording and the clicks"
         )
     options = options or calibration.options
     if options.method != "paper":

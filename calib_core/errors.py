@@ -32,4 +32,14 @@ class OptionError(CalibrationError):
 
 
 class UnsolvableError(CalibrationError):
-    """A calibration was requested that the data cannot give; raised by `Unsolvable.unwrap` only."""
+    """A calibration was requested where the data do not determine one; raised by `Unsolvable.unwrap` only.
+
+    Attributes:
+        code: one word for programs, such as "too-few-pairs".
+        reason: what is missing, with figures.
+        hint: what to do about it.
+    """
+
+    def __init__(self, code: str, reason: str, hint: str) -> None:
+        super().__init__(f"no calibration: {reason}; {hint}")
+        self.code, self.reason, self.hint = code, reason, hint

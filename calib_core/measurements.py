@@ -308,7 +308,7 @@ class Unsolvable:
         Raises:
             UnsolvableError: reason and hint in one line.
         """
-        raise UnsolvableError(f"no calibration: {self.reason}; {self.hint}")
+        raise UnsolvableError(self.code, self.reason, self.hint)
 
     def __str__(self) -> str:
         rows = (f"\n  click {click.id}: {click.reason}; {click.hint}" for click in self.unpaired)

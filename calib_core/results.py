@@ -5,8 +5,9 @@ from typing import Self
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, frozen_array
+from calib_core.arrays import Matrix66, Points2, Points3, Values, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
+from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.measurements import Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
@@ -202,8 +203,14 @@ class Calibration:
 
         Args:
             points_radar_m: (n, 3).
+
+        Raises:
+            InputError: the points have another shape.
         """
-        jacobian = self.camera.pose_jacobian(self.camera_from_radar, points_radar_m)
+        points = np.asarray(points_radar_m, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise InputError(f"points_radar_m: expected an array of n x 3, got {' x '.join(map(str, points.shape))}")
+        jacobian = self.camera.pose_jacobian(self.camera_from_radar, points)
         return np.asarray(jacobian @ self.covariance @ np.swapaxes(jacobian, 1, 2))
 
     def pixel_sigma(self, points_radar_m: Points3) -> Points2:
@@ -223,7 +230,7 @@ class Calibration:
             self.camera_from_radar.translation_m,
             quaternion_wxyz_from_matrix(self.camera_from_radar.rotation),
         )
-        metrics, advised = self.metrics, self.next_placement
+        metrics, advised, held_out_px = self.metrics, self.next_placement, self.metrics.held_out_aed_px
         advice = "none" if advised is None else "no further placement is needed"
         if advised is not None and not advised.may_stop:
             x_m, y_m, z_m = advised.position_radar_m
@@ -234,14 +241,19 @@ class Calibration:
                 f"camera_from_radar, method {self.options.method}: {agreeing} of {len(used)} pairs agree",
                 "  translation     " + " ".join(f"{value:.4f}" for value in place) + " m",
                 "  quaternion wxyz " + " ".join(f"{value:.6f}" for value in quaternion),
-                f"  one sigma       {_numbers(100 * sigma[:3], 2)} cm, {_numbers(np.rad2deg(sigma[3:]), 3)} deg",
+                f"  one sigma       {_sigma_text(sigma)}",
                 f"  residuals       AED {metrics.aed_px:.2f} px, CDSD {metrics.cdsd_px:.2f} px, RMS {metrics.rms_px:.2f} px",
-                f"  held-out AED    {metrics.held_out_aed_px:.2f} px",
+                "  held-out AED    " + (f"{held_out_px:.2f} px" if np.isfinite(held_out_px) else "unknown"),
                 "  warnings        " + (", ".join(warning.code for warning in self.warnings) or "none"),
                 "  next placement  " + advice,
             )
         )
 
 
-def _numbers(values: Vector3, digits: int) -> str:
-    return " ".join(f"{value:.{digits}f}" for value in values)
+def _sigma_text(sigma: Values) -> str:
+    """Write the standard deviations of the translation and of the rotation about the camera's x, y and z axes."""
+    if not np.isfinite(sigma).all():
+        return "unknown: this method has no noise model"
+    x, y, z = 100.0 * sigma[:3]
+    about_x, about_y, about_z = np.rad2deg(sigma[3:])
+    return f"x {x:.2f}, y {y:.2f}, z {z:.2f} cm; about x {about_x:.3f}, y {about_y:.3f}, z {about_z:.3f} deg"

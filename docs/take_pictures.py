@@ -49,7 +49,7 @@ def placed(driver: Driver, clicks: list[dict[str, Any]]) -> None:
 
 
 def take_all(browser: Browser, server: RunningServer, clicks: list[dict[str, Any]]) -> None:
-    """Walk through one calibration: first look, a click under the loupe, the result, a pair in doubt, the light theme."""
+    """Walk through one calibration: first look, a click under the loupe, the result, an outlier, the light theme."""
     driver = opened(browser, server, "dark")
     driver.press("n")
     shoot(driver, "empty")

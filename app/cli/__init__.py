@@ -47,7 +47,7 @@ def refuse(reason: str) -> int:
 
 
 def _run(first: str = "--help", *others: str) -> int:
-    if first in ("-h", "--help"):
+    if first in ("-h", "--help", "help"):
         print(overview())
         return 0
     if first == "--version":

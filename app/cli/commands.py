@@ -7,9 +7,9 @@ import importlib
 import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol, cast
+from typing import Protocol, Self, cast, runtime_checkable
 
-__all__ = ["COMMANDS", "PROGRAM", "Command", "Runnable", "overview"]
+__all__ = ["COMMANDS", "PROGRAM", "Command", "HasFileDefaults", "Runnable", "overview"]
 
 PROGRAM = "cocalib"
 _DESCRIPTION = "Radar-camera calibration: click the corner reflector, get camera_from_radar and its uncertainty."
@@ -21,6 +21,15 @@ class Runnable(Protocol):
 
     def run(self) -> int:
         """Run the command; return the exit code."""
+        ...
+
+
+@runtime_checkable
+class HasFileDefaults(Protocol):
+    """A command whose defaults may come from a file that its arguments name."""
+
+    def file_defaults(self) -> Self | None:
+        """Return the command with that file's defaults; None to keep its own."""
         ...
 
 

@@ -1,9 +1,10 @@
 """`cocalib solve`: calibrate without a browser."""
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -44,10 +45,29 @@ class Solve:
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
 
+    def file_defaults(self) -> Self | None:
+        """Take the options of a calibration that is to be solved again; typed options replace them."""
+        if self.pairs is None or self.recording or self.clicks:
+            return None
+        from calib_core.interchange import CALIBRATION_SCHEMA, names_schema, read_calibration
+
+        text = read_text(self.pairs)
+        if not names_schema(text, CALIBRATION_SCHEMA):
+            return None
+        options = read_calibration(text, str(self.pairs)).calibration.options
+        position = options.solving.camera_position
+        measured = MeasuredCamera(position.position_m, position.sigma_m) if position else MeasuredCamera()
+        free = dataclasses.replace(options, solving=dataclasses.replace(options.solving, camera_position=None))
+        return type(self)(options=free, measured=measured)
+
     def run(self) -> int:
         """Solve, write the calibration, print its summary; return the exit code."""
         if self.pairs is not None and (self.recording or self.clicks):
             raise InputError("solve takes either a recording with --clicks, or --pairs, not both")
+        if self.pairs is not None and (self.camera or self.topics != TopicFlags()):
+            raise InputError(
+                "--camera and the options of a recording do not apply to --pairs, which brings its own camera"
+            )
         if self.pairs is not None:
             return self._solve_pairs(self.pairs)
         if not self.recording:

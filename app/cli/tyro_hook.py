@@ -97,7 +97,14 @@ class BadValue:
 Fault: TypeAlias = UnknownArgument | MissingArguments | MissingValue | WrongChoice | BadValue
 
 
-def parse(kind: type[Parsed], arguments: Sequence[str], *, program: str, refuse: Callable[[Fault], None]) -> Parsed:
+def parse(
+    kind: type[Parsed],
+    arguments: Sequence[str],
+    *,
+    program: str,
+    refuse: Callable[[Fault], None],
+    default: Parsed | None = None,
+) -> Parsed:
     """Parse the arguments of one command.
 
     Args:
@@ -105,6 +112,7 @@ def parse(kind: type[Parsed], arguments: Sequence[str], *, program: str, refuse:
         arguments: the command-line arguments after the command.
         program: the program and command names, as shown in the help.
         refuse: called with the fault if the arguments are invalid; raises. If it returns, tyro prints its message and exits.
+        default: the value of what is not typed; None takes the dataclass's own defaults.
 
     Raises:
         SystemExit: the help was requested and printed, or tyro printed an error.
@@ -112,7 +120,9 @@ def parse(kind: type[Parsed], arguments: Sequence[str], *, program: str, refuse:
 
     def read() -> Parsed:
         config = (tyro.conf.OmitSubcommandPrefixes, tyro.conf.FlagCreatePairsOff)
-        return tyro.cli(kind, prog=program, args=list(arguments), config=config)
+        if default is None:
+            return tyro.cli(kind, prog=program, args=list(arguments), config=config)
+        return tyro.cli(kind, prog=program, args=list(arguments), config=config, default=default)
 
     def on_event(event: Any) -> None:
         if (fault := _fault(event)) is not None:

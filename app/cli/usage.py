@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import NoReturn
 
-from app.cli.commands import PROGRAM, Command, Runnable
+from app.cli.commands import PROGRAM, Command, HasFileDefaults, Runnable
 from app.cli.tyro_hook import (
     Argument,
     BadValue,
@@ -39,7 +39,9 @@ def read_command(command: Command, arguments: Sequence[str]) -> Runnable:
     def refuse(fault: Fault) -> NoReturn:
         raise InputError(f"{_reason(fault, kind)}; see {program} --help")
 
-    return parse(kind, arguments, program=program, refuse=refuse)
+    parsed = parse(kind, arguments, program=program, refuse=refuse)
+    default = parsed.file_defaults() if isinstance(parsed, HasFileDefaults) else None
+    return parsed if default is None else parse(kind, arguments, program=program, refuse=refuse, default=default)
 
 
 def _reason(fault: Fault, kind: type[Runnable]) -> str:

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 from functools import singledispatch
 
-from app.option_changes import changed_options, checked_options
+from app.option_changes import changed_options
 from app.session.events import (
     Cleared,
     ClickExcluded,
@@ -20,6 +20,7 @@ from app.session.events import (
 from app.session.state import RecordingFacts, Session
 from calib_core.errors import CalibrationError
 from calib_core.measurements import ReflectorClick, TimeNs, time_parts
+from calib_core.option_checks import checked_options
 
 __all__ = ["EventError", "apply"]
 

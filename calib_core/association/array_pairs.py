@@ -1,6 +1,7 @@
 """Pairs from arrays of radar positions and pixels that are already matched."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -35,9 +36,8 @@ def pairs_from_arrays(
     Raises:
         InputError: the arrays differ in length, contain numbers that are not finite, or a position is at the radar.
     """
-    points, pixels = (np.asarray(values, dtype=np.float64) for values in (points_radar_m, pixels_px))
-    _require_columns(points, 3, "points_radar_m")
-    _require_columns(pixels, 2, "pixels_px")
+    points = _numbers(points_radar_m, 3, "points_radar_m")
+    pixels = _numbers(pixels_px, 2, "pixels_px")
     names = [f"pair-{i + 1}" for i in range(len(points))] if ids is None else [str(name) for name in ids]
     if not len(points) == len(pixels) == len(names):
         raise InputError(
@@ -58,12 +58,27 @@ def pairs_from_arrays(
     )
 
 
-def _require_columns(values: np.ndarray, columns: int, name: str) -> None:
-    if values.ndim != 2 or values.shape[1] != columns:
-        raise InputError(f"{name}: expected an array of n x {columns}, got {' x '.join(map(str, values.shape))}")
-    wrong = np.flatnonzero(~np.isfinite(values).all(axis=1))
+def _numbers(values: Any, columns: int, name: str) -> np.ndarray:
+    """Return an array of finite numbers, n x columns; masked entries count as missing."""
+    try:
+        array = np.asarray(np.ma.filled(np.ma.asarray(values).astype(np.float64, casting="same_kind"), np.nan))
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected an array of n x {columns} real numbers, got {_kind(values)}") from None
+    if array.ndim != 2 or array.shape[1] != columns:
+        raise InputError(
+            f"{name}: expected an array of n x {columns}, got {' x '.join(map(str, array.shape)) or 'one value'}"
+        )
+    wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(wrong):
-        raise InputError(f"{name}[{wrong[0]}]: {values[wrong[0]].tolist()} is not finite; remove the pair")
+        raise InputError(f"{name}[{wrong[0]}]: {array[wrong[0]].tolist()} is not finite; remove the pair")
+    return array
+
+
+def _kind(values: Any) -> str:
+    try:
+        return f"an array of {np.asarray(values).dtype}"
+    except ValueError:
+        return "rows of different lengths"
 
 
 def _sigma_polar_rows(sigma_polar: np.ndarray | None, noise: NoiseOptions, count: int) -> Points3:

@@ -65,9 +65,9 @@ def write_pairs(path: PathLike, pairs_file: pairs_json.PairsFile) -> None:
     """Write a pairs-1 file.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
     """
-    Path(path).write_text(pairs_json.write_pairs(pairs_file), encoding="utf-8", newline="\n")
+    _write(path, pairs_json.write_pairs(pairs_file))
 
 
 def read_clicks(path: PathLike) -> tuple[ReflectorClick, ...]:
@@ -83,9 +83,9 @@ def write_clicks(path: PathLike, clicks: tuple[ReflectorClick, ...]) -> None:
     """Write a clicks-1 file.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
     """
-    Path(path).write_text(clicks_json.write_clicks(clicks), encoding="utf-8", newline="\n")
+    _write(path, clicks_json.write_clicks(clicks))
 
 
 def read_calibration(path: PathLike) -> CalibrationFile:
@@ -113,14 +113,14 @@ def write_calibration(
         provenance: where a result comes from.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
     """
     text = (
         calibration_json.calibration_text(calibration, frames, provenance)
         if isinstance(calibration, Calibration)
         else calibration_json.write_calibration(calibration)
     )
-    Path(path).write_text(text, encoding="utf-8", newline="\n")
+    _write(path, text)
 
 
 def export(
@@ -187,3 +187,10 @@ def _text(path: PathLike) -> str:
         raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{file}: not a text file (byte {error.start} is not UTF-8); check the path") from None
+
+
+def _write(path: PathLike, text: str) -> None:
+    try:
+        Path(path).write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); check the path") from None

@@ -25,8 +25,8 @@ from calib_core.recordings.radar.list_messages import PointLayout
 from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.stamping import StampedTopic, read_stamps
+from calib_core.recordings.time.clock_choice import ClockChoice, Stamps, choose_clock, choose_clocks
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
-from calib_core.recordings.time.clocks import ClockChoice, Stamps, choose_clock, choose_clocks
 from calib_core.recordings.topics import Rhythm, Topic, TopicSummary, join_topics
 from calib_core.recordings.usages import Usage, usage_of
 from calib_core.results import DataWarning

@@ -8,8 +8,8 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.radar.list_messages import PointLayout, first_of_scans
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.stamping import StampedTopic, read_stamps
+from calib_core.recordings.time.clock_choice import Stamps, choose_clock
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, diagnose
-from calib_core.recordings.time.clocks import Stamps, choose_clock
 from calib_core.recordings.topics import join_topics
 from calib_core.recordings.usages import usage_of
 

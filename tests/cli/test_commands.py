@@ -287,3 +287,47 @@ def test_the_demo_of_another_version_has_a_session_of_its_own(tmp_path: Path, mo
         assert opening.Demo().run() == 0
     assert sessions[0] == sessions[1]
     assert sessions[2] != sessions[0]
+
+
+def test_a_calibration_is_solved_again_and_only_typed_options_change(
+    cocalib: Callable[..., Any], pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    first, again, turned = (tmp_path / f"{name}.json" for name in ("first", "again", "turned"))
+    position = ("--camera-position-m", "0.1", "0", "0.05", "--camera-position-sigma-m", "0.02")
+    assert cocalib("solve", "--pairs", pairs_file(), "--method", "paper", *position, "--out", first).code == 0
+    assert cocalib("solve", "--pairs", first, "--out", again).code == 0
+    assert (
+        cocalib(
+            "solve", "--pairs", first, "--method", "default", "--camera-position-sigma-m", "0.01", "--out", turned
+        ).code
+        == 0
+    )  # both are the defaults: typed, they replace what the file says
+    texts = [json.loads(path.read_text()) for path in (first, again, turned)]
+    assert {key: value for key, value in texts[0].items() if key != "provenance"} == {
+        key: value for key, value in texts[1].items() if key != "provenance"
+    }
+    assert texts[2]["options"]["method"] == "default"
+    assert texts[2]["options"]["solving"]["camera_position"] == {"position_m": [0.1, 0.0, 0.05], "sigma_m": 0.01}
+
+
+def test_options_of_a_recording_are_refused_for_pairs(
+    cocalib: Callable[..., Any], pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    for option in (("--camera", "nowhere.yaml"), ("--radar-axes", "up,up,up")):
+        refused = cocalib("solve", "--pairs", pairs_file(), *option)
+        assert (refused.code, refused.out) == (2, "")
+        assert "do not apply to --pairs" in refused.err
+    assert cocalib("solve", "--pairs", pairs_file(), "--out", tmp_path / "a.json").code == 0
+    refused = cocalib("solve", "--pairs", tmp_path / "a.json", "--gating.max-range-m", "8")
+    assert refused.code == 2
+    assert "gating.max_range_m chooses radar returns" in refused.err
+
+
+def test_output_that_cannot_be_a_file_is_refused_in_one_line(
+    cocalib: Callable[..., Any], pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    for out, words in ((tmp_path, "is a folder"), (tmp_path / "nowhere" / "a.json", "does not exist; create it")):
+        refused = cocalib("solve", "--pairs", pairs_file(), "--out", out)
+        assert refused.code == 2
+        assert words in refused.err
+        assert refused.err.count("\n") == 1

@@ -1,13 +1,15 @@
 """The methods of a result: unwrap, the summary, and the uncertainty in pixels."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from calib_core.association.array_pairs import pairs_from_arrays
 from calib_core.calibration import calibrate_pairs
-from calib_core.errors import InputError, UnsolvableError
+from calib_core.errors import InputError, OptionError, UnsolvableError
 from calib_core.measurements import Unpaired, Unsolvable
-from calib_core.options import CalibrationOptions
+from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 
@@ -34,6 +36,7 @@ def test_unwrap_gives_the_calibration_or_raises_with_reason_and_hint(simulated: 
         unsolvable.unwrap()
     assert unsolvable.reason in str(refusal.value)
     assert unsolvable.hint in str(refusal.value)
+    assert (refusal.value.code, refusal.value.reason) == (unsolvable.code, unsolvable.reason)
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
@@ -93,6 +96,11 @@ def test_arrays_become_pairs_that_give_the_same_pose(simulated: SimulatedPairs) 
     [
         (np.zeros((2, 2)), np.zeros((2, 2)), {}, "points_radar_m: expected an array of n x 3, got 2 x 2"),
         (np.ones((2, 3)), np.zeros(2), {}, "pixels_px: expected an array of n x 2, got 2"),
+        ([[1, 2, 3], [4, 5]], np.zeros((2, 2)), {}, "points_radar_m: .* real numbers, got rows of different lengths"),
+        (np.full((1, 3), "x"), np.zeros((1, 2)), {}, "points_radar_m: .* real numbers, got an array of <U1"),
+        (np.ones((1, 3)) * 1j, np.zeros((1, 2)), {}, "points_radar_m: .* real numbers, got an array of complex"),
+        (None, np.zeros((1, 2)), {}, "points_radar_m: "),
+        (np.ma.masked_less(np.ones((1, 3)), 2), np.zeros((1, 2)), {}, r"points_radar_m\[0\]: .* is not finite"),
         (np.ones((2, 3)), np.zeros((3, 2)), {}, "2 radar positions, 3 pixels and 2 ids"),
         (np.full((1, 3), np.nan), np.zeros((1, 2)), {}, r"points_radar_m\[0\]: .* is not finite"),
         (np.ones((1, 3)), np.full((1, 2), np.inf), {}, r"pixels_px\[0\]: .* is not finite"),
@@ -107,3 +115,22 @@ def test_arrays_that_make_no_pairs_are_refused_with_a_clear_error(
 ) -> None:
     with pytest.raises(InputError, match=words):
         pairs_from_arrays(points, pixels, **more)  # type: ignore[arg-type]
+
+
+def test_points_of_another_shape_are_refused(simulated: SimulatedPairs) -> None:
+    with pytest.raises(InputError, match="points_radar_m: expected an array of n x 3, got 3"):
+        solved(simulated).pixel_sigma(np.array([5.0, 1.0, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (CalibrationOptions(method="magic"), "option method: unknown value 'magic'; choose default or paper"),  # type: ignore[arg-type]
+        (CalibrationOptions(noise=NoiseOptions(sigma_px=-3.0)), r"option noise\.sigma_px: -3 is out of range"),
+        (CalibrationOptions(noise=NoiseOptions(sigma_px="2")), r"option noise\.sigma_px: expected a number, got '2'"),  # type: ignore[arg-type]
+        ({"method": "paper"}, "options: expected CalibrationOptions, got dict"),
+    ],
+)
+def test_invalid_options_are_refused_by_name(simulated: SimulatedPairs, options: Any, words: str) -> None:
+    with pytest.raises(OptionError, match=words):
+        calibrate_pairs(simulated.pairs, simulated.camera, options)

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -43,7 +44,7 @@ def solved(request: pytest.FixtureRequest, project_root: Path) -> Calibration:
 
 def test_the_file_solved_again_differs_only_in_its_provenance(solved: Calibration) -> None:
     text = calibration_text(solved)
-    again = solve_pairs(text, "calibration.json", CalibrationOptions())
+    again = solve_pairs(text, "calibration.json")
     assert isinstance(again, Calibration)
     assert without_provenance(calibration_text_of_pairs(again, text, "calibration.json")) == without_provenance(text)
 
@@ -79,24 +80,59 @@ def test_clock_warnings_of_the_recording_are_copied(project_root: Path) -> None:
     assert again.warnings == outcome.warnings
 
 
-def test_given_options_override_those_of_the_file(solved: Calibration) -> None:
+def test_given_options_replace_those_of_the_file(solved: Calibration) -> None:
     text = calibration_text(solved)
-    other = "paper" if solved.options.method == "default" else "default"
-    again = solve_pairs(text, "calibration.json", CalibrationOptions(noise=NoiseOptions(sigma_px=7.0)))
+    louder = replace(solved.options, noise=replace(solved.options.noise, sigma_px=7.0))
+    again = solve_pairs(text, "calibration.json", louder)
     assert isinstance(again, Calibration)
-    assert again.options == replace(solved.options, noise=replace(solved.options.noise, sigma_px=7.0))
-    if other == "paper":
-        turned = solve_pairs(text, "calibration.json", CalibrationOptions(method="paper"))
-        assert isinstance(turned, Calibration)
-        assert turned.options == replace(solved.options, method="paper")
+    assert again.options == louder
+    other = replace(solved.options, method="paper" if solved.options.method == "default" else "default")
+    turned = solve_pairs(text, "calibration.json", other)
+    assert isinstance(turned, Calibration)
+    assert turned.options == other
     with pytest.raises(OptionError, match=r"noise\.sigma_px"):
-        solve_pairs(text, "calibration.json", CalibrationOptions(noise=NoiseOptions(sigma_px=-1.0)))
+        solve_pairs(text, "calibration.json", replace(solved.options, noise=NoiseOptions(sigma_px=-1.0)))
+
+
+def test_options_that_choose_returns_are_refused_for_pairs_that_exist(solved: Calibration) -> None:
+    nearer = replace(solved.options, gating=replace(solved.options.gating, max_range_m=8.0))
+    with pytest.raises(OptionError, match=r"^a\.json: gating\.max_range_m chooses radar returns, .* made with 60"):
+        solve_pairs(calibration_text(solved), "a.json", nearer)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda pair: pair["candidates"][0].update(sigma_polar=[0.1, -0.1, 0.1]), r"sigma_polar\[1\]"),
+        (lambda pair: pair["candidates"][0].update(score=2.0), "score"),
+        (lambda pair: pair["candidates"][0].update(radar_m=[0.0, 0.0, 0.0]), "is at the radar's origin"),
+        (lambda pair: pair.update(radar_m=[1.0, 2.0, 3.0]), r"pairs\[1\]\.radar_m: is not the position of candidate 0"),
+        (lambda pair: pair.update(candidate=9), r"pairs\[1\]\.radar_m: is not the position of candidate 9"),
+        (lambda pair: pair.update(id="a"), "a"),
+    ],
+)
+def test_an_edited_pair_that_contradicts_itself_is_refused_with_its_place(change: Any, words: str) -> None:
+    simulated = simulate_pairs(8, rng=np.random.default_rng(2), noise="ti")
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera)
+    assert isinstance(outcome, Calibration)
+    content = json.loads(calibration_text(outcome))
+    content["pairs"][0]["id"] = "a"
+    change(content["pairs"][1])
+    with pytest.raises(InputError, match=words) as refusal:
+        solve_pairs(json.dumps(content), "edited.json")
+    assert "edited.json" in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_pose_without_pairs_says_so(solved: Calibration) -> None:
+    with pytest.raises(InputError, match="contains a pose but no pairs"):
+        solve_again(replace(solved, pairs=()))
 
 
 def test_pairs_without_candidates_cannot_be_solved_again_and_the_error_says_so(project_root: Path) -> None:
     earlier = (project_root / "tests" / "golden" / "calibration-1-earlier.json").read_text(encoding="utf-8")
     with pytest.raises(InputError, match=r"^earlier\.json: .* pairs have no candidates") as refusal:
-        solve_pairs(earlier, "earlier.json", CalibrationOptions())
+        solve_pairs(earlier, "earlier.json")
     assert "\n" not in str(refusal.value)
 
 

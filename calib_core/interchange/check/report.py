@@ -52,6 +52,9 @@ class CheckReport:
     results: tuple[CheckResult, ...]
     comparison: Comparison | None = None
 
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
     @property
     def ok(self) -> bool:
         """Whether there is no error; warnings do not count."""

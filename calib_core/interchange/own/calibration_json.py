@@ -19,6 +19,7 @@ from calib_core.interchange.calibration_file import (
 from calib_core.interchange.own import documents
 from calib_core.interchange.own.angle_map_document import angle_map_document, angle_map_of
 from calib_core.interchange.own.camera_document import camera_document, camera_of
+from calib_core.interchange.own.clicks_json import refuse_repeated_ids
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
 from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
 from calib_core.interchange.own.provenance_document import provenance_document, provenance_of
@@ -165,6 +166,7 @@ def calibration_file_of(
     Raises:
         InputError: the camera or a frame name is invalid.
     """
+    refuse_repeated_ids([pair.id for pair in document.pairs], source=source, place="pairs")
     check = document.check_point
     scale = document.noise_scale
     calibration = Calibration(
@@ -172,7 +174,7 @@ def calibration_file_of(
         covariance=np.array(document.covariance or np.full((6, 6), np.nan)),
         camera=camera_of(document.camera, source=source),
         metrics=_metrics(document.metrics),
-        pairs=tuple(solved_pair_of(pair) for pair in document.pairs),
+        pairs=tuple(solved_pair_of(pair, source=source, place=f"pairs[{i}]") for i, pair in enumerate(document.pairs)),
         unpaired=tuple(Unpaired(u.id, u.code, u.reason, u.hint) for u in document.unpaired),
         warnings=tuple(DataWarning(c.code, c.message, c.hint) for c in document.warnings),
         options=document.options,

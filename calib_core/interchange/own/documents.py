@@ -52,7 +52,6 @@ Measured = Annotated[float, Meta(ge=-1e9, le=1e9)]
 Pixel = tuple[Measured, Measured]
 Position = tuple[Measured, Measured, Measured]
 Vector2 = tuple[float, float]
-Vector3 = tuple[float, float, float]
 Vector4 = tuple[float, float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 Matrix22 = tuple[Vector2, Vector2]
@@ -185,8 +184,8 @@ class CandidateDocument(Struct, frozen=True):
     """
 
     radar_m: Position
-    sigma_polar: Vector3 | None = None
-    score: float = 1.0
+    sigma_polar: tuple[Positive, Positive, Positive] | None = None
+    score: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
     returns: Count = 1
     scans: Count = 1
     snr_db: float | None = None

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from calib_core.errors import InputError
 from calib_core.interchange.own import documents
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
 from calib_core.measurements import Candidate, Pair, TimeNs, time_from_parts, time_parts
@@ -9,6 +10,8 @@ from calib_core.radar import covariance_from_sigma_polar
 from calib_core.results import PairResult
 
 __all__ = ["SOLVED_FROM_KEYS", "solved_pair_document", "solved_pair_of"]
+
+_AGREEMENT_M = 1e-6
 
 SOLVED_FROM_KEYS = ("sigma_px", "radar_time", "candidates")
 """The data a pair was solved from; omitted if unknown, as in files from other tools."""
@@ -37,8 +40,13 @@ def solved_pair_document(pair: PairResult) -> documents.SolvedPairDocument:
     )
 
 
-def solved_pair_of(document: documents.SolvedPairDocument) -> PairResult:
-    """Return the solved pair in a document."""
+def solved_pair_of(document: documents.SolvedPairDocument, *, source: str, place: str) -> PairResult:
+    """Return the solved pair of a JSON object.
+
+    Raises:
+        InputError: a candidate is at the radar's origin, or radar_m is not the position of the chosen candidate.
+    """
+    _check_candidates(document, source=source, place=place)
     return PairResult(
         id=document.id,
         pixel_px=np.array(document.pixel_px),
@@ -96,3 +104,19 @@ def _time_document(time: TimeNs | None) -> documents.TimeDocument | None:
 
 def _time_of(document: documents.TimeDocument | None) -> TimeNs | None:
     return None if document is None else time_from_parts(document.sec, document.nanosec)
+
+
+def _check_candidates(document: documents.SolvedPairDocument, *, source: str, place: str) -> None:
+    for i, candidate in enumerate(document.candidates):
+        if not any(candidate.radar_m):
+            raise InputError(
+                f"{source}: {place}.candidates[{i}].radar_m: is at the radar's origin; remove the candidate"
+            )
+    if not document.candidates:
+        return
+    chosen = document.candidates[document.candidate] if document.candidate < len(document.candidates) else None
+    if chosen is None or max(abs(a - b) for a, b in zip(chosen.radar_m, document.radar_m, strict=True)) > _AGREEMENT_M:
+        raise InputError(
+            f"{source}: {place}.radar_m: is not the position of candidate {document.candidate}; correct one of the two, "
+            "or remove the candidates"
+        )

@@ -8,7 +8,7 @@ import numpy as np
 
 from calib_core.arrays import TimesNs, Values
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings.time.clocks import Clock, Stamps, header_fault
+from calib_core.recordings.time.clock_choice import Clock, Stamps, header_fault
 from calib_core.recordings.time.dates import span_text
 from calib_core.results import DataWarning
 

@@ -8,15 +8,14 @@ import pytest
 
 from app import option_changes
 from app.option_changes import (
-    RANGES,
     OptionChange,
     changed_options,
     changes_from_tree,
-    checked_options,
     option_groups,
     options_from_tree,
 )
 from calib_core.errors import OptionError
+from calib_core.option_checks import RANGES, checked_options
 from calib_core.options import CalibrationOptions, CameraPositionPrior, GatingOptions, PaperOptions, SolvingOptions
 from calib_core.recordings import RecordingOptions
 from calib_core.synthetic import RigOptions, SimulationOptions

@@ -11,6 +11,7 @@ import pytest
 from calib_core.advice.angle_map import AngleMap
 from calib_core.interchange import (
     FORMATS,
+    Content,
     export,
     read_calibration,
     read_camera,
@@ -71,7 +72,7 @@ def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(
     project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
-    (recipe,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    recipe, _ = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     golden = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
     add = np.deg2rad(np.random.default_rng(2).uniform(-2, 2, (4, 6, 2)))
     angle_map = AngleMap(np.linspace(-0.5, 0.5, 6), np.linspace(-0.2, 0.1, 4), add, np.abs(add), 9.0, 5.0)
@@ -85,3 +86,17 @@ def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(
 
     np.testing.assert_allclose(names["corrected"], angle_map.corrected(names["points"]), rtol=0, atol=1e-12)
     assert np.abs(names["corrected"] - names["points"]).max() > 0.01
+
+
+def test_the_example_of_a_format_writes_and_reads(project_root: Path):
+    page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
+    _, example = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    golden = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+    names: dict[str, Any] = {}
+    exec(example, names)
+    acme = names["ACME_FORMAT"]
+    text = acme.write(golden)
+    content = Content("lines", text=text)
+    assert acme.reads.recognizes(content)
+    back = acme.reads.read(content, "acme.txt").camera_from_radar
+    assert np.array_equal(back.as_matrix(), golden.calibration.camera_from_radar.as_matrix())
