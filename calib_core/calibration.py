@@ -212,7 +212,7 @@ class _Fit:
 
 
 def _best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> _Fit | Unsolvable:
-    """Run GNC from several initial poses and refine the most likely solution by errors in variables."""
+    """Run GNC from several initial poses and fit errors in variables from the most likely solution."""
     estimate_scale, seed = options.noise.estimate_scale, options.solving.seed
     few = _some_pairs(measurements)
     most = _STARTS_MEASURED if measurements.prior.measured else _STARTS_FREE

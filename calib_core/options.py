@@ -57,7 +57,7 @@ class LocatingOptions:
 
 @dataclass(frozen=True, slots=True)
 class NoiseOptions:
-    """Standard deviations to use where the message gives none; the solver then estimates how far they are off."""
+    """Standard deviations to use where the message gives none; the solver then estimates a scale factor for each."""
 
     sigma_px: float = option(2.0, "Standard deviation of a click, per axis [px].", low=0.01, high=1000.0)
     sigma_range_m: float = option(0.03, "Standard deviation of a placement's range [m].", low=1e-4, high=10.0)

@@ -124,7 +124,7 @@ class AngleMap:
 
     @property
     def pays(self) -> bool:
-        """Whether clamped-out pairs reproject clearly closer to their clicks with the map."""
+        """Whether the map clearly reduces the held-out residuals."""
         return self.corrected_aed_px < _LARGEST_AED_RATIO * self.raw_aed_px
 
     def corrected(self, points_radar_m: Points3) -> Points3:

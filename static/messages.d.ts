@@ -64,7 +64,7 @@ export interface LocatingOptions {
   max_time_gap_s: number;
 }
 
-/** Standard deviations to use where the message gives none; the solver then estimates how far they are off. */
+/** Standard deviations to use where the message gives none; the solver then estimates a scale factor for each. */
 export interface NoiseOptions {
   sigma_px: number;
   sigma_range_m: number;

@@ -30,7 +30,7 @@ _NEGLIGIBLE = 1e-10
 
 
 def pose_spread(refined: ErrorsInVariablesFit, information: Matrix66) -> Matrix66 | None:
-    """Return the covariance (6, 6) of the least-squares pose under smooth angle errors; None without evidence of them.
+    """Return the covariance (6, 6) of the least-squares pose under smooth angle errors; None if the residuals do not show them.
 
     Every split of the noise into independent and smooth parts is weighted by its probability: a few dozen pairs determine
     the size of the smooth part only roughly, so the covariance must not rely on a single estimate of it.

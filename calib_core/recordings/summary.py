@@ -91,7 +91,7 @@ class CameraSummary:
 
 
 class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "cautions"}):
-    """Everything `cocalib info` shows. In the JSON, warnings keep the key that scripts already use, "cautions".
+    """Everything `cocalib info` shows. In the JSON, the warnings keep the key of version 0.1, "cautions".
 
     Attributes:
         files: as opened.
