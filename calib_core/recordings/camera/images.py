@@ -191,6 +191,8 @@ class ImageLayout:
                 return self._png(data, said)
         except MessageError as error:
             raise self._refused(str(error)) from error
+        if said.lower() in ("jpeg", "jpg", "png") and not data.startswith(b"qoif"):
+            raise self._refused(f"declared as '{said}', but the data is neither JPEG nor PNG; {READABLE}")
         kind = "qoi" if data.startswith(b"qoif") else said or data[:4].hex() or "nothing"
         raise self._refused(
             f"the encoding '{kind}' is not supported; record in jpeg or png, or convert to them; {READABLE}"

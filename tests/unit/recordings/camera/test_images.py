@@ -186,7 +186,7 @@ def test_unsupported_raw_encodings_are_refused_with_a_clear_error(ros, write, en
         (b"qoif" + bytes(40), "rgb8; qoi", "the encoding 'qoi' is not supported; record in jpeg or png"),
         (bytes(12) + b"\x89PNG" + bytes(40), "16UC1; compressedDepth", "is a depth image, not a picture"),
         (b"RIFF1234WEBP" + bytes(40), "webp", "the encoding 'webp' is not supported"),
-        (b"", "jpeg", "the encoding 'jpeg' is not supported"),
+        (b"", "jpeg", "declared as 'jpeg', but the data is neither JPEG nor PNG"),
         (b"\xff\xd8\xff\xe0", "jpeg", "the JPEG ends before its image data"),
         (cv2.imencode(".png", np.zeros((4, 4), np.uint16))[1].tobytes(), "16UC1; png compressed ", "16-bit grey"),
     ],
