@@ -4,7 +4,7 @@ LOWEST_PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 PARALLEL := -n logical --maxprocesses 4 --dist loadfile
-FAST := tests/architecture tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
+FAST := tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
   $(addprefix tests/unit/,advice association diagnostics estimation interchange)
 
 .PHONY: help env dev demo test test-fast test-lowest test-newest check lock bench bench-accuracy sample picture clean
