@@ -36,6 +36,8 @@ CAMERA = Camera(
     "plumb_bob", 960, 600, np.array([[800.0, 0, 480], [0, 800, 300], [0, 0, 1]]), np.array([-0.1, 0.02, 0, 0])
 )
 LINK_FROM_OPTICAL = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+pytestmark = pytest.mark.slow  # every slip in every format: a fifth of what make test-fast would take
+
 NO_COMMENT = {known.name for known in FORMATS if known.comment == "none"}
 ANGLE = re.compile(r"(roll: |pitch: |yaw: |--roll |--pitch |--yaw )(\S+)")
 
