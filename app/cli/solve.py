@@ -4,9 +4,10 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
 import numpy as np
+import tyro
 
 from app.cli.flags import File
 from app.cli.output import explain_unsolvable, read_text, required_camera, seconds_text, write_whole
@@ -44,6 +45,8 @@ class Solve:
     measured: CameraPosition = field(default_factory=MeasuredCamera)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
+    pairs_text: Annotated[str | None, tyro.conf.Suppress] = None
+    """What the file of pairs holds, once it has been read: a pipe can be read only once."""
 
     def file_defaults(self) -> Self | None:
         """Take the options of a calibration that is to be solved again; typed options replace them."""
@@ -53,12 +56,12 @@ class Solve:
 
         text = read_text(self.pairs)
         if not names_schema(text, CALIBRATION_SCHEMA):
-            return None
+            return type(self)(pairs_text=text)
         options = read_calibration(text, str(self.pairs)).calibration.options
         position = options.solving.camera_position
         measured = MeasuredCamera(position.position_m, position.sigma_m) if position else MeasuredCamera()
         free = dataclasses.replace(options, solving=dataclasses.replace(options.solving, camera_position=None))
-        return type(self)(options=free, measured=measured)
+        return type(self)(options=free, measured=measured, pairs_text=text)
 
     def run(self) -> int:
         """Solve, write the calibration, print its summary; return the exit code."""
@@ -93,7 +96,7 @@ class Solve:
     def _solve_pairs(self, path: Path) -> int:
         from app.solving import calibration_text_of_pairs, solve_pairs
 
-        text = read_text(path)
+        text = read_text(path) if self.pairs_text is None else self.pairs_text
         outcome = solve_pairs(text, source=str(path), options=self.measured.over(self.options))
         if isinstance(outcome, Unsolvable):
             return explain_unsolvable(outcome)

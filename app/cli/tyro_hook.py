@@ -154,6 +154,8 @@ def flags_of(kind: type[Any], prefix: str = "") -> Iterator[str]:
     for field in dataclasses.fields(kind):
         annotated = typing.get_origin(hints[field.name]) is typing.Annotated
         value, *notes = typing.get_args(hints[field.name]) if annotated else (hints[field.name],)
+        if tyro.conf.Suppress in notes:
+            continue
         if dataclasses.is_dataclass(value):
             unnamed = any(getattr(note, "name", None) == "" for note in notes)  # set by tyro.conf.arg(name="")
             yield from flags_of(typing.cast(type, value), prefix if unnamed else f"{prefix}{field.name}.")

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import threading
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -308,6 +309,22 @@ def test_a_calibration_is_solved_again_and_only_typed_options_change(
     }
     assert texts[2]["options"]["method"] == "default"
     assert texts[2]["options"]["solving"]["camera_position"] == {"position_m": [0.1, 0.0, 0.05], "sigma_m": 0.01}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no named pipes in the file system")
+@pytest.mark.parametrize("solved", [False, True], ids=["pairs-1", "calibration-1"])
+def test_pairs_are_read_once_so_a_pipe_works(
+    cocalib: Callable[..., Any], pairs_file: Callable[..., Path], tmp_path: Path, solved: bool
+) -> None:
+    source, pipe = pairs_file(), tmp_path / "pipe"
+    if solved:
+        assert cocalib("solve", "--pairs", source, "--out", tmp_path / "a.json").code == 0
+        source = tmp_path / "a.json"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=pipe.write_bytes, args=(source.read_bytes(),), daemon=True)
+    writer.start()
+    assert cocalib("solve", "--pairs", pipe, "--out", tmp_path / "b.json").code == 0
+    writer.join(60)
 
 
 def test_options_of_a_recording_are_refused_for_pairs(
