@@ -8,10 +8,13 @@ __all__ = [
     "CalibrationOptions",
     "CameraPositionPrior",
     "GatingOptions",
+    "LensOptions",
     "LocatingOptions",
     "Method",
     "NoiseOptions",
     "PaperOptions",
+    "RadarOptions",
+    "ReflectorOptions",
     "SolvingOptions",
     "option",
 ]
@@ -76,6 +79,61 @@ class NoiseOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class RadarOptions:
+    """Systematic errors of the radar, as standard deviations; 0 means exact."""
+
+    azimuth_scale_sigma: float = option(
+        0.02,
+        "Of the azimuth's scale, as a share: element spacing and wavelength are known to a few percent.",
+        low=0.0,
+        high=0.5,
+    )
+    elevation_scale_sigma: float = option(0.03, "Of the elevation's scale, as a share.", low=0.0, high=0.5)
+    range_bias_sigma_m: float = option(0.03, "Of a constant range error [m].", low=0.0, high=5.0)
+    range_scale_sigma: float = option(0.003, "Of the range's scale, as a share.", low=0.0, high=0.5)
+    azimuth_bias_sigma_deg: float = option(
+        1.0,
+        "Of a constant azimuth error [deg]; it is a rotation of the radar, so it counts only for the pose of the housing.",
+        low=0.0,
+        high=45.0,
+    )
+    elevation_bias_sigma_deg: float = option(1.0, "The same for the elevation [deg].", low=0.0, high=45.0)
+    tilt_sigma_deg: float = option(
+        10.0, "Of the tilt of a radar that measures no elevation, up or down [deg].", low=0.0, high=45.0
+    )
+    height_sigma_m: float = option(
+        1.0,
+        "Of the height of the placements above or below a radar that measures no elevation [m].",
+        low=0.0,
+        high=20.0,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class LensOptions:
+    """Errors of the intrinsics, as standard deviations; 0 means exact. The camera file's own values take precedence."""
+
+    focal_length_sigma: float = option(0.003, "Of the focal length, as a share.", low=0.0, high=0.5)
+    principal_point_sigma_px: float = option(2.0, "Of the principal point, per axis [px].", low=0.0, high=1000.0)
+    distortion_sigma: float = option(0.005, "Of the first radial distortion coefficient.", low=0.0, high=1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class ReflectorOptions:
+    """What is wrong with every click alike, as standard deviations; 0 means exact."""
+
+    offset_sigma_m: float = option(
+        0.02,
+        "Of the clicked point from the radar's phase centre, per axis of the camera [m]: a trihedral's apex is behind its mouth.",
+        low=0.0,
+        high=1.0,
+    )
+    click_offset_sigma_px: float = option(
+        1.5, "Of what one person's clicks are all off by, per axis [px].", low=0.0, high=100.0
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class CameraPositionPrior:
     """A tape-measured camera position; no other extra measurement helps as much."""
 
@@ -95,6 +153,10 @@ class SolvingOptions:
         "Rough distance between the sensors [m]: a wide prior, only to distinguish a pose from its mirror image.",
         low=0.01,
         high=100.0,
+    )
+    sensors_above_placements: bool = option(
+        True,
+        "Radar and camera are on the same side of the plane of the placements, as above a floor; this tells mirrored axes.",
     )
     seed: int = option(1, "Seed of the random generator; the same seed gives the same bytes.", low=0, high=2**32 - 1)
 
@@ -142,5 +204,8 @@ class CalibrationOptions:
     gating: GatingOptions = field(default_factory=GatingOptions)
     locating: LocatingOptions = field(default_factory=LocatingOptions)
     noise: NoiseOptions = field(default_factory=NoiseOptions)
+    radar: RadarOptions = field(default_factory=RadarOptions)
+    lens: LensOptions = field(default_factory=LensOptions)
+    reflector: ReflectorOptions = field(default_factory=ReflectorOptions)
     solving: SolvingOptions = field(default_factory=SolvingOptions)
     paper: PaperOptions = field(default_factory=PaperOptions)

@@ -73,6 +73,31 @@ export interface NoiseOptions {
   estimate_scale: boolean;
 }
 
+/** Systematic errors of the radar, as standard deviations; 0 means exact. */
+export interface RadarOptions {
+  azimuth_scale_sigma: number;
+  elevation_scale_sigma: number;
+  range_bias_sigma_m: number;
+  range_scale_sigma: number;
+  azimuth_bias_sigma_deg: number;
+  elevation_bias_sigma_deg: number;
+  tilt_sigma_deg: number;
+  height_sigma_m: number;
+}
+
+/** Errors of the intrinsics, as standard deviations; 0 means exact. The camera file's own values take precedence. */
+export interface LensOptions {
+  focal_length_sigma: number;
+  principal_point_sigma_px: number;
+  distortion_sigma: number;
+}
+
+/** What is wrong with every click alike, as standard deviations; 0 means exact. */
+export interface ReflectorOptions {
+  offset_sigma_m: number;
+  click_offset_sigma_px: number;
+}
+
 /** A tape-measured camera position; no other extra measurement helps as much. */
 export interface CameraPositionPrior {
   position_m: [number, number, number];
@@ -83,6 +108,7 @@ export interface CameraPositionPrior {
 export interface SolvingOptions {
   camera_position: CameraPositionPrior | null;
   nominal_camera_distance_m: number;
+  sensors_above_placements: boolean;
   seed: number;
 }
 
@@ -105,6 +131,9 @@ export interface CalibrationOptions {
   gating: GatingOptions;
   locating: LocatingOptions;
   noise: NoiseOptions;
+  radar: RadarOptions;
+  lens: LensOptions;
+  reflector: ReflectorOptions;
   solving: SolvingOptions;
   paper: PaperOptions;
 }

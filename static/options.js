@@ -15,7 +15,7 @@ const FIRST = [
 /** Options that a method ignores. @type {Record<string, (path: string) => boolean>} */
 const IDLE = {
   default: (path) => path.startsWith("paper."),
-  paper: (path) => /^(noise|solving|gating)\./.test(path) || (path.startsWith("locating.") && path !== "locating.max_time_gap_s"),
+  paper: (path) => /^(noise|solving|gating|radar|lens|reflector)\./.test(path) || (path.startsWith("locating.") && path !== "locating.max_time_gap_s"),
 };
 /** Labels that are clearer than the option's own name. @type {Record<string, string>} */
 const LABELS = {
