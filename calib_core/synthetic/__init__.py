@@ -16,6 +16,7 @@ from calib_core.synthetic.radar_profiles import RADAR_PROFILES, RadarProfile
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording, simulate
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
 from calib_core.synthetic.scans import SimulatedPlacement, SimulatedScans, simulate_scans
+from calib_core.synthetic.systematic_errors import SystematicErrors, draw_systematic_errors
 
 __all__ = [
     "AISLE",
@@ -39,6 +40,8 @@ __all__ = [
     "SimulatedRecording",
     "SimulatedScans",
     "SimulationOptions",
+    "SystematicErrors",
+    "draw_systematic_errors",
     "random_rig",
     "simulate",
     "simulate_pairs",

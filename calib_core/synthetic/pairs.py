@@ -1,6 +1,6 @@
 """Simulated pairs with known truth, without a recording, to test and benchmark the estimators."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -9,8 +9,9 @@ from calib_core.arrays import Flags, Points2, Points3, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Candidate, Pair
-from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
+from calib_core.synthetic.systematic_errors import SystematicErrors
 
 __all__ = [
     "AISLE",
@@ -101,12 +102,13 @@ class SimulatedPairs:
     """Pairs and their truth.
 
     Attributes:
-        rig: the sensors; rig.camera_from_radar is the truth.
+        rig: the sensors as they are, with the true intrinsics.
         pairs: the input of an estimator; ids "p1", "p2", ...
-        points_radar_m: (n, 3) true reflector positions.
+        points_radar_m: (n, 3) true positions of the reflector's phase centre, in the axes in which the radar reports.
         pixels_px: (n, 2) their true pixels.
         outlier: (n,) whether the pair is wrong.
         true_candidate: for each pair, which of its candidates is the reflector; -1 for an outlier.
+        systematic: the errors that all pairs share.
     """
 
     rig: Rig
@@ -115,6 +117,7 @@ class SimulatedPairs:
     pixels_px: Points2
     outlier: Flags
     true_candidate: tuple[int, ...]
+    systematic: SystematicErrors = field(default_factory=SystematicErrors)
 
     def __post_init__(self) -> None:
         n = len(self.pairs)
@@ -124,12 +127,14 @@ class SimulatedPairs:
 
     @property
     def camera(self) -> Camera:
-        """The intrinsics."""
-        return self.rig.camera
+        """The intrinsics that an estimator is given."""
+        return self.systematic.given_camera(self.rig.camera)
 
     @property
     def camera_from_radar(self) -> RigidTransform:
-        """The true pose."""
+        """The true pose of the axes in which the radar reports."""
+        if self.systematic.turns_axes:
+            return self.rig.camera_from_radar @ self.systematic.reported_from_radar.inverse()
         return self.rig.camera_from_radar
 
 
@@ -145,6 +150,7 @@ def simulate_pairs(
     camera: Camera | None = None,
     rig_options: RigOptions | None = None,
     rig: Rig | None = None,
+    systematic: SystematicErrors | None = None,
 ) -> SimulatedPairs:
     """Draw a rig and pairs of clicks and radar positions.
 
@@ -158,28 +164,35 @@ def simulate_pairs(
         outlier_mix: kinds of outliers; None takes half ghosts, a quarter each of misclicks and wrong pairings.
         decoys: additional, wrong candidates per pair. The right one is the most plausible in two pairs out of three.
         layout: where the reflector is put.
-        camera: the intrinsics; None takes 1920 x 1080 with 75 deg and slight barrel distortion.
+        camera: the true intrinsics; None takes 1920 x 1080 with 75 deg and slight barrel distortion.
         rig_options: how the sensors are mounted; None takes the defaults.
         rig: sensors to use instead of random ones.
+        systematic: errors that all pairs share; None has none.
     """
     profile = NOISE_PROFILES[noise] if isinstance(noise, str) else noise
     rig = rig or random_rig(rng, camera=camera or study_camera(), options=rig_options)
+    systematic = systematic or SystematicErrors()
     points = draw_positions(rng, count=count, rig=rig, layout=layout)
-    pixels = rig.camera.project(rig.camera_from_radar @ points)
-    measured = _measured(rng, points, profile)
-    clicks = pixels + profile.sigma_px * rng.standard_normal(pixels.shape)
+    aimed = systematic.aimed_pixels(rig.camera, rig.camera_from_radar @ points)
+    polar = systematic.reported_polar(points)
+    reported = points if systematic == SystematicErrors() else cartesian_from_polar(polar)
+    measured = cartesian_from_polar(polar + profile.sigma_polar * rng.standard_normal(points.shape))
+    clicks = aimed + profile.sigma_px * rng.standard_normal(aimed.shape)
     outlier = np.zeros(count, dtype=np.bool_)
     outlier[rng.permutation(count)[: round(outlier_share * count)]] = True
     mix = outlier_mix or OutlierMix()
     for i in np.flatnonzero(outlier).tolist():
-        _make_outlier(rng, i, measured, clicks, rig=rig, layout=layout, mix=mix, true=points)
+        _make_outlier(rng, i, measured, clicks, rig=rig, layout=layout, mix=mix, reported=reported)
     sigma_polar = (profile if profile.sigma_range_m > 0 else NOISE_PROFILES["ti_fine"]).sigma_polar
     pairs, true_candidate = [], []
     for i in range(count):
-        candidates, chosen = _candidates(rng, measured[i], decoys, rig, layout, sigma_polar)
+        positions, chosen = _positions(rng, measured[i], decoys, rig, layout)
+        candidates = _candidates(systematic.without_elevation(positions), sigma_polar)
         pairs.append(Pair(f"p{i + 1}", clicks[i], candidates, sigma_px=max(profile.sigma_px, 0.5)))
         true_candidate.append(-1 if outlier[i] else chosen)
-    return SimulatedPairs(rig, tuple(pairs), points, pixels, outlier, tuple(true_candidate))
+    in_axes = systematic.reported_from_radar @ points if systematic.turns_axes else points
+    pixels = rig.camera.project(rig.camera_from_radar @ points)
+    return SimulatedPairs(rig, tuple(pairs), in_axes, pixels, outlier, tuple(true_candidate), systematic)
 
 
 def study_camera() -> Camera:
@@ -217,11 +230,6 @@ def draw_positions(rng: np.random.Generator, *, count: int, rig: Rig, layout: Pa
     return np.array(found).reshape(-1, 3)
 
 
-def _measured(rng: np.random.Generator, points: Points3, profile: NoiseProfile) -> Points3:
-    polar = polar_from_cartesian(points) + profile.sigma_polar * rng.standard_normal(points.shape)
-    return cartesian_from_polar(polar)
-
-
 def _anywhere(rng: np.random.Generator, rig: Rig, layout: PairsLayout) -> Vector3:
     """Draw a position in front of the radar: a wider field than the reflector's, at any height up to 2 m."""
     wide = PairsLayout(
@@ -244,30 +252,34 @@ def _make_outlier(
     rig: Rig,
     layout: PairsLayout,
     mix: OutlierMix,
-    true: Points3,
+    reported: Points3,
 ) -> None:
-    """Turn pair i into an outlier, in place."""
+    """Turn pair i into an outlier, in place; reported: (n, 3) what the radar reports without noise."""
     kind = rng.uniform(0.0, mix.ghost + mix.misclick + mix.wrong_pairing)
     if kind < mix.ghost:
         measured[i] = _anywhere(rng, rig, layout)
-    elif kind < mix.ghost + mix.misclick or len(true) < 2:
+    elif kind < mix.ghost + mix.misclick or len(reported) < 2:
         clicks[i] = rng.uniform([0.0, 0.0], [rig.camera.width_px - 1.0, rig.camera.height_px - 1.0])
     else:
-        other = int(rng.integers(len(true) - 1))
-        measured[i] = true[other + (other >= i)] + 0.02 * rng.standard_normal(3)
+        other = int(rng.integers(len(reported) - 1))
+        measured[i] = reported[other + (other >= i)] + 0.02 * rng.standard_normal(3)
 
 
-def _candidates(
-    rng: np.random.Generator, measured: Vector3, decoys: int, rig: Rig, layout: PairsLayout, sigma_polar: Vector3
-) -> tuple[tuple[Candidate, ...], int]:
-    """Build the candidates of a pair, the most plausible first, and return which is the measured one."""
+def _positions(
+    rng: np.random.Generator, measured: Vector3, decoys: int, rig: Rig, layout: PairsLayout
+) -> tuple[Points3, int]:
+    """Return the radar positions of a pair, the most plausible first, and which of them is the measured one."""
     positions = [_anywhere(rng, rig, layout) for _ in range(decoys)]
     place = 0 if decoys == 0 or rng.uniform() < 2.0 / 3.0 else int(rng.integers(1, decoys + 1))
     positions.insert(place, measured)
+    return np.array(positions), place
+
+
+def _candidates(positions: Points3, sigma_polar: Vector3) -> tuple[Candidate, ...]:
+    """Build the candidates of a pair from their positions (k, 3), the most plausible first."""
     shares = 0.5 ** np.arange(1, len(positions) + 1)
-    covariances = covariance_from_sigma_polar(np.array(positions), np.tile(sigma_polar, (len(positions), 1)))
-    candidates = tuple(
+    covariances = covariance_from_sigma_polar(positions, np.tile(sigma_polar, (len(positions), 1)))
+    return tuple(
         Candidate(position, sigma_polar, covariance, score=float(share / shares.sum()), returns=30, scans=30)
         for position, covariance, share in zip(positions, covariances, shares, strict=True)
     )
-    return candidates, place

@@ -1,0 +1,151 @@
+"""What goes wrong with simulated pairs beyond noise: clicks of one placement, companions, a moved camera, axes, units."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from calib_core.arrays import Flags, Points3
+from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.measurements import Candidate, Pair
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar, polar_from_cartesian
+from calib_core.synthetic.pairs import SimulatedPairs
+
+__all__ = [
+    "clicked_again",
+    "from_moved_camera",
+    "in_other_units",
+    "mirrored",
+    "with_companion",
+    "with_rounded_elevations",
+]
+
+
+def clicked_again(
+    simulated: SimulatedPairs, clicks: int, *, rng: np.random.Generator, sigma_px: float = 2.0
+) -> SimulatedPairs:
+    """Click every placement several times; its clicks share one radar position, so also the radar's error.
+
+    Args:
+        simulated: one click per placement, ids "p1", "p2", ...; further clicks get "p1-2", "p1-3", ...
+        clicks: per placement.
+        rng: the only source of randomness.
+        sigma_px: standard deviation of a click. Further clicks of an outlier are as far off as the first.
+    """
+    points_camera_m = simulated.camera_from_radar @ simulated.points_radar_m
+    aimed_px = simulated.systematic.aimed_pixels(simulated.rig.camera, points_camera_m)
+    pairs: list[Pair] = []
+    for pair, centre_px, outlier in zip(simulated.pairs, aimed_px, simulated.outlier, strict=True):
+        pairs.append(pair)
+        for number in range(2, clicks + 1):
+            pixel_px = (pair.pixel_px if outlier else centre_px) + sigma_px * rng.standard_normal(2)
+            pairs.append(replace(pair, id=f"{pair.id}-{number}", pixel_px=pixel_px))
+    rows = np.repeat(np.arange(len(simulated.pairs)), clicks)
+    return replace(
+        simulated,
+        pairs=tuple(pairs),
+        points_radar_m=simulated.points_radar_m[rows],
+        pixels_px=simulated.pixels_px[rows],
+        outlier=simulated.outlier[rows],
+        true_candidate=tuple(simulated.true_candidate[row] for row in rows),
+    )
+
+
+def with_companion(
+    simulated: SimulatedPairs,
+    *,
+    rng: np.random.Generator,
+    behind_m: float = 1.0,
+    wander_m: float = 0.1,
+    share: float = 1.0,
+    reflector_seen: bool = True,
+) -> SimulatedPairs:
+    """Put an object that echoes more behind the reflector: its position becomes the first candidate of some pairs.
+
+    Args:
+        simulated: the pairs; outliers stay as they are.
+        rng: the only source of randomness.
+        behind_m: how far behind, along the radar's line of sight [m].
+        wander_m: standard deviation of the companion's place about that, per axis [m].
+        share: of the pairs; which ones is random.
+        reflector_seen: keep the reflector's own position as a less plausible candidate; otherwise the pair is wrong.
+    """
+    chosen = _some(rng, len(simulated.pairs), share) & ~simulated.outlier
+    pairs, true_candidate = list(simulated.pairs), list(simulated.true_candidate)
+    for i in np.flatnonzero(chosen).tolist():
+        own = pairs[i].candidates[0]
+        away_m = behind_m * own.position_radar_m / np.linalg.norm(own.position_radar_m) + wander_m * (
+            rng.standard_normal(3)
+        )
+        companion = replace(_moved(own, own.position_radar_m + away_m), score=0.6)
+        others = tuple(replace(one, score=0.4 * one.score) for one in pairs[i].candidates)
+        pairs[i] = replace(pairs[i], candidates=(companion, *(others if reflector_seen else others[1:])))
+        true_candidate[i] = true_candidate[i] + 1 if reflector_seen else -1
+    wrong = simulated.outlier | (chosen if not reflector_seen else np.zeros_like(chosen))
+    return replace(simulated, pairs=tuple(pairs), outlier=wrong, true_candidate=tuple(true_candidate))
+
+
+def from_moved_camera(
+    simulated: SimulatedPairs, *, rng: np.random.Generator, share: float, turn_deg: float
+) -> SimulatedPairs:
+    """Turn the camera by an angle about a random axis for some pairs: they agree among themselves on another pose."""
+    chosen = _some(rng, len(simulated.pairs), share) & ~simulated.outlier
+    axis = rng.standard_normal(3)
+    turn = RigidTransform(rotation_exp(np.deg2rad(turn_deg) * axis / np.linalg.norm(axis)), np.zeros(3))
+    points_camera_m = simulated.camera_from_radar @ simulated.points_radar_m
+    camera, errors = simulated.rig.camera, simulated.systematic
+    moved_px = errors.aimed_pixels(camera, turn @ points_camera_m) - errors.aimed_pixels(camera, points_camera_m)
+    pairs = tuple(
+        replace(pair, pixel_px=pair.pixel_px + shift) if moved else pair
+        for pair, shift, moved in zip(simulated.pairs, moved_px, chosen, strict=True)
+    )
+    true_candidate = tuple(
+        -1 if moved else place for place, moved in zip(simulated.true_candidate, chosen, strict=True)
+    )
+    return replace(simulated, pairs=pairs, outlier=simulated.outlier | chosen, true_candidate=true_candidate)
+
+
+def mirrored(simulated: SimulatedPairs, axis: Literal["left", "up"] = "left") -> SimulatedPairs:
+    """Give one coordinate of every radar position the wrong sign; no pose is true of such pairs."""
+    signs = np.array([1.0, -1.0, 1.0] if axis == "left" else [1.0, 1.0, -1.0])
+    return _with_positions(simulated, lambda points: points * signs)
+
+
+def in_other_units(simulated: SimulatedPairs, units_per_metre: float) -> SimulatedPairs:
+    """Give the radar positions in another unit as if they were metres: 1000 for millimetres, 3.28 for feet."""
+    return _with_positions(simulated, lambda points: points * units_per_metre)
+
+
+def with_rounded_elevations(
+    simulated: SimulatedPairs, *, rng: np.random.Generator, rounding_rad: float = 1e-6
+) -> SimulatedPairs:
+    """Add errors of rounding, up to an angle, to all elevations, as of a driver that converts zeros back and forth."""
+
+    def off(points: Points3) -> Points3:
+        errors_rad = rng.uniform(-rounding_rad, rounding_rad, len(points))
+        return cartesian_from_polar(polar_from_cartesian(points) + errors_rad[:, None] * np.array([0.0, 0.0, 1.0]))
+
+    return _with_positions(simulated, off)
+
+
+def _with_positions(simulated: SimulatedPairs, change: Callable[[Points3], Points3]) -> SimulatedPairs:
+    """Replace the positions of all candidates."""
+    pairs = []
+    for pair in simulated.pairs:
+        positions = change(np.array([one.position_radar_m for one in pair.candidates]))
+        candidates = tuple(_moved(one, new) for one, new in zip(pair.candidates, positions, strict=True))
+        pairs.append(replace(pair, candidates=candidates))
+    return replace(simulated, pairs=tuple(pairs))
+
+
+def _moved(candidate: Candidate, position_radar_m: np.ndarray) -> Candidate:
+    covariance = covariance_from_sigma_polar(position_radar_m, candidate.sigma_polar)
+    return replace(candidate, position_radar_m=position_radar_m, covariance_m2=covariance)
+
+
+def _some(rng: np.random.Generator, count: int, share: float) -> Flags:
+    """Choose round(share * count) of the pairs."""
+    chosen = np.zeros(count, dtype=np.bool_)
+    chosen[rng.permutation(count)[: round(share * count)]] = True
+    return chosen
