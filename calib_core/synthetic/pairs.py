@@ -134,7 +134,7 @@ class SimulatedPairs:
     def camera_from_radar(self) -> RigidTransform:
         """The true pose of the axes in which the radar reports."""
         if self.systematic.turns_axes:
-            return self.rig.camera_from_radar @ self.systematic.reported_from_radar.inverse()
+            return self.rig.camera_from_radar @ self.systematic.turn_of_axes.inverse()
         return self.rig.camera_from_radar
 
 
@@ -190,7 +190,7 @@ def simulate_pairs(
         candidates = _candidates(systematic.without_elevation(positions), sigma_polar)
         pairs.append(Pair(f"p{i + 1}", clicks[i], candidates, sigma_px=max(profile.sigma_px, 0.5)))
         true_candidate.append(-1 if outlier[i] else chosen)
-    in_axes = systematic.reported_from_radar @ points if systematic.turns_axes else points
+    in_axes = systematic.turn_of_axes @ points if systematic.turns_axes else points
     pixels = rig.camera.project(rig.camera_from_radar @ points)
     return SimulatedPairs(rig, tuple(pairs), in_axes, pixels, outlier, tuple(true_candidate), systematic)
 

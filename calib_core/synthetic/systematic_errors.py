@@ -58,7 +58,7 @@ class SystematicErrors:
         return bool(self.azimuth_bias_deg or self.elevation_bias_deg)
 
     @property
-    def reported_from_radar(self) -> RigidTransform:
+    def turn_of_axes(self) -> RigidTransform:
         """The rotation from the radar's true axes to those in which it reports: that of the angles' biases."""
         azimuth_rad, elevation_rad = np.deg2rad([self.azimuth_bias_deg, self.elevation_bias_deg])
         turn = rotation_exp(np.array([0.0, 0.0, azimuth_rad])) @ rotation_exp(np.array([0.0, -elevation_rad, 0.0]))
