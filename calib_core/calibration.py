@@ -140,12 +140,12 @@ def _solved(
     if isinstance(fit, Unsolvable):
         return fit
     refined = fit.refined
-    uncertainty = pose_covariance(refined)
+    uncertainty = pose_covariance(refined, options.radar)
     rotation_sigma_rad = float(np.sqrt(uncertainty.covariance[3:, 3:].diagonal().max()))
     if not rotation_sigma_rad < _UNDETERMINED_ROTATION_RAD:
         return _degenerate(len(used))
     left_out = leave_one_out(refined, uncertainty.information)
-    influential = find_influential_pairs(measurements, refined, uncertainty.information)
+    influential = find_influential_pairs(measurements, refined, uncertainty)
     refined, uncertainty = average_over_influential_pairs(refined, uncertainty, influential)
     metrics = fit_metrics(measurements, refined, left_out)
     solved_fit = SolvedFit(
@@ -174,6 +174,8 @@ def _solved(
         options=options,
         noise_scale=_four(refined.noise_scale),
         covariance_quantile=uncertainty.quantile,
+        radar_errors=refined.measurements.errors.radar,
+        systematic_errors=uncertainty.systematic_errors,
     )
     angle_map = learn_angle_map(calibration)
     return replace(

@@ -1,7 +1,7 @@
 """All options of the core. They define the flags, the page's fields and the provenance in exported files."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "ReflectorOptions",
     "SolvingOptions",
     "option",
+    "without_systematic_errors",
 ]
 
 Method = Literal["default", "paper"]
@@ -114,7 +115,12 @@ class LensOptions:
     """Errors of the intrinsics, as standard deviations; 0 means exact. The camera file's own values take precedence."""
 
     focal_length_sigma: float = option(0.003, "Of the focal length, as a share.", low=0.0, high=0.5)
-    principal_point_sigma_px: float = option(2.0, "Of the principal point, per axis [px].", low=0.0, high=1000.0)
+    principal_point_sigma_px: float = option(
+        5.0,
+        "Of the principal point, per axis [px of a picture 1920 px wide; scaled to the width].",
+        low=0.0,
+        high=1000.0,
+    )
     distortion_sigma: float = option(0.005, "Of the first radial distortion coefficient.", low=0.0, high=1.0)
 
 
@@ -129,7 +135,7 @@ class ReflectorOptions:
         high=1.0,
     )
     click_offset_sigma_px: float = option(
-        1.5, "Of what one person's clicks are all off by, per axis [px].", low=0.0, high=100.0
+        2.0, "Of what one person's clicks are all off by, per axis [px].", low=0.0, high=100.0
     )
 
 
@@ -209,3 +215,11 @@ class CalibrationOptions:
     reflector: ReflectorOptions = field(default_factory=ReflectorOptions)
     solving: SolvingOptions = field(default_factory=SolvingOptions)
     paper: PaperOptions = field(default_factory=PaperOptions)
+
+
+def without_systematic_errors(options: CalibrationOptions) -> CalibrationOptions:
+    """Return the options of exact instruments: every prior of a systematic error 0."""
+    radar = RadarOptions(**{one.name: 0.0 for one in fields(RadarOptions)})
+    lens = LensOptions(**{one.name: 0.0 for one in fields(LensOptions)})
+    reflector = ReflectorOptions(**{one.name: 0.0 for one in fields(ReflectorOptions)})
+    return replace(options, radar=radar, lens=lens, reflector=reflector)

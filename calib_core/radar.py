@@ -3,7 +3,7 @@
 Radar frame: x forward, y left, z up (docs/conventions.md). Azimuth is positive to the left, elevation upwards.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from calib_core.arrays import Points3, Values, frozen_array
 
 __all__ = [
     "AngleMap",
+    "RadarErrors",
     "cartesian_from_polar",
     "cartesian_jacobian",
     "covariance_from_sigma_polar",
@@ -18,6 +19,8 @@ __all__ = [
     "polar_from_cartesian",
     "position_planes",
 ]
+
+_LEAST_SHARE_SQUARED = 0.25  # of the range that is left along the plane of the placements
 
 _LARGEST_AED_RATIO = 0.97
 """Ratio of the AED with the map to the AED without it; above this the gain may be due to chance."""
@@ -85,6 +88,42 @@ def covariance_from_sigma_polar(points_radar_m: Points3, sigma_polar: Points3) -
     jacobian = cartesian_jacobian(polar_from_cartesian(points_radar_m))
     scaled = jacobian * np.asarray(sigma_polar, dtype=np.float64)[..., None, :]
     return scaled @ np.swapaxes(scaled, -1, -2)
+
+
+@dataclass(frozen=True, slots=True)
+class RadarErrors:
+    """What the radar gets wrong at every position alike, as estimated with the pose; all zero if nothing was estimated.
+
+    Attributes:
+        azimuth_scale: reported azimuth over the true one, minus 1.
+        elevation_scale: the same of the elevation.
+        range_bias_m: reported range minus the true one [m].
+        squared_height_m2: squared height of the placements above or below a radar that measures no elevation [m^2].
+    """
+
+    azimuth_scale: float = 0.0
+    elevation_scale: float = 0.0
+    range_bias_m: float = 0.0
+    squared_height_m2: float = 0.0
+
+    @classmethod
+    def named(cls, values: dict[str, float]) -> "RadarErrors":
+        """Take the errors of these names; other names are ignored."""
+        known = {one.name for one in fields(cls)}
+        return cls(**{name: value for name, value in values.items() if name in known})
+
+    def corrected(self, points_radar_m: Points3) -> Points3:
+        """Return reported positions (n, 3) with these errors taken out."""
+        if self == RadarErrors():
+            return np.asarray(points_radar_m, dtype=np.float64)
+        return cartesian_from_polar(self.corrected_polar(polar_from_cartesian(points_radar_m).T).T)
+
+    def corrected_polar(self, polar: np.ndarray) -> np.ndarray:
+        """Return reported range [m], azimuth and elevation [rad] (3, n) with these errors taken out."""
+        range_m = polar[0] - self.range_bias_m
+        if self.squared_height_m2:
+            range_m = np.sqrt(np.maximum(range_m**2 - self.squared_height_m2, _LEAST_SHARE_SQUARED * range_m**2))
+        return np.array([range_m, polar[1] / (1.0 + self.azimuth_scale), polar[2] / (1.0 + self.elevation_scale)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,9 +11,18 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.measurements import Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
-from calib_core.radar import AngleMap
+from calib_core.radar import AngleMap, RadarErrors
 
-__all__ = ["Calibration", "CheckPoint", "DataWarning", "InputFile", "Metrics", "NextPlacement", "PairResult"]
+__all__ = [
+    "Calibration",
+    "CheckPoint",
+    "DataWarning",
+    "InputFile",
+    "Metrics",
+    "NextPlacement",
+    "PairResult",
+    "SystematicErrorResult",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +87,8 @@ class PairResult:
     Attributes:
         id: the click's id.
         pixel_px: (2,) the click.
-        projected_px: (2,) the chosen radar position projected through camera_from_radar; NaN if it lies behind the camera.
+        projected_px: (2,) the chosen radar position, corrected by radar_errors, projected through camera_from_radar; NaN if
+            it lies behind the camera.
         point_radar_m: (3,) the chosen radar position as measured.
         inlier: it took part in the final pose.
         excluded: the user left it out.
@@ -153,9 +163,36 @@ class NextPlacement:
         object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
 
 
+@dataclass(frozen=True, slots=True)
+class SystematicErrorResult:
+    """One error that all pairs share: what is known of it, and its part in the uncertainty of the pose.
+
+    Attributes:
+        name: key in files, with its unit; scales and shares have none.
+        text: what it is, for users.
+        value: estimated; for an error that is not taken out of the pose, what the residuals suggest.
+        sigma: standard deviation of that value.
+        prior_sigma: the same before any pair, as the options state it.
+        estimated: whether the pose was estimated together with it; otherwise it only widens the covariance.
+        position_share: its part of the variance of the translation, 0 to 1.
+        rotation_share: the same of the rotation.
+    """
+
+    name: str
+    text: str
+    value: float
+    sigma: float
+    prior_sigma: float
+    estimated: bool
+    position_share: float
+    rotation_share: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
     """A solved extrinsic calibration: p_camera = R p_radar + t.
+
+    p_radar is the true position; a reported one is first corrected by radar_errors.
 
     Attributes:
         camera_from_radar: the pose.
@@ -172,6 +209,8 @@ class Calibration:
         sqpnp_px: the same with SQPnP.
         angle_map: the radar's smooth angle errors; None if correcting them gains nothing.
         next_placement: where the next placement would help most; None if no place is known.
+        radar_errors: the radar's systematic errors, estimated with the pose.
+        systematic_errors: every error that the pairs share, and its part in the uncertainty.
     """
 
     camera_from_radar: RigidTransform
@@ -188,13 +227,15 @@ class Calibration:
     sqpnp_px: float = float("nan")
     angle_map: AngleMap | None = None
     next_placement: NextPlacement | None = None
+    radar_errors: RadarErrors = field(default_factory=RadarErrors)
+    systematic_errors: tuple[SystematicErrorResult, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))
 
     def reproject(self, points_radar_m: Points3) -> Points2:
-        """Project radar points (n, 3) [m] to pixels (n, 2); NaN where the lens does not see them."""
-        return self.camera.project(self.camera_from_radar @ points_radar_m)
+        """Project positions (n, 3) [m] as the radar reports them to pixels (n, 2); NaN where the lens does not see them."""
+        return self.camera.project(self.camera_from_radar @ self.radar_errors.corrected(points_radar_m))
 
     def pixel_covariance(self, points_radar_m: Points3) -> np.ndarray:
         """Return the covariance (n, 2, 2) [px^2] of where true radar points project; NaN where the lens does not see them.

@@ -11,7 +11,6 @@ from calib_core.diagnostics.intrinsics import intrinsics
 from calib_core.diagnostics.pairs import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
 from calib_core.diagnostics.pose import assumed_axes, camera_position, mirrored_axes, two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
-from calib_core.estimation.unmeasured_elevation import is_flat
 from calib_core.geometry import skew
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.results import DataWarning
@@ -50,7 +49,7 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:
     """Warn of a radar without elevation: say what the pairs determine and what depends on the reflector's assumed height."""
-    if not is_flat(fit.measurements):
+    if not fit.measurements.flat:
         return []
     position_cm, turn_deg = _sigmas_in_radar_axes(fit)
     determined = (
@@ -121,7 +120,7 @@ def _noise_excess(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _smooth_angle_errors(fit: SolvedFit) -> list[DataWarning]:
-    if fit.uncertainty.growth < _NOTABLE_GROWTH or is_flat(fit.measurements):
+    if fit.uncertainty.growth < _NOTABLE_GROWTH or fit.measurements.flat:
         return []
     return [
         DataWarning(

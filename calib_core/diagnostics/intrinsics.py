@@ -17,7 +17,6 @@ import numpy as np
 
 from calib_core.arrays import Values
 from calib_core.diagnostics.solved_fit import SolvedFit
-from calib_core.estimation.unmeasured_elevation import is_flat
 from calib_core.results import DataWarning
 
 __all__ = ["LensError", "intrinsics", "lens_errors"]
@@ -45,7 +44,7 @@ class LensError:
 
 def intrinsics(fit: SolvedFit) -> list[DataWarning]:
     """Warn of the focal length or the distortion, whichever explains more of the residuals."""
-    if fit.inliers.sum() < _LEAST_PAIRS or is_flat(fit.measurements):
+    if fit.inliers.sum() < _LEAST_PAIRS or fit.measurements.flat:
         return []
     focal, radial = lens_errors(fit)
     if min(focal.chance, radial.chance) >= _LEVEL:

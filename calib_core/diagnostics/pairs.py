@@ -86,7 +86,7 @@ def _losses(fit: SolvedFit) -> Values:
     """
     refined = fit.refined
     inverse = np.linalg.inv(fit.uncertainty.information)
-    jacobian = refined.model.pose_jacobian
+    jacobian = refined.model.jacobian
     share = refined.weights[:, None, None] * (jacobian @ inverse @ np.swapaxes(jacobian, 1, 2))
     largest = np.linalg.eigvalsh(share)[:, -1]
     return np.asarray(np.where(fit.inliers, 1.0 / np.sqrt(np.maximum(1.0 - largest, 1e-9)), 0.0))

@@ -9,7 +9,6 @@ from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.mirror_test import MIRRORED_GAIN, NOT_MIRRORED_GAIN
-from calib_core.estimation.unmeasured_elevation import is_flat
 from calib_core.geometry import RigidTransform
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import DataWarning
@@ -51,7 +50,7 @@ def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
 
 def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
     """Warn if only the expected camera distance, and not the pairs, rules out mirrored axes."""
-    already_warned = fit.mirror_gain > NOT_MIRRORED_GAIN or is_flat(fit.measurements)
+    already_warned = fit.mirror_gain > NOT_MIRRORED_GAIN or fit.measurements.flat
     if already_warned or fit.measurements.prior.measured or _heights_decide(fit):
         return []
     return [
@@ -90,7 +89,7 @@ def two_poses(fit: SolvedFit) -> list[DataWarning]:
     for other in fit.alternatives[1:]:
         error = other.camera_from_radar.error_from(fit.refined.camera_from_radar)
         apart_rad = float(np.linalg.norm(error[3:]))
-        sigmas = float(np.sqrt(error @ fit.uncertainty.information @ error))
+        sigmas = float(np.sqrt(error @ fit.uncertainty.pose_information @ error))
         if other.cost - best.cost < _ALMOST_AS_LIKELY and apart_rad > _OTHER_POSE_RAD and sigmas > _OTHER_POSE_SIGMAS:
             return [
                 DataWarning(

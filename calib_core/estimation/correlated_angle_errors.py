@@ -13,7 +13,7 @@ becomes H^-1 (J^T V J) H^-1.
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Points2, Values, Vector3
+from calib_core.arrays import Points2, Values
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.radar import polar_from_cartesian
 
@@ -29,21 +29,23 @@ _CLEARLY_INDEPENDENT = 0.7  # probability of purely independent errors
 _NEGLIGIBLE = 1e-10
 
 
-def pose_spread(refined: ErrorsInVariablesFit, information: Matrix66) -> Matrix66 | None:
-    """Return the covariance (6, 6) of the least-squares pose under smooth angle errors; None if the residuals do not show them.
+def pose_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> np.ndarray | None:
+    """Return the covariance (6 + k, 6 + k) of the least-squares pose and systematic errors under smooth angle errors.
+
+    None if the residuals do not show them.
 
     Every split of the noise into independent and smooth parts is weighted by its probability: a few dozen pairs determine
     the size of the smooth part only roughly, so the covariance must not rely on a single estimate of it.
 
     Args:
         refined: the fit.
-        information: (6, 6) H, prior included.
+        information: (6 + k, 6 + k) H, priors included.
     """
     if refined.weights.sum() < _LEAST_PAIRS or refined.degrees_of_freedom <= 0:
         return None
     inliers = np.flatnonzero(refined.weights > 0.5)  # an outlier's down-weighted residual would look like a perfect one
     residual, jacobian = _weighted_rows(refined, inliers)
-    prior = refined.measurements.prior.rows(refined.camera_from_radar)
+    prior = _prior_rows(refined)
     levels = [(independent, smooth) for independent in _INDEPENDENT for smooth in _SMOOTH]
     nothing = np.zeros((len(residual), 0))
     likelihoods = [_log_likelihoods(residual, jacobian, prior, nothing, [(1.0, 0.0)]) + _INDEPENDENT_LOG_ODDS]
@@ -64,10 +66,21 @@ def pose_spread(refined: ErrorsInVariablesFit, information: Matrix66) -> Matrix6
     return np.asarray(inverse @ middle @ inverse)
 
 
+def _prior_rows(refined: ErrorsInVariablesFit) -> tuple[Values, np.ndarray]:
+    """Return the whitened residuals (3 + k,) and Jacobian (3 + k, 6 + k) of the priors of camera centre and errors."""
+    errors = refined.measurements.errors
+    residual, jacobian = refined.measurements.prior.rows(refined.camera_from_radar)
+    rows = np.zeros((3 + len(errors), 6 + len(errors)))
+    rows[:3, :6] = jacobian
+    if len(errors):
+        rows[3:, 6:] = np.diag(1.0 / errors.sigma)
+    return np.concatenate([residual, -errors.values / errors.sigma if len(errors) else []]), rows
+
+
 def _weighted_rows(refined: ErrorsInVariablesFit, inliers: np.ndarray) -> tuple[Values, np.ndarray]:
     root = np.sqrt(refined.weights[inliers])[:, None]
-    jacobian = (refined.model.pose_jacobian[inliers] * root[:, :, None]).reshape(-1, 6)
-    return (refined.model.residual[inliers] * root).reshape(-1), jacobian
+    jacobian = refined.model.jacobian[inliers] * root[:, :, None]
+    return (refined.model.residual[inliers] * root).reshape(-1), jacobian.reshape(2 * len(inliers), -1)
 
 
 def _shape(refined: ErrorsInVariablesFit, inliers: np.ndarray, directions: Points2, length_rad: float) -> np.ndarray:
@@ -89,7 +102,7 @@ def _directions(refined: ErrorsInVariablesFit, inliers: np.ndarray) -> Points2:
     """Return azimuth and elevation (n, 2) of each inlier from its click: the measured angles contain the errors in question."""
     rays = refined.measurements.rays[inliers] @ refined.camera_from_radar.rotation
     directions = polar_from_cartesian(rays)[:, 1:]
-    return np.where(np.isfinite(directions), directions, refined.measurements.polar[refined.rows[inliers], 1:])
+    return np.where(np.isfinite(directions), directions, refined.polar[1:, inliers].T)
 
 
 def _kernel(a: Points2, b: Points2, length_rad: float) -> np.ndarray:
@@ -100,7 +113,7 @@ def _kernel(a: Points2, b: Points2, length_rad: float) -> np.ndarray:
 def _log_likelihoods(
     residual: Values,
     jacobian: np.ndarray,
-    prior: tuple[Vector3, np.ndarray],
+    prior: tuple[Values, np.ndarray],
     shape: np.ndarray,
     levels: list[tuple[float, float]],
 ) -> Values:

@@ -4,11 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix66
+from calib_core.arrays import Matrix66, Values
 from calib_core.estimation.correlated_angle_errors import pose_spread
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import normal_equations
-from calib_core.estimation.unmeasured_elevation import shared_elevation_spread
+from calib_core.estimation.systematic_errors import SystematicError
+from calib_core.estimation.unmeasured_elevation import mounting_spread
+from calib_core.options import RadarOptions
+from calib_core.results import SystematicErrorResult
 
 __all__ = ["PoseCovariance", "pose_covariance"]
 
@@ -22,87 +25,183 @@ class PoseCovariance:
 
     Attributes:
         covariance: (6, 6) of (dt, dtheta) [m, rad].
-        information: (6, 6) Gauss-Newton Hessian of the fit, for Newton steps from it.
+        information: (6 + k, 6 + k) Gauss-Newton Hessian of the fit, the k estimated systematic errors included.
         quantile: the factor on the covariance that gives the 95 % ellipsoid.
         condition: condition number of the information of the pairs alone, after scaling each unknown.
         growth: factor by which smooth angle errors of the radar widen the rotation's standard deviation; 1 without them.
+        systematic_errors: what each of them contributes.
     """
 
     covariance: Matrix66
-    information: Matrix66
+    information: np.ndarray
     quantile: float
     condition: float
     growth: float
+    systematic_errors: tuple[SystematicErrorResult, ...] = ()
+
+    @property
+    def pose_information(self) -> Matrix66:
+        """The information about the pose alone (6, 6): the systematic errors are eliminated."""
+        return np.asarray(np.linalg.inv(_symmetric_inverse(self.information)[:6, :6]))
 
 
-def pose_covariance(refined: ErrorsInVariablesFit) -> PoseCovariance:
+def pose_covariance(refined: ErrorsInVariablesFit, radar: RadarOptions | None = None) -> PoseCovariance:
     """Invert the observed information of the mixture at the optimum, and widen it by errors that the pairs share.
 
     Pairs that may be outliers (0 < w < 1) contribute less than w of their Gauss-Newton information: by Louis' identity
 
         I = sum w J^T J - sum w (1 - w) g g^T,   g = J^T e   (whitened).
+
+    Args:
+        refined: the fit.
+        radar: priors of the mounting of a radar that measures no elevation; None takes the defaults.
     """
     plain, _ = normal_equations(refined.measurements, refined.camera_from_radar, refined.model, refined.weights)
-    gradients = (np.swapaxes(refined.model.pose_jacobian, 1, 2) @ refined.model.residual[:, :, None])[:, :, 0]
+    gradients = (np.swapaxes(refined.model.jacobian, 1, 2) @ refined.model.residual[:, :, None])[:, :, 0]
     weight_variance = refined.weights * (1.0 - refined.weights)
     lost = (gradients * weight_variance[:, None]).T @ gradients
     information = _floored(plain, lost)
-    prior_jacobian = refined.measurements.prior.rows(refined.camera_from_radar)[1]
-    pairs_only = plain - prior_jacobian.T @ prior_jacobian
+    prior_information = _prior_information(refined)
     independent = _symmetric_inverse(information)
     spread = pose_spread(refined, plain)
     covariance = independent if spread is None else _widened(independent, plain, spread)
-    growth = float(np.sqrt(np.trace(covariance[3:, 3:]) / np.trace(independent[3:, 3:])))
-    shared = shared_elevation_spread(refined, plain)
-    covariance = covariance if shared is None else covariance + shared
-    from_pairs = 1.0 - float(np.trace(prior_jacobian @ covariance @ prior_jacobian.T)) / 6.0
+    growth = float(np.sqrt(np.trace(covariance[3:6, 3:6]) / np.trace(independent[3:6, 3:6])))
+    wide, found = _shared_errors(refined, plain, covariance)
+    pose = covariance[:6, :6] + wide
+    if refined.measurements.flat:
+        reported = refined.measurements.reported[refined.rows]
+        height_m = float(np.median(reported[:, 0] * np.sin(reported[:, 2])))
+        pose = pose + mounting_spread(refined.camera_from_radar, height_m, radar or RadarOptions())
+    noise = (independent @ (information - prior_information) @ independent)[:6, :6]
+    from_pairs = float(np.trace(np.linalg.solve(pose, noise))) / 6.0
     return PoseCovariance(
-        covariance=covariance,
+        covariance=pose,
         information=plain,
-        quantile=_quantile(refined.degrees_of_freedom, max(from_pairs, 0.0)),
-        condition=_scaled_condition(pairs_only),
+        quantile=_quantile(refined.degrees_of_freedom, min(max(from_pairs, 0.0), 1.0)),
+        condition=_scaled_condition(plain - prior_information),
         growth=growth,
+        systematic_errors=tuple(_result(one, pose) for one in found),
     )
 
 
-def _floored(plain: Matrix66, lost: Matrix66) -> Matrix66:
+def _prior_information(refined: ErrorsInVariablesFit) -> np.ndarray:
+    """Return the part (6 + k, 6 + k) of the information that comes from the priors."""
+    errors = refined.measurements.errors
+    jacobian = refined.measurements.prior.rows(refined.camera_from_radar)[1]
+    information = np.zeros((6 + len(errors), 6 + len(errors)))
+    information[:6, :6] = jacobian.T @ jacobian
+    information[6:, 6:] = np.diag(errors.sigma**-2.0) if len(errors) else 0.0
+    return information
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """What is known of one error: its value, the standard deviation of that, and the variance (6,) it gives the pose."""
+
+    error: SystematicError
+    value: float
+    sigma: float
+    estimated: bool
+    variance: Values
+
+
+def _shared_errors(
+    refined: ErrorsInVariablesFit, plain: np.ndarray, covariance: np.ndarray
+) -> tuple[Matrix66, list[_Found]]:
+    """Return what the widening errors add to the pose's covariance (6, 6), and what is known of every error.
+
+    An estimated error's part of the variance is what knowing it exactly would save: with C the covariance, C_pe C_ee^-1 C_ep.
+    """
+    measurements, errors = refined.measurements, refined.measurements.errors
+    variances = np.diag(covariance)[6:]
+    found = [
+        _Found(
+            error, float(errors.values[k]), float(variances[k] ** 0.5), True, covariance[:6, 6 + k] ** 2 / variances[k]
+        )
+        for k, error in enumerate(errors.estimated)
+    ]
+    if not errors.widening:
+        return np.zeros((6, 6)), found
+    planes = measurements.measured(refined.rows)
+    columns = planes.columns(measurements.camera, refined.camera_from_radar, errors.widening, refined.polar)
+    whitened = refined.model.whitening @ columns.transpose(2, 1, 0)  # (n, 2, e)
+    jacobian, weights = refined.model.jacobian, refined.weights[:, None, None]
+    mixed = (np.swapaxes(jacobian, 1, 2) @ (weights * whitened)).sum(axis=0)
+    moves = -np.linalg.solve(plain, mixed)[:6] * np.array([one.sigma for one in errors.widening])
+    values, sigmas = _suggested(refined, whitened, mixed, plain)
+    found += [_Found(error, values[k], sigmas[k], False, moves[:, k] ** 2) for k, error in enumerate(errors.widening)]
+    return np.asarray(moves @ moves.T), found
+
+
+def _suggested(
+    refined: ErrorsInVariablesFit, whitened: np.ndarray, mixed: np.ndarray, plain: np.ndarray
+) -> tuple[list[float], list[float]]:
+    """Estimate each widening error alone, by one step from the optimum: values and standard deviations, priors included."""
+    values, sigmas = [], []
+    weighted = whitened * refined.weights[:, None, None]
+    squares = (weighted * whitened).sum(axis=(0, 1))
+    pulls = (weighted * refined.model.residual[:, :, None]).sum(axis=(0, 1))
+    taken = (mixed * np.linalg.solve(plain, mixed)).sum(axis=0)
+    for k, error in enumerate(refined.measurements.errors.widening):
+        information = max(float(squares[k] - taken[k]), 0.0) + error.sigma**-2.0
+        values.append(float(pulls[k]) / information)
+        sigmas.append(information**-0.5)
+    return values, sigmas
+
+
+def _result(found: _Found, pose: Matrix66) -> SystematicErrorResult:
+    position, rotation = float(np.trace(pose[:3, :3])), float(np.trace(pose[3:, 3:]))
+    return SystematicErrorResult(
+        name=found.error.name,
+        text=found.error.text,
+        value=found.value,
+        sigma=found.sigma,
+        prior_sigma=found.error.sigma,
+        estimated=found.estimated,
+        position_share=float(found.variance[:3].sum()) / position,
+        rotation_share=float(found.variance[3:].sum()) / rotation,
+    )
+
+
+def _floored(plain: np.ndarray, lost: np.ndarray) -> np.ndarray:
     """Subtract the lost information, but keep at least a share of the plain information in every direction."""
     root = np.linalg.cholesky(plain + 1e-12 * np.diag(np.diag(plain)))
     inverse = np.linalg.inv(root)
-    values, vectors = np.linalg.eigh(np.eye(6) - inverse @ lost @ inverse.T)
+    values, vectors = np.linalg.eigh(np.eye(len(plain)) - inverse @ lost @ inverse.T)
     kept = (vectors * np.maximum(values, _LEAST_SHARE)) @ vectors.T
     return np.asarray(root @ kept @ root.T)
 
 
-def _widened(covariance: Matrix66, plain: Matrix66, spread: Matrix66) -> Matrix66:
+def _widened(covariance: np.ndarray, plain: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """Add to a covariance what smooth angle errors add to the plain one, in every direction at least zero."""
     root = np.linalg.cholesky(plain)
-    values, vectors = np.linalg.eigh(root.T @ spread @ root - np.eye(6))
+    values, vectors = np.linalg.eigh(root.T @ spread @ root - np.eye(len(plain)))
     back = np.linalg.inv(root).T @ vectors
     widened = covariance + (back * np.maximum(values, 0.0)) @ back.T
     return np.asarray((widened + widened.T) / 2.0)
 
 
-def _symmetric_inverse(matrix: Matrix66) -> Matrix66:
+def _symmetric_inverse(matrix: np.ndarray) -> np.ndarray:
     scale = 1.0 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     inverse = np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)
     return np.asarray((inverse + inverse.T) / 2.0)
 
 
-def _scaled_condition(information: Matrix66) -> float:
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    values = np.linalg.eigvalsh(information * np.outer(scale, scale))
+def _scaled_condition(information: np.ndarray) -> float:
+    pose = information[:6, :6]
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(pose), 1e-300))
+    values = np.linalg.eigvalsh(pose * np.outer(scale, scale))
     return float(values[-1] / max(values[0], 1e-16))
 
 
 def _quantile(degrees_of_freedom: float, from_pairs: float) -> float:
     """Return the 95 % quantile for 6 parameters: chi-square with the noise known, 6 F(6, nu) with it estimated.
 
-    The contribution of a measured camera position does not depend on the estimated noise; the two are mixed by their shares.
+    The contribution of the priors does not depend on the estimated noise; the two are mixed by their shares.
 
     Args:
         degrees_of_freedom: nu of the noise level; 0 if it was not estimated.
-        from_pairs: the share of the parameters that the pairs determine, 0 to 1.
+        from_pairs: the share of the pose's variance that is the pairs' noise, 0 to 1.
     """
     if degrees_of_freedom <= 0:
         return _CHI2_95_6

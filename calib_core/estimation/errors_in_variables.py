@@ -4,10 +4,11 @@ Pose and true reflector positions mu are estimated together, by expectation-maxi
 
     sum_i w_i [ |z_i - pi(R p(mu_i) + t)|^2_C + |m_i - mu_i|^2_V ] + |c - c0|^2 / sigma_c^2,
 
-with the mu_i eliminated exactly (equation (2) of `linearization`). Plain PnP takes the noisy m_i as the truth; the resulting
-bias does not shrink with more pairs. w_i is the probability that pair i is an inlier: neither an outlier anywhere on the
-image nor a near outlier, several times farther off than noise explains. Each pair is judged by its leave-one-out prediction
-(`leave_one_out_prediction`): a wrong pair would pass a test against a fit and a noise level that it has itself distorted.
+with the mu_i eliminated exactly (equation (2) of `linearization`). The estimated `systematic_errors` are further unknowns.
+Plain PnP takes the noisy m_i as the truth; the resulting bias does not shrink with more pairs. w_i is the probability that
+pair i is an inlier: neither an outlier anywhere on the image nor a near outlier, several times farther off than noise
+explains. Each pair is judged by its leave-one-out prediction (`leave_one_out_prediction`): a wrong pair would pass a test
+against a fit and a noise level that it has itself distorted.
 """
 
 from dataclasses import dataclass, field
@@ -53,7 +54,8 @@ class ErrorsInVariablesFit:
         camera_from_radar: the pose.
         rows: (n,) the chosen candidate row of each pair.
         weights: (n,) probability that the pair is an inlier.
-        measurements: the measurements with the estimated noise.
+        measurements: the measurements with the estimated noise and the estimated systematic errors taken out.
+        polar: (3, n) estimated true positions at which the model is linearized.
         model: the linear model at the optimum, whitened by that noise.
         noise_scale: (4,) estimated over assumed sigma of (click, range, azimuth, elevation).
         degrees_of_freedom: of the noise scales, those of the assumed sigmas included; 0 if not estimated.
@@ -64,6 +66,7 @@ class ErrorsInVariablesFit:
     rows: Indices
     weights: Values
     measurements: PairMeasurements
+    polar: np.ndarray
     model: Linearization
     noise_scale: Values
     degrees_of_freedom: float
@@ -87,6 +90,8 @@ class _State:
     """of those rows, with the noise of the current round"""
     scale: Values
     share: float
+    errors: Values
+    """of the estimated systematic errors"""
     weights: Values = field(default_factory=lambda: np.zeros(0))
     change: Values = field(default_factory=lambda: np.zeros(4))
     """of the logarithm of the scales in the previous round"""
@@ -117,14 +122,14 @@ def fit_errors_in_variables(
         coarse: stop when pose and noise level are known to a few hundredths of a standard deviation.
     """
     tolerances = _COARSE_TOLERANCES if coarse else _TOLERANCES
-    rows = associate(measurements, start.camera_from_radar)[0]
     scale = np.full(4, start.noise_scale)
-    noisy = measurements.scaled(scale)
-    state = _State(start.camera_from_radar, None, rows, noisy.measured(rows), scale, 0.8)
+    noisy = measurements.without_errors().scaled(scale)
+    rows = associate(noisy, start.camera_from_radar)[0]
+    state = _State(start.camera_from_radar, None, rows, noisy.measured(rows), scale, 0.8, measurements.errors.values)
     state.weights = _first_weights(noisy, state)
     degrees = 0.0
     for round_ in range(_MOST_ROUNDS):
-        noisy = measurements.scaled(state.scale)
+        noisy = measurements.scaled(state.scale).with_errors(state.errors)
         weigh = round_ <= _ROUNDS_BEFORE_SCALES or round_ % _ROUNDS_PER_WEIGHING == 0
         model, parts = _expect(noisy, state, weigh=weigh, scaled=degrees > 0.0)
         step, hessian = _maximise(noisy, state, model)
@@ -135,9 +140,12 @@ def fit_errors_in_variables(
         settled = step < tolerances[0] and moved < tolerances[1]
         if settled and round_ > _ROUNDS_BEFORE_SCALES and (weigh or coarse):
             break
-    noisy = measurements.scaled(state.scale)
+    noisy = measurements.scaled(state.scale).with_errors(state.errors)
     model, _ = _expect(noisy, state, weigh=True, scaled=degrees > 0.0)
-    return ErrorsInVariablesFit(state.pose, state.rows, state.weights, noisy, model, state.scale, degrees, state.share)
+    polar = state.measured.polar if state.polar is None else state.polar
+    return ErrorsInVariablesFit(
+        state.pose, state.rows, state.weights, noisy, polar, model, state.scale, degrees, state.share
+    )
 
 
 def _first_weights(measurements: PairMeasurements, state: _State) -> Values:
@@ -157,7 +165,7 @@ def _expect(
     if not measurements.one_to_one:
         rows = associate(measurements, state.pose)[0]
         if state.polar is not None:
-            state.polar = np.where(rows == state.rows, state.polar, measurements.polar[rows].T)
+            state.polar = np.where(rows == state.rows, state.polar, measurements.measured(rows).polar)
         state.rows = rows
     state.measured = measurements.measured(state.rows)
     model = _model(measurements, state)
@@ -191,15 +199,16 @@ def _maximise(measurements: PairMeasurements, state: _State, model: Linearizatio
     """Update pose and true positions (M-step); return the step's length in standard deviations, and the Hessian."""
     hessian, gradient = normal_equations(measurements, state.pose, model, state.weights)
     scale = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
-    step = np.linalg.solve(hessian / np.outer(scale, scale) + 1e-12 * np.eye(6), gradient / scale) / scale
-    longest = max(float(np.linalg.norm(step[3:])) / 0.2, float(np.linalg.norm(step[:3])) / 1.0, 1.0)
+    step = np.linalg.solve(hessian / np.outer(scale, scale) + 1e-12 * np.eye(len(scale)), gradient / scale) / scale
+    longest = max(float(np.linalg.norm(step[3:6])) / 0.2, float(np.linalg.norm(step[:3])) / 1.0, 1.0)
     step = step / longest
-    state.pose = state.pose.perturbed(step)
-    # mu = m + V J^T S^-1 (e - J_pose step), from the eliminated equations
-    left = model.planes[0] - (step @ model.planes[1:7].reshape(6, -1)).reshape(2, -1)
-    pull = (model.planes[7:] * left).sum(axis=1)
+    state.pose = state.pose.perturbed(step[:6])
+    state.errors = state.errors + step[6:]
+    # mu = m' + V J^T S^-1 (e - J step), from the eliminated equations
+    left = model.planes[0] - (step @ model.unknown_planes.reshape(len(step), -1)).reshape(2, -1)
+    pull = (model.polar_planes * left).sum(axis=1)
     near = left[0] ** 2 + left[1] ** 2 < _NEAR**2
-    polar = state.measured.polar
+    polar = measurements.with_errors(state.errors).measured(state.rows).polar
     state.polar = np.where(near, polar + state.measured.sigma_polar**2 * pull, polar)
     return float(np.sqrt(max(step @ hessian @ step, 0.0))), hessian
 
@@ -212,8 +221,8 @@ def _variance_components(
     With P = W^T (I - w J_pose H^-1 J_pose^T) W, component k with covariance Q_k of the residual has
     q_k = e^T S^-1 Q_k S^-1 e and redundancy r_k = tr(P Q_k); its variance changes by q_k / r_k.
     """
-    weights, jacobian = state.weights, model.planes[1:7]
-    back = (np.linalg.inv(hessian) @ jacobian.reshape(6, -1)).reshape(jacobian.shape)
+    weights, jacobian = state.weights, model.unknown_planes
+    back = (np.linalg.inv(hessian) @ jacobian.reshape(len(hessian), -1)).reshape(jacobian.shape)
     taken = parts.squared_lengths(Symmetric.between(jacobian, back))
     redundant = ((parts.planes**2).sum(axis=1) - weights * taken) @ weights
     squares = (parts.along**2 @ weights) @ COMPONENTS

@@ -77,6 +77,7 @@ def solve_gnc(
     if not starts:
         return ()
     scales = _NOISE_SCALES if estimate_scale else _NOISE_SCALES[:1]
+    measurements = measurements.without_errors()
     poses = _graduated(measurements, _Poses.of(starts))
     costs = _mixture_costs(measurements, poses, scales)
     best = costs.argmin(axis=1)
@@ -123,7 +124,7 @@ def associate(measurements: PairMeasurements, pose: RigidTransform) -> tuple[Ind
 def _of_candidates(measurements: PairMeasurements) -> MeasurementPlanes:
     """Return every candidate row with its pair's click."""
     each = measurements if measurements.one_to_one else measurements.candidates_apart()
-    return each.measured(np.arange(len(each.polar)))
+    return each.measured(np.arange(len(each.reported)))
 
 
 def _associated(
@@ -131,7 +132,7 @@ def _associated(
 ) -> tuple[Indices, Linearization]:
     """Associate at each pose: rows (..., n), and their model."""
     model = candidates.linearize(measurements.camera, poses.rotations, poses.translations_m)
-    count = len(measurements.polar)
+    count = len(measurements.reported)
     if measurements.one_to_one:
         return np.arange(count), model
     cost = model.squared + model.log_determinant - 2.0 * measurements.log_score
@@ -144,19 +145,29 @@ def _associated(
 def normal_equations(
     measurements: PairMeasurements, pose: RigidTransform, model: Linearization, weights: Values
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the Gauss-Newton Hessian (6, 6) and the right-hand side (6,) of the normal equations, prior included."""
+    """Return the Gauss-Newton Hessian (6 + k, 6 + k) and the right-hand side (6 + k,) of the normal equations.
+
+    The priors of the camera centre and of the k systematic errors are included.
+    """
     return _normal_equations(measurements, _Poses(pose.rotation, pose.translation_m), model, weights)
 
 
 def _normal_equations(
     measurements: PairMeasurements, poses: _Poses, model: Linearization, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return Hessians (..., 6, 6) and right-hand sides (..., 6), both blocks of one product of (residual, Jacobian) rows."""
-    rows = model.planes[..., :7, :, :] * np.sqrt(weights)[..., None, None, :]
+    """Return Hessians (..., 6 + k, 6 + k) and right-hand sides, both blocks of one product of (residual, Jacobian) rows."""
+    rows = model.planes[..., :-3, :, :] * np.sqrt(weights)[..., None, None, :]
     rows = rows.reshape(*rows.shape[:-2], -1)
     product = rows @ np.swapaxes(rows, -1, -2)
+    hessian, gradient = product[..., 1:, 1:], product[..., 1:, 0]
     prior_hessian, prior_gradient = measurements.prior.information(poses.rotations, poses.translations_m)
-    return product[..., 1:, 1:] + prior_hessian, product[..., 1:, 0] + prior_gradient
+    hessian[..., :6, :6] += prior_hessian
+    gradient[..., :6] += prior_gradient
+    if len(measurements.errors):
+        precision = measurements.errors.sigma**-2.0
+        hessian[..., 6:, 6:] += np.diag(precision)
+        gradient[..., 6:] -= precision * measurements.errors.values
+    return hessian, gradient
 
 
 def _damped(hessians: np.ndarray, gradients: np.ndarray) -> np.ndarray:
@@ -183,8 +194,8 @@ def _log_odds(
 
 
 def mixture_cost(measurements: PairMeasurements, pose: RigidTransform) -> float:
-    """Return twice the negative log-likelihood of the mixture relative to "all are outliers", camera prior included."""
-    return float(_mixture_costs(measurements, _Poses.of([pose]), (1.0,))[0, 0])
+    """Return twice the negative log-likelihood of the mixture relative to "all are outliers", priors included."""
+    return float(_mixture_costs(measurements, _Poses.of([pose]), (1.0,))[0, 0]) + measurements.errors.squared
 
 
 def _mixture_costs(measurements: PairMeasurements, poses: _Poses, scales: Sequence[float]) -> np.ndarray:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Values
+from calib_core.arrays import Values
 from calib_core.estimation.covariance import PoseCovariance, pose_covariance
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution, associate
@@ -45,14 +45,14 @@ class InfluentialPair:
 
 
 def find_influential_pairs(
-    measurements: PairMeasurements, refined: ErrorsInVariablesFit, information: Matrix66
+    measurements: PairMeasurements, refined: ErrorsInVariablesFit, uncertainty: PoseCovariance
 ) -> tuple[InfluentialPair, ...]:
     """Find the influential pairs: screen all pairs by one Newton step, then refit without each suspect.
 
     Args:
         measurements: all pairs with the assumed noise.
         refined: their fit.
-        information: (6, 6) of all pairs.
+        uncertainty: of that fit.
     """
     inliers = refined.inliers
     if refined.weights.sum() < _LEAST_PAIRS:
@@ -62,10 +62,11 @@ def find_influential_pairs(
     one = predict_left_out(
         refined.measurements, refined.camera_from_radar, refined.model, refined.weights, parts, scale
     )
-    levels = _LEVEL * np.where(inliers, _shares(refined, information), 0.0)
+    levels = _LEVEL * np.where(inliers, _shares(refined, uncertainty.information), 0.0)
     chances = tail_chance(one.squared(), one.degrees_of_freedom)
     suspects = np.flatnonzero(chances < _SCREENING * levels)
     worst = suspects[np.argsort(chances[suspects] / levels[suspects], kind="stable")][:_MOST_REFITS]
+    information = uncertainty.pose_information
     refits = [_left_out(measurements, refined, int(pair)) for pair in worst]
     return tuple(
         influential
@@ -74,9 +75,9 @@ def find_influential_pairs(
     )
 
 
-def _shares(refined: ErrorsInVariablesFit, information: Matrix66) -> Values:
+def _shares(refined: ErrorsInVariablesFit, information: np.ndarray) -> Values:
     """Divide the level among the pairs by squared leverage w tr(J H^-1 J^T), with a limit per pair."""
-    jacobian = refined.model.pose_jacobian
+    jacobian = refined.model.jacobian
     leverage = refined.weights * ((jacobian @ np.linalg.inv(information)) * jacobian).sum(axis=(1, 2))
     return np.minimum(leverage**2 / (leverage**2).sum(), _LARGEST_SHARE)
 
@@ -88,7 +89,7 @@ def _left_out(
     others = measurements.some(np.delete(np.arange(len(measurements)), pair))
     start = GncSolution(refined.camera_from_radar, 0.0, 1.0)
     fit = fit_errors_in_variables(others, start, estimate_scale=refined.degrees_of_freedom > 0)
-    own = measurements.some(np.array([pair])).scaled(fit.noise_scale)
+    own = measurements.some(np.array([pair])).scaled(fit.noise_scale).with_errors(fit.measurements.errors.values)
     model = associate(own, fit.camera_from_radar)[1]
     residual, jacobian = model.residual[0], model.pose_jacobian[0]
     spread = np.eye(2) + jacobian @ pose_covariance(fit).covariance @ jacobian.T

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Points2, Points3, Values
+from calib_core.arrays import Points2, Points3, Values
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.radar import cartesian_from_polar
 
@@ -24,22 +24,24 @@ class LeaveOneOut:
     influence: Values
 
 
-def leave_one_out(refined: ErrorsInVariablesFit, information: Matrix66) -> LeaveOneOut:
+def leave_one_out(refined: ErrorsInVariablesFit, information: np.ndarray) -> LeaveOneOut:
     """Leave out each pair by one Newton step: delta_i = -(H - w J_i^T J_i)^-1 w J_i^T e_i.
 
     Args:
         refined: the fit.
-        information: (6, 6) of all pairs.
+        information: (6 + k, 6 + k) of all pairs.
     """
-    jacobian, residual, weights = refined.model.pose_jacobian, refined.model.residual, refined.weights
+    jacobian, residual, weights = refined.model.jacobian, refined.model.residual, refined.weights
     own = weights[:, None, None] * (np.swapaxes(jacobian, 1, 2) @ jacobian)
     pull = weights[:, None] * (np.swapaxes(jacobian, 1, 2) @ residual[:, :, None])[:, :, 0]
     scale = 1.0 / np.sqrt(np.diag(information))
     rest = (information - 0.999 * own) * np.outer(scale, scale)
     moves = -np.linalg.solve(rest, (pull * scale)[:, :, None])[:, :, 0] * scale
-    influence = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", moves, information, moves), 0.0))
-    points = cartesian_from_polar(refined.measurements.polar[refined.rows])
-    missed_px = _projected_after(refined, moves, points) - refined.measurements.pixels_px
+    turned = moves[:, :6] @ np.linalg.inv(np.linalg.inv(information)[:6, :6])
+    influence = np.sqrt(np.maximum((turned * moves[:, :6]).sum(axis=1), 0.0))
+    polar = refined.measurements.measured(refined.rows).polar
+    polar = polar + refined.measurements.errors.polar_change(polar, moves[:, 6:])
+    missed_px = _projected_after(refined, moves[:, :6], cartesian_from_polar(polar.T)) - refined.measurements.pixels_px
     return LeaveOneOut(np.linalg.norm(missed_px, axis=1), influence)
 
 

@@ -163,7 +163,7 @@ def noise_parts(measurements: PairMeasurements, model: Linearization, sigma_pola
     planes = np.empty((5, *model.planes.shape[1:]))
     planes[0] = model.whitening_planes[:2] * measurements.sigma_px  # the first column of W, which is triangular
     planes[1, 0], planes[1, 1] = 0.0, model.whitening_planes[2] * measurements.sigma_px
-    np.multiply(model.planes[7:], sigma_polar.T[:, None, :], out=planes[2:])
+    np.multiply(model.polar_planes, sigma_polar.T[:, None, :], out=planes[2:])
     return NoiseParts(planes, (planes * model.planes[0]).sum(axis=1))
 
 
@@ -186,9 +186,9 @@ def predict_left_out(
         scale: (4,) estimated over assumed noise; None if the noise is as assumed.
     """
     hessian, gradient = normal_equations(measurements, pose, model, weights)
-    residual, jacobian = model.planes[0], model.planes[1:7]
+    residual, jacobian = model.planes[0], model.unknown_planes
     inverse = np.linalg.inv(hessian + 1e-12 * np.diag(np.diag(hessian)))
-    back = (inverse @ jacobian.reshape(6, -1)).reshape(jacobian.shape)  # B
+    back = (inverse @ jacobian.reshape(len(hessian), -1)).reshape(jacobian.shape)  # B
     leverage = Symmetric.between(jacobian, back)  # G
     own = _OWN_SHARE * weights
     factor = _woodbury_factor(leverage, own)  # N
@@ -237,16 +237,16 @@ class _Others:
     parts: NoiseParts
     weights: Values
     jacobian: np.ndarray
-    """(6, 2, n)"""
+    """(6 + k, 2, n)"""
     moves: np.ndarray
-    """(6, n) d"""
+    """(6 + k, n) d"""
     left: np.ndarray
     """(2, n) e - J d"""
     propagated: Symmetric
     inverse: np.ndarray
-    """(6, 6) C"""
+    """(6 + k, 6 + k) C"""
     back: np.ndarray
-    """(6, 2, n) B"""
+    """(6 + k, 2, n) B"""
     factor: Symmetric
     """w N"""
 
@@ -254,11 +254,11 @@ class _Others:
 def _scales_of_others(o: _Others, scale: Values) -> tuple[np.ndarray, Values]:
     """Return the noise scales (n, 4) without each pair, at the pose without it, and their degrees of freedom (n,)."""
     columns, along, weights = o.parts.planes, o.parts.along, o.weights
-    jacobian = (columns[:, None] * o.jacobian).sum(axis=2)  # of the residual along each column, (5, 6, n)
+    jacobian = (columns[:, None] * o.jacobian).sum(axis=2)  # of the residual along each column, (5, 6 + k, n)
     turned = np.swapaxes(jacobian, 1, 2)
     weighted = jacobian * weights
     linear = (weighted @ along[:, :, None])[:, :, 0]
-    quadratic, taken = weighted @ turned, (weighted * weights) @ turned  # (5, 6, 6)
+    quadratic, taken = weighted @ turned, (weighted * weights) @ turned  # (5, 6 + k, 6 + k)
     own = (columns * o.left).sum(axis=1) ** 2
     second_order = (_by_component(quadratic) @ o.moves * o.moves).sum(axis=1)
     squares = COMPONENTS.T @ ((weights * along**2).sum(axis=1, keepdims=True) - 2.0 * linear @ o.moves - weights * own)
@@ -277,8 +277,8 @@ def _by_component(five: np.ndarray) -> np.ndarray:
 
 
 def _traces(taken: np.ndarray, o: _Others) -> np.ndarray:
-    """Return tr(P T) (4, n) of each T (4, 6, 6): tr(C T) + tr(w N B^T T B)."""
-    through = (taken @ o.back.reshape(6, -1)).reshape(4, *o.back.shape)  # T B
+    """Return tr(P T) (4, n) of each T (4, 6 + k, 6 + k): tr(C T) + tr(w N B^T T B)."""
+    through = (taken @ o.back.reshape(len(o.back), -1)).reshape(4, *o.back.shape)  # T B
     straight = (o.back * through).sum(axis=1)  # (4, 2, n)
     across = (o.back[:, 0] * through[:, :, 1]).sum(axis=1)
     plain = np.trace(o.inverse @ taken, axis1=1, axis2=2)[:, None]

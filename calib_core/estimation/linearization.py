@@ -11,12 +11,14 @@ drop out (the Schur complement of the joint problem):
     e ~ N(0, S),    S = C + J V J^T.                                                                       (2)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from calib_core.arrays import Indices, Points2, Points3, Values
 from calib_core.camera import Camera
+from calib_core.estimation.systematic_errors import NO_ERRORS, Sensitivity, SystematicError, SystematicErrors
 from calib_core.geometry import RigidTransform, rotation_jacobian
 from calib_core.radar import position_planes
 
@@ -32,14 +34,16 @@ class MeasurementPlanes:
     Attributes:
         pixels_px: (2, n) clicks.
         sigma_px: (n,) or a single number.
-        polar: (3, n) range [m], azimuth, elevation [rad].
+        polar: (3, n) range [m], azimuth, elevation [rad], the radar's estimated errors taken out.
         sigma_polar: (3, n).
+        errors: systematic errors; the estimated ones are unknowns beside the pose.
     """
 
     pixels_px: np.ndarray
     sigma_px: Values
     polar: np.ndarray
     sigma_polar: np.ndarray
+    errors: SystematicErrors = NO_ERRORS
 
     def linearize(
         self, camera: Camera, rotations: np.ndarray, translations_m: np.ndarray, at_polar: np.ndarray | None = None
@@ -52,20 +56,42 @@ class MeasurementPlanes:
             translations_m: (..., 3).
             at_polar: (3, n) the true positions mu to linearize at; None takes the measured ones.
         """
-        position_m, turning = position_planes(self.polar if at_polar is None else at_polar)
+        true_polar = self.polar if at_polar is None else at_polar
+        position_m, turning = position_planes(true_polar)
         turned_m = rotations @ position_m
-        projected_px, d_point = camera.project_planes(turned_m + translations_m[..., None])
+        projected_px, d_point = camera.project_planes(turned_m + (translations_m + self.errors.offset_m)[..., None])
         d_polar = (rotations @ turning.reshape(3, -1)).reshape(*rotations.shape[:-2], *turning.shape)
-        # residual, d pixel / d (dt, dtheta), d pixel / d polar, stacked
-        rows = np.empty((*rotations.shape[:-2], 10, *self.pixels_px.shape))
+        # residual, d pixel / d (dt, dtheta), d pixel / d errors, d pixel / d polar, stacked
+        rows = np.empty((*rotations.shape[:-2], 10 + len(self.errors), *self.pixels_px.shape))
         np.subtract(self.pixels_px, projected_px, out=rows[..., 0, :, :])
         rows[..., 1:4, :, :] = d_point
         rotation_jacobian(turned_m, d_point, out=rows[..., 4:7, :, :])
-        to_polar = rows[..., 7:, :, :]
+        to_polar = rows[..., -3:, :, :]
         np.einsum("...irn,...ikn->...krn", d_point, d_polar, out=to_polar)
+        if self.errors.estimated:
+            at = _sensitivity(camera, true_polar, projected_px, d_point, to_polar)
+            for k, error in enumerate(self.errors.estimated):
+                rows[..., 7 + k, :, :] = error.column(at)
         if at_polar is not None:
             rows[..., 0, :, :] -= (to_polar * (self.polar - at_polar)[:, None, :]).sum(axis=-3)
         return _whitened(rows, self.sigma_px, self.sigma_polar)
+
+    def columns(
+        self,
+        camera: Camera,
+        pose: RigidTransform,
+        errors: Sequence[SystematicError],
+        at_polar: np.ndarray | None = None,
+    ) -> np.ndarray:
+        """Return d pixel / d error (k, 2, n), not whitened, of errors that are no unknowns of the fit."""
+        true_polar = self.polar if at_polar is None else at_polar
+        position_m, turning = position_planes(true_polar)
+        translation_m = pose.translation_m + self.errors.offset_m
+        projected_px, d_point = camera.project_planes(pose.rotation @ position_m + translation_m[:, None])
+        d_polar = (pose.rotation @ turning.reshape(3, -1)).reshape(turning.shape)
+        to_polar = np.einsum("irn,ikn->krn", d_point, d_polar)
+        at = _sensitivity(camera, true_polar, projected_px, d_point, to_polar)
+        return np.array([error.column(at) for error in errors]).reshape(len(errors), *self.pixels_px.shape)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +101,8 @@ class Linearization:
     The properties without "planes" in their name require a single pose.
 
     Attributes:
-        planes: (..., 10, 2, n) W e; W d pixel / d (dt, dtheta), 6 of them; W d pixel / d polar, 3.
+        planes: (..., 10 + k, 2, n) W e; W d pixel / d (dt, dtheta), 6 of them; the same for k systematic errors;
+            W d pixel / d polar, 3.
         whitening_planes: (..., 3, n) the entries 00, 10 and 11 of W, which is triangular.
         log_determinant: (..., n) of S.
     """
@@ -90,14 +117,29 @@ class Linearization:
         return np.asarray(self.planes[0].T)
 
     @property
+    def unknown_planes(self) -> np.ndarray:
+        """W d pixel / d unknown: (..., 6 + k, 2, n), the pose and the systematic errors."""
+        return np.asarray(self.planes[..., 1:-3, :, :])
+
+    @property
+    def polar_planes(self) -> np.ndarray:
+        """W d pixel / d polar: (..., 3, 2, n)."""
+        return np.asarray(self.planes[..., -3:, :, :])
+
+    @property
     def pose_jacobian(self) -> np.ndarray:
         """W d pixel / d (dt, dtheta): (n, 2, 6)."""
         return np.asarray(self.planes[1:7].T)
 
     @property
+    def jacobian(self) -> np.ndarray:
+        """W d pixel / d unknown: (n, 2, 6 + k), the pose and the systematic errors."""
+        return np.asarray(self.unknown_planes.T)
+
+    @property
     def point_jacobian(self) -> np.ndarray:
         """W d pixel / d polar: (n, 2, 3)."""
-        return np.asarray(self.planes[7:].T)
+        return np.asarray(self.polar_planes.T)
 
     @property
     def whitening(self) -> np.ndarray:
@@ -146,9 +188,16 @@ def linearize(
     return measured.linearize(camera, camera_from_radar.rotation, camera_from_radar.translation_m, at)
 
 
+def _sensitivity(
+    camera: Camera, polar: np.ndarray, projected_px: np.ndarray, d_point: np.ndarray, to_polar: np.ndarray
+) -> Sensitivity:
+    matrix_px = camera.matrix_px
+    return Sensitivity(polar, d_point, to_polar, projected_px - matrix_px[:2, 2:], float(matrix_px[0, 0]))
+
+
 def _whitened(rows: np.ndarray, sigma_px: Values, sigma_polar: np.ndarray) -> Linearization:
-    """Multiply rows (..., 10, 2, n) by W, W S W^T = I for S = C + J V J^T, from the Cholesky factor of the 2 x 2."""
-    noisy = rows[..., 7:, :, :] * sigma_polar[:, None, :]
+    """Multiply rows (..., 10 + k, 2, n) by W, W S W^T = I for S = C + J V J^T, from the Cholesky factor of the 2 x 2."""
+    noisy = rows[..., -3:, :, :] * sigma_polar[:, None, :]
     u, v = noisy[..., 0, :], noisy[..., 1, :]
     click = sigma_px**2
     a = np.sqrt((u * u).sum(axis=-2) + click)

@@ -1,4 +1,4 @@
-"""Measurement model: the measured pairs and the camera prior as arrays."""
+"""Measurement model: the measured pairs, the errors they share, and the camera prior, as arrays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,14 +8,14 @@ import numpy as np
 from calib_core.arrays import Indices, Matrix33, Points2, Points3, Values, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.estimation.linearization import MeasurementPlanes
+from calib_core.estimation.systematic_errors import NO_ERRORS, SystematicErrors, systematic_errors
+from calib_core.estimation.unmeasured_elevation import OWN_SIGMA_RAD, is_flat
 from calib_core.geometry import RigidTransform, skew
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions
 from calib_core.radar import polar_from_cartesian
 
 __all__ = ["CameraPrior", "PairMeasurements", "pair_measurements"]
-
-_FLAT_SIGMA_RAD = np.deg2rad(10.0)  # elevation of a radar that always reports 0: unknown, not zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,11 +27,13 @@ class CameraPrior:
         sigma_m: per axis.
         measured: whether it was measured with a tape and is fully used by the estimate; otherwise it only selects between
             poses, and its weight in the estimate decreases with the distance.
+        height_sigma_m: what is added to the variance of its up coordinate, for a radar that does not measure elevation.
     """
 
     position_m: Vector3
     sigma_m: float
     measured: bool
+    height_sigma_m: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position_m", frozen_array(self.position_m, (3,)))
@@ -43,27 +45,34 @@ class CameraPrior:
         """
         rotation, translation_m = camera_from_radar.rotation, camera_from_radar.translation_m
         away_m = self.position_m + rotation.T @ translation_m
-        sigma_m = self.sigma_m if self.measured else float(np.sqrt(self.sigma_m**2 + away_m @ away_m))
+        sigma_m = np.sqrt(self._variance_m2(away_m))
         jacobian = np.concatenate([-rotation.T, -rotation.T @ skew(translation_m)], axis=1)
-        return away_m / sigma_m, jacobian / sigma_m
+        return away_m / sigma_m, jacobian / sigma_m[:, None]
+
+    def _variance_m2(self, away_m: np.ndarray) -> np.ndarray:
+        """Return the variance per radar axis (..., 3), for a camera (..., 3) away from the prior's position."""
+        variance = np.full(away_m.shape, self.sigma_m**2)
+        if not self.measured:
+            variance += (away_m**2).sum(axis=-1, keepdims=True)
+        variance[..., 2] += self.height_sigma_m**2
+        return variance
 
     def information(self, rotations: np.ndarray, translations_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return J^T J (..., 6, 6) and J^T residual (..., 6) of `rows` at poses (..., 3, 3) and (..., 3).
 
-        In camera axes the residual is -(R c0 + t) and its Jacobian (I, [t]x): the same up to a rotation, which cancels.
+        In camera axes the residual is -(R c0 + t), its Jacobian (I, [t]x) and its precision R diag(1 / sigma^2) R^T.
         """
         missed = -(rotations @ self.position_m + translations_m)
-        variance = self.sigma_m**2
-        if not self.measured:
-            variance = variance + (missed**2).sum(axis=-1)[..., None]
+        to_radar = np.swapaxes(rotations, -1, -2)
+        variance = self._variance_m2((to_radar @ missed[..., None])[..., 0])
+        precision = (rotations / variance[..., None, :]) @ to_radar
         x, y, z = translations_m[..., 0], translations_m[..., 1], translations_m[..., 2]
         jacobian = np.zeros((*translations_m.shape, 6))
         jacobian[..., 0, 0] = jacobian[..., 1, 1] = jacobian[..., 2, 2] = 1.0
         jacobian[..., 0, 4], jacobian[..., 0, 5], jacobian[..., 1, 5] = -z, y, -x
         jacobian[..., 1, 3], jacobian[..., 2, 3], jacobian[..., 2, 4] = z, -y, x
-        turned = np.swapaxes(jacobian, -1, -2)
-        gradient = (turned @ missed[..., None])[..., 0] / variance
-        return (turned @ jacobian) / np.asarray(variance)[..., None], gradient
+        weighted = np.swapaxes(jacobian, -1, -2) @ precision
+        return weighted @ jacobian, (weighted @ missed[..., None])[..., 0]
 
     def weakened(self) -> "CameraPrior":
         """Return the same position as a weak prior, with a sigma of at least 1 m."""
@@ -71,7 +80,9 @@ class CameraPrior:
 
     def costs(self, rotations: np.ndarray, translations_m: np.ndarray) -> Values:
         """Return twice the negative log-probability of each pose's camera centre (s,), up to a constant."""
-        return np.asarray(((rotations @ self.position_m + translations_m) ** 2).sum(axis=-1) / self.sigma_m**2)
+        away_m = (np.swapaxes(rotations, -1, -2) @ translations_m[..., None])[..., 0] + self.position_m
+        sigma_m = np.array([self.sigma_m, self.sigma_m, np.hypot(self.sigma_m, self.height_sigma_m)])
+        return np.asarray(((away_m / sigma_m) ** 2).sum(axis=-1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,10 +95,12 @@ class PairMeasurements:
         sigma_px: (n,) their standard deviation per axis.
         rays: (n, 3) unit directions of the clicks in the camera frame; NaN where the lens model has none.
         first: (n + 1,).
-        polar: (m, 3) measured range [m], azimuth, elevation [rad] of the candidates.
+        reported: (m, 3) range [m], azimuth, elevation [rad] of the candidates as the radar reports them.
         sigma_polar: (m, 3) their standard deviations.
         log_score: (m,) logarithm of each candidate's plausibility before any pose.
         prior: of the camera centre.
+        errors: that all pairs share, with their present values.
+        flat: whether the radar does not measure elevation.
     """
 
     camera: Camera
@@ -95,13 +108,20 @@ class PairMeasurements:
     sigma_px: Values
     rays: Points3
     first: Indices
-    polar: Points3
+    reported: Points3
     sigma_polar: Points3
     log_score: Values
     prior: CameraPrior
+    errors: SystematicErrors = NO_ERRORS
+    flat: bool = False
 
     def __len__(self) -> int:
         return len(self.pixels_px)
+
+    @property
+    def polar(self) -> Points3:
+        """The candidates' positions with the radar's estimated errors taken out: (m, 3)."""
+        return np.asarray(self.errors.radar.corrected_polar(self.reported.T).T)
 
     @property
     def owner(self) -> Indices:
@@ -111,7 +131,7 @@ class PairMeasurements:
     @property
     def one_to_one(self) -> bool:
         """Whether every pair has a single candidate, so that there is nothing to associate."""
-        return len(self.polar) == len(self)
+        return len(self.reported) == len(self)
 
     def some(self, pairs: Indices) -> "PairMeasurements":
         """Keep the pairs of the given indices, with their candidates."""
@@ -122,15 +142,16 @@ class PairMeasurements:
             sigma_px=self.sigma_px[pairs],
             rays=self.rays[pairs],
             first=np.concatenate([[0], np.cumsum(np.diff(self.first)[pairs])]),
-            polar=self.polar[rows],
+            reported=self.reported[rows],
             sigma_polar=self.sigma_polar[rows],
             log_score=self.log_score[rows],
         )
 
     def measured(self, rows: Indices) -> MeasurementPlanes:
         """Take one candidate row per pair (n,), as planes."""
+        polar = self.errors.radar.corrected_polar(self.reported[rows].T)
         return MeasurementPlanes(
-            self.pixels_px.T.copy(), self.sigma_px, self.polar[rows].T.copy(), self.sigma_polar[rows].T.copy()
+            self.pixels_px.T.copy(), self.sigma_px, polar, self.sigma_polar[rows].T.copy(), self.errors
         )
 
     def candidates_apart(self) -> "PairMeasurements":
@@ -148,7 +169,18 @@ class PairMeasurements:
         """Return the pairs with the radar's y axis mirrored."""
         left_right = np.array([1.0, -1.0, 1.0])
         prior = replace(self.prior, position_m=self.prior.position_m * left_right)
-        return replace(self, polar=self.polar * left_right, prior=prior)
+        return replace(self, reported=self.reported * left_right, prior=prior)
+
+    def with_errors(self, values: Values) -> "PairMeasurements":
+        """Take the systematic errors to have these values (k,)."""
+        return replace(self, errors=self.errors.at(values)) if len(self.errors) else self
+
+    def without_errors(self) -> "PairMeasurements":
+        """Treat systematic errors as independent noise of the same size: enough to find the pose and the inliers."""
+        if not len(self.errors):
+            return self
+        spread = self.errors.spread(self.reported.T).T
+        return replace(self, sigma_polar=np.hypot(self.sigma_polar, spread), errors=NO_ERRORS)
 
     def scaled(self, noise_scale: Sequence[float] | Values) -> "PairMeasurements":
         """Multiply the assumed sigmas of (click, range, azimuth, elevation)."""
@@ -161,8 +193,9 @@ def pair_measurements(pairs: Sequence[Pair], camera: Camera, options: Calibratio
     candidates = [candidate for pair in pairs for candidate in pair.candidates]
     points = np.array([candidate.position_radar_m for candidate in candidates]).reshape(-1, 3)
     sigma_polar = np.array([candidate.sigma_polar for candidate in candidates]).reshape(-1, 3)
-    if len(points) and not points[:, 2].any():
-        sigma_polar[:, 2] = np.maximum(sigma_polar[:, 2], _FLAT_SIGMA_RAD)
+    flat = is_flat(points)
+    if flat:
+        sigma_polar[:, 2] = OWN_SIGMA_RAD
     score = np.array([candidate.score for candidate in candidates])
     sigma_px = [options.noise.sigma_px if pair.sigma_px is None else pair.sigma_px for pair in pairs]
     pixels_px = np.array([pair.pixel_px for pair in pairs]).reshape(-1, 2)
@@ -172,15 +205,18 @@ def pair_measurements(pairs: Sequence[Pair], camera: Camera, options: Calibratio
         sigma_px=np.array(sigma_px, dtype=np.float64),
         rays=camera.rays(pixels_px),
         first=np.concatenate([[0], np.cumsum([len(pair.candidates) for pair in pairs])]).astype(np.int64),
-        polar=polar_from_cartesian(points),
+        reported=polar_from_cartesian(points),
         sigma_polar=sigma_polar,
         log_score=np.log(np.clip(score, 1e-6, 1.0)),
-        prior=_prior(options),
+        prior=_prior(options, flat=flat),
+        errors=systematic_errors(options, camera, flat=flat),
+        flat=flat,
     )
 
 
-def _prior(options: CalibrationOptions) -> CameraPrior:
+def _prior(options: CalibrationOptions, *, flat: bool) -> CameraPrior:
+    height_sigma_m = options.radar.height_sigma_m if flat else 0.0
     measured = options.solving.camera_position
     if measured is None:
-        return CameraPrior(np.zeros(3), options.solving.nominal_camera_distance_m, measured=False)
-    return CameraPrior(np.array(measured.position_m), measured.sigma_m, measured=True)
+        return CameraPrior(np.zeros(3), options.solving.nominal_camera_distance_m, False, height_sigma_m)
+    return CameraPrior(np.array(measured.position_m), measured.sigma_m, True, height_sigma_m)

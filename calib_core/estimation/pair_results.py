@@ -1,6 +1,7 @@
 """Pair results: the residual and influence of each pair under a fit, and the metrics over the inliers."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,7 @@ __all__ = ["excluded_pair_results", "fit_metrics", "used_pair_results"]
 def fit_metrics(measurements: PairMeasurements, refined: ErrorsInVariablesFit, left_out: LeaveOneOut) -> Metrics:
     """Compute the metrics of the inlier pairs; chi2 uses the assumed noise, so that a wrong assumption shows."""
     inliers = refined.inliers
+    measurements = measurements.with_errors(refined.measurements.errors.values)
     points = cartesian_from_polar(measurements.polar[refined.rows])
     projected = measurements.camera.project(refined.camera_from_radar @ points)
     errors = distances(projected, measurements.pixels_px)
@@ -81,16 +83,18 @@ def excluded_pair_results(
     if not omitted:
         return {}
     measurements = pair_measurements(omitted, camera, options).scaled(refined.noise_scale)
+    measurements = replace(measurements, errors=refined.measurements.errors)
     rows, model = associate(measurements, refined.camera_from_radar)
     expected = _residual_covariances(model)
     results = {}
     for i, pair in enumerate(omitted):
         chosen = int(rows[i] - measurements.first[i])
         point = pair.candidates[chosen].position_radar_m
+        true_point = refined.measurements.errors.radar.corrected(point[None])
         results[pair.id] = PairResult(
             id=pair.id,
             pixel_px=pair.pixel_px,
-            projected_px=camera.project(refined.camera_from_radar @ point[None])[0],
+            projected_px=camera.project(refined.camera_from_radar @ true_point)[0],
             point_radar_m=point,
             inlier=False,
             excluded=True,

@@ -1,46 +1,52 @@
-"""Unmeasured elevation: what a radar without elevation adds to the covariance of the pose.
+"""Unmeasured elevation: what a radar without elevation determines, and what it leaves open.
 
-Such a radar reports elevation 0 whatever the reflector's height. The true elevations are not noise about 0: the radar is
-tilted up or down by a constant angle, and the reflector is above or below it by the same height at every placement. With
-g_tilt = 1 and g_height = 1 / range the elevation errors of all pairs have the covariance
-
-    V = V_own + sigma_tilt^2 g_tilt g_tilt^T + sigma_height^2 g_height g_height^T,                              (6)
-
-whose shared parts do not average out, however many pairs there are. Such an error moves the least-squares pose by B = H^-1
-J^T W d pixel / d elevation times the error; the covariance grows by the outer products.
+Such a radar reports one elevation, or one height, for whatever it sees. A pitch or a roll of the radar against the plane of
+the placements is then exactly a rotation, and the height of that plane above or below the radar a shift along its up axis, but
+for the range along the plane, sqrt(r^2 - h^2). So each elevation is taken as reported, with a small noise of its own, h^2 is
+estimated with the pose (`systematic_errors`), and pitch, roll and height are added to the covariance afterwards: the pose is
+the one that maps reported positions to pixels, its covariance that of the radar's housing.
 """
 
 import numpy as np
 
-from calib_core.arrays import Matrix66
-from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
-from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.arrays import Matrix66, Points3
+from calib_core.geometry import RigidTransform
+from calib_core.options import RadarOptions
 
-__all__ = ["TILT_SIGMA_RAD", "is_flat", "shared_elevation_spread"]
+__all__ = ["OWN_SIGMA_RAD", "is_flat", "mounting_spread"]
 
-TILT_SIGMA_RAD = np.deg2rad(10.0)
-"""Standard deviation of the radar's tilt up or down."""
+OWN_SIGMA_RAD = np.deg2rad(0.5)
+"""Standard deviation of each placement's elevation above or below the common plane: uneven ground."""
 
-HEIGHT_SIGMA_M = 1.0
-"""Standard deviation of the reflector's height above or below the radar, the same at every placement."""
-
-
-def is_flat(measurements: PairMeasurements) -> bool:
-    """Return whether every radar position has elevation 0."""
-    return bool(len(measurements)) and not measurements.polar[:, 2].any()
+_SAME_ELEVATION_RAD = np.deg2rad(0.01)
+_SAME_HEIGHT_M = 0.001
+_LEAST_POSITIONS = 2
 
 
-def shared_elevation_spread(refined: ErrorsInVariablesFit, information: Matrix66) -> Matrix66 | None:
-    """Return what shared elevation errors add to the covariance (6, 6) of the pose; None for a radar that measures elevation.
+def is_flat(points_radar_m: Points3) -> bool:
+    """Return whether all radar positions (n, 3) have one elevation or one height, up to rounding."""
+    if len(points_radar_m) < _LEAST_POSITIONS:
+        return False
+    height_m = points_radar_m[:, 2]
+    elevation_rad = np.arctan2(height_m, np.hypot(points_radar_m[:, 0], points_radar_m[:, 1]))
+    return bool(height_m.std() < _SAME_HEIGHT_M or elevation_rad.std() < _SAME_ELEVATION_RAD)
+
+
+def mounting_spread(camera_from_radar: RigidTransform, height_m: float, radar: RadarOptions) -> Matrix66:
+    """Return the covariance (6, 6) that an unknown pitch, roll and height of the radar add to the pose (dt, dtheta).
+
+    Bearings meet where the radar's up axis passes through the plane of the placements, ranges start at the foot of its normal;
+    the two are apart by tilt times height, forward and left. The radar is taken to be about as high as the camera.
 
     Args:
-        refined: the fit.
-        information: (6, 6) H, prior included.
+        camera_from_radar: the pose; the columns of its rotation are the radar's axes in the camera frame.
+        height_m: z of the plane of the placements as reported.
+        radar: with the priors of tilt and height.
     """
-    if not is_flat(refined.measurements):
-        return None
-    range_m = refined.measurements.polar[refined.rows, 0]
-    shared = np.stack([np.full_like(range_m, TILT_SIGMA_RAD), HEIGHT_SIGMA_M / range_m], axis=1)  # (n, 2)
-    pulls = np.swapaxes(refined.model.pose_jacobian, 1, 2) @ refined.model.point_jacobian[:, :, 2, None]  # (n, 6, 1)
-    moves = np.linalg.solve(information, (refined.weights[:, None] * pulls[:, :, 0]).T @ shared)
+    rotation, tilt_rad = camera_from_radar.rotation, np.deg2rad(radar.tilt_sigma_deg)
+    above_m = abs(float(camera_from_radar.inverse().translation_m[2]) - height_m)
+    moves = np.zeros((6, 5))
+    moves[3:, :2] = rotation[:, :2] * tilt_rad
+    moves[:3, 2] = rotation[:, 2] * radar.height_sigma_m
+    moves[:3, 3:] = rotation[:, :2] * (tilt_rad * above_m)
     return np.asarray(moves @ moves.T)

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from calib_core.calibration import calibrate_pairs
-from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
+EXACT = without_systematic_errors(MEASURED)
 
 
 def solved(simulated: SimulatedPairs, options: CalibrationOptions = MEASURED) -> Calibration:
@@ -34,7 +35,7 @@ def test_the_ellipsoid_contains_the_truth_about_as_often_as_stated() -> None:
 
 def test_pixel_covariance_is_that_of_projections_under_drawn_poses() -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(3), noise="imaging")
-    calibration = solved(simulated)
+    calibration = solved(simulated, EXACT)
     points = np.array([[8.0, 1.0, 0.2], [4.0, -1.0, -0.5]])
     rng = np.random.default_rng(1)
     drawn = rng.multivariate_normal(np.zeros(6), calibration.covariance, 1500)
@@ -57,7 +58,7 @@ def test_a_measured_camera_position_shrinks_rotation_and_position_uncertainty() 
 
 def test_leave_one_out_by_one_step_agrees_with_solving_without_the_pair() -> None:
     simulated = simulate_pairs(16, rng=np.random.default_rng(5), noise="imaging")
-    fixed = replace(MEASURED, noise=replace(MEASURED.noise, estimate_scale=False))
+    fixed = replace(EXACT, noise=replace(MEASURED.noise, estimate_scale=False))
     whole = solved(simulated, fixed)
     moved = []
     for name in ("p3", "p9"):

@@ -9,11 +9,13 @@ from scipy.optimize import least_squares
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.measurement_model import pair_measurements
-from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
 from calib_core.radar import cartesian_from_polar
 from calib_core.synthetic import FIELD, simulate_pairs
 
-MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
+MEASURED = without_systematic_errors(
+    CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
+)
 
 
 def test_scipy_finds_the_same_optimum_over_pose_and_true_positions() -> None:
@@ -45,7 +47,9 @@ def test_the_camera_is_not_pulled_backwards_by_many_noisy_pairs() -> None:
     backwards_m = []
     for seed in range(4):
         simulated = simulate_pairs(300, rng=np.random.default_rng(seed), noise="ti_aisle", layout=crowded)
-        measurements = pair_measurements(simulated.pairs, simulated.camera, CalibrationOptions())
+        measurements = pair_measurements(
+            simulated.pairs, simulated.camera, without_systematic_errors(CalibrationOptions())
+        )
         refined = fit_errors_in_variables(
             measurements, GncSolution(simulated.camera_from_radar, 0.0, 1.0), estimate_scale=False
         )

@@ -9,12 +9,13 @@ import pytest
 
 from calib_core.calibration import calibrate, calibrate_pairs
 from calib_core.geometry import RigidTransform
-from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions, without_systematic_errors
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 from tests.rooftop import ClickedSample, read_rooftop
 
 FREE = CalibrationOptions()
+EXACT = without_systematic_errors(FREE)
 MEASURED = CalibrationOptions(solving=SolvingOptions(camera_position=CameraPositionPrior((0.0, 0.0, 0.045), 0.01)))
 
 
@@ -31,11 +32,16 @@ def truth(project_root: Path) -> RigidTransform:
 
 
 def solved_with(
-    rooftop: ClickedSample, click: str, *, du_px: float = 0.0, dv_px: float = 0.0, method: str = "default"
+    rooftop: ClickedSample,
+    click: str,
+    *,
+    du_px: float = 0.0,
+    dv_px: float = 0.0,
+    options: CalibrationOptions = FREE,
 ) -> Calibration:
     clicks, scans, camera = rooftop
     slipped = [replace(one, u_px=one.u_px + du_px, v_px=one.v_px + dv_px) if one.id == click else one for one in clicks]
-    outcome = calibrate(slipped, scans, camera, CalibrationOptions(method=method))  # type: ignore[arg-type]
+    outcome = calibrate(slipped, scans, camera, options)
     assert isinstance(outcome, Calibration)
     return outcome
 
@@ -67,9 +73,11 @@ def test_the_sample_gives_no_warning_except_that_flat_ground_leaves_the_handedne
 def test_a_misplaced_click_is_reported_and_the_truth_stays_inside_the_stated_uncertainty(
     rooftop: ClickedSample, truth: RigidTransform, click: str, du_px: float, dv_px: float
 ) -> None:
-    calibration = solved_with(rooftop, click, du_px=du_px, dv_px=dv_px)
-    assert named(calibration) == {click}
-    assert inside_what_is_stated(calibration, truth)
+    exact = solved_with(rooftop, click, du_px=du_px, dv_px=dv_px, options=EXACT)
+    assert named(exact) == {click}
+    assert inside_what_is_stated(exact, truth)
+    # a radar whose scales are uncertain may see the click so: it is not always named, but never silently wrong
+    assert inside_what_is_stated(solved_with(rooftop, click, du_px=du_px, dv_px=dv_px), truth)
 
 
 def test_a_misplaced_click_far_away_does_not_change_the_noise_level(rooftop: ClickedSample) -> None:
@@ -81,9 +89,9 @@ def test_a_misplaced_click_far_away_does_not_change_the_noise_level(rooftop: Cli
 
 def test_excluding_an_influential_pair_moves_the_camera_as_stated_in_the_warning(rooftop: ClickedSample) -> None:
     clicks, scans, camera = rooftop
-    warned = solved_with(rooftop, "c1", du_px=-40.0)
+    warned = solved_with(rooftop, "c1", du_px=-40.0, options=EXACT)
     rest = [replace(click, excluded=click.id == "c1") for click in clicks]
-    alone = calibrate(rest, scans, camera, FREE)
+    alone = calibrate(rest, scans, camera, EXACT)
     assert isinstance(alone, Calibration)
     centres = [one.camera_from_radar.inverse().translation_m for one in (warned, alone)]
     moved_cm = 100 * np.linalg.norm(centres[0] - centres[1])
@@ -112,6 +120,6 @@ def test_a_hundred_good_sets_give_hardly_any_warning(
 
 
 def test_algorithm_1_says_that_most_pairs_disagree_and_residuals_are_too_large(rooftop: ClickedSample) -> None:
-    calibration = solved_with(rooftop, "c1", method="paper")
+    calibration = solved_with(rooftop, "c1", options=CalibrationOptions(method="paper"))
     codes = {warning.code for warning in calibration.warnings}
     assert {"many-outliers", "residuals-too-large"} <= codes

@@ -25,7 +25,8 @@ def test_one_step_predicts_what_a_fit_without_the_pair_predicts(estimate_scale: 
         alone = fit_errors_in_variables(
             measurements.some(np.delete(np.arange(20), pair)), start, estimate_scale=estimate_scale
         )
-        model = associate(measurements.some(np.array([pair])).scaled(alone.noise_scale), alone.camera_from_radar)[1]
+        own = measurements.some(np.array([pair])).scaled(alone.noise_scale)
+        model = associate(own.with_errors(alone.measurements.errors.values), alone.camera_from_radar)[1]
         missed = np.linalg.solve(model.whitening[0], model.residual[0])
         predicted = np.linalg.solve(fit.model.whitening[pair], one_step.residual[pair])
         assert np.linalg.norm(predicted - missed) < 0.15 * np.linalg.norm(missed) + 0.5  # pixels

@@ -95,7 +95,7 @@ def test_a_weak_camera_prior_has_less_weight_the_farther_it_is_off() -> None:
     assert pulls[1] < 0.25 * pulls[0]
 
 
-def test_a_radar_that_always_reports_elevation_zero_gets_a_large_elevation_sigma() -> None:
+def test_a_radar_that_always_reports_elevation_zero_has_a_small_sigma_and_an_unknown_height() -> None:
     pairs, _ = simulated()
     flat = [
         type(pair)(
@@ -109,7 +109,9 @@ def test_a_radar_that_always_reports_elevation_zero_gets_a_large_elevation_sigma
         for pair in pairs.pairs
     ]
     measurements = pair_measurements(flat, pairs.camera, CalibrationOptions())
-    assert (measurements.sigma_polar[:, 2] >= np.deg2rad(9.0)).all()
+    assert measurements.flat
+    assert (measurements.sigma_polar[:, 2] == np.deg2rad(0.5)).all()
+    assert "squared_height_m2" in {one.name for one in measurements.errors.estimated}
 
 
 def test_some_pairs_keep_their_candidates() -> None:

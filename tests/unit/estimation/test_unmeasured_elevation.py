@@ -47,6 +47,26 @@ def test_the_truth_lies_inside_whether_the_reflector_stood_on_the_ground_or_at_t
     assert inside >= 8
 
 
+@pytest.mark.parametrize("reported_z_m", [0.5, 1e-5])
+def test_a_radar_that_reports_one_height_or_rounded_zeros_is_flat_too(reported_z_m: float) -> None:
+    """Drivers add the mounting height, or convert zeros back and forth: judged as elevations, both are wrong by metres."""
+    rng, inside = np.random.default_rng(4), 0
+    for seed in range(6):
+        simulated = simulate_pairs(15, rng=np.random.default_rng([11, seed]), rig_options=LEVEL)
+        pairs = []
+        for pair in map(flattened, simulated.pairs):
+            (candidate,) = pair.candidates
+            z_m = reported_z_m if reported_z_m > 0.1 else reported_z_m * rng.standard_normal()
+            raised = candidate.position_radar_m + np.array([0.0, 0.0, z_m])
+            pairs.append(replace(pair, candidates=(replace(candidate, position_radar_m=raised),)))
+        outcome = calibrate_pairs(pairs, simulated.camera, FREE)
+        assert isinstance(outcome, Calibration)
+        error = simulated.camera_from_radar.error_from(outcome.camera_from_radar)
+        inside += bool(error @ np.linalg.solve(outcome.covariance, error) < outcome.covariance_quantile)
+        assert "flat-radar" in {one.code for one in outcome.warnings}
+    assert inside == 6
+
+
 def test_the_warning_says_what_the_pairs_determine_and_what_is_assumed() -> None:
     calibration, _ = solved(1, 1.2, FREE)
     (warning,) = (one for one in calibration.warnings if one.code == "flat-radar")

@@ -1,0 +1,253 @@
+"""Systematic errors: what is wrong with every pair alike, with a prior for each, in the estimate and in the covariance.
+
+With eta these errors, h the radar's way of reporting and o, K the click's and the lens's, the model of `linearization` is
+
+    m = h(mu; eta) + noise(V),    z = pi_K(R p(mu) + t + d) + o + noise(C).                                (3)
+
+Undoing h at the current eta gives m'. The pixel then changes with eta by A = J d m' / d eta for errors of the radar, by
+d pi / d point for the reflector's offset d, and by the derivative of the lens for its errors. An error is *estimated* with the
+pose, as one more unknown with its prior, where it bends the whole pose (a scale of the angles); the small ones only *widen*
+the covariance, by B Sigma B^T with B = -H^-1 J^T W A.
+
+The derivative belongs at the estimated true position mu: at the measured one it is correlated with the noise, and a scale
+comes out too large. A new error is one more entry of `_errors`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from calib_core.arrays import Values, Vector3, frozen_array
+from calib_core.camera import Camera
+from calib_core.options import CalibrationOptions, RadarOptions
+from calib_core.radar import RadarErrors
+
+__all__ = ["NO_ERRORS", "Sensitivity", "SystematicError", "SystematicErrors", "systematic_errors"]
+
+_RADAR_ERRORS = {one.name for one in fields(RadarErrors)}
+_SMALL = 1e-4  # standard deviations over which a derivative is taken
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensitivity:
+    """The derivatives of the pixels of n pairs at one pose or many, before whitening.
+
+    Attributes:
+        polar: (3, n) true positions: range [m], azimuth, elevation [rad].
+        d_point: (..., 3, 2, n) d pixel / d point in the camera frame [px/m].
+        d_polar: (..., 3, 2, n) d pixel / d polar.
+        offset_px: (..., 2, n) projections, from the principal point.
+        focal_px: of the camera.
+    """
+
+    polar: np.ndarray
+    d_point: np.ndarray
+    d_polar: np.ndarray
+    offset_px: np.ndarray
+    focal_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SystematicError:
+    """One error that all pairs share.
+
+    Attributes:
+        name: key in files, with its unit; a scale without one.
+        text: what it is, for users.
+        sigma: standard deviation of its prior.
+        column: d pixel / d error (..., 2, n).
+        axis: of the camera along which it shifts the reflector; None for other errors.
+    """
+
+    name: str
+    text: str
+    sigma: float
+    column: Callable[[Sensitivity], np.ndarray]
+    axis: int | None = None
+
+    @property
+    def of_radar(self) -> bool:
+        """Whether it is one of `RadarErrors`, and so can be taken out of reported positions."""
+        return self.name in _RADAR_ERRORS
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SystematicErrors:
+    """All errors of a set of pairs, and the present values of the estimated ones.
+
+    Attributes:
+        estimated: unknowns of the fit.
+        widening: errors that only widen the covariance.
+        values: (k,) of the estimated ones; 0 is no error.
+    """
+
+    estimated: tuple[SystematicError, ...] = ()
+    widening: tuple[SystematicError, ...] = ()
+    values: Values = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        values = np.zeros(len(self.estimated)) if self.values is None else self.values
+        object.__setattr__(self, "values", frozen_array(values, (len(self.estimated),)))
+
+    def __len__(self) -> int:
+        return len(self.estimated)
+
+    @property
+    def sigma(self) -> Values:
+        """Standard deviations of the priors of the estimated errors: (k,)."""
+        return np.array([one.sigma for one in self.estimated])
+
+    @property
+    def offset_m(self) -> Vector3:
+        """The reflector's offset from the clicked point, in the camera frame: (3,)."""
+        offset_m = np.zeros(3)
+        for one, value in zip(self.estimated, self.values.tolist(), strict=True):
+            if one.axis is not None:
+                offset_m[one.axis] = value
+        return offset_m
+
+    @property
+    def squared(self) -> float:
+        """Squared distance of the values from their priors, in standard deviations."""
+        return float(((self.values / self.sigma) ** 2).sum()) if len(self) else 0.0
+
+    def at(self, values: Values) -> "SystematicErrors":
+        """Return the same errors with other values."""
+        return replace(self, values=values)
+
+    @property
+    def radar(self) -> RadarErrors:
+        """The values of the radar's errors."""
+        return RadarErrors.named(
+            {one.name: value for one, value in zip(self.estimated, self.values.tolist(), strict=True)}
+        )
+
+    def polar_change(self, polar: np.ndarray, moves: np.ndarray) -> np.ndarray:
+        """Return how positions (3, n) change if the errors change by a small amount for each of them.
+
+        Args:
+            polar: range [m], azimuth, elevation [rad], corrected by the present values.
+            moves: (n, k) changes of the values.
+        """
+        change = np.zeros_like(polar)
+        for one, move in zip(self.estimated, moves.T, strict=True):
+            if one.of_radar:
+                small = _SMALL * one.sigma
+                change += (RadarErrors.named({one.name: small}).corrected_polar(polar) - polar) * (move / small)
+        return change
+
+    def spread(self, polar: np.ndarray) -> np.ndarray:
+        """Return the standard deviations (3, n) that the radar's errors add to each position as if they were independent."""
+        variance = np.zeros_like(polar)
+        for one in self.estimated:
+            if one.of_radar:
+                variance += (RadarErrors.named({one.name: one.sigma}).corrected_polar(polar) - polar) ** 2
+        return np.asarray(np.sqrt(variance))
+
+
+NO_ERRORS = SystematicErrors()
+
+
+def systematic_errors(options: CalibrationOptions, camera: Camera, *, flat: bool) -> SystematicErrors:
+    """List the errors of a set of pairs, with the priors of the options; a sigma of 0 leaves an error out.
+
+    Args:
+        options: with the priors.
+        camera: the intrinsics.
+        flat: whether the radar does not measure elevation.
+    """
+    taped = options.solving.camera_position is not None
+    estimated = [
+        _scale("azimuth_scale", "the radar's azimuth scale", _azimuth_scale_sigma(options.radar, flat=flat), 1)
+    ]
+    if flat:
+        estimated.append(_squared_height(options.radar.height_sigma_m))
+    else:
+        estimated.append(
+            _scale("elevation_scale", "the radar's elevation scale", options.radar.elevation_scale_sigma, 2)
+        )
+    estimated.append(_range_bias(options.radar.range_bias_sigma_m))
+    reflector = [_reflector(axis, name, options.reflector.offset_sigma_m) for axis, name in enumerate(_AXES)]
+    widening = [
+        _scale("range_scale", "the radar's range scale", options.radar.range_scale_sigma, 0),
+        *(_click(row, name, _click_sigma_px(options, camera)) for row, name in enumerate(_AXES[:2])),
+        _focal(options.lens.focal_length_sigma),
+        _radial(options.lens.distortion_sigma),
+    ]
+    (estimated if taped else widening).extend(reflector)
+    return SystematicErrors(
+        tuple(one for one in estimated if one.sigma > 0.0), tuple(one for one in widening if one.sigma > 0.0)
+    )
+
+
+def _azimuth_scale_sigma(radar: RadarOptions, *, flat: bool) -> float:
+    """Return the prior of the azimuth's scale; a tilt a of a radar without elevation scales azimuths by 1 / cos(a)."""
+    if not (flat and radar.azimuth_scale_sigma):
+        return radar.azimuth_scale_sigma
+    tilted = np.sqrt(3.0) / 2.0 * np.deg2rad(radar.tilt_sigma_deg) ** 2  # rms of a^2 / 2
+    return float(np.hypot(radar.azimuth_scale_sigma, tilted))
+
+
+_PRIOR_WIDTH_PX = 1920.0  # of the picture that the prior of the principal point is stated for
+_AXES = ("right", "down", "forward")
+
+
+def _click_sigma_px(options: CalibrationOptions, camera: Camera) -> float:
+    """Return the standard deviation of what clicks and principal point together are off by; no pair tells them apart."""
+    principal_point_px = options.lens.principal_point_sigma_px * camera.width_px / _PRIOR_WIDTH_PX
+    return float(np.hypot(options.reflector.click_offset_sigma_px, principal_point_px))
+
+
+def _scale(name: str, text: str, sigma: float, coordinate: int) -> SystematicError:
+    def column(at: Sensitivity) -> np.ndarray:
+        return np.asarray(at.d_polar[..., coordinate, :, :] * -at.polar[coordinate])
+
+    return SystematicError(name, text, sigma, column)
+
+
+def _range_bias(sigma_m: float) -> SystematicError:
+    def column(at: Sensitivity) -> np.ndarray:
+        return -at.d_polar[..., 0, :, :]
+
+    return SystematicError("range_bias_m", "a constant range error", sigma_m, column)
+
+
+def _squared_height(sigma_m: float) -> SystematicError:
+    """Height h of the placements above or below a radar without elevation: the range along its plane is sqrt(r^2 - h^2)."""
+
+    def column(at: Sensitivity) -> np.ndarray:
+        return np.asarray(at.d_polar[..., 0, :, :] / (-2.0 * at.polar[0]))
+
+    return SystematicError("squared_height_m2", "the height of the placements", sigma_m**2, column)
+
+
+def _reflector(axis: int, name: str, sigma_m: float) -> SystematicError:
+    def column(at: Sensitivity) -> np.ndarray:
+        return np.asarray(at.d_point[..., axis, :, :])
+
+    text = f"the clicked point being {name} of the phase centre"
+    return SystematicError(f"reflector_{name}_m", text, sigma_m, column, axis=axis)
+
+
+def _click(row: int, name: str, sigma_px: float) -> SystematicError:
+    def column(at: Sensitivity) -> np.ndarray:
+        shift = np.zeros_like(at.offset_px)
+        shift[..., row, :] = 1.0
+        return shift
+
+    return SystematicError(
+        f"click_{name}_px", f"clicks or the principal point being off to the {name}", sigma_px, column
+    )
+
+
+def _focal(sigma: float) -> SystematicError:
+    return SystematicError("focal_length", "the focal length", sigma, lambda at: at.offset_px)
+
+
+def _radial(sigma: float) -> SystematicError:
+    def column(at: Sensitivity) -> np.ndarray:
+        squared = (at.offset_px**2).sum(axis=-2, keepdims=True) / at.focal_px**2
+        return np.asarray(at.offset_px * squared)
+
+    return SystematicError("distortion", "the lens distortion", sigma, column)
