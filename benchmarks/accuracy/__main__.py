@@ -11,6 +11,7 @@ from benchmarks.accuracy import (
     clutter,
     coverage,
     crying_wolf,
+    dragging,
     efficiency,
     flat_radars,
     handedness,
@@ -32,6 +33,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 TABLES: dict[str, tuple[Row, ...]] = {
     "real": real.ROWS,
     "handedness": handedness.ROWS,
+    "drag": dragging.ROWS,
     "wolf": crying_wolf.ROWS,
     "shared": shared_errors.ROWS,
     "clean": shared_errors.CLEAN_ROWS,
@@ -58,6 +60,7 @@ def sections(kept: Kept) -> tuple[Section, ...]:
         crying_wolf.section(kept),
         flat_radars.section(kept),
         handedness.section(kept),
+        dragging.section(kept),
         efficiency.section(kept),
         efficiency.peer_section(kept),
         coverage.section(kept),

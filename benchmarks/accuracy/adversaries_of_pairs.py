@@ -17,6 +17,7 @@ from calib_core.synthetic.pair_defects import (
     mirrored,
     with_companion,
     with_rounded_elevations,
+    with_zero_pair,
 )
 from calib_core.synthetic.pairs import NoiseName
 
@@ -41,14 +42,6 @@ def _tape_off(key: str, noise: NoiseName, off_m: float, trial: int) -> Solved:
     prior = CameraPositionPrior((float(told_m[0]), float(told_m[1]), float(told_m[2])), _TAPE_M)
     options = CalibrationOptions(solving=replace(tape_measured(_TAPE_M), camera_position=prior))
     return Solved(calibrate_pairs(simulated.pairs, simulated.camera, options), simulated.camera_from_radar)
-
-
-def _near_origin(simulated: SimulatedPairs, rng: np.random.Generator) -> SimulatedPairs:
-    """Put the radar position of the first pair 1 mm from the origin."""
-    first = simulated.pairs[0]
-    place = 0.001 * rng.standard_normal(3)
-    wrong = replace(first, candidates=(replace(first.candidates[0], position_radar_m=place),))
-    return replace(simulated, pairs=(wrong, *simulated.pairs[1:]))
 
 
 def _again(clicks: int) -> Change:
@@ -94,6 +87,7 @@ def _told(draw: Draw) -> str:
 _MODES = ("doubtful-pair", "one-pair-decides", "two-poses")
 _HAND = ("mirrored-axes", "handedness-open")
 _LENS = ("intrinsics-suspected",)
+_UNITS = ("camera-position-contradicted",)
 
 _SHARED = (
     *_rows(
@@ -237,19 +231,30 @@ _INPUT = (
         partial(_tape_off, "tape-off-imaging", "imaging", 0.3),
     ),
     *_rows(
-        "radar positions in another unit",
-        ("camera-position-contradicted",),
+        "radar positions in millimetres",
+        _UNITS,
         Draw("millimetres-tape", "ti", tape_m=_TAPE_M, change=_units(1000.0)),
-        Draw("centimetres-tape", "ti", tape_m=_TAPE_M, change=_units(100.0)),
-        Draw("feet-tape", "ti", tape_m=_TAPE_M, change=_units(3.2808)),
         Draw("millimetres-free", "ti", change=_units(1000.0)),
         always_wrong=True,
     ),
-    *_rows("one radar position 1 mm from the origin", (), Draw("origin-imaging-free", change=_near_origin)),
+    *_rows(
+        "radar positions in centimetres",
+        _UNITS,
+        Draw("centimetres-tape", "ti", tape_m=_TAPE_M, change=_units(100.0)),
+        always_wrong=True,
+    ),
+    *_rows(
+        "radar positions in feet",
+        _UNITS,
+        Draw("feet-tape", "ti", tape_m=_TAPE_M, change=_units(3.2808)),
+        always_wrong=True,
+    ),
+    *_rows("one radar position 1 mm from the origin", (), Draw("origin-imaging-free", change=with_zero_pair)),
     *_rows(
         "method paper on a good set",
         ("few-pairs", "many-outliers", "residuals-too-large", "behind-camera", "weak-geometry"),
         Draw("paper-ti-free", "ti", options=CalibrationOptions(method="paper")),
+        Draw("paper-imaging-free", options=CalibrationOptions(method="paper")),
         trusted=(1.0, 0.25),
     ),
 )

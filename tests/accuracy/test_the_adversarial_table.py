@@ -80,7 +80,7 @@ def test_one_trial_of_every_table_has_its_figures() -> None:
     assert {"squared", "stated_m", "stated_rad", "position_m"} <= set(measure_shared(case, 1))
     assert measure_clean(Shared("ti", 12, 0.01, errors=False), 1)["exact position_m"] is not None
     assert measure_flat("imaging", 10, 1)["paper_px"] is not None
-    assert codes_in(measure_hand(Hand("imaging", 12, 8.0, mirrored=True), 1))
+    assert codes_in(measure_hand(Hand("imaging", 12, 8.0, "mirrored"), 1))
     assert measure_apart("imaging", 1)["position_m"] is not None
 
 
