@@ -114,9 +114,11 @@ def _overall_claim(counts: Sequence[int], lengths: Sequence[int]) -> Claim:
 
 
 _TEXT = """Each row draws pairs, or scans and clicks, with one defect, and solves them with the default options, the camera
-position being unknown ("free") or given to 1 cm ("tape"). An answer is silently wrong if the squared Mahalanobis distance of
-the true pose is above twice the stated 99.9 % quantile and none of the row's warnings is given; "warned" is the share with such
-a warning, "-" if no warning excuses the row. The stated quantile is that of 6 F(6, nu), with nu from the stated 95 % quantile.
-Where no pose is true of the pairs (mirrored axes, other units), every answer without the warning is silently wrong. Algorithm 1
-states no uncertainty: its answers count above 1 deg or 25 cm. No answer is better than a wrong one, and never counts. `c` is the
-share whose truth lies inside the stated 95 % ellipsoid."""
+position being unknown ("free") or given to 1 cm ("tape"). An answer is silently wrong if the squared Mahalanobis
+distance of the true pose is above twice the stated 99.9 % quantile and none of the row's warnings is given; "warned"
+is the share with such a warning, "-" if no warning excuses the row. The stated quantile is that of 6 F(6, nu), with
+nu from the stated 95 % quantile. Where the input makes no sense (mirrored axes, positions in millimetres or
+centimetres), every answer without the warning is silently wrong. With positions in feet and a measured camera
+position the pose can be right all the same. Algorithm 1 states no uncertainty: its answers count above 1 deg or 25
+cm. No answer is better than a wrong one, and never counts. `c` is the share whose truth lies inside the stated 95 %
+ellipsoid."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.accuracy.cases import tape_measured
+from benchmarks.accuracy.outcomes import solved_or_refused
 from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
@@ -87,7 +88,8 @@ class Draw:
             systematic=errors,
         )
         changed = simulated if self.change is None else self.change(simulated, rng)
-        return Solved(calibrate_pairs(changed.pairs, changed.camera, self._options()), changed.camera_from_radar)
+        outcome = solved_or_refused(lambda: calibrate_pairs(changed.pairs, changed.camera, self._options()))
+        return Solved(outcome, changed.camera_from_radar)
 
     def _rig(self, rng: np.random.Generator) -> Rig:
         if self.apart_m:

@@ -247,7 +247,6 @@ _INPUT = (
         "radar positions in feet",
         _UNITS,
         Draw("feet-tape", "ti", tape_m=_TAPE_M, change=_units(3.2808)),
-        always_wrong=True,
     ),
     *_rows("one radar position 1 mm from the origin", (), Draw("origin-imaging-free", change=with_zero_pair)),
     *_rows(

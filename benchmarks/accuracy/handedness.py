@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from benchmarks.accuracy.figures import MET, MISSED, UNDECIDED
-from benchmarks.accuracy.outcomes import codes_in, outcome_figures
+from benchmarks.accuracy.outcomes import codes_in, outcome_figures, solved_or_refused
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions, SolvingOptions
@@ -75,7 +75,8 @@ def measure_hand(case: Hand, trial: int) -> Figures:
     elif case.kind == "zero":
         given = with_zero_pair(given, rng)
     solving = SolvingOptions(nominal_camera_distance_m=case.apart_m) if case.apart_m else SolvingOptions()
-    outcome = calibrate_pairs(given.pairs, given.camera, CalibrationOptions(solving=solving))
+    options = CalibrationOptions(solving=solving)
+    outcome = solved_or_refused(lambda: calibrate_pairs(given.pairs, given.camera, options))
     return outcome_figures(outcome, given.camera_from_radar)
 
 

@@ -1,20 +1,29 @@
 """One outcome as raw figures: its errors, its stated uncertainty, and the codes of its warnings."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from benchmarks.accuracy.rows import Figures
+from calib_core.errors import InputError
 from calib_core.estimation.measurement_model import CameraPrior
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration
 
-__all__ = ["codes_in", "named", "outcome_figures", "quantile_999", "silently_wrong"]
+__all__ = ["codes_in", "named", "outcome_figures", "quantile_999", "silently_wrong", "solved_or_refused"]
 
 _CODE = "code "
 _CHI2_95, _CHI2_999 = 12.591587243743977, 22.457744484825323  # of 6 parameters
 _FAR = 2.0  # times the 99.9 % quantile
+
+
+def solved_or_refused(solve: Callable[[], Calibration | Unsolvable]) -> Calibration | Unsolvable:
+    """Return the outcome; input that is refused with a reason gives no pose, like input that does not determine one."""
+    try:
+        return solve()
+    except InputError as error:
+        return Unsolvable("refused", str(error), "")
 
 
 def outcome_figures(outcome: Calibration | Unsolvable, truth: RigidTransform) -> Figures:

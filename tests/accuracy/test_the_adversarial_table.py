@@ -12,9 +12,10 @@ from benchmarks.accuracy.adversaries import draw_flat
 from benchmarks.accuracy.crying_wolf import measure_apart
 from benchmarks.accuracy.flat_radars import measure_flat
 from benchmarks.accuracy.handedness import Hand, measure_hand
-from benchmarks.accuracy.outcomes import codes_in, outcome_figures, quantile_999, silently_wrong
+from benchmarks.accuracy.outcomes import codes_in, outcome_figures, quantile_999, silently_wrong, solved_or_refused
 from benchmarks.accuracy.rows import Figures
 from benchmarks.accuracy.shared_errors import Shared, draw_shared, measure_clean, measure_shared
+from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable
 from calib_core.synthetic import SystematicErrors
@@ -31,6 +32,15 @@ def test_an_answer_is_silently_wrong_outside_twice_the_stated_quantile_without_t
     trials = [figures(44.0), figures(46.0), figures(46.0, "other"), figures(46.0, "named")]
     assert silently_wrong(trials, ["named"]).tolist() == [False, True, True, False]
     assert silently_wrong(trials, ["named"], always_wrong=True).tolist() == [True, True, True, False]
+
+
+def test_input_that_is_refused_is_not_silent() -> None:
+    def refuse() -> Unsolvable:
+        raise InputError("positions in furlongs")
+
+    refused = outcome_figures(solved_or_refused(refuse), RigidTransform.identity())
+    assert codes_in(refused) == {"refused"}
+    assert silently_wrong([refused], [], always_wrong=True).tolist() == [False]
 
 
 def test_no_pose_and_no_covariance_are_not_silent() -> None:
