@@ -61,8 +61,9 @@ bench: dev  ## Measure speed, as ratios within one run; write docs/speed.md. BEN
 	@$(BIN)/python tests/find_browser.py --install
 	$(BIN)/python -m benchmarks.speed $(BENCH)
 
-bench-accuracy: $(VENV)/.bench  ## Measure accuracy against the bound and other estimators; write docs/accuracy.md (an hour or two).
-	$(BIN)/python -m benchmarks.accuracy $(ACCURACY)
+bench-accuracy: SEED ?= fixed
+bench-accuracy: $(VENV)/.bench  ## Measure accuracy against the bound and other estimators; write docs/accuracy.md (an hour or two). SEED=fresh: draws from the commit's hash.
+	$(BIN)/python -m benchmarks.accuracy --seed $(SEED) $(ACCURACY)
 
 sample: env  ## Regenerate sample_data/, bit for bit.
 	$(BIN)/python -m calib_core.synthetic.sample sample_data

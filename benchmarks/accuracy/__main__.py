@@ -5,7 +5,23 @@ import os
 import sys
 from pathlib import Path
 
-from benchmarks.accuracy import advice, clutter, coverage, efficiency, many, mirrored, real, smooth
+from benchmarks.accuracy import (
+    adversarial,
+    advice,
+    clutter,
+    coverage,
+    crying_wolf,
+    dragging,
+    efficiency,
+    flat_radars,
+    handedness,
+    many,
+    mirrored,
+    real,
+    shared_errors,
+    smooth,
+)
+from benchmarks.accuracy.fresh_seeds import fresh_seeds, last_fresh_seeds
 from benchmarks.accuracy.keeping import Keeper, digest_of_sources
 from benchmarks.accuracy.page import page
 from benchmarks.accuracy.rows import Kept, Row, Section
@@ -16,6 +32,13 @@ __all__ = ["TABLES", "main", "sections"]
 _ROOT = Path(__file__).resolve().parents[2]
 TABLES: dict[str, tuple[Row, ...]] = {
     "real": real.ROWS,
+    "handedness": handedness.ROWS,
+    "drag": dragging.ROWS,
+    "wolf": crying_wolf.ROWS,
+    "shared": shared_errors.ROWS,
+    "clean": shared_errors.CLEAN_ROWS,
+    "flat": flat_radars.ROWS,
+    "adversarial": adversarial.ROWS,
     "mirrored": mirrored.ROWS,
     "clutter": clutter.ROWS,
     "smooth": smooth.ROWS,
@@ -31,6 +54,13 @@ TABLES: dict[str, tuple[Row, ...]] = {
 def sections(kept: Kept) -> tuple[Section, ...]:
     """Return the sections in the order of the page."""
     return (
+        shared_errors.section(kept),
+        shared_errors.clean_section(kept),
+        adversarial.section(kept),
+        crying_wolf.section(kept),
+        flat_radars.section(kept),
+        handedness.section(kept),
+        dragging.section(kept),
         efficiency.section(kept),
         efficiency.peer_section(kept),
         coverage.section(kept),
@@ -50,6 +80,12 @@ def main() -> int:
         "--only", action="append", choices=sorted(TABLES), help="measure this table only; may be repeated"
     )
     parser.add_argument("--trials", type=int, default=None, help="largest number of trials per row")
+    parser.add_argument(
+        "--seed",
+        choices=("fixed", "fresh"),
+        default="fixed",
+        help="fixed, or drawn from the present commit's hash; the page shows both (default: fixed)",
+    )
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes (default: one per processor)")
     parser.add_argument("--scratch", type=Path, default=_ROOT / "build" / "accuracy", help="where raw figures are kept")
     parser.add_argument("--page", type=Path, default=_ROOT / "docs" / "accuracy.md", help="the page that is written")
@@ -59,12 +95,19 @@ def main() -> int:
     )
     arguments = parser.parse_args()
     keeper = Keeper(arguments.kept or arguments.scratch / digest_of_sources())
+    fresh = fresh_seeds(keeper.folder) if arguments.seed == "fresh" else last_fresh_seeds(keeper.folder)
+    first = fresh.first_trial if fresh is not None and arguments.seed == "fresh" else 0
     rows = [row for name in TABLES if not arguments.only or name in arguments.only for row in TABLES[name]]
     if not arguments.write_only:
-        run(rows, keeper, jobs=arguments.jobs, most=arguments.trials)
+        run(rows, keeper, jobs=arguments.jobs, most=arguments.trials, first=first)
     everything = [row for several in TABLES.values() for row in several]
-    kept = kept_figures(everything, keeper, most=arguments.trials)
-    arguments.page.write_text(page(sections(kept)), encoding="utf-8")
+    fixed_sections = sections(kept_figures(everything, keeper, most=arguments.trials))
+    if fresh is None:
+        text = page(fixed_sections)
+    else:
+        kept = kept_figures(everything, keeper, most=arguments.trials, first=fresh.first_trial)
+        text = page(fixed_sections, sections(kept), commit=fresh.commit)
+    arguments.page.write_text(text, encoding="utf-8")
     return 0
 
 

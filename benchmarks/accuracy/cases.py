@@ -1,6 +1,6 @@
 """Pairs with known truth: noise, number of pairs, share of wrong pairs, what the estimator is given, and the bound."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 import numpy as np
@@ -8,12 +8,20 @@ import numpy as np
 from calib_core.association.clustering import candidate_at
 from calib_core.estimation.measurement_model import CameraPrior
 from calib_core.measurements import Pair
-from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
+from calib_core.options import (
+    CalibrationOptions,
+    CameraPositionPrior,
+    LensOptions,
+    NoiseOptions,
+    RadarOptions,
+    ReflectorOptions,
+    SolvingOptions,
+)
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.synthetic import AISLE, FIELD, NOISE_PROFILES, RigOptions, SimulatedPairs, random_rig, simulate_pairs
 from calib_core.synthetic.pairs import NoiseName, study_camera
 
-__all__ = ["Bound", "Case", "SceneName", "bound_of", "draw", "options_of", "tape_measured"]
+__all__ = ["Bound", "Case", "SceneName", "bound_of", "draw", "exact_instruments", "options_of", "tape_measured"]
 
 SceneName = Literal["field", "aisle"]
 
@@ -51,9 +59,15 @@ def tape_measured(sigma_m: float | None) -> SolvingOptions:
     )
 
 
+def exact_instruments(options: CalibrationOptions) -> CalibrationOptions:
+    """Return the options with every systematic error ruled out, as the bound assumes."""
+    radar, lens, reflector = ([0.0] * len(fields(kind)) for kind in (RadarOptions, LensOptions, ReflectorOptions))
+    return replace(options, radar=RadarOptions(*radar), lens=LensOptions(*lens), reflector=ReflectorOptions(*reflector))
+
+
 def options_of(case: Case) -> CalibrationOptions:
-    """Return the options given to our estimator along with the pairs."""
-    return CalibrationOptions(noise=NoiseOptions(), solving=tape_measured(case.tape_m))
+    """Return the options given to our estimator along with pairs that have no systematic errors."""
+    return exact_instruments(CalibrationOptions(noise=NoiseOptions(), solving=tape_measured(case.tape_m)))
 
 
 def draw(case: Case, trial: int) -> SimulatedPairs:

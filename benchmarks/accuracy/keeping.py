@@ -8,20 +8,28 @@ from pathlib import Path
 
 from benchmarks.accuracy.rows import Figures
 
-__all__ = ["Keeper", "digest_of_sources"]
+__all__ = ["Keeper", "digest_of_sources", "sources"]
 
 _ROOT = Path(__file__).resolve().parents[2]
-_WRITING_ONLY = {"__main__.py", "figures.py", "keeping.py", "page.py", "running.py"}
+_WRITING_ONLY = {"__main__.py", "figures.py", "fresh_seeds.py", "keeping.py", "page.py", "running.py"}
 
 
 def digest_of_sources() -> str:
     """Return a short digest of all code that the figures depend on, so that figures of different versions are not mixed."""
     content = hashlib.sha256()
-    files = [*(_ROOT / "calib_core").glob("*.py"), *(_ROOT / "calib_core" / "synthetic").glob("*.py")]
-    files += [path for path in Path(__file__).parent.glob("*.py") if path.name not in _WRITING_ONLY]
-    for path in sorted(files):
-        content.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    for path in sorted(sources()):
+        content.update(str(path.relative_to(_ROOT)).encode() + b"\0" + path.read_bytes() + b"\0")
     return content.hexdigest()[:12]
+
+
+def sources() -> list[Path]:
+    """Return the files of code that the figures depend on."""
+    files = [path for path in (_ROOT / "calib_core").rglob("*.py") if not _without_figures(path)]
+    return files + [path for path in Path(__file__).parent.glob("*.py") if path.name not in _WRITING_ONLY]
+
+
+def _without_figures(path: Path) -> bool:
+    return bool({"interchange", "recordings", "rendering"} & set(path.relative_to(_ROOT).parts))
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLI
 _Measured = list[tuple[int, Figures]]
 
 
-def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = None) -> None:
+def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = None, first: int = 0) -> None:
     """Measure the trials that are not kept yet.
 
     Args:
@@ -28,8 +28,9 @@ def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = No
         keeper: stores the figures.
         jobs: number of processes, one BLAS thread each; 1 measures in this process.
         most: largest number of trials per row.
+        first: number of the first trial; other numbers are other draws.
     """
-    chunks = [(row, chunk) for row in rows for chunk in _missing(row, keeper, most)]
+    chunks = [(row, chunk) for row in rows for chunk in _missing(row, keeper, most, first)]
     progress = _Progress(sum(len(chunk) for _, chunk in chunks))
     if jobs == 1:
         for row, chunk in chunks:
@@ -48,12 +49,12 @@ def run(rows: Sequence[Row], keeper: Keeper, *, jobs: int, most: int | None = No
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def kept_figures(rows: Sequence[Row], keeper: Keeper, *, most: int | None = None) -> Kept:
-    """Read the kept figures in order of the trial number, up to the wanted number of trials."""
+def kept_figures(rows: Sequence[Row], keeper: Keeper, *, most: int | None = None, first: int = 0) -> Kept:
+    """Read the kept figures in order of the trial number, from the first one up to the wanted number of trials."""
     kept = {}
     for row in rows:
         trials = keeper.read(row.key)
-        kept[row.key] = tuple(trials[trial] for trial in sorted(trials) if trial < _wanted(row, most))
+        kept[row.key] = tuple(trials[trial] for trial in sorted(trials) if first <= trial < first + _wanted(row, most))
     return kept
 
 
@@ -61,9 +62,9 @@ def _wanted(row: Row, most: int | None) -> int:
     return row.trials if most is None else min(row.trials, most)
 
 
-def _missing(row: Row, keeper: Keeper, most: int | None) -> list[list[int]]:
+def _missing(row: Row, keeper: Keeper, most: int | None, first: int) -> list[list[int]]:
     kept = keeper.read(row.key)
-    missing = [trial for trial in range(_wanted(row, most)) if trial not in kept]
+    missing = [trial for trial in range(first, first + _wanted(row, most)) if trial not in kept]
     return [missing[i : i + _CHUNK] for i in range(0, len(missing), _CHUNK)]
 
 

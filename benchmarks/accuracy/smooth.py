@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.accuracy.cases import Case, options_of
+from benchmarks.accuracy.cases import Case, tape_measured
 from benchmarks.accuracy.efficiency import errors_of, inside
 from benchmarks.accuracy.figures import Measured, at_most, column, fewest, summed_up
 from benchmarks.accuracy.methods import as_printed, best_threshold_px
@@ -14,6 +14,7 @@ from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
 from calib_core.advice.angle_map import learn_angle_map
 from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import RigidTransform
+from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
 from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
@@ -52,7 +53,8 @@ def measure_smooth(count: int, trial: int, *, smooth: bool = True) -> Figures:
         everything, true = _measured_off_by(true, own + shared), _measured_off_by(true, own)
     simulated = _first(everything, count)
     case = Case("ti", count)
-    outcome = calibrate_pairs(simulated.pairs, simulated.camera, options_of(case))
+    options = CalibrationOptions(solving=tape_measured(case.tape_m))
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
     ours = outcome if isinstance(outcome, Calibration) else None
     paper = as_printed(simulated, best_threshold_px(case, float(simulated.camera.matrix_px[0, 0])))
     return errors_of(simulated, None if ours is None else ours.camera_from_radar) | {

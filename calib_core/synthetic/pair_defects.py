@@ -19,6 +19,7 @@ __all__ = [
     "mirrored",
     "with_companion",
     "with_rounded_elevations",
+    "with_zero_pair",
 ]
 
 
@@ -127,6 +128,20 @@ def with_rounded_elevations(
         return cartesian_from_polar(polar_from_cartesian(points) + errors_rad[:, None] * np.array([0.0, 0.0, 1.0]))
 
     return _with_positions(simulated, off)
+
+
+def with_zero_pair(simulated: SimulatedPairs, rng: np.random.Generator, *, distance_m: float = 0.001) -> SimulatedPairs:
+    """Put the radar position of the first pair next to the radar, as an empty return is often written."""
+    first = simulated.pairs[0]
+    wrong = replace(first, candidates=(_moved(first.candidates[0], distance_m * rng.standard_normal(3)),))
+    outlier = simulated.outlier.copy()
+    outlier[0] = True
+    return replace(
+        simulated,
+        pairs=(wrong, *simulated.pairs[1:]),
+        outlier=outlier,
+        true_candidate=(-1, *simulated.true_candidate[1:]),
+    )
 
 
 def _with_positions(simulated: SimulatedPairs, change: Callable[[Points3], Points3]) -> SimulatedPairs:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.accuracy.advice import Advised, measure_advice
-from benchmarks.accuracy.clutter import SCENES, Scene, measure_clutter
+from benchmarks.accuracy.clutter import SCENES, measure_clutter
 from benchmarks.accuracy.mirrored import Mirrored, measure_mirrored
+from benchmarks.accuracy.scenes import Scene
 
 _OF_SCENE = {scene.name: scene for scene in SCENES}
 

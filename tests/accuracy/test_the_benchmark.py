@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.accuracy import keeping
 from benchmarks.accuracy.__main__ import TABLES, sections
 from benchmarks.accuracy.cases import Case, bound_of, draw
 from benchmarks.accuracy.efficiency import failed, measure_ours
 from benchmarks.accuracy.figures import MET, MISSED, UNDECIDED, Measured, at_most, ratio, share, within
-from benchmarks.accuracy.keeping import Keeper
+from benchmarks.accuracy.fresh_seeds import FreshSeeds, fresh_seeds, last_fresh_seeds
+from benchmarks.accuracy.keeping import Keeper, digest_of_sources
 from benchmarks.accuracy.page import page
 from benchmarks.accuracy.rows import Figures, Row
 from benchmarks.accuracy.running import kept_figures, run
@@ -43,6 +45,28 @@ def test_processes_do_not_change_a_figure(tmp_path: Path) -> None:
     assert kept_figures([row()], Keeper(tmp_path))[row().key] == tuple(measure_ours(CASE, trial) for trial in range(11))
 
 
+def test_fresh_seeds_are_other_trials_of_the_same_row_and_are_kept_next_to_the_fixed_ones(tmp_path: Path) -> None:
+    assert last_fresh_seeds(tmp_path) is None
+    fresh = fresh_seeds(tmp_path)
+    assert last_fresh_seeds(tmp_path) == fresh
+    assert len(fresh.commit) == 40
+    assert FreshSeeds("00000001" + 32 * "0").first_trial - FreshSeeds(40 * "0").first_trial > 10_000
+    keeper = Keeper(tmp_path)
+    run([row()], keeper, jobs=1, most=2)
+    run([row()], keeper, jobs=1, most=3, first=fresh.first_trial)
+    fixed = kept_figures([row()], keeper)[row().key]
+    others = kept_figures([row()], keeper, first=fresh.first_trial)[row().key]
+    assert (len(fixed), len(others)) == (2, 3)
+    assert others[0] == measure_ours(CASE, fresh.first_trial) != fixed[0]
+
+
+def test_figures_are_not_kept_across_a_change_of_the_estimator() -> None:
+    assert digest_of_sources() == digest_of_sources()
+    sources = [path for path in Path(keeping.__file__).parents[2].glob("calib_core/estimation/*.py")]
+    assert sources
+    assert set(sources) <= set(keeping.sources())
+
+
 def test_every_row_has_a_key_of_its_own_that_is_a_file_name() -> None:
     keys = [row.key for rows in TABLES.values() for row in rows]
     assert len(set(keys)) == len(keys)
@@ -58,6 +82,22 @@ def test_the_page_names_met_and_missed_aims() -> None:
         assert verdict in line
         assert "RMSE of the rotation at most 1.05 times the bound" in text
     assert "Not run." in text
+
+
+def test_the_page_shows_both_seeds_side_by_side() -> None:
+    figures = {
+        "rotation_rad": 0.01,
+        "position_m": 0.01,
+        "stated_rad": 0.01,
+        "stated_m": 0.01,
+        "squared": 3.0,
+        "quantile": 13.0,
+    }
+    kept = {"shared-field-ti-12-10pc-free": [figures] * 3}
+    text = page(sections(kept), sections(kept), commit=40 * "a")
+    assert "| aim | fixed seeds |  | seeds from the hash of aaaaaaa |  |" in text
+    assert text.count("| field | ti | 12 | 10% | free | 3 |") == 2
+    assert text.count("### Fresh seeds") == 1
 
 
 def test_a_figure_above_its_limit_is_missed_only_when_that_is_significant() -> None:

@@ -12,6 +12,7 @@ from calib_core.synthetic.pair_defects import (
     mirrored,
     with_companion,
     with_rounded_elevations,
+    with_zero_pair,
 )
 
 
@@ -77,3 +78,11 @@ def test_rounding_changes_elevations_by_less_than_a_microradian() -> None:
     rounded = polar_from_cartesian(first_positions(with_rounded_elevations(flat, rng=np.random.default_rng(1))))
     assert 0.0 < np.abs(rounded[:, 2]).max() <= 1e-6
     assert rounded[:, :2] == pytest.approx(polar_from_cartesian(first_positions(flat))[:, :2])
+
+
+def test_a_zero_pair_is_next_to_the_radar_and_an_outlier(simulated: SimulatedPairs) -> None:
+    zeroed = with_zero_pair(simulated, np.random.default_rng(1))
+    assert np.linalg.norm(first_positions(zeroed)[0]) < 0.01
+    assert zeroed.outlier[0]
+    assert zeroed.true_candidate[0] == -1
+    assert np.array_equal(first_positions(zeroed)[1:], first_positions(simulated)[1:])

@@ -1,0 +1,135 @@
+"""Mirrored and right radars on one rig and on rigs far apart: is the one noticed, and the other left alone?"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+from typing import Literal
+
+import numpy as np
+
+from benchmarks.accuracy.figures import MET, MISSED, UNDECIDED
+from benchmarks.accuracy.outcomes import codes_in, outcome_figures, solved_or_refused
+from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
+from calib_core.calibration import calibrate_pairs
+from calib_core.options import CalibrationOptions, SolvingOptions
+from calib_core.synthetic import Rig, random_rig, simulate_pairs
+from calib_core.synthetic.pair_defects import clicked_again, mirrored, with_zero_pair
+from calib_core.synthetic.pairs import NoiseName, study_camera
+from calib_core.synthetic.rig import random_rig_apart
+from calib_core.synthetic.systematic_errors import draw_systematic_errors
+
+__all__ = ["ROWS", "Hand", "measure_hand", "section"]
+
+_RIGHT, _MIRRORED = 80, 20  # times fourteen and eight cases: 1,120 and 160
+_NOISES: tuple[NoiseName, ...] = ("ti", "imaging")
+_Kind = Literal["mirrored", "right", "thrice", "flat", "zero"]
+_KINDS: tuple[_Kind, ...] = ("mirrored", "right", "thrice", "flat", "zero")
+_SHOWN: dict[_Kind, str] = {
+    "mirrored": "mirrored",
+    "right": "right",
+    "thrice": "right, three clicks of every placement",
+    "flat": "right, without elevation",
+    "zero": "right, one position of zero",
+}
+_ACCUSED, _NOTICED = ("mirrored-axes",), ("mirrored-axes", "handedness-open")
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """What is drawn: noise, placements, distance between the sensors (0: on one mast), and what is wrong.
+
+    A radar is mirrored, or right: with one click of each placement or three, without elevation, or with one position of zero.
+    """
+
+    noise: NoiseName
+    pairs: int
+    apart_m: float = 0.0
+    kind: _Kind = "right"
+
+    @property
+    def key(self) -> str:
+        """A file name."""
+        return f"hand-{self.noise}-{self.pairs}-{self.apart_m:g}m-{self.kind}"
+
+
+_CASES = (
+    *(
+        Hand(noise, pairs, apart_m, kind)
+        for kind, apart_m, noise, pairs in product(_KINDS[:2], (0.0, 8.0), _NOISES, (12, 20))
+    ),
+    *(Hand(noise, 12, kind=kind) for kind, noise in product(_KINDS[2:], _NOISES)),
+)
+
+
+def measure_hand(case: Hand, trial: int) -> Figures:
+    """Solve one set; the estimator is told a distance of 8 m, and nothing of a common mast."""
+    rng = np.random.default_rng([2034, case.pairs, trial])
+    rig = _rig(case, rng)
+    errors = replace(draw_systematic_errors(rng), measures_elevation=case.kind != "flat")
+    given = simulate_pairs(case.pairs, rng=rng, noise=case.noise, rig=rig, systematic=errors)
+    if case.kind == "mirrored":
+        given = mirrored(given)
+    elif case.kind == "thrice":
+        given = clicked_again(given, 3, rng=rng)
+    elif case.kind == "zero":
+        given = with_zero_pair(given, rng)
+    solving = SolvingOptions(nominal_camera_distance_m=case.apart_m) if case.apart_m else SolvingOptions()
+    options = CalibrationOptions(solving=solving)
+    outcome = solved_or_refused(lambda: calibrate_pairs(given.pairs, given.camera, options))
+    return outcome_figures(outcome, given.camera_from_radar)
+
+
+def _rig(case: Hand, rng: np.random.Generator) -> Rig:
+    if case.apart_m:
+        return random_rig_apart(rng, camera=study_camera(), distance_m=case.apart_m)
+    return random_rig(rng, camera=study_camera())
+
+
+ROWS = tuple(
+    Row(case.key, _MIRRORED if case.kind == "mirrored" else _RIGHT, partial(measure_hand, case)) for case in _CASES
+)
+
+
+def section(kept: Kept) -> Section:
+    """Write the table."""
+    cells = []
+    counts: dict[bool, list[int]] = {True: [], False: []}
+    draws: dict[bool, int] = {True: 0, False: 0}
+    for case in _CASES:
+        trials = kept.get(case.key, ())
+        if not trials:
+            continue
+        bad, turned = _bad(case, trials), case.kind == "mirrored"
+        counts[turned].append(bad)
+        draws[turned] += len(trials)
+        where = f"{case.apart_m:g} m apart, told" if case.apart_m else "one mast, not told"
+        what = (_SHOWN[case.kind], case.noise, str(case.pairs), where, str(len(trials)))
+        kinds = [f"{sum(code in codes_in(one) for one in trials)}" for code in (*_NOTICED, "handedness-assumed")]
+        cells.append((*what, *kinds, f"{bad} {'silent' if turned else 'accused'}", MISSED if bad else MET))
+    head = ("radar", "noise", "placements", "sensors", "trials", *_NOTICED, "handedness-assumed", "wrong", "")
+    claims = (
+        _claim("mirrored radars silent: 0 in 160", counts[True], draws[True], _MIRRORED * 8),
+        _claim("right radars accused of mirrored axes: 0 in 1,120", counts[False], draws[False], _RIGHT * 14),
+    )
+    title = "Handedness on one mast and far apart"
+    return Section(title, _TEXT, (Part("", head, tuple(cells)),), claims, side_by_side=True)
+
+
+def _bad(case: Hand, trials: Sequence[Figures]) -> int:
+    """Count mirrored radars without a word about it, or right ones that are called mirrored."""
+    if case.kind == "mirrored":
+        return sum("rotation_rad" in one and not codes_in(one) & set(_NOTICED) for one in trials)
+    return sum(bool(codes_in(one) & set(_ACCUSED)) for one in trials)
+
+
+def _claim(aim: str, counts: Sequence[int], draws: int, wanted: int) -> Claim:
+    if not draws:
+        return Claim(aim, "not run", "not run")
+    verdict = MISSED if sum(counts) else MET if draws >= wanted else UNDECIDED
+    return Claim(aim, f"{sum(counts)} in {draws:,}", verdict)
+
+
+_TEXT = """Placements on flat ground, no wrong pairs, camera position not given, shared errors drawn from the priors. A mirrored
+radar is silent if the result says neither `mirrored-axes` nor `handedness-open`; a right one is accused if it says
+`mirrored-axes`."""
