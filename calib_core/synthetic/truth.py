@@ -6,6 +6,7 @@ from typing import Any
 from calib_core.camera import Camera
 from calib_core.interchange import write_clicks
 from calib_core.measurements import TimeNs, time_parts
+from calib_core.synthetic.options import Clicking
 from calib_core.synthetic.recording import SimulatedRecording
 
 __all__ = ["clicks_text", "truth_text"]
@@ -17,7 +18,7 @@ _PIXEL_DECIMALS = 6
 def truth_text(recording: SimulatedRecording) -> str:
     """Return the truth about a recording (schema cocalib/truth-1). No estimator may read it."""
     pose = recording.camera_from_radar
-    document = {
+    document: dict[str, Any] = {
         "schema": "cocalib/truth-1",
         "camera_from_radar": {"rotation": pose.rotation.tolist(), "translation_m": pose.translation_m.tolist()},
         "camera": _camera(recording.camera),
@@ -35,6 +36,10 @@ def truth_text(recording: SimulatedRecording) -> str:
             for placement in recording.placements
         ],
     }
+    if recording.options.clicking != Clicking():
+        document["clicks"] = [
+            {"id": one.click.id, "placement": one.placement_id, "faults": list(one.faults)} for one in recording.clicked
+        ]
     return _text(document)
 
 
