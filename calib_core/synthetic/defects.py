@@ -6,9 +6,10 @@ Positions here are rows of direction cosines: range [m], sines of azimuth and el
 import numpy as np
 
 from calib_core.arrays import Flags, Points3, Values
+from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.synthetic.options import RadarDefects
 
-__all__ = ["distorted", "reported_points", "second_azimuths", "second_is_true"]
+__all__ = ["distorted", "radar_from_reported", "reported_points", "second_azimuths", "second_is_true"]
 
 _ROUNDING_RAD = 1e-6
 _PERIOD = 0.6
@@ -60,6 +61,17 @@ def reported_points(rng: np.random.Generator, cosines: Points3, defects: RadarDe
     x = r * np.sqrt(np.maximum(0.0, 1.0 - u * u - w * w))
     z = r * w + defects.z_offset_m if defects.z_offset_m else r * w
     return np.stack([x, r * u, z], axis=1)
+
+
+def radar_from_reported(defects: RadarDefects) -> RigidTransform:
+    """Return the radar's frame from the frame in which it reports: a bias of the angles turns it, an offset of z moves it.
+
+    The azimuth's bias and the offset of z are exactly such a motion, the elevation's bias only straight ahead.
+    """
+    turn = rotation_exp(np.array([0.0, 0.0, -np.deg2rad(defects.azimuth_bias_deg)]))
+    nod = rotation_exp(np.array([0.0, np.deg2rad(defects.elevation_bias_deg), 0.0]))
+    rotation = nod @ turn
+    return RigidTransform(rotation, -rotation @ np.array([0.0, 0.0, defects.z_offset_m]))
 
 
 def second_azimuths(points_radar_m: Points3) -> Points3:

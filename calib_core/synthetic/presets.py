@@ -14,6 +14,7 @@ PresetName: TypeAlias = Literal[
     "sine-scale",
     "range-bias",
     "biased-radar",
+    "mount-height",
     "flat",
     "flat-height",
     "flat-rounding",
@@ -52,14 +53,15 @@ PRESETS: Mapping[PresetName, SimulationOptions] = {
             azimuth_bias_deg=1.0,
             elevation_bias_deg=-1.0,
             range_bias_m=-0.05,
-            z_offset_m=0.5,
         )
     ),
+    "mount-height": SimulationOptions(defects=RadarDefects(z_offset_m=0.5)),
     "flat": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="zero")),
     "flat-height": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="zero", z_offset_m=0.5)),
     "flat-rounding": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="rounding")),
     "flat-tilted": SimulationOptions(
-        rig=RigOptions(radar_height_m=1.2, radar_tilt_deg=10.0), defects=RadarDefects(elevation="zero")
+        rig=RigOptions(radar_height_m=1.2, radar_tilt_deg=10.0, radar_roll_deg=3.0),
+        defects=RadarDefects(elevation="zero"),
     ),
     "coarse": SimulationOptions(
         defects=RadarDefects(

@@ -5,8 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Points3, Vector3
+from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.synthetic.antennas import Antenna, antennas_of
+from calib_core.synthetic.defects import radar_from_reported
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.pairs import draw_positions
 from calib_core.synthetic.passers_by import draw_passers_by
@@ -64,6 +66,11 @@ class Stage:
     def scan_times(self) -> SensorTimes:
         """When the radar measured; of two antennas the far one."""
         return self.antennas[0].times
+
+    @property
+    def camera_from_reported(self) -> RigidTransform:
+        """The pose that maps what the radar reports to the camera, without scales: what an overlay needs."""
+        return self.rig.camera_from_radar @ radar_from_reported(self.options.defects)
 
     def recorded_span(self, start_s: float, end_s: float) -> tuple[TimeNs, TimeNs]:
         """Return the first and the last time, on the camera's clock, at which a part of the story is recorded."""

@@ -1,5 +1,6 @@
 """Simulated radars that are not perfect: each defect is measured in the returns."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,13 +8,16 @@ import numpy as np
 import pytest
 
 from calib_core.measurements import NS_PER_S, TimeNs
-from calib_core.radar import direction_cosines, polar_from_cartesian
+from calib_core.radar import cartesian_from_polar, direction_cosines, polar_from_cartesian
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.recordings.containers.writing import CloudMessage, write_ros1_bag
 from calib_core.synthetic import RADAR_PROFILES, RadarDefects, SimulationOptions, simulate, simulate_scans
+from calib_core.synthetic.defects import radar_from_reported
 from calib_core.synthetic.messages import CLOUD_TOPIC, SECOND_COLUMN, SECOND_SUFFIX, radar_messages
 from calib_core.synthetic.options import SecondAzimuth
 from calib_core.synthetic.returns import Targets, measure
+from calib_core.synthetic.rig import RigOptions, radar_stand
+from calib_core.synthetic.truth import truth_text
 
 QUIET = SimulationOptions(
     radar="imaging", placements=6, dwell_s=3.5, radar_rate_hz=5.0, clutter="none", person=False, seed=3
@@ -88,6 +92,25 @@ def test_a_driver_adds_the_mounting_height_to_z() -> None:
     lifted, plain = (_reported(RadarDefects(z_offset_m=z_m)) for z_m in (0.5, 0.0))
     height_m = lifted[:, 0] * np.sin(lifted[:, 2]) - plain[:, 0] * np.sin(plain[:, 2])
     assert height_m == pytest.approx(0.5, abs=1e-4)
+
+
+def test_biases_and_a_z_offset_turn_and_move_the_frame_in_which_the_radar_reports() -> None:
+    defects = RadarDefects(azimuth_bias_deg=3.0, z_offset_m=0.5)
+    points_radar = radar_from_reported(defects) @ cartesian_from_polar(_reported(defects))
+    assert points_radar == pytest.approx(PLACES[np.argsort(np.linalg.norm(PLACES, axis=1))], abs=1e-3)
+    ahead = radar_from_reported(RadarDefects(elevation_bias_deg=2.0)) @ np.array([[np.cos(0.1), 0.0, np.sin(0.1)]])
+    assert polar_from_cartesian(ahead)[0, 2] == pytest.approx(0.1 - np.deg2rad(2.0))
+
+
+def test_the_truth_file_holds_the_pose_of_the_reported_frame_if_it_is_another_one() -> None:
+    plain, biased = (
+        json.loads(truth_text(simulate(replace(QUIET, placements=1, defects=RadarDefects(z_offset_m=z_m)))))
+        for z_m in (0.0, 0.5)
+    )
+    assert "camera_from_reported" not in plain
+    assert biased["camera_from_radar"] == plain["camera_from_radar"]
+    apart = np.subtract(*(biased[f"camera_from_{frame}"]["translation_m"] for frame in ("reported", "radar")))
+    assert np.linalg.norm(apart) == pytest.approx(0.5)
 
 
 def test_in_a_recording_reported_over_true_azimuth_is_the_scale() -> None:
@@ -195,3 +218,11 @@ def test_without_defects_no_draw_changes() -> None:
     assert np.array_equal(plain.scans.times_ns, other.scans.times_ns)
     assert len(plain.scans.points_radar_m) == pytest.approx(len(other.scans.points_radar_m), abs=5)
     assert plain.clicks == other.clicks
+
+
+def test_a_radar_leans_to_its_right() -> None:
+    left_m, right_m = (
+        (radar_stand(RigOptions(radar_roll_deg=5.0)).inverse() @ np.array([[0.0, y_m, 0.0]]))[0, 2]
+        for y_m in (1.0, -1.0)
+    )
+    assert left_m - right_m == pytest.approx(2.0 * np.sin(np.deg2rad(5.0)) * np.cos(np.deg2rad(10.0)))
