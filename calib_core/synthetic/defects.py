@@ -47,7 +47,7 @@ def _scaled(angle_rad: Values, scale: float, defects: RadarDefects) -> Values:
 
 
 def reported_points(rng: np.random.Generator, cosines: Points3, defects: RadarDefects) -> Points3:
-    """Convert to x, y, z [m] as the driver does, without elevation if it measures none, and with its own origin of z.
+    """Convert to x, y, z as the driver does: with its axes, its unit and its origin of z, and perhaps without elevation.
 
     Args:
         rng: used for the rounding error only.
@@ -60,7 +60,8 @@ def reported_points(rng: np.random.Generator, cosines: Points3, defects: RadarDe
         w = size * rng.uniform(-1.0, 1.0, len(w)) if size else np.zeros(len(w))
     x = r * np.sqrt(np.maximum(0.0, 1.0 - u * u - w * w))
     z = r * w + defects.z_offset_m if defects.z_offset_m else r * w
-    return np.stack([x, r * u, z], axis=1)
+    points = np.stack([x, -r * u if defects.mirrored else r * u, z], axis=1)
+    return points if defects.length_unit_m == 1.0 else points / defects.length_unit_m
 
 
 def radar_from_reported(defects: RadarDefects) -> RigidTransform:

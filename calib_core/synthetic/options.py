@@ -14,6 +14,7 @@ __all__ = [
     "Clicking",
     "Clutter",
     "Container",
+    "IntrinsicsErrors",
     "RadarDefects",
     "RadarMessage",
     "RadarName",
@@ -51,6 +52,10 @@ class RadarDefects:
     )
     z_offset_m: float = option(
         0.0, "What the driver adds to z, such as the height of the mount [m].", low=-10.0, high=10.0
+    )
+    mirrored: bool = option(False, "Have the driver report y to the right, which mirrors the scene.")
+    length_unit_m: float = option(
+        1.0, "Unit of the lengths that the driver reports, such as 0.001 for millimetres [m].", low=1e-4, high=10.0
     )
     range_bin_m: float | None = option(None, "Width of a range bin [m]; by default the radar's.", low=0.001, high=1.0)
     azimuth_bins: int | None = option(
@@ -91,7 +96,23 @@ class Surroundings:
         "Radar cross-section of one more permanent target, such as 29; by default there is none [dBsm].",
         high=60.0,
     )
+    flickering_targets: int = option(
+        0,
+        "Number of static targets whose echoes come and go every few seconds, as of swaying branches.",
+        low=0,
+        high=40,
+    )
     passers_by: int = option(0, "Number of people who walk through the scene; every third stops on the way.", low=0)
+
+
+@dataclass(frozen=True, slots=True)
+class IntrinsicsErrors:
+    """How the published intrinsics differ from those of the pictures."""
+
+    focal_length_scale: float = option(1.0, "Published focal length over the true one.", low=0.5, high=2.0)
+    principal_point_px: tuple[float, float] = option(
+        (0.0, 0.0), "How far right and down of the true one the published principal point is [px]."
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +178,9 @@ class SimulationOptions:
     rig: RigOptions = option(RigOptions(), "How the sensors are mounted.")
     defects: RadarDefects = option(RadarDefects(), "How the radar differs from a perfect one.")
     surroundings: Surroundings = option(Surroundings(), "What stands and walks in the scene besides the reflector.")
+    intrinsics: IntrinsicsErrors = option(
+        IntrinsicsErrors(), "How the published intrinsics differ from those of the pictures."
+    )
     clicking: Clicking = option(Clicking(), "How the example clicks are made.")
 
     def __post_init__(self) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Literal, TypeAlias
 
-from calib_core.synthetic.options import Clicking, RadarDefects, SimulationOptions, Surroundings
+from calib_core.synthetic.options import Clicking, IntrinsicsErrors, RadarDefects, SimulationOptions, Surroundings
 from calib_core.synthetic.rig import RigOptions
 
 __all__ = ["PRESETS", "PresetName"]
@@ -15,6 +15,8 @@ PresetName: TypeAlias = Literal[
     "range-bias",
     "biased-radar",
     "mount-height",
+    "mirrored-radar",
+    "millimetres",
     "flat",
     "flat-height",
     "flat-rounding",
@@ -26,9 +28,12 @@ PresetName: TypeAlias = Literal[
     "two-reflectors",
     "companion",
     "car-park",
+    "flickering",
     "passers-by",
     "islands",
     "two-reflectors-islands",
+    "focal-length",
+    "principal-point",
     "double-clicks",
     "low-clicks",
     "mouth-clicks",
@@ -56,6 +61,8 @@ PRESETS: Mapping[PresetName, SimulationOptions] = {
         )
     ),
     "mount-height": SimulationOptions(defects=RadarDefects(z_offset_m=0.5)),
+    "mirrored-radar": SimulationOptions(defects=RadarDefects(mirrored=True)),
+    "millimetres": SimulationOptions(defects=RadarDefects(length_unit_m=0.001)),
     "flat": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="zero")),
     "flat-height": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="zero", z_offset_m=0.5)),
     "flat-rounding": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="rounding")),
@@ -80,11 +87,14 @@ PRESETS: Mapping[PresetName, SimulationOptions] = {
     "two-reflectors": SimulationOptions(reflectors=2),
     "companion": SimulationOptions(surroundings=Surroundings(companion=True)),
     "car-park": SimulationOptions(scene="field", surroundings=_CAR_PARK),
+    "flickering": SimulationOptions(surroundings=Surroundings(flickering_targets=10)),
     "passers-by": SimulationOptions(surroundings=Surroundings(passers_by=6)),
-    "islands": SimulationOptions(islands=True),
+    "islands": SimulationOptions(dwell_s=10.0, islands=True),
     "two-reflectors-islands": SimulationOptions(
-        scene="field", reflectors=2, islands=True, surroundings=Surroundings(parked_cars=2)
+        scene="field", dwell_s=10.0, reflectors=2, islands=True, surroundings=Surroundings(parked_cars=2)
     ),
+    "focal-length": SimulationOptions(intrinsics=IntrinsicsErrors(focal_length_scale=1.02)),
+    "principal-point": SimulationOptions(intrinsics=IntrinsicsErrors(principal_point_px=(30.0, 0.0))),
     "double-clicks": SimulationOptions(clicking=Clicking(clicks_per_placement=3)),
     "low-clicks": SimulationOptions(clicking=Clicking(low_px=6.0)),
     "mouth-clicks": SimulationOptions(clicking=Clicking(low_m=0.1)),

@@ -56,6 +56,11 @@ class SimulatedScans:
         return self.stage.rig.camera
 
     @property
+    def published_camera(self) -> Camera:
+        """The intrinsics that an estimator is given; wrong if the options say so."""
+        return self.stage.published_camera
+
+    @property
     def camera_from_radar(self) -> RigidTransform:
         """The true pose."""
         return self.stage.rig.camera_from_radar
@@ -134,7 +139,7 @@ class _Echo:
 def targets_at(stage: Stage, time_s: float) -> Targets:
     """List the objects in front of the radar at a time: clutter, reflectors and their ghosts, people's limbs."""
     before, now, after = (stage.story.at(time_s + step) for step in (-_STEP_S, 0.0, _STEP_S))
-    echoes = [_clutter_echo(stage), *_reflector_echoes(stage, before, now, after)]
+    echoes = [_clutter_echo(stage), *_flicker_echoes(stage, time_s), *_reflector_echoes(stage, before, now, after)]
     if stage.options.person:
         echoes.append(_person_echo(before.person, after.person))
     if len(before.passers_by) == len(after.passers_by):
@@ -161,6 +166,14 @@ def targets_at(stage: Stage, time_s: float) -> Targets:
 def _clutter_echo(stage: Stage) -> _Echo:
     places = np.array([[thing.x_m, thing.y_m, thing.z_m] for thing in stage.clutter]).reshape(-1, 3)
     return _Echo(places, places, tuple(thing.rcs_dbsm for thing in stage.clutter), 2.0, stage.clutter_bias)
+
+
+def _flicker_echoes(stage: Stage, time_s: float) -> list[_Echo]:
+    shown = [one.scatterer for one in stage.flickers if one.shows(time_s)]
+    if not shown:
+        return []
+    places = np.array([[one.x_m, one.y_m, one.z_m] for one in shown])
+    return [_Echo(places, places, tuple(one.rcs_dbsm for one in shown), 2.0, np.zeros((len(shown), 3)))]
 
 
 def _reflector_echoes(stage: Stage, before: Moment, now: Moment, after: Moment) -> list[_Echo]:

@@ -5,18 +5,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Points3, Vector3
+from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.synthetic.antennas import Antenna, antennas_of
 from calib_core.synthetic.defects import radar_from_reported
-from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.options import IntrinsicsErrors, SimulationOptions
 from calib_core.synthetic.pairs import draw_positions
 from calib_core.synthetic.passers_by import draw_passers_by
 from calib_core.synthetic.radar_profiles import RadarProfile, profile_with
 from calib_core.synthetic.rig import Rig, random_rig, typical_camera
 from calib_core.synthetic.scenes import Scatterer, Scene, scene_named
 from calib_core.synthetic.story import Story, tell_story
-from calib_core.synthetic.surroundings import furnished, in_sight
+from calib_core.synthetic.surroundings import Flicker, draw_flickers, furnished, in_sight
 from calib_core.synthetic.timeline import Islands, SensorTimes, draw_islands, draw_times
 
 __all__ = ["Stage", "child_rng", "set_stage"]
@@ -43,6 +44,7 @@ class Stage:
         clutter_bias: (k, 3) the constant error of each of them: range [m], sines of azimuth and elevation.
         reflector_bias: (n, 3) the constant error of each placement: range [m], sines of azimuth and elevation.
         ghosts: for each placement the static reflection that comes and goes with it, or None.
+        flickers: static targets that the radar sees at times.
     """
 
     options: SimulationOptions
@@ -56,6 +58,7 @@ class Stage:
     clutter_bias: Points3
     reflector_bias: Points3
     ghosts: tuple[Scatterer | None, ...]
+    flickers: tuple[Flicker, ...] = ()
 
     @property
     def profile(self) -> RadarProfile:
@@ -66,6 +69,17 @@ class Stage:
     def scan_times(self) -> SensorTimes:
         """When the radar measured; of two antennas the far one."""
         return self.antennas[0].times
+
+    @property
+    def published_camera(self) -> Camera:
+        """The intrinsics in the recording's camera info, which may be wrong; those of the pictures are the rig's."""
+        camera, errors = self.rig.camera, self.options.intrinsics
+        if errors == IntrinsicsErrors():
+            return camera
+        matrix = camera.matrix_px.copy()
+        matrix[[0, 1], [0, 1]] *= errors.focal_length_scale
+        matrix[:2, 2] += errors.principal_point_px
+        return replace(camera, matrix_px=matrix)
 
     @property
     def camera_from_reported(self) -> RigidTransform:
@@ -119,7 +133,10 @@ def set_stage(options: SimulationOptions) -> Stage:
     ghosts = tuple(_ghost(rng, resting.position_m) for resting in story.restings)
     clutter = _clutter(child_rng(options, 6), scene, options)
     clutter_bias = child_rng(options, 7).standard_normal((len(clutter), 3)) * bias_sigma
-    return Stage(options, scene, rig, story, frame_times, antennas, islands, clutter, clutter_bias, bias, ghosts)
+    flickers = draw_flickers(child_rng(options, 18), options.surroundings.flickering_targets, scene)
+    return Stage(
+        options, scene, rig, story, frame_times, antennas, islands, clutter, clutter_bias, bias, ghosts, flickers
+    )
 
 
 def _story(positions_m: Points3, scene: Scene, options: SimulationOptions) -> Story:

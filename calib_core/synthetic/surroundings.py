@@ -1,6 +1,6 @@
 """What stands in a scene besides the reflector: parked cars, a fence, a strong target, the cart behind each placement."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from calib_core.arrays import Flags, Points3, Vector3
 from calib_core.synthetic.options import Surroundings
 from calib_core.synthetic.scenes import Box, Cylinder, Scatterer, Scene
 
-__all__ = ["cart_position", "furnished", "in_sight"]
+__all__ = ["Flicker", "cart_position", "draw_flickers", "furnished", "in_sight"]
 
 _CAR_M = (4.4, 1.8)
 _CAR_DBSM = (20.0, 14.0, 11.0)
@@ -18,6 +18,36 @@ _FENCE_M = (7.5, 5.0, 21.0)
 """Distance from the radar's axis, begin and end of the fence."""
 _POST_DBSM = 8.0
 _CART_HEIGHT_M = 0.5
+_FLICKER_S = (8.0, 30.0)
+_FLICKER_SHARE = (0.2, 0.6)
+_FLICKER_DBSM = (6.0, 14.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Flicker:
+    """A static target that the radar sees for a share of each period [s], from a phase (0 to 1) on."""
+
+    scatterer: Scatterer
+    period_s: float
+    share: float
+    phase: float
+
+    def shows(self, time_s: float) -> bool:
+        """Return whether the radar sees it at a time of the story."""
+        return (time_s / self.period_s + self.phase) % 1.0 < self.share
+
+
+def draw_flickers(rng: np.random.Generator, count: int, scene: Scene) -> tuple[Flicker, ...]:
+    """Draw targets that come and go, among the placements and a little beyond."""
+    found = []
+    for _ in range(count):
+        range_m, aside = rng.uniform(3.0, scene.layout.max_range_m + 2.0), rng.uniform(-1.0, 1.0)
+        azimuth_rad = aside * min(np.deg2rad(scene.layout.max_azimuth_deg), scene.layout.max_lateral_m / range_m)
+        x_m, y_m = float(range_m * np.cos(azimuth_rad)), float(range_m * np.sin(azimuth_rad))
+        scatterer = Scatterer(x_m, y_m, float(rng.uniform(0.2, 1.5)), float(rng.uniform(*_FLICKER_DBSM)))
+        rhythm = (float(rng.uniform(*_FLICKER_S)), float(rng.uniform(*_FLICKER_SHARE)), float(rng.uniform()))
+        found.append(Flicker(scatterer, *rhythm))
+    return tuple(found)
 
 
 def furnished(rng: np.random.Generator, scene: Scene, surroundings: Surroundings) -> tuple[Scene, Scene]:

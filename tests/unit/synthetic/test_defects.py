@@ -10,10 +10,17 @@ import pytest
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import cartesian_from_polar, direction_cosines, polar_from_cartesian
 from calib_core.recordings import RecordingOptions, open_recording
-from calib_core.recordings.containers.writing import CloudMessage, write_ros1_bag
-from calib_core.synthetic import RADAR_PROFILES, RadarDefects, SimulationOptions, simulate, simulate_scans
+from calib_core.recordings.containers.writing import CameraInfoMessage, CloudMessage, write_ros1_bag
+from calib_core.synthetic import (
+    RADAR_PROFILES,
+    IntrinsicsErrors,
+    RadarDefects,
+    SimulationOptions,
+    simulate,
+    simulate_scans,
+)
 from calib_core.synthetic.defects import radar_from_reported
-from calib_core.synthetic.messages import CLOUD_TOPIC, SECOND_COLUMN, SECOND_SUFFIX, radar_messages
+from calib_core.synthetic.messages import CLOUD_TOPIC, SECOND_COLUMN, SECOND_SUFFIX, camera_messages, radar_messages
 from calib_core.synthetic.options import SecondAzimuth
 from calib_core.synthetic.returns import Targets, measure
 from calib_core.synthetic.rig import RigOptions, radar_stand
@@ -111,6 +118,25 @@ def test_the_truth_file_holds_the_pose_of_the_reported_frame_if_it_is_another_on
     assert biased["camera_from_radar"] == plain["camera_from_radar"]
     apart = np.subtract(*(biased[f"camera_from_{frame}"]["translation_m"] for frame in ("reported", "radar")))
     assert np.linalg.norm(apart) == pytest.approx(0.5)
+
+
+def test_a_driver_may_report_y_to_the_right_and_millimetres() -> None:
+    plain, mirrored, fine = (
+        cartesian_from_polar(_reported(defects))
+        for defects in (RadarDefects(), RadarDefects(mirrored=True), RadarDefects(length_unit_m=0.001))
+    )
+    assert mirrored == pytest.approx(plain * [1.0, -1.0, 1.0], abs=1e-5)
+    assert fine == pytest.approx(plain * 1000.0, rel=1e-5)
+
+
+def test_the_published_intrinsics_may_be_wrong_while_the_pictures_and_the_truth_are_not() -> None:
+    wrong = IntrinsicsErrors(focal_length_scale=1.02, principal_point_px=(30.0, -10.0))
+    recording = simulate(replace(QUIET, placements=1, intrinsics=wrong, width_px=64, height_px=64, camera_rate_hz=1.0))
+    [info, *_] = [m.body for m in camera_messages(recording) if isinstance(m.body, CameraInfoMessage)]
+    true, published = recording.camera.matrix_px, info.camera.matrix_px
+    assert np.diag(published)[:2] / np.diag(true)[:2] == pytest.approx(1.02)
+    assert published[:2, 2] - true[:2, 2] == pytest.approx([30.0, -10.0])
+    assert json.loads(truth_text(recording))["camera"]["matrix_px"] == true.tolist()
 
 
 def test_in_a_recording_reported_over_true_azimuth_is_the_scale() -> None:

@@ -92,6 +92,18 @@ def test_parked_cars_a_fence_and_a_target_of_29_dbsm_are_always_there_and_hide_n
     assert count > len(simulate_scans(replace(QUIET, clutter="scene")).scans.points_radar_m) / len(session.scans) + 5.0
 
 
+def test_flickering_targets_are_seen_for_a_share_of_the_time_and_by_turns() -> None:
+    session = simulate_scans(replace(QUIET, radar_rate_hz=10.0, surroundings=Surroundings(flickering_targets=5)))
+    times_s = np.arange(0.0, session.stage.story.duration_s, 0.1)
+    for one in session.stage.flickers:
+        shown = np.array([one.shows(float(time_s)) for time_s in times_s])
+        thing = one.scatterer
+        position = (session.stage.rig.radar_from_world @ np.array([[thing.x_m, thing.y_m, thing.z_m]]))[0]
+        assert 0.1 < shown.mean() < 0.75
+        assert 2 <= np.abs(np.diff(shown.astype(int))).sum() < 20
+        assert _seen(session.scans, position) == pytest.approx(shown.mean(), abs=0.15)
+
+
 def test_passers_by_cross_the_scene_and_some_stop() -> None:
     session = simulate_scans(replace(QUIET, radar_rate_hz=10.0, surroundings=Surroundings(passers_by=3)))
     story = session.stage.story
