@@ -113,17 +113,7 @@ def set_stage(options: SimulationOptions) -> Stage:
     story = _story(positions, scene, options)
     islands = _islands(story, options)
     profile = profile_with(options.radar, options.defects)
-    frame_times = draw_times(
-        child_rng(options, 3),
-        duration_s=story.duration_s,
-        rate_hz=options.camera_rate_hz,
-        jitter_s=options.stamp_jitter_s,
-        dropped_share=options.dropped_share,
-        latency_s=0.0,
-        transfer_s=0.022,
-        start_ns=options.start_s * NS_PER_S,
-        islands=islands,
-    )
+    frame_times = _frame_times(story, islands, options)
     antennas = antennas_of(
         options, profile, (child_rng(options, 4), child_rng(options, 14)), duration_s=story.duration_s, islands=islands
     )
@@ -156,6 +146,20 @@ def _story(positions_m: Points3, scene: Scene, options: SimulationOptions) -> St
         max_range_m=0.8 * scene.layout.max_range_m,
     )
     return replace(story, passers_by=passers_by)
+
+
+def _frame_times(story: Story, islands: Islands | None, options: SimulationOptions) -> SensorTimes:
+    return draw_times(
+        child_rng(options, 3),
+        duration_s=story.duration_s,
+        rate_hz=options.camera_rate_hz,
+        jitter_s=options.stamp_jitter_s,
+        dropped_share=options.dropped_share,
+        latency_s=0.0,
+        transfer_s=0.022,
+        start_ns=options.start_s * NS_PER_S,
+        islands=islands,
+    )
 
 
 def _islands(story: Story, options: SimulationOptions) -> Islands | None:

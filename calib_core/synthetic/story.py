@@ -175,6 +175,18 @@ class _Script:
         self.heading_rad = float(np.arctan2(look[1], look[0]))
         self._add(action, self.place_m, duration_s, carrying, placement)
 
+    def put_down(self, stand_m: Vector2, placement: int, apex_m: Vector2) -> float:
+        """Carry the reflector to a placement and put it down; return when it is released."""
+        self.walk(stand_m, carrying=True, placement=placement)
+        self.stay("put", _PUT_DOWN_S, carrying=False, placement=placement, facing_m=apex_m)
+        return self.time_s
+
+    def wait(self, aside_m: Vector2, dwell_s: float, placement: int, apex_m: Vector2) -> None:
+        """Step aside and stand there, until it is time to come back."""
+        self.walk(aside_m, carrying=False, placement=placement, duration_s=_STEP_AWAY_S)
+        wait_s = dwell_s - 2.0 * _STEP_AWAY_S
+        self.stay("stand", wait_s, carrying=False, placement=placement, facing_m=apex_m)
+
     def _add(self, action: _Action, to_m: Vector2, duration_s: float, carrying: bool, placement: int) -> None:
         end_s = self.time_s + duration_s
         self.legs.append(
@@ -230,12 +242,8 @@ def tell_story(
         position = positions_m[chosen]
         away = position[:2] / np.linalg.norm(position[:2])
         stands.append(position[:2] + _BEHIND_M * away)
-        script.walk(stands[index], carrying=True, placement=index)
-        script.stay("put", _PUT_DOWN_S, carrying=False, placement=index, facing_m=position[:2])
-        start_s = script.time_s
-        script.walk(_aside(rng, stands[index], away, narrow), carrying=False, placement=index, duration_s=_STEP_AWAY_S)
-        wait_s = dwell_s - 2.0 * _STEP_AWAY_S
-        script.stay("stand", wait_s, carrying=False, placement=index, facing_m=position[:2])
+        start_s = script.put_down(stands[index], index, position[:2])
+        script.wait(_aside(rng, stands[index], away, narrow), dwell_s, index, position[:2])
         facing_rad = float(np.arctan2(-away[1], -away[0]) + np.deg2rad(6.0) * rng.standard_normal())
         left_s = script.time_s if reflectors > 1 else math.inf
         restings.append(Resting(index, start_s, math.inf, position, facing_rad, left_s))
