@@ -29,6 +29,7 @@ PresetName: TypeAlias = Literal[
     "companion",
     "car-park",
     "flickering",
+    "busy",
     "passers-by",
     "islands",
     "two-reflectors-islands",
@@ -88,6 +89,13 @@ PRESETS: Mapping[PresetName, SimulationOptions] = {
     "companion": SimulationOptions(surroundings=Surroundings(companion=True)),
     "car-park": SimulationOptions(scene="field", surroundings=_CAR_PARK),
     "flickering": SimulationOptions(surroundings=Surroundings(flickering_targets=10)),
+    "busy": SimulationOptions(
+        scene="field",
+        clutter="heavy",
+        surroundings=Surroundings(
+            parked_cars=4, fence=True, strong_target_dbsm=29.0, flickering_targets=40, passers_by=6
+        ),
+    ),
     "passers-by": SimulationOptions(surroundings=Surroundings(passers_by=6)),
     "islands": SimulationOptions(dwell_s=10.0, islands=True),
     "two-reflectors-islands": SimulationOptions(
