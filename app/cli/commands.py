@@ -26,10 +26,10 @@ class Runnable(Protocol):
 
 @runtime_checkable
 class HasFileDefaults(Protocol):
-    """A command whose defaults may come from a file that its arguments name."""
+    """A command whose defaults may come from a file or a preset that its arguments name."""
 
     def file_defaults(self) -> Self | None:
-        """Return the command with that file's defaults; None to keep its own."""
+        """Return the command with those defaults; None to keep its own."""
         ...
 
 

@@ -1,7 +1,19 @@
 """Simulation: scenes, sensors and recordings with a known camera_from_radar, for tests and benchmarks."""
 
+from calib_core.synthetic.clicking import SimulatedClick
 from calib_core.synthetic.files import write_recording
-from calib_core.synthetic.options import Clutter, Container, RadarMessage, RadarName, SceneName, SimulationOptions
+from calib_core.synthetic.options import (
+    Clicking,
+    Clutter,
+    Container,
+    IntrinsicsErrors,
+    RadarDefects,
+    RadarMessage,
+    RadarName,
+    SceneName,
+    SimulationOptions,
+    Surroundings,
+)
 from calib_core.synthetic.pairs import (
     AISLE,
     FIELD,
@@ -12,34 +24,43 @@ from calib_core.synthetic.pairs import (
     SimulatedPairs,
     simulate_pairs,
 )
+from calib_core.synthetic.placements import SimulatedPlacement
+from calib_core.synthetic.presets import PRESETS, PresetName
 from calib_core.synthetic.radar_profiles import RADAR_PROFILES, RadarProfile
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording, simulate
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
-from calib_core.synthetic.scans import SimulatedPlacement, SimulatedScans, simulate_scans
+from calib_core.synthetic.scans import SimulatedScans, simulate_scans
 from calib_core.synthetic.systematic_errors import SystematicErrors, draw_systematic_errors
 
 __all__ = [
     "AISLE",
     "FIELD",
     "NOISE_PROFILES",
+    "PRESETS",
     "RADAR_PROFILES",
+    "Clicking",
     "Clutter",
     "Container",
+    "IntrinsicsErrors",
     "NoiseProfile",
     "OutlierMix",
     "PairsLayout",
+    "PresetName",
+    "RadarDefects",
     "RadarMessage",
     "RadarName",
     "RadarProfile",
     "Rig",
     "RigOptions",
     "SceneName",
+    "SimulatedClick",
     "SimulatedFrame",
     "SimulatedPairs",
     "SimulatedPlacement",
     "SimulatedRecording",
     "SimulatedScans",
     "SimulationOptions",
+    "Surroundings",
     "SystematicErrors",
     "draw_systematic_errors",
     "random_rig",

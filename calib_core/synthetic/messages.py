@@ -2,11 +2,13 @@
 
 import heapq
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from calib_core.measurements import RadarScan, TimeNs
+from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.containers.writing import (
     CameraInfoMessage,
     CloudMessage,
@@ -15,6 +17,8 @@ from calib_core.recordings.containers.writing import (
     RadarReturnMessage,
     RecordedMessage,
 )
+from calib_core.synthetic.antennas import Antenna
+from calib_core.synthetic.defects import second_azimuths
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
 
 __all__ = [
@@ -25,6 +29,8 @@ __all__ = [
     "RADAR_FRAME",
     "RADAR_SCAN_TOPIC",
     "RAW_IMAGE_TOPIC",
+    "SECOND_COLUMN",
+    "SECOND_SUFFIX",
     "all_messages",
     "camera_messages",
     "radar_messages",
@@ -35,6 +41,10 @@ CLOUD_TOPIC = "/ti_mmwave/radar_scan_pcl"
 RAW_IMAGE_TOPIC = "/camera/image_raw"
 IMAGE_TOPIC = "/camera/image_raw/compressed"
 CAMERA_INFO_TOPIC = "/camera/camera_info"
+SECOND_SUFFIX = "_second_azimuth"
+"""Of the topic with the same returns at their second azimuths."""
+SECOND_COLUMN = "azimuth_2"
+"""Or of the column with the second azimuth [rad]."""
 RADAR_FRAME = "ti_mmwave_0"
 CAMERA_FRAME = "camera_optical_frame"
 
@@ -53,7 +63,7 @@ def camera_messages(
     """
     options = recording.options
     for frame in recording.frames() if frames is None else frames:
-        info = CameraInfoMessage(frame.time, CAMERA_FRAME, recording.camera)
+        info = CameraInfoMessage(frame.time, CAMERA_FRAME, recording.stage.published_camera)
         yield RecordedMessage(CAMERA_INFO_TOPIC, frame.receive_time, info)
         if options.raw_images:
             raw = ImageMessage(frame.time, CAMERA_FRAME, frame.pixels)
@@ -72,13 +82,25 @@ def radar_messages(recording: SimulatedRecording, generation: Literal[1, 2]) -> 
         recording: the recording.
         generation: of ROS; 1 writes the messages of options.radar_message, 2 writes clouds.
     """
-    options = recording.options
+    streams = [_antenna_messages(recording, antenna, generation) for antenna in recording.stage.antennas]
+    return heapq.merge(*streams, key=lambda message: message.receive_time)
+
+
+def _antenna_messages(
+    recording: SimulatedRecording, antenna: Antenna, generation: Literal[1, 2]
+) -> Iterator[RecordedMessage]:
+    options, second = recording.options, recording.options.defects.second_azimuth
     cloud = generation == 2 or options.radar_message == "cloud" or options.radar == "imaging"
-    for scan, receive in zip(recording.scans(), recording.stage.scan_times.receive_ns, strict=True):
-        if cloud:
-            yield _cloud(scan, TimeNs(int(receive)))
-        else:
+    cloud = cloud or second != "none" or bool(antenna.name)
+    topic = f"{CLOUD_TOPIC}_{antenna.name}" if antenna.name else CLOUD_TOPIC
+    for scan, receive in zip(recording.scans_of(antenna), antenna.times.receive_ns, strict=True):
+        if not cloud:
             yield from _returns(recording, scan, int(receive))
+            continue
+        yield _cloud(topic, scan, TimeNs(int(receive)), second_column=second == "column")
+        if second == "topic":
+            other = replace(scan, points_radar_m=second_azimuths(scan.points_radar_m))
+            yield _cloud(f"{topic}{SECOND_SUFFIX}", other, TimeNs(int(receive)))
 
 
 def all_messages(
@@ -98,10 +120,13 @@ def all_messages(
     )
 
 
-def _cloud(scan: RadarScan, receive: TimeNs) -> RecordedMessage:
-    values = np.column_stack([scan.points_radar_m, scan.snr_db, scan.doppler_mps])
-    body = CloudMessage(scan.time, RADAR_FRAME, ("x", "y", "z", "intensity", "velocity"), values)
-    return RecordedMessage(CLOUD_TOPIC, receive, body)
+def _cloud(topic: str, scan: RadarScan, receive: TimeNs, *, second_column: bool = False) -> RecordedMessage:
+    names: tuple[str, ...] = ("x", "y", "z", "intensity", "velocity")
+    columns = [scan.points_radar_m, scan.snr_db, scan.doppler_mps]
+    if second_column:
+        names = (*names, SECOND_COLUMN)
+        columns.append(polar_from_cartesian(second_azimuths(scan.points_radar_m))[:, 1])
+    return RecordedMessage(topic, receive, CloudMessage(scan.time, RADAR_FRAME, names, np.column_stack(columns)))
 
 
 def _returns(recording: SimulatedRecording, scan: RadarScan, receive: int) -> Iterator[RecordedMessage]:

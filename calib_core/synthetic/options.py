@@ -1,20 +1,131 @@
 """All options of a simulated recording. They define the flags of `cocalib simulate`."""
 
+import dataclasses
+import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from calib_core.camera import CameraModel
 from calib_core.errors import OptionError
 from calib_core.options import option
 from calib_core.synthetic.rig import RigOptions
 
-__all__ = ["Clutter", "Container", "RadarMessage", "RadarName", "SceneName", "SimulationOptions"]
+__all__ = [
+    "Clicking",
+    "Clutter",
+    "Container",
+    "IntrinsicsErrors",
+    "RadarDefects",
+    "RadarMessage",
+    "RadarName",
+    "ReportedElevation",
+    "SceneName",
+    "SecondAzimuth",
+    "SimulationOptions",
+    "Surroundings",
+]
 
 SceneName = Literal["rooftop", "field", "aisle", "checkerboard"]
 RadarName = Literal["awr1843", "imaging"]
 RadarMessage = Literal["filled", "stock", "cloud"]
 Clutter = Literal["none", "scene", "heavy"]
 Container = Literal["ros1", "mcap", "db3"]
+ReportedElevation = Literal["measured", "zero", "rounding"]
+SecondAzimuth = Literal["none", "column", "topic"]
+
+
+@dataclass(frozen=True, slots=True)
+class RadarDefects:
+    """How the radar differs from a perfect one, and what its driver does to the positions."""
+
+    azimuth_scale: float = option(1.0, "Reported azimuth over the true one.", low=0.5, high=2.0)
+    elevation_scale: float = option(1.0, "Reported elevation over the true one.", low=0.5, high=2.0)
+    scaled: Literal["angle", "sine"] = option(
+        "angle", "What the two scales multiply: the angle, or its sine, as a wrong spacing or wavelength does."
+    )
+    azimuth_bias_deg: float = option(0.0, "Constant azimuth error [deg].", low=-45.0, high=45.0)
+    elevation_bias_deg: float = option(0.0, "Constant elevation error [deg].", low=-45.0, high=45.0)
+    range_bias_m: float = option(0.0, "Constant range error [m].", low=-2.0, high=2.0)
+    range_scale: float = option(1.0, "Reported range over the true one.", low=0.5, high=2.0)
+    elevation: ReportedElevation = option(
+        "measured", "Elevations: as measured, all zero as from a 2D radar, or a rounding error of 1e-6 rad."
+    )
+    z_offset_m: float = option(
+        0.0, "What the driver adds to z, such as the height of the mount [m].", low=-10.0, high=10.0
+    )
+    mirrored: bool = option(False, "Have the driver report y to the right, which mirrors the scene.")
+    length_unit_m: float = option(
+        1.0, "Unit of the lengths that the driver reports, such as 0.001 for millimetres [m].", low=1e-4, high=10.0
+    )
+    range_bin_m: float | None = option(None, "Width of a range bin [m]; by default the radar's.", low=0.001, high=1.0)
+    azimuth_bins: int | None = option(
+        None, "Bins over the sine of the azimuth from -1 to 1, 0 to interpolate; by default the radar's.", high=4096
+    )
+    elevation_bins: int = option(0, "The same for the elevation.", low=0, high=4096)
+    scatter_range_m: float | None = option(
+        None, "Standard deviation of one scan's range [m]; by default the radar's.", low=0.0, high=2.0
+    )
+    scatter_azimuth_deg: float | None = option(
+        None, "Standard deviation of one scan's azimuth [deg]; by default the radar's.", low=0.0, high=20.0
+    )
+    scatter_elevation_deg: float | None = option(
+        None, "Standard deviation of one scan's elevation [deg]; by default the radar's.", low=0.0, high=20.0
+    )
+    near_and_far: bool = option(
+        False, "Publish near scans (25 Hz, up to 10 m) and far scans (20 Hz, from 5 m) as clouds in two topics."
+    )
+    second_azimuth: SecondAzimuth = option(
+        "none", "Publish a second azimuth of each return: not, or in a column or a topic of its own; as clouds."
+    )
+    second_azimuth_share: float = option(
+        0.15, "Share of the ranges at which the second azimuth is the true one.", low=0.0, high=1.0
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What stands and walks in the scene besides the reflector."""
+
+    companion: bool = option(False, "Put a cart behind each reflector, at every placement.")
+    companion_distance_m: float = option(1.0, "How far behind the reflector the cart stands [m].", low=0.3, high=5.0)
+    companion_dbsm: float = option(18.0, "Radar cross-section of the cart; the reflector has 12 [dBsm].", high=60.0)
+    parked_cars: int = option(0, "Number of parked cars at the sides of the scene.", low=0, high=8)
+    fence: bool = option(False, "Put a fence with metal posts along one side of the scene.")
+    strong_target_dbsm: float | None = option(
+        None,
+        "Radar cross-section of one more permanent target, such as 29; by default there is none [dBsm].",
+        high=60.0,
+    )
+    flickering_targets: int = option(
+        0,
+        "Number of static targets whose echoes come and go every few seconds, as of swaying branches.",
+        low=0,
+        high=40,
+    )
+    passers_by: int = option(0, "Number of people who walk through the scene; every third stops on the way.", low=0)
+
+
+@dataclass(frozen=True, slots=True)
+class IntrinsicsErrors:
+    """How the published intrinsics differ from those of the pictures."""
+
+    focal_length_scale: float = option(1.0, "Published focal length over the true one.", low=0.5, high=2.0)
+    principal_point_px: tuple[float, float] = option(
+        (0.0, 0.0), "How far right and down of the true one the published principal point is [px]."
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Clicking:
+    """How the example clicks are made."""
+
+    clicks_per_placement: int = option(1, "Clicks of each placement, in different frames.", low=1, high=9)
+    low_px: float = option(0.0, "How far below the right pixel every click is [px].", low=-500.0, high=500.0)
+    low_m: float = option(0.0, "How far below the apex every click is, on the reflector [m].", low=-1.0, high=1.0)
+    late_share: float = option(
+        0.0, "Share of the clicks that are made one dwell late, when the reflector has moved on.", low=0.0, high=1.0
+    )
+    hasty_first_px: float = option(0.0, "Error of the first click, in any direction [px].", low=0.0, high=500.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +171,17 @@ class SimulationOptions:
     click_sigma_px: float = option(0.7, "Standard deviation of the example clicks, per axis [px].")
     start_s: int = option(1_760_000_000, "Start of the recording [s since 1970].")
     seed: int = option(1, "Seed of the random generator.")
+    reflectors: int = option(
+        1, "Number of reflectors, moved in turn; the example clicks name all that stand.", low=1, high=4
+    )
+    islands: bool = option(False, "Record only 2 to 15 s around each dwell, with gaps of 1 to 5 minutes between.")
     rig: RigOptions = option(RigOptions(), "How the sensors are mounted.")
+    defects: RadarDefects = option(RadarDefects(), "How the radar differs from a perfect one.")
+    surroundings: Surroundings = option(Surroundings(), "What stands and walks in the scene besides the reflector.")
+    intrinsics: IntrinsicsErrors = option(
+        IntrinsicsErrors(), "How the published intrinsics differ from those of the pictures."
+    )
+    clicking: Clicking = option(Clicking(), "How the example clicks are made.")
 
     def __post_init__(self) -> None:
         _require(self.placements >= 1, "placements", self.placements, "at least 1")
@@ -69,6 +190,24 @@ class SimulationOptions:
         _require(1 <= self.jpeg_quality <= 100, "jpeg_quality", self.jpeg_quality, "1 to 100")
         _require(0.0 <= self.dropped_share < 0.9, "dropped_share", self.dropped_share, "0 to 0.9")
         _require(min(self.width_px, self.height_px) >= 64, "image size", self.width_px, "at least 64 px")
+        roomy = self.scene != "aisle" or not (self.surroundings.parked_cars or self.surroundings.fence)
+        _require(roomy, "scene", self.scene, "another one: the aisle has no room for parked cars or a fence")
+        _check_ranges(self)
+
+
+def _check_ranges(options: Any, prefix: str = "") -> None:
+    """Compare every number with the range of its field.
+
+    Raises:
+        OptionError: names the option, its value and the range.
+    """
+    for field in dataclasses.fields(options):
+        value, name = getattr(options, field.name), f"{prefix}{field.name}"
+        if dataclasses.is_dataclass(value):
+            _check_ranges(value, f"{name}.")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            low, high = field.metadata["low"], field.metadata["high"]
+            _require(math.isfinite(value) and low <= value <= high, name, value, f"{low:g} to {high:g}")
 
 
 def _require(good: bool, name: str, value: object, wanted: str) -> None:

@@ -1,13 +1,15 @@
-"""Resolution and noise of two kinds of radar.
+"""Resolution and noise of two kinds of radar, and what the options change of them.
 
 The values are assumptions in line with vendors' figures and with an array simulation; no real radar was measured.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from calib_core.synthetic.options import RadarName
+import numpy as np
 
-__all__ = ["RADAR_PROFILES", "RadarProfile"]
+from calib_core.synthetic.options import RadarDefects, RadarName
+
+__all__ = ["RADAR_PROFILES", "RadarProfile", "profile_with"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +52,8 @@ class RadarProfile:
     """Mean number of false returns per scan."""
     latency_s: float
     """Delay from the measurement to its stamp [s]."""
+    elevation_bins: int = 0
+    """Bins over the sine of the elevation from -1 to 1; 0 interpolates."""
 
 
 RADAR_PROFILES: dict[RadarName, RadarProfile] = {
@@ -94,3 +98,20 @@ RADAR_PROFILES: dict[RadarName, RadarProfile] = {
         latency_s=0.030,
     ),
 }
+
+
+def profile_with(name: RadarName, defects: RadarDefects) -> RadarProfile:
+    """Return a radar's profile with the bins and the scatter that the options ask for."""
+    changes: dict[str, float | int | None] = {
+        "range_bin_m": defects.range_bin_m,
+        "angle_bins": defects.azimuth_bins,
+        "elevation_bins": defects.elevation_bins,
+        "range_sigma_m": defects.scatter_range_m,
+        "azimuth_sigma": _sine(defects.scatter_azimuth_deg),
+        "elevation_sigma": _sine(defects.scatter_elevation_deg),
+    }
+    return replace(RADAR_PROFILES[name], **{key: value for key, value in changes.items() if value is not None})  # type: ignore[arg-type]
+
+
+def _sine(angle_deg: float | None) -> float | None:
+    return None if angle_deg is None else float(np.sin(np.deg2rad(angle_deg)))

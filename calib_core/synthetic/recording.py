@@ -8,9 +8,12 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import RadarScan, ReflectorClick, TimeNs
+from calib_core.synthetic.antennas import Antenna
+from calib_core.synthetic.clicking import SimulatedClick, clicks_of
 from calib_core.synthetic.options import SimulationOptions
+from calib_core.synthetic.placements import SimulatedPlacement, placements_of
 from calib_core.synthetic.rendering.frames import FrameRenderer
-from calib_core.synthetic.scans import SimulatedPlacement, clicks_of, placements_of, radar_scans
+from calib_core.synthetic.scans import antenna_scans, radar_scans
 from calib_core.synthetic.stage import Stage, child_rng, set_stage
 
 __all__ = ["SimulatedFrame", "SimulatedRecording", "simulate"]
@@ -48,12 +51,17 @@ class SimulatedRecording:
     Attributes:
         stage: everything decided before the sensors measure.
         placements: the truth about each placement, in order of time.
-        clicks: one example click per placement, with click noise.
+        clicked: the example clicks with their truth; by default one per placement, with click noise.
     """
 
     stage: Stage
     placements: tuple[SimulatedPlacement, ...]
-    clicks: tuple[ReflectorClick, ...]
+    clicked: tuple[SimulatedClick, ...]
+
+    @property
+    def clicks(self) -> tuple[ReflectorClick, ...]:
+        """The example clicks."""
+        return tuple(one.click for one in self.clicked)
 
     @property
     def options(self) -> SimulationOptions:
@@ -71,8 +79,12 @@ class SimulatedRecording:
         return self.stage.rig.camera_from_radar
 
     def scans(self) -> Iterator[RadarScan]:
-        """Yield scans in order of header stamps; the same scans every time."""
+        """Yield the scans of all antennas in order of header stamps; the same scans every time."""
         return radar_scans(self.stage)
+
+    def scans_of(self, antenna: Antenna) -> Iterator[RadarScan]:
+        """Yield the scans of one of the stage's antennas."""
+        return antenna_scans(self.stage, antenna)
 
     def frames(self, limit: int | None = None) -> Iterator[SimulatedFrame]:
         """Render and yield frames; the same frames every time.
@@ -81,7 +93,7 @@ class SimulatedRecording:
             limit: number of frames from the start; None for all.
         """
         stage, options = self.stage, self.options
-        renderer = FrameRenderer.of(stage.scene, stage.rig)
+        renderer = FrameRenderer.of(stage.scene, stage.rig, options.surroundings)
         rng = child_rng(options, 11)
         for i, moment_s in enumerate(stage.frame_times.moment_s[:limit]):
             moment = stage.story.at(float(moment_s))

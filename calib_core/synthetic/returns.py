@@ -7,6 +7,8 @@ import numpy as np
 from calib_core.arrays import Flags, Points3, Values, frozen_array
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import direction_cosines
+from calib_core.synthetic.defects import distorted, reported_points
+from calib_core.synthetic.options import RadarDefects
 from calib_core.synthetic.radar_profiles import RadarProfile
 
 __all__ = ["Targets", "measure"]
@@ -14,6 +16,7 @@ __all__ = ["Targets", "measure"]
 _MISSED = 0.02
 _SIDE_LOBE_SHARE = 0.12
 _SIDE_LOBE_DB = 11.0
+_NO_DEFECTS = RadarDefects()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,6 +54,19 @@ class Targets:
     def __len__(self) -> int:
         return len(self.points_radar_m)
 
+    def within(self, min_range_m: float, max_range_m: float) -> "Targets":
+        """Return only the objects between two ranges."""
+        range_m = np.linalg.norm(self.points_radar_m, axis=1)
+        rows = (range_m >= min_range_m) & (range_m <= max_range_m)
+        return Targets(
+            self.points_radar_m[rows],
+            self.velocity_mps[rows],
+            self.rcs_dbsm[rows],
+            self.fading_db[rows],
+            self.bias[rows],
+            self.hidden[rows],
+        )
+
 
 def measure(
     rng: np.random.Generator,
@@ -60,6 +76,7 @@ def measure(
     time: TimeNs,
     angle_bins: bool = True,
     calibration_phase: float = 0.0,
+    defects: RadarDefects = _NO_DEFECTS,
 ) -> RadarScan:
     """Measure all targets once.
 
@@ -73,16 +90,16 @@ def measure(
         time: the stamp.
         angle_bins: whether azimuths lie on the profile's lattice.
         calibration_phase: where the smooth angle error is zero; a property of one radar.
+        defects: how the radar differs from a perfect one.
     """
     cosines, velocity, snr = _echoes(rng, targets, profile, calibration_phase)
     cosines, velocity, snr = _with_side_lobes(rng, cosines, velocity, snr, profile)
     cosines, velocity, snr = _with_false_alarms(rng, cosines, velocity, snr, profile)
+    cosines = distorted(cosines, defects)
     cosines, velocity = _on_bins(cosines, velocity, profile, angle_bins)
     kept = _resolved(cosines, velocity, snr, profile)
     kept = kept[np.argsort(cosines[kept, 0], kind="stable")]
-    r, u, w = cosines[kept].T
-    x = r * np.sqrt(np.maximum(0.0, 1.0 - u * u - w * w))
-    points = np.stack([x, r * u, r * w], axis=1).astype(np.float32).astype(np.float64)
+    points = reported_points(rng, cosines[kept], defects).astype(np.float32).astype(np.float64)
     n = len(points)
     return RadarScan(
         time,
@@ -155,6 +172,9 @@ def _on_bins(cosines: Points3, velocity: Values, profile: RadarProfile, angle_bi
     if angle_bins and profile.angle_bins:
         half = profile.angle_bins / 2.0
         cosines[:, 1] = np.clip(np.round(cosines[:, 1] * half), -half, half - 1.0) / half
+    if profile.elevation_bins:
+        half = profile.elevation_bins / 2.0
+        cosines[:, 2] = np.clip(np.round(cosines[:, 2] * half), -half, half - 1.0) / half
     cosines[:, 2] = np.clip(cosines[:, 2], -0.95, 0.95)
     half_bins = profile.doppler_bins // 2
     index = np.round(velocity / profile.doppler_bin_mps)

@@ -35,6 +35,7 @@ class RigOptions:
 
     radar_height_m: float = option(1.2, "Height of the radar above the ground [m].")
     radar_tilt_deg: float = option(10.0, "How far the radar looks down [deg].")
+    radar_roll_deg: float = option(0.0, "How far the radar leans to its right [deg].")
     camera_offset_m: tuple[float, float, float] = option(
         (0.0, 0.0, 0.045), "Nominal camera centre in the radar frame: forward, left, up [m]."
     )
@@ -108,8 +109,10 @@ def typical_camera(
 
 
 def radar_stand(options: RigOptions) -> RigidTransform:
-    """Return radar_from_world of a radar at the given height, tilted down."""
+    """Return radar_from_world of a radar at the given height, tilted down and leaning."""
     tilt = rotation_exp(np.array([0.0, np.deg2rad(options.radar_tilt_deg), 0.0]))  # world_from_radar: nose down
+    if options.radar_roll_deg:
+        tilt = tilt @ rotation_exp(np.array([np.deg2rad(options.radar_roll_deg), 0.0, 0.0]))
     world_from_radar = RigidTransform(tilt, np.array([0.0, 0.0, options.radar_height_m]))
     return world_from_radar.inverse()
 

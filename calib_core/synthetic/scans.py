@@ -1,61 +1,32 @@
 """A simulated session without pictures: radar scans, truth and example clicks."""
 
+import heapq
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points2, Points3, Vector2, Vector3, frozen_array
+from calib_core.arrays import Flags, Points2, Points3
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
-from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
+from calib_core.measurements import RadarScan, RadarScans, ReflectorClick, TimeNs
+from calib_core.synthetic.antennas import Antenna
+from calib_core.synthetic.clicking import SimulatedClick, clicks_of
+from calib_core.synthetic.defects import second_azimuths, second_is_true
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.person import PersonState, capsules
+from calib_core.synthetic.placements import SimulatedPlacement, placements_of
 from calib_core.synthetic.returns import Targets, measure
 from calib_core.synthetic.stage import Stage, child_rng, set_stage
 from calib_core.synthetic.story import Moment, Resting
+from calib_core.synthetic.surroundings import cart_position
 
-__all__ = [
-    "SimulatedPlacement",
-    "SimulatedScans",
-    "clicks_of",
-    "placements_of",
-    "radar_scans",
-    "simulate_scans",
-    "targets_at",
-]
+__all__ = ["SimulatedScans", "antenna_scans", "radar_scans", "simulate_scans", "targets_at"]
 
 _REFLECTOR_DBSM = 12.0
 _CARRIED_DBSM = 0.0
 _SHOULDER_M = 0.24
 _STEP_S = 0.01
-_CLEARANCE_M = 0.16
-"""How far a limb must be from the line of sight for all of the reflector to be visible."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SimulatedPlacement:
-    """The truth about one placement.
-
-    Attributes:
-        id: "placement-01" and so on.
-        start: when the reflector is released, on the camera's clock.
-        end: when it is picked up again.
-        position_radar_m: (3,) its apex, which is its phase centre.
-        pixel_px: (2,) where the camera sees that apex.
-        best_image_time: stamp of the frame nearest to the middle of the dwell with nobody in front.
-    """
-
-    id: str
-    start: TimeNs
-    end: TimeNs
-    position_radar_m: Vector3
-    pixel_px: Vector2
-    best_image_time: TimeNs
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "position_radar_m", frozen_array(self.position_radar_m, (3,)))
-        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,20 +35,30 @@ class SimulatedScans:
 
     Attributes:
         stage: everything decided before the sensors measure.
-        scans: the radar's scans, by header stamps.
-        clicks: one per placement at its best frame, with click noise; ids "c1", "c2", ...
+        scans: the radar's scans of all antennas, by header stamps.
+        clicked: the example clicks with their truth; by default one per placement at its best frame, with click noise.
         placements: the truth, in order of time.
     """
 
     stage: Stage
     scans: RadarScans
-    clicks: tuple[ReflectorClick, ...]
+    clicked: tuple[SimulatedClick, ...]
     placements: tuple[SimulatedPlacement, ...]
+
+    @property
+    def clicks(self) -> tuple[ReflectorClick, ...]:
+        """The example clicks; ids "c1", "c2", ..."""
+        return tuple(one.click for one in self.clicked)
 
     @property
     def camera(self) -> Camera:
         """The intrinsics."""
         return self.stage.rig.camera
+
+    @property
+    def published_camera(self) -> Camera:
+        """The intrinsics that an estimator is given; wrong if the options say so."""
+        return self.stage.published_camera
 
     @property
     def camera_from_radar(self) -> RigidTransform:
@@ -108,77 +89,40 @@ def simulate_scans(options: SimulationOptions | None = None) -> SimulatedScans:
     )
 
 
-def clicks_of(stage: Stage, placements: tuple[SimulatedPlacement, ...]) -> tuple[ReflectorClick, ...]:
-    """Click each placement once, with click noise."""
-    noise = stage.options.click_sigma_px * child_rng(stage.options, 8).standard_normal((len(placements), 2))
-    pixels = [placement.pixel_px + error for placement, error in zip(placements, noise, strict=True)]
-    return tuple(
-        ReflectorClick(placement.best_image_time, f"c{i + 1}", round(float(pixel[0]), 2), round(float(pixel[1]), 2))
-        for i, (placement, pixel) in enumerate(zip(placements, pixels, strict=True))
-    )
-
-
-def placements_of(stage: Stage) -> tuple[SimulatedPlacement, ...]:
-    """Return the truth about every placement."""
-    start_ns = stage.options.start_s * NS_PER_S
-    found = []
-    for resting in stage.story.restings:
-        point = (stage.rig.radar_from_world @ resting.position_m[None])[0]
-        pixel = stage.rig.camera.project(stage.rig.camera_from_radar @ point[None])[0]
-        found.append(
-            SimulatedPlacement(
-                f"placement-{resting.index + 1:02d}",
-                TimeNs(start_ns + round(resting.start_s * NS_PER_S)),
-                TimeNs(start_ns + round(resting.end_s * NS_PER_S)),
-                point,
-                pixel,
-                _best_frame(stage, resting),
-            )
-        )
-    return tuple(found)
-
-
-def _best_frame(stage: Stage, resting: Resting) -> TimeNs:
-    """Find the frame nearest to the middle of a placement in which the whole reflector is visible.
-
-    Raises:
-        ValueError: no frame shows it; the frame rate is too low for the dwell.
-    """
-    moments = stage.frame_times.moment_s
-    inside = np.flatnonzero((moments > resting.start_s) & (moments < resting.end_s))
-    middle_s = 0.5 * (resting.start_s + resting.end_s)
-    for i in inside[np.argsort(np.abs(moments[inside] - middle_s), kind="stable")].tolist():
-        person = stage.story.at(float(moments[i])).person
-        if not stage.options.person or _shows(stage, person, resting.position_m):
-            return TimeNs(int(stage.frame_times.header_ns[i]))
-    raise ValueError(f"no frame shows placement {resting.index + 1}: raise the frame rate or the dwell time")
-
-
-def _shows(stage: Stage, person: PersonState, position_m: Vector3) -> bool:
-    """Return whether no limb is near the line of sight from the camera to the reflector."""
-    eye = stage.rig.camera_position_world_m
-    sight = np.linspace(0.02, 0.98, 60)[:, None] * (position_m - eye) + eye
-    for limb in capsules(person):
-        steps = np.linspace(0.0, 1.0, 4)[:, None] * (limb.end_m - limb.start_m) + limb.start_m
-        gap = np.linalg.norm(sight[:, None] - steps[None], axis=2).min()
-        if gap < max(limb.start_radius_m, limb.end_radius_m) + _CLEARANCE_M:
-            return False
-    return True
-
-
 def radar_scans(stage: Stage) -> Iterator[RadarScan]:
-    """Yield the radar's scans."""
-    rng = child_rng(stage.options, 9)
-    phase = float(child_rng(stage.options, 10).uniform(0.0, 2.0 * np.pi))
-    for moment_s, stamp in zip(stage.scan_times.moment_s, stage.scan_times.header_ns, strict=True):
-        yield measure(
+    """Yield the radar's scans of all antennas, by header stamps."""
+    streams = [antenna_scans(stage, antenna) for antenna in stage.antennas]
+    return heapq.merge(*streams, key=lambda scan: scan.time)
+
+
+def antenna_scans(stage: Stage, antenna: Antenna) -> Iterator[RadarScan]:
+    """Yield the scans of one antenna."""
+    number = 20 * stage.antennas.index(antenna)
+    rng = child_rng(stage.options, 9 + number)
+    phase = float(child_rng(stage.options, 10 + number).uniform(0.0, 2.0 * np.pi))
+    for moment_s, stamp in zip(antenna.times.moment_s, antenna.times.header_ns, strict=True):
+        targets = targets_at(stage, float(moment_s))
+        if antenna.name:
+            targets = targets.within(antenna.min_range_m, antenna.max_range_m)
+        scan = measure(
             rng,
-            targets_at(stage, float(moment_s)),
-            profile=stage.profile,
+            targets,
+            profile=antenna.profile,
             time=TimeNs(int(stamp)),
             angle_bins=stage.options.angle_bins,
             calibration_phase=phase,
+            defects=stage.options.defects,
         )
+        yield scan if stage.options.defects.second_azimuth == "none" else _with_wrong_azimuths(stage, scan)
+
+
+def _with_wrong_azimuths(stage: Stage, scan: RadarScan) -> RadarScan:
+    """Give the returns at some ranges the second azimuth as their first one."""
+    points, share = scan.points_radar_m, stage.options.defects.second_azimuth_share
+    phase = float(child_rng(stage.options, 12).uniform())
+    wrong = second_is_true(np.linalg.norm(points, axis=1), phase, share)
+    taken = np.where(wrong[:, None], second_azimuths(points), points)
+    return replace(scan, points_radar_m=taken.astype(np.float32).astype(np.float64))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,18 +137,22 @@ class _Echo:
 
 
 def targets_at(stage: Stage, time_s: float) -> Targets:
-    """List the objects in front of the radar at a time: clutter, reflector and its ghost, the person's limbs."""
+    """List the objects in front of the radar at a time: clutter, reflectors and their ghosts, people's limbs."""
     before, now, after = (stage.story.at(time_s + step) for step in (-_STEP_S, 0.0, _STEP_S))
-    echoes = [_clutter_echo(stage), *_reflector_echoes(stage, before, now, after)]
+    echoes = [_clutter_echo(stage), *_flicker_echoes(stage, time_s), *_reflector_echoes(stage, before, now, after)]
     if stage.options.person:
         echoes.append(_person_echo(before.person, after.person))
+    if len(before.passers_by) == len(after.passers_by):
+        echoes += [_person_echo(*states) for states in zip(before.passers_by, after.passers_by, strict=True)]
     from_world = stage.rig.radar_from_world
     start = from_world @ np.concatenate([echo.before_m for echo in echoes])
     end = from_world @ np.concatenate([echo.after_m for echo in echoes])
     middle = 0.5 * (start + end)
     speed = (np.linalg.norm(end, axis=1) - np.linalg.norm(start, axis=1)) / (2.0 * _STEP_S)
     world = np.concatenate([0.5 * (echo.before_m + echo.after_m) for echo in echoes])
-    hidden = _behind(now.person, world) if stage.options.person else np.zeros(len(world), dtype=np.bool_)
+    hidden = np.zeros(len(world), dtype=np.bool_)
+    for person in (now.person, *now.passers_by) if stage.options.person else now.passers_by:
+        hidden |= _behind(person, world)
     return Targets(
         middle,
         speed,
@@ -220,19 +168,38 @@ def _clutter_echo(stage: Stage) -> _Echo:
     return _Echo(places, places, tuple(thing.rcs_dbsm for thing in stage.clutter), 2.0, stage.clutter_bias)
 
 
+def _flicker_echoes(stage: Stage, time_s: float) -> list[_Echo]:
+    shown = [one.scatterer for one in stage.flickers if one.shows(time_s)]
+    if not shown:
+        return []
+    places = np.array([[one.x_m, one.y_m, one.z_m] for one in shown])
+    return [_Echo(places, places, tuple(one.rcs_dbsm for one in shown), 2.0, np.zeros((len(shown), 3)))]
+
+
 def _reflector_echoes(stage: Stage, before: Moment, now: Moment, after: Moment) -> list[_Echo]:
-    if now.resting is None:
-        if not stage.options.person:
-            return []
+    standing = (now.resting, *now.standing) if now.resting is not None else now.standing
+    echoes = [echo for resting in standing for echo in _standing_echoes(stage, resting)]
+    if now.resting is None and stage.options.person:
         still = np.zeros((1, 3))
-        return [_Echo(before.reflector_m[None], after.reflector_m[None], (_CARRIED_DBSM,), 5.0, still)]
-    place = now.resting.position_m[None]
-    bias = stage.reflector_bias[now.resting.index][None]
+        echoes.append(_Echo(before.reflector_m[None], after.reflector_m[None], (_CARRIED_DBSM,), 5.0, still))
+        if stage.options.surroundings.companion:
+            carts = [cart_position(moment.reflector_m, stage.options.surroundings)[None] for moment in (before, after)]
+            echoes.append(_Echo(carts[0], carts[1], (stage.options.surroundings.companion_dbsm,), 5.0, still))
+    return echoes
+
+
+def _standing_echoes(stage: Stage, resting: Resting) -> list[_Echo]:
+    """List a reflector at rest, its ghost, and the cart behind it."""
+    place = resting.position_m[None]
+    bias = stage.reflector_bias[resting.index][None]
     echoes = [_Echo(place, place, (_REFLECTOR_DBSM,), 1.0, bias)]
-    ghost = stage.ghosts[now.resting.index]
+    ghost = stage.ghosts[resting.index]
     if ghost is not None:
         mirrored = np.array([[ghost.x_m, ghost.y_m, ghost.z_m]])
         echoes.append(_Echo(mirrored, mirrored, (ghost.rcs_dbsm,), 4.0, bias))
+    if stage.options.surroundings.companion:
+        cart = cart_position(resting.position_m, stage.options.surroundings)[None]
+        echoes.append(_Echo(cart, cart, (stage.options.surroundings.companion_dbsm,), 1.5, bias))
     return echoes
 
 

@@ -5,14 +5,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Points3, Vector3
-from calib_core.measurements import NS_PER_S
-from calib_core.synthetic.options import SimulationOptions
+from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.synthetic.antennas import Antenna, antennas_of
+from calib_core.synthetic.defects import radar_from_reported
+from calib_core.synthetic.options import IntrinsicsErrors, SimulationOptions
 from calib_core.synthetic.pairs import draw_positions
-from calib_core.synthetic.radar_profiles import RADAR_PROFILES, RadarProfile
+from calib_core.synthetic.passers_by import draw_passers_by
+from calib_core.synthetic.radar_profiles import RadarProfile, profile_with
 from calib_core.synthetic.rig import Rig, random_rig, typical_camera
 from calib_core.synthetic.scenes import Scatterer, Scene, scene_named
 from calib_core.synthetic.story import Story, tell_story
-from calib_core.synthetic.timeline import SensorTimes, draw_times
+from calib_core.synthetic.surroundings import Flicker, draw_flickers, furnished, in_sight
+from calib_core.synthetic.timeline import Islands, SensorTimes, draw_islands, draw_times
 
 __all__ = ["Stage", "child_rng", "set_stage"]
 
@@ -32,11 +38,13 @@ class Stage:
         rig: the sensors.
         story: where person and reflector are at any time.
         frame_times: of the camera.
-        scan_times: of the radar.
+        antennas: the radar's, each with its times; one, or a near and a far one.
+        islands: the recorded parts of the story; None if all of it is recorded.
         clutter: static objects that the radar sees, in the world.
         clutter_bias: (k, 3) the constant error of each of them: range [m], sines of azimuth and elevation.
         reflector_bias: (n, 3) the constant error of each placement: range [m], sines of azimuth and elevation.
         ghosts: for each placement the static reflection that comes and goes with it, or None.
+        flickers: static targets that the radar sees at times.
     """
 
     options: SimulationOptions
@@ -44,16 +52,46 @@ class Stage:
     rig: Rig
     story: Story
     frame_times: SensorTimes
-    scan_times: SensorTimes
+    antennas: tuple[Antenna, ...]
+    islands: Islands | None
     clutter: tuple[Scatterer, ...]
     clutter_bias: Points3
     reflector_bias: Points3
     ghosts: tuple[Scatterer | None, ...]
+    flickers: tuple[Flicker, ...] = ()
 
     @property
     def profile(self) -> RadarProfile:
         """The radar's profile."""
-        return RADAR_PROFILES[self.options.radar]
+        return profile_with(self.options.radar, self.options.defects)
+
+    @property
+    def scan_times(self) -> SensorTimes:
+        """When the radar measured; of two antennas the far one."""
+        return self.antennas[0].times
+
+    @property
+    def published_camera(self) -> Camera:
+        """The intrinsics in the recording's camera info, which may be wrong; those of the pictures are the rig's."""
+        camera, errors = self.rig.camera, self.options.intrinsics
+        if errors == IntrinsicsErrors():
+            return camera
+        matrix = camera.matrix_px.copy()
+        matrix[[0, 1], [0, 1]] *= errors.focal_length_scale
+        matrix[:2, 2] += errors.principal_point_px
+        return replace(camera, matrix_px=matrix)
+
+    @property
+    def camera_from_reported(self) -> RigidTransform:
+        """The pose that maps what the radar reports to the camera, without scales: what an overlay needs."""
+        return self.rig.camera_from_radar @ radar_from_reported(self.options.defects)
+
+    def recorded_span(self, start_s: float, end_s: float) -> tuple[TimeNs, TimeNs]:
+        """Return the first and the last time, on the camera's clock, at which a part of the story is recorded."""
+        if self.islands is not None:
+            start_s, end_s = self.islands.first_after_s(start_s), self.islands.last_before_s(end_s)
+        start_ns = self.options.start_s * NS_PER_S
+        return TimeNs(start_ns + round(start_s * NS_PER_S)), TimeNs(start_ns + round(end_s * NS_PER_S))
 
 
 def child_rng(options: SimulationOptions, number: int) -> np.random.Generator:
@@ -63,7 +101,7 @@ def child_rng(options: SimulationOptions, number: int) -> np.random.Generator:
 
 def set_stage(options: SimulationOptions) -> Stage:
     """Decide where everything is at any time, from the options alone."""
-    scene = scene_named(options.scene)
+    scene, added = furnished(child_rng(options, 13), scene_named(options.scene), options.surroundings)
     camera = typical_camera(
         options.camera_model,
         width_px=options.width_px,
@@ -71,29 +109,13 @@ def set_stage(options: SimulationOptions) -> Stage:
         field_of_view_deg=options.field_of_view_deg,
     )
     rig = random_rig(child_rng(options, 0), camera=camera, options=options.rig)
-    positions = _positions(child_rng(options, 1), scene, rig, options)
-    story = tell_story(child_rng(options, 2), positions_m=positions, dwell_s=options.dwell_s, narrow=scene.narrow)
-    profile = RADAR_PROFILES[options.radar]
-    start_ns = options.start_s * NS_PER_S
-    frame_times = draw_times(
-        child_rng(options, 3),
-        duration_s=story.duration_s,
-        rate_hz=options.camera_rate_hz,
-        jitter_s=options.stamp_jitter_s,
-        dropped_share=options.dropped_share,
-        latency_s=0.0,
-        transfer_s=0.022,
-        start_ns=start_ns,
-    )
-    scan_times = draw_times(
-        child_rng(options, 4),
-        duration_s=story.duration_s,
-        rate_hz=options.radar_rate_hz,
-        jitter_s=options.stamp_jitter_s,
-        dropped_share=options.dropped_share,
-        latency_s=profile.latency_s + options.clock_offset_s,
-        transfer_s=0.003,
-        start_ns=start_ns,
+    positions = _positions(child_rng(options, 1), scene, added, rig, options)
+    story = _story(positions, scene, options)
+    islands = _islands(story, options)
+    profile = profile_with(options.radar, options.defects)
+    frame_times = _frame_times(story, islands, options)
+    antennas = antennas_of(
+        options, profile, (child_rng(options, 4), child_rng(options, 14)), duration_s=story.duration_s, islands=islands
     )
     rng = child_rng(options, 5)
     bias_sigma = [0.004, profile.azimuth_bias_sigma, profile.elevation_bias_sigma]
@@ -101,10 +123,53 @@ def set_stage(options: SimulationOptions) -> Stage:
     ghosts = tuple(_ghost(rng, resting.position_m) for resting in story.restings)
     clutter = _clutter(child_rng(options, 6), scene, options)
     clutter_bias = child_rng(options, 7).standard_normal((len(clutter), 3)) * bias_sigma
-    return Stage(options, scene, rig, story, frame_times, scan_times, clutter, clutter_bias, bias, ghosts)
+    flickers = draw_flickers(child_rng(options, 18), options.surroundings.flickering_targets, scene)
+    return Stage(
+        options, scene, rig, story, frame_times, antennas, islands, clutter, clutter_bias, bias, ghosts, flickers
+    )
 
 
-def _positions(rng: np.random.Generator, scene: Scene, rig: Rig, options: SimulationOptions) -> Points3:
+def _story(positions_m: Points3, scene: Scene, options: SimulationOptions) -> Story:
+    story = tell_story(
+        child_rng(options, 2),
+        positions_m=positions_m,
+        dwell_s=options.dwell_s,
+        narrow=scene.narrow,
+        reflectors=options.reflectors,
+    )
+    if not options.surroundings.passers_by:
+        return story
+    passers_by = draw_passers_by(
+        child_rng(options, 15),
+        options.surroundings.passers_by,
+        duration_s=story.duration_s,
+        max_range_m=0.8 * scene.layout.max_range_m,
+    )
+    return replace(story, passers_by=passers_by)
+
+
+def _frame_times(story: Story, islands: Islands | None, options: SimulationOptions) -> SensorTimes:
+    return draw_times(
+        child_rng(options, 3),
+        duration_s=story.duration_s,
+        rate_hz=options.camera_rate_hz,
+        jitter_s=options.stamp_jitter_s,
+        dropped_share=options.dropped_share,
+        latency_s=0.0,
+        transfer_s=0.022,
+        start_ns=options.start_s * NS_PER_S,
+        islands=islands,
+    )
+
+
+def _islands(story: Story, options: SimulationOptions) -> Islands | None:
+    if not options.islands:
+        return None
+    middles_s = np.array([resting.start_s + 0.5 * options.dwell_s for resting in story.restings])
+    return draw_islands(child_rng(options, 16), middles_s)
+
+
+def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, options: SimulationOptions) -> Points3:
     """Draw apex positions in the world, clear of the solids."""
     layout = scene.layout
     if options.heights:
@@ -116,6 +181,7 @@ def _positions(rng: np.random.Generator, scene: Scene, rig: Rig, options: Simula
         whole = rig.camera.in_image(
             rig.camera.project(rig.camera_from_world @ batch), margin_px=-_RIM_SHARE * options.width_px
         )
+        whole &= in_sight(added, batch)
         for position in batch[whole]:
             apart = all(np.linalg.norm(position[:2] - other[:2]) >= layout.separation_m for other in found)
             if apart and scene.free(position[:2], 0.7) and len(found) < options.placements:

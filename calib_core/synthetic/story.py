@@ -1,14 +1,17 @@
 """The story: a person carries the reflector from placement to placement and steps away each time.
 
+Several reflectors are carried in turn: the one that has stood longest goes to the next placement.
 Times here are seconds from the start of the recording.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from calib_core.arrays import Values, Vector2, Vector3
+from calib_core.synthetic.passers_by import PasserBy
 from calib_core.synthetic.person import PersonState, hand_position
 
 __all__ = ["Moment", "Resting", "Story", "tell_story"]
@@ -34,6 +37,7 @@ class Resting:
         end_s: when it is picked up again.
         position_m: (3,) the apex in the world.
         facing_rad: where the reflector faces, as a heading in the world.
+        left_alone_s: when the person turns to another reflector, if there are several.
     """
 
     index: int
@@ -41,6 +45,7 @@ class Resting:
     end_s: float
     position_m: Vector3
     facing_rad: float
+    left_alone_s: float = math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +58,8 @@ class Moment:
         facing_rad: where it faces, as a heading in the world.
         resting: the placement it rests at; None while the person holds it.
         next_height_m: height of the apex at the present, previous or next placement.
+        standing: the placements of the other reflectors.
+        passers_by: people who walk through the scene.
     """
 
     person: PersonState
@@ -60,6 +67,8 @@ class Moment:
     facing_rad: float
     resting: Resting | None
     next_height_m: float
+    standing: tuple[Resting, ...] = ()
+    passers_by: tuple[PersonState, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,9 +92,16 @@ class Story:
     duration_s: float
     _legs: tuple[_Leg, ...]
     _ends_s: Values
+    passers_by: tuple[PasserBy, ...] = ()
 
     def at(self, time_s: float) -> Moment:
-        """Return the person and the reflector at a time."""
+        """Return the person and the reflectors at a time."""
+        moment = self._moment(time_s)
+        resting = [one for one in self.restings if one.start_s <= time_s < one.end_s and one is not moment.resting]
+        passing = [state for one in self.passers_by if (state := one.at(time_s)) is not None]
+        return replace(moment, standing=tuple(resting), passers_by=tuple(passing)) if resting or passing else moment
+
+    def _moment(self, time_s: float) -> Moment:
         number = min(int(np.searchsorted(self._ends_s, time_s, side="right")), len(self._legs) - 1)
         leg = self._legs[number]
         person = _person(leg, self._legs[number - 1] if number else leg, time_s)
@@ -159,6 +175,18 @@ class _Script:
         self.heading_rad = float(np.arctan2(look[1], look[0]))
         self._add(action, self.place_m, duration_s, carrying, placement)
 
+    def put_down(self, stand_m: Vector2, placement: int, apex_m: Vector2) -> float:
+        """Carry the reflector to a placement and put it down; return when it is released."""
+        self.walk(stand_m, carrying=True, placement=placement)
+        self.stay("put", _PUT_DOWN_S, carrying=False, placement=placement, facing_m=apex_m)
+        return self.time_s
+
+    def wait(self, aside_m: Vector2, dwell_s: float, placement: int, apex_m: Vector2) -> None:
+        """Step aside and stand there, until it is time to come back."""
+        self.walk(aside_m, carrying=False, placement=placement, duration_s=_STEP_AWAY_S)
+        wait_s = dwell_s - 2.0 * _STEP_AWAY_S
+        self.stay("stand", wait_s, carrying=False, placement=placement, facing_m=apex_m)
+
     def _add(self, action: _Action, to_m: Vector2, duration_s: float, carrying: bool, placement: int) -> None:
         end_s = self.time_s + duration_s
         self.legs.append(
@@ -195,36 +223,44 @@ def tell_story(
     dwell_s: float,
     narrow: bool = False,
     start_m: tuple[float, float] = (2.6, -1.2),
+    reflectors: int = 1,
 ) -> Story:
     """Let a person carry the reflector to each position, always to the nearest one next.
 
     Args:
         rng: the only source of randomness.
         positions_m: (n, 3) apex positions in the world, in any order.
-        dwell_s: from releasing the reflector to picking it up.
+        dwell_s: from releasing the reflector to picking it up; with several, to picking up another one.
         narrow: the person steps back, not to the side.
-        start_m: where the person comes from.
+        start_m: where the person comes from, and where further reflectors wait.
+        reflectors: how many, carried in turn; the last ones stay until the end.
     """
     script = _Script(np.array(start_m))
     restings: list[Resting] = []
+    stands: list[Vector2] = []
     for index, chosen in enumerate(_in_order(positions_m, script.place_m)):
         position = positions_m[chosen]
         away = position[:2] / np.linalg.norm(position[:2])
-        behind = position[:2] + _BEHIND_M * away
-        script.walk(behind, carrying=True, placement=index)
-        script.stay("put", _PUT_DOWN_S, carrying=False, placement=index, facing_m=position[:2])
-        start_s = script.time_s
-        script.walk(_aside(rng, behind, away, narrow), carrying=False, placement=index, duration_s=_STEP_AWAY_S)
-        wait_s = dwell_s - 2.0 * _STEP_AWAY_S
-        script.stay("stand", wait_s, carrying=False, placement=index, facing_m=position[:2])
-        script.walk(behind, carrying=False, placement=index, duration_s=_STEP_AWAY_S)
+        stands.append(position[:2] + _BEHIND_M * away)
+        start_s = script.put_down(stands[index], index, position[:2])
+        script.wait(_aside(rng, stands[index], away, narrow), dwell_s, index, position[:2])
         facing_rad = float(np.arctan2(-away[1], -away[0]) + np.deg2rad(6.0) * rng.standard_normal())
-        restings.append(Resting(index, start_s, script.time_s, position, facing_rad))
-        script.stay("pick", _PUT_DOWN_S, carrying=False, placement=index, facing_m=position[:2])
+        left_s = script.time_s if reflectors > 1 else math.inf
+        restings.append(Resting(index, start_s, math.inf, position, facing_rad, left_s))
+        taken = index + 1 - reflectors
+        if taken < 0:
+            script.walk(np.array(start_m), carrying=False, placement=index)
+            continue
+        quickly_s = _STEP_AWAY_S if taken == index else None
+        script.walk(stands[taken], carrying=False, placement=index, duration_s=quickly_s)
+        restings[taken] = replace(restings[taken], end_s=script.time_s)
+        script.stay("pick", _PUT_DOWN_S, carrying=False, placement=taken, facing_m=restings[taken].position_m[:2])
     home = script.place_m + np.array([-1.0, 1.5 if script.place_m[1] < 0 else -1.5])
-    script.walk(home, carrying=True, placement=len(restings) - 1)
+    script.walk(home, carrying=len(restings) >= reflectors, placement=len(restings) - 1)
+    duration_s = script.time_s + _LEAD_IN_S
+    restings = [replace(resting, end_s=min(resting.end_s, duration_s)) for resting in restings]
     ends_s = np.array([leg.end_s for leg in script.legs])
-    return Story(tuple(restings), script.time_s + _LEAD_IN_S, tuple(script.legs), ends_s)
+    return Story(tuple(restings), duration_s, tuple(script.legs), ends_s)
 
 
 def _aside(rng: np.random.Generator, behind: Vector2, away: Vector2, narrow: bool) -> Vector2:

@@ -4,8 +4,10 @@ import json
 from typing import Any
 
 from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
 from calib_core.interchange import write_clicks
 from calib_core.measurements import TimeNs, time_parts
+from calib_core.synthetic.options import Clicking
 from calib_core.synthetic.recording import SimulatedRecording
 
 __all__ = ["clicks_text", "truth_text"]
@@ -17,9 +19,9 @@ _PIXEL_DECIMALS = 6
 def truth_text(recording: SimulatedRecording) -> str:
     """Return the truth about a recording (schema cocalib/truth-1). No estimator may read it."""
     pose = recording.camera_from_radar
-    document = {
+    document: dict[str, Any] = {
         "schema": "cocalib/truth-1",
-        "camera_from_radar": {"rotation": pose.rotation.tolist(), "translation_m": pose.translation_m.tolist()},
+        "camera_from_radar": _transform(pose),
         "camera": _camera(recording.camera),
         "radar_stamps_ahead_s": recording.stage.profile.latency_s + recording.options.clock_offset_s,
         "seed": recording.options.seed,
@@ -35,12 +37,23 @@ def truth_text(recording: SimulatedRecording) -> str:
             for placement in recording.placements
         ],
     }
+    defects = recording.options.defects
+    if defects.azimuth_bias_deg or defects.elevation_bias_deg or defects.z_offset_m:
+        document["camera_from_reported"] = _transform(recording.stage.camera_from_reported)
+    if recording.options.clicking != Clicking():
+        document["clicks"] = [
+            {"id": one.click.id, "placement": one.placement_id, "faults": list(one.faults)} for one in recording.clicked
+        ]
     return _text(document)
 
 
 def clicks_text(recording: SimulatedRecording) -> str:
     """Return the example clicks (schema cocalib/clicks-1)."""
     return write_clicks(recording.clicks)
+
+
+def _transform(pose: RigidTransform) -> dict[str, Any]:
+    return {"rotation": pose.rotation.tolist(), "translation_m": pose.translation_m.tolist()}
 
 
 def _time(time: TimeNs) -> dict[str, int]:

@@ -13,7 +13,7 @@ from calib_core.synthetic.options import RadarName
 from calib_core.synthetic.person import PersonState, capsules
 from calib_core.synthetic.rendering.noise import line_coverage
 from calib_core.synthetic.returns import Targets, measure
-from calib_core.synthetic.timeline import draw_times
+from calib_core.synthetic.timeline import draw_islands, draw_times
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -109,3 +109,21 @@ def test_a_pixel_is_never_covered_by_less_than_nothing_or_more_than_all(
 ) -> None:
     covered = line_coverage(np.array([at]), period_m=period, width_m=share * period, footprint_m=np.array([size]))
     assert -1e-6 <= covered[0] <= 1.0 + 1e-6
+
+
+@given(seed=seeds, steps_s=st.lists(st.floats(4.0, 40.0), min_size=1, max_size=8))
+def test_islands_keep_the_order_of_time_and_leave_minutes_between(seed: int, steps_s: list[float]) -> None:
+    middles_s = np.cumsum(steps_s)
+    islands = draw_islands(np.random.default_rng(seed), middles_s)
+    times_s = np.arange(0.0, middles_s[-1] + 20.0, 0.05)
+    kept = times_s[islands.recorded(times_s)]
+    recorded_s = kept + islands.delay_s(kept)
+    steps = np.diff(recorded_s)
+    assert islands.recorded(middles_s).all()
+    assert (steps > 0.0).all()
+    assert (steps[steps > 1.0] >= 60.0 - 1e-6).all()
+    assert (steps > 1.0).sum() == len(middles_s) - 1
+    for start_s, end_s in zip(middles_s - 1.0, middles_s + 1.0, strict=True):
+        first_s, last_s = islands.first_after_s(float(start_s)), islands.last_before_s(float(end_s))
+        middle_s = 0.5 * (start_s + end_s)
+        assert first_s <= middle_s + float(islands.delay_s(np.array([middle_s]))[0]) <= last_s

@@ -1,11 +1,14 @@
-"""Frames: the still backdrop with reflector and person in front of it, plus camera noise."""
+"""Frames: the still backdrop with reflectors and people in front of it, plus camera noise."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from calib_core.arrays import Vector3
-from calib_core.synthetic.person import Capsule, capsules
+from calib_core.synthetic.options import Surroundings
+from calib_core.synthetic.person import Capsule, PersonState, capsules
+from calib_core.synthetic.rendering.carts import cart_facets
 from calib_core.synthetic.rendering.light import display, sun_direction
 from calib_core.synthetic.rendering.people import Window, draw_limbs, shade_ground
 from calib_core.synthetic.rendering.reflector import (
@@ -19,12 +22,23 @@ from calib_core.synthetic.rendering.still import Still, trace_still
 from calib_core.synthetic.rig import Rig
 from calib_core.synthetic.scenes import Scene
 from calib_core.synthetic.story import Moment
+from calib_core.synthetic.surroundings import cart_position
 
 __all__ = ["FrameRenderer"]
 
 _FINE = 8
 _SHIFT = 6
 _SOFT_SHADOW = 0.62
+_NOTHING_ELSE = Surroundings()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Thing:
+    """A moving object in the picture: the farthest is drawn first."""
+
+    distance_m: float
+    draw: Callable[[np.ndarray], None]
+    shadows: tuple[tuple[Capsule, ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,11 +49,12 @@ class FrameRenderer:
     rig: Rig
     still: Still
     towards: Vector3
+    surroundings: Surroundings = _NOTHING_ELSE
 
     @classmethod
-    def of(cls, scene: Scene, rig: Rig) -> "FrameRenderer":
+    def of(cls, scene: Scene, rig: Rig, surroundings: Surroundings = _NOTHING_ELSE) -> "FrameRenderer":
         """Trace the backdrop, which takes some seconds, and return a renderer."""
-        return cls(scene, rig, trace_still(scene, rig), sun_direction(scene))
+        return cls(scene, rig, trace_still(scene, rig), sun_direction(scene), surroundings)
 
     def render(
         self, moment: Moment, *, person: bool = True, noise_grey: float = 0.0, rng: np.random.Generator | None = None
@@ -53,24 +68,54 @@ class FrameRenderer:
             rng: random generator of that noise.
         """
         levels = self.still.levels.copy()
-        limbs = capsules(moment.person) if person else ()
-        shown = person or moment.resting is not None
-        raised = shown and not on_block(moment.next_height_m)
-        stand = stand_limbs(moment.reflector_m, at_rest=moment.resting is not None) if raised else ()
-        self._shade(levels, limbs, stand, moment if shown else None)
-        distance = float(np.linalg.norm(moment.reflector_m - self.still.eye_m))
-        body = np.array([moment.person.x_m, moment.person.y_m, 1.0])
-        nearer = distance < float(np.linalg.norm(body - self.still.eye_m))
-        if nearer:
-            self._draw_limbs(levels, limbs)
-        if shown:
-            self._draw_limbs(levels, stand)
-            self._draw_reflector(levels, moment)
-        if not nearer:
-            self._draw_limbs(levels, limbs)
+        things = self._things(moment, person)
+        for thing in things:
+            for limbs in thing.shadows:
+                self._shade(levels, limbs)
+        for thing in sorted(things, key=lambda thing: -thing.distance_m):
+            thing.draw(levels)
         if noise_grey > 0.0 and rng is not None:
             levels += noise_grey * rng.standard_normal(levels.shape, dtype=np.float32)
         return np.ascontiguousarray(np.clip(levels + 0.5, 0.0, 255.0).astype(np.uint8)[..., ::-1])
+
+    def _things(self, moment: Moment, person: bool) -> list[_Thing]:
+        """List what moves, people first: so do their shadows fall."""
+        shown = person or moment.resting is not None
+        people = [
+            self._person(state) for state in ((moment.person, *moment.passers_by) if person else moment.passers_by)
+        ]
+        reflectors = [self._reflector(moment)] if shown else []
+        for resting in moment.standing:
+            height_m = float(resting.position_m[2])
+            other = Moment(moment.person, resting.position_m, resting.facing_rad, resting, height_m)
+            reflectors.append(self._reflector(other))
+        carts: list[_Thing] = []
+        if self.surroundings.companion:
+            apexes = [moment.reflector_m] if shown else []
+            carts = [self._cart(apex) for apex in (*apexes, *(resting.position_m for resting in moment.standing))]
+        return [*people, *reflectors, *carts]
+
+    def _person(self, state: PersonState) -> _Thing:
+        limbs = capsules(state)
+        distance = float(np.linalg.norm(np.array([state.x_m, state.y_m, 1.0]) - self.still.eye_m))
+        return _Thing(distance, lambda levels: self._draw_limbs(levels, limbs), (limbs,))
+
+    def _reflector(self, moment: Moment) -> _Thing:
+        raised = not on_block(moment.next_height_m)
+        stand = stand_limbs(moment.reflector_m, at_rest=moment.resting is not None) if raised else ()
+
+        def draw(levels: np.ndarray) -> None:
+            self._draw_limbs(levels, stand)
+            self._draw_reflector(levels, moment)
+
+        distance = float(np.linalg.norm(moment.reflector_m - self.still.eye_m))
+        return _Thing(distance, draw, ((*shadow_limbs(moment.reflector_m, moment.facing_rad), *stand),))
+
+    def _cart(self, apex_m: Vector3) -> _Thing:
+        place = cart_position(apex_m, self.surroundings)
+        facets = cart_facets(place, scene=self.scene, towards=self.towards, eye_m=self.still.eye_m)
+        distance = float(np.linalg.norm(place - self.still.eye_m))
+        return _Thing(distance, lambda levels: self._draw_facets(levels, facets, distance))
 
     def _draw_limbs(self, levels: np.ndarray, limbs: tuple[Capsule, ...]) -> None:
         draw_limbs(
@@ -83,22 +128,16 @@ class FrameRenderer:
             towards=self.towards,
         )
 
-    def _shade(
-        self, levels: np.ndarray, limbs: tuple[Capsule, ...], stand: tuple[Capsule, ...], moment: Moment | None
-    ) -> None:
-        groups = [limbs]
-        if moment is not None:
-            groups.append((*shadow_limbs(moment.reflector_m, moment.facing_rad), *stand))
-        for group in groups:
-            shade_ground(
-                levels,
-                group,
-                still=self.still,
-                camera=self.rig.camera,
-                camera_from_world=self.rig.camera_from_world,
-                towards=self.towards,
-                strength=_SOFT_SHADOW if self.scene.ceiling_m == 0.0 else 0.4,
-            )
+    def _shade(self, levels: np.ndarray, limbs: tuple[Capsule, ...]) -> None:
+        shade_ground(
+            levels,
+            limbs,
+            still=self.still,
+            camera=self.rig.camera,
+            camera_from_world=self.rig.camera_from_world,
+            towards=self.towards,
+            strength=_SOFT_SHADOW if self.scene.ceiling_m == 0.0 else 0.4,
+        )
 
     def _draw_reflector(self, levels: np.ndarray, moment: Moment) -> None:
         facets = reflector_facets(

@@ -1,0 +1,124 @@
+"""Named sets of options: one per way in which the world is unkind, and one with many of them at once."""
+
+from collections.abc import Mapping
+from typing import Literal, TypeAlias
+
+from calib_core.synthetic.options import Clicking, IntrinsicsErrors, RadarDefects, SimulationOptions, Surroundings
+from calib_core.synthetic.rig import RigOptions
+
+__all__ = ["PRESETS", "PresetName"]
+
+PresetName: TypeAlias = Literal[
+    "default",
+    "angle-scale",
+    "sine-scale",
+    "range-bias",
+    "biased-radar",
+    "mount-height",
+    "mirrored-radar",
+    "millimetres",
+    "flat",
+    "flat-height",
+    "flat-rounding",
+    "flat-tilted",
+    "coarse",
+    "fine",
+    "near-far",
+    "second-azimuth",
+    "two-reflectors",
+    "companion",
+    "car-park",
+    "flickering",
+    "busy",
+    "passers-by",
+    "islands",
+    "two-reflectors-islands",
+    "focal-length",
+    "principal-point",
+    "double-clicks",
+    "low-clicks",
+    "mouth-clicks",
+    "late-clicks",
+    "careless-clicks",
+    "unkind",
+]
+
+_LEVEL = RigOptions(radar_height_m=0.5, radar_tilt_deg=0.0)
+"""A radar at the height of a bumper that looks straight ahead."""
+_CAR_PARK = Surroundings(parked_cars=3, fence=True, strong_target_dbsm=29.0)
+
+PRESETS: Mapping[PresetName, SimulationOptions] = {
+    "default": SimulationOptions(),
+    "angle-scale": SimulationOptions(defects=RadarDefects(azimuth_scale=1.03)),
+    "sine-scale": SimulationOptions(defects=RadarDefects(azimuth_scale=1.02, elevation_scale=0.97, scaled="sine")),
+    "range-bias": SimulationOptions(radar="imaging", defects=RadarDefects(range_bias_m=0.12, range_scale=1.003)),
+    "biased-radar": SimulationOptions(
+        defects=RadarDefects(
+            azimuth_scale=0.98,
+            elevation_scale=1.03,
+            azimuth_bias_deg=1.0,
+            elevation_bias_deg=-1.0,
+            range_bias_m=-0.05,
+        )
+    ),
+    "mount-height": SimulationOptions(defects=RadarDefects(z_offset_m=0.5)),
+    "mirrored-radar": SimulationOptions(defects=RadarDefects(mirrored=True)),
+    "millimetres": SimulationOptions(defects=RadarDefects(length_unit_m=0.001)),
+    "flat": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="zero")),
+    "flat-height": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="zero", z_offset_m=0.5)),
+    "flat-rounding": SimulationOptions(rig=_LEVEL, defects=RadarDefects(elevation="rounding")),
+    "flat-tilted": SimulationOptions(
+        rig=RigOptions(radar_height_m=1.2, radar_tilt_deg=10.0, radar_roll_deg=3.0),
+        defects=RadarDefects(elevation="zero"),
+    ),
+    "coarse": SimulationOptions(
+        defects=RadarDefects(
+            range_bin_m=0.15,
+            azimuth_bins=32,
+            scatter_range_m=0.15,
+            scatter_azimuth_deg=1.5,
+            scatter_elevation_deg=3.0,
+        )
+    ),
+    "fine": SimulationOptions(
+        radar="imaging", defects=RadarDefects(range_bin_m=0.01, azimuth_bins=512, elevation_bins=256)
+    ),
+    "near-far": SimulationOptions(radar="imaging", defects=RadarDefects(near_and_far=True)),
+    "second-azimuth": SimulationOptions(radar="imaging", defects=RadarDefects(second_azimuth="topic")),
+    "two-reflectors": SimulationOptions(reflectors=2),
+    "companion": SimulationOptions(surroundings=Surroundings(companion=True)),
+    "car-park": SimulationOptions(scene="field", surroundings=_CAR_PARK),
+    "flickering": SimulationOptions(surroundings=Surroundings(flickering_targets=10)),
+    "busy": SimulationOptions(
+        scene="field",
+        clutter="heavy",
+        surroundings=Surroundings(
+            parked_cars=4, fence=True, strong_target_dbsm=29.0, flickering_targets=40, passers_by=6
+        ),
+    ),
+    "passers-by": SimulationOptions(surroundings=Surroundings(passers_by=6)),
+    "islands": SimulationOptions(dwell_s=10.0, islands=True),
+    "two-reflectors-islands": SimulationOptions(
+        scene="field", dwell_s=10.0, reflectors=2, islands=True, surroundings=Surroundings(parked_cars=2)
+    ),
+    "focal-length": SimulationOptions(intrinsics=IntrinsicsErrors(focal_length_scale=1.02)),
+    "principal-point": SimulationOptions(intrinsics=IntrinsicsErrors(principal_point_px=(30.0, 0.0))),
+    "double-clicks": SimulationOptions(clicking=Clicking(clicks_per_placement=3)),
+    "low-clicks": SimulationOptions(clicking=Clicking(low_px=6.0)),
+    "mouth-clicks": SimulationOptions(clicking=Clicking(low_m=0.1)),
+    "late-clicks": SimulationOptions(clicking=Clicking(late_share=0.2)),
+    "careless-clicks": SimulationOptions(
+        click_sigma_px=2.0,
+        clicking=Clicking(clicks_per_placement=2, low_m=0.05, late_share=0.1, hasty_first_px=40.0),
+    ),
+    "unkind": SimulationOptions(
+        scene="field",
+        reflectors=2,
+        islands=True,
+        click_sigma_px=2.0,
+        defects=RadarDefects(azimuth_scale=1.02, elevation_scale=0.97, scaled="sine", range_bias_m=0.05),
+        surroundings=Surroundings(parked_cars=2, strong_target_dbsm=29.0, passers_by=4),
+        clicking=Clicking(clicks_per_placement=2, low_m=0.05, late_share=0.1, hasty_first_px=40.0),
+    ),
+}
+"""The presets by name; what one does not name has its default."""
