@@ -7,9 +7,10 @@ import numpy as np
 
 from calib_core.arrays import Vector3
 from calib_core.association.clustering import CLUSTER_SCALE
+from calib_core.diagnostics.handedness import assumed_axes, mirrored_axes
 from calib_core.diagnostics.intrinsics import intrinsics
 from calib_core.diagnostics.pairs import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
-from calib_core.diagnostics.pose import assumed_axes, camera_position, mirrored_axes, two_poses
+from calib_core.diagnostics.pose import camera_position, two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.unmeasured_elevation import is_flat
 from calib_core.geometry import skew

@@ -1,4 +1,4 @@
-"""Warnings about the pose as a whole: mirrored axes, a second pose, and an implausible camera position."""
+"""Warnings about the pose as a whole: a second pose, and an implausible camera position."""
 
 from dataclasses import replace
 
@@ -8,13 +8,10 @@ from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
 from calib_core.estimation.gnc import GncSolution
-from calib_core.estimation.mirror_test import MIRRORED_GAIN, NOT_MIRRORED_GAIN
-from calib_core.estimation.unmeasured_elevation import is_flat
 from calib_core.geometry import RigidTransform
-from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import DataWarning
 
-__all__ = ["assumed_axes", "camera_position", "mirrored_axes", "two_poses"]
+__all__ = ["camera_position", "two_poses"]
 
 _ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
 _OTHER_POSE_RAD = np.deg2rad(5.0)
@@ -22,66 +19,6 @@ _OTHER_POSE_SIGMAS = 6.0
 _FAR_CAMERA = 3.0
 _CONTRADICTION_SIGMAS = 4.0
 _LEAST_CHI2_PER_DEGREE = 1.6
-_PLANE_ROUNDS = 6
-_NORMAL_QUANTILE_99 = 2.33
-
-
-def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if mirrored radar axes are more likely, or about as likely."""
-    if fit.mirror_gain > MIRRORED_GAIN:
-        return [
-            DataWarning(
-                "mirrored-axes",
-                "pairs and expected camera position agree better with one radar axis mirrored "
-                f"(log-likelihood ratio {fit.mirror_gain / 2:.1f}): the radar's axes look left-handed",
-                "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) at the source; "
-                "do not use this pose",
-            )
-        ]
-    if fit.mirror_gain > NOT_MIRRORED_GAIN:
-        return [
-            DataWarning(
-                "handedness-open",
-                "a mirrored radar axis would explain the pairs about as well: all placements lie near one plane",
-                "measure the camera position with a tape, or add placements at other heights (a tripod)",
-            )
-        ]
-    return []
-
-
-def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if only the expected camera distance, and not the pairs, rules out mirrored axes."""
-    already_warned = fit.mirror_gain > NOT_MIRRORED_GAIN or is_flat(fit.measurements)
-    if already_warned or fit.measurements.prior.measured or _heights_decide(fit):
-        return []
-    return [
-        DataWarning(
-            "handedness-assumed",
-            "the placements lie near one plane, so mirrored radar axes fit equally well: that none is mirrored is inferred "
-            f"only from the camera being within about {fit.measurements.prior.sigma_m:g} m of the radar",
-            "measure the camera position (0.3 m is enough for this), or add placements at other heights (a tripod)",
-        )
-    ]
-
-
-def _heights_decide(fit: SolvedFit) -> bool:
-    """Return whether the placements are far enough from any plane that the pairs alone rule out mirrored axes.
-
-    Mirrored axes with a rotated camera are a reflection in some plane, which moves a placement by twice its height h above
-    that plane. Twice the log-likelihood therefore falls by about sum (2 h / sigma)^2 with the true heights, by
-    4 (chi2 - (n - 3)) with measured ones; the limit includes the 99 % quantile of the noise of that figure.
-    """
-    measurements, rows = fit.refined.measurements, fit.refined.rows[fit.inliers]
-    points = cartesian_from_polar(measurements.polar[rows])
-    covariances = covariance_from_sigma_polar(points, measurements.sigma_polar[rows])
-    weights, chi2 = np.ones(len(points)), np.inf
-    for _ in range(_PLANE_ROUNDS):
-        offsets = points - (weights @ points) / weights.sum()
-        normal = np.linalg.svd(offsets * np.sqrt(weights)[:, None])[2][2]
-        weights = 1.0 / np.einsum("i,nij,j->n", normal, covariances, normal)
-        chi2 = min(chi2, float(weights @ (offsets @ normal) ** 2))
-    redundancy = max(len(points) - 3, 1)
-    return 4.0 * (chi2 - redundancy) > MIRRORED_GAIN + 4.0 * _NORMAL_QUANTILE_99 * np.sqrt(2.0 * redundancy)
 
 
 def two_poses(fit: SolvedFit) -> list[DataWarning]:

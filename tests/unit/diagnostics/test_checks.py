@@ -12,7 +12,6 @@ from calib_core.measurements import Pair, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.results import DataWarning
 from calib_core.synthetic import FIELD, RigOptions, simulate_pairs
-from calib_core.synthetic.pairs import NoiseName
 
 FREE = CalibrationOptions()
 
@@ -70,21 +69,6 @@ def test_mirrored_axes_are_caught_by_placements_at_varied_heights_alone() -> Non
     assert "mirrored-axes" in codes(moved(simulated.pairs, (1, -1, 1)), simulated.camera, FREE)
     assert "mirrored-axes" not in codes(simulated.pairs, simulated.camera, FREE)
     assert "handedness-open" not in codes(simulated.pairs, simulated.camera, FREE)
-
-
-HANDEDNESS = {"mirrored-axes", "handedness-open", "handedness-assumed"}
-
-
-@pytest.mark.parametrize("noise", ["ti", "imaging"])
-def test_flat_ground_is_never_called_good_without_a_camera_position(noise: NoiseName) -> None:
-    for seed in range(6):
-        simulated = simulate_pairs(20, rng=np.random.default_rng(seed), noise=noise)
-        assert codes(simulated.pairs, simulated.camera, FREE) & HANDEDNESS
-        assert not codes(simulated.pairs, simulated.camera, measured(0.3)) & HANDEDNESS
-        tripod = simulate_pairs(
-            20, rng=np.random.default_rng(seed), noise=noise, layout=replace(FIELD, max_height_m=1.5)
-        )
-        assert not codes(tripod.pairs, tripod.camera, FREE) & HANDEDNESS
 
 
 def test_two_mirrored_axes_are_a_rotation_and_give_no_warning() -> None:
