@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from calib_core.arrays import Matrix66
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
@@ -18,7 +19,7 @@ _OTHER_POSE_RAD = np.deg2rad(5.0)
 _OTHER_POSE_SIGMAS = 6.0
 _FAR_CAMERA = 3.0
 _CONTRADICTION_SIGMAS = 4.0
-_LEAST_CHI2_PER_DEGREE = 1.6
+_SCREENING_SIGMAS = 1.8
 
 
 def two_poses(fit: SolvedFit) -> list[DataWarning]:
@@ -59,29 +60,44 @@ def camera_position(fit: SolvedFit) -> list[DataWarning]:
 def _contradicted_position(fit: SolvedFit) -> list[DataWarning]:
     """Compare the measured camera position with the one from the pairs alone.
 
-    A position with a small sigma overrides the pairs and only makes the residuals large, so it becomes a weak prior here.
+    A position with a small sigma overrides the pairs and only makes the residuals large, or not even that, so it becomes a
+    weak prior here. One step from the solved pose tells whether the fit without it is needed.
     """
-    prior = fit.measurements.prior
-    if fit.chi2_per_degree < _LEAST_CHI2_PER_DEGREE:
+    prior, refined = fit.refined.measurements.prior, fit.refined
+    residual, jacobian = prior.rows(refined.camera_from_radar)
+    weak_jacobian = prior.weakened().rows(refined.camera_from_radar)[1]
+    information = fit.uncertainty.information - jacobian.T @ jacobian + weak_jacobian.T @ weak_jacobian
+    step = -np.linalg.solve(information, jacobian.T @ residual)
+    moved = refined.camera_from_radar.perturbed(step)
+    if _away_in_sigmas(fit, moved, np.linalg.inv(information)) < _SCREENING_SIGMAS:
         return []
-    start = GncSolution(fit.refined.camera_from_radar, 0.0, float(fit.refined.noise_scale.max()))
-    alone = fit_errors_in_variables(replace(fit.measurements, prior=prior.weakened()), start, estimate_scale=True)
-    away_m = _camera_centre(alone.camera_from_radar) - prior.position_m
-    centre_jacobian = prior.rows(alone.camera_from_radar)[1] * prior.sigma_m
-    difference_covariance = centre_jacobian @ pose_covariance(
-        alone
-    ).covariance @ centre_jacobian.T + prior.sigma_m**2 * np.eye(3)
-    sigmas = float(np.sqrt(away_m @ np.linalg.solve(difference_covariance, away_m)))
+    start = GncSolution(refined.camera_from_radar, 0.0, float(refined.noise_scale.max()))
+    weakened = replace(fit.measurements, prior=prior.weakened())
+    alone = fit_errors_in_variables(weakened, start, estimate_scale=fit.options.noise.estimate_scale)
+    sigmas = _away_in_sigmas(fit, alone.camera_from_radar, pose_covariance(alone).covariance)
     if sigmas < _CONTRADICTION_SIGMAS:
         return []
+    away_m = float(np.linalg.norm(_camera_centre(alone.camera_from_radar) - prior.position_m))
     return [
         DataWarning(
             "camera-position-contradicted",
-            f"the pairs alone place the camera {100 * np.linalg.norm(away_m):.0f} cm from the measured position, "
+            f"the pairs alone place the camera {100 * away_m:.0f} cm from the measured position, "
             f"{sigmas:.1f} standard deviations",
             "measure again from the radar's antennas to the lens: forward, left, up; or state a larger uncertainty",
         )
     ]
+
+
+def _away_in_sigmas(fit: SolvedFit, camera_from_radar: RigidTransform, covariance: Matrix66) -> float:
+    """Return the distance of a pose's camera centre from the measured one, in standard deviations of their difference.
+
+    The clicked point may be off the radar's phase centre, which moves the position that the pairs give by as much.
+    """
+    prior = fit.measurements.prior
+    away_m = _camera_centre(camera_from_radar) - prior.position_m
+    centre = prior.rows(camera_from_radar)[1] * prior.sigma_m
+    tape_m2 = prior.sigma_m**2 + fit.options.reflector.offset_sigma_m**2
+    return float(np.sqrt(away_m @ np.linalg.solve(centre @ covariance @ centre.T + tape_m2 * np.eye(3), away_m)))
 
 
 def _camera_centre(camera_from_radar: RigidTransform) -> np.ndarray:

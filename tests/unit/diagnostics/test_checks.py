@@ -98,6 +98,19 @@ def test_a_wrong_tape_measure_is_contradicted() -> None:
     assert "camera-position-contradicted" in codes(simulated.pairs, simulated.camera, measured(0.02, (0.0, 0.4, 0.0)))
 
 
+def test_a_tape_that_fits_the_residuals_is_contradicted_by_the_pairs_all_the_same() -> None:
+    contradicted = 0
+    for seed in range(6):
+        simulated = simulate_pairs(20, rng=np.random.default_rng([51, seed]))
+        x_m, y_m, z_m = simulated.rig.camera_position_radar_m.tolist()
+        off = {"forward": (x_m - 0.3, y_m, z_m), "left": (x_m, y_m + 0.3, z_m), "up": (x_m, y_m, z_m + 0.3)}
+        contradicted += "camera-position-contradicted" in codes(
+            simulated.pairs, simulated.camera, measured(0.01, off[("forward", "left", "up")[seed % 3]])
+        )
+        assert codes(simulated.pairs, simulated.camera, measured(0.01, (x_m + 0.02, y_m, z_m - 0.02))) == set()
+    assert contradicted >= 5
+
+
 def test_a_camera_farther_away_than_expected_is_reported() -> None:
     far_camera = RigOptions(camera_offset_m=(0.0, 4.0, 1.0))
     simulated = simulate_pairs(40, rng=np.random.default_rng(6), noise="imaging", rig_options=far_camera)
