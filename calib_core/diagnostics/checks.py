@@ -14,6 +14,7 @@ from calib_core.diagnostics.pose import camera_position, two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.unmeasured_elevation import is_flat
 from calib_core.geometry import skew
+from calib_core.plausibility import PIXELS_SUSPECTED, implausible_input
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.results import DataWarning
 
@@ -25,10 +26,13 @@ _WEAK_POSITION_M = 0.15
 _NOISE_EXCESS = 2.5
 _NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
+_FOLLOWS_FROM_PIXELS = {"mirrored-axes", "handedness-open", "handedness-assumed", "intrinsics-suspected"}
 
 
 def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
     """Run every check; the most serious warnings come first."""
+    points = cartesian_from_polar(fit.measurements.polar)
+    suspected = implausible_input(fit.ids, points, fit.measurements.pixels_px, fit.measurements.camera, fit.options)
     checks = (
         mirrored_axes,
         two_poses,
@@ -46,7 +50,9 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         decisive_pair,
         assumed_axes,
     )
-    return tuple(warning for check in checks for warning in check(fit))
+    wrong_pixels = any(warning.code == PIXELS_SUSPECTED for warning in suspected)
+    found = [warning for check in checks for warning in check(fit)]
+    return (*suspected, *(one for one in found if not (wrong_pixels and one.code in _FOLLOWS_FROM_PIXELS)))
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:

@@ -1,10 +1,10 @@
 """Warnings about the pose as a whole: a second pose, and an implausible camera position."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Matrix66
+from calib_core.arrays import Matrix33, Matrix66, Vector3
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
@@ -20,6 +20,14 @@ _OTHER_POSE_SIGMAS = 6.0
 _FAR_CAMERA = 3.0
 _CONTRADICTION_SIGMAS = 4.0
 _SCREENING_SIGMAS = 1.8
+_AGREEING_SIGMAS = 3.0
+_UNIT_SLIPS = (
+    ("the measured position looks like centimetres", 0.01, 2.0),
+    ("the measured position looks like millimetres", 0.001, 2.0),
+    ("the measured position looks like feet", 0.3048, 0.0),
+    ("the radar's ranges look like feet", 1.0 / 0.3048, 0.0),
+)
+"""What would remove a contradiction, the factor on the measured position, and the smallest position [m] it is said of."""
 
 
 def two_poses(fit: SolvedFit) -> list[DataWarning]:
@@ -67,37 +75,56 @@ def _contradicted_position(fit: SolvedFit) -> list[DataWarning]:
     residual, jacobian = prior.rows(refined.camera_from_radar)
     weak_jacobian = prior.weakened().rows(refined.camera_from_radar)[1]
     information = fit.uncertainty.information - jacobian.T @ jacobian + weak_jacobian.T @ weak_jacobian
-    step = -np.linalg.solve(information, jacobian.T @ residual)
-    moved = refined.camera_from_radar.perturbed(step)
-    if _away_in_sigmas(fit, moved, np.linalg.inv(information)) < _SCREENING_SIGMAS:
+    moved = refined.camera_from_radar.perturbed(-np.linalg.solve(information, jacobian.T @ residual))
+    if _Centre.of(fit, moved, np.linalg.inv(information)).sigmas_from(prior.position_m) < _SCREENING_SIGMAS:
         return []
     start = GncSolution(refined.camera_from_radar, 0.0, float(refined.noise_scale.max()))
     weakened = replace(fit.measurements, prior=prior.weakened())
     alone = fit_errors_in_variables(weakened, start, estimate_scale=fit.options.noise.estimate_scale)
-    sigmas = _away_in_sigmas(fit, alone.camera_from_radar, pose_covariance(alone).covariance)
+    centre = _Centre.of(fit, alone.camera_from_radar, pose_covariance(alone).covariance)
+    sigmas = centre.sigmas_from(prior.position_m)
     if sigmas < _CONTRADICTION_SIGMAS:
         return []
-    away_m = float(np.linalg.norm(_camera_centre(alone.camera_from_radar) - prior.position_m))
+    away_m = float(np.linalg.norm(centre.position_m - prior.position_m))
     return [
         DataWarning(
             "camera-position-contradicted",
             f"the pairs alone place the camera {100 * away_m:.0f} cm from the measured position, "
-            f"{sigmas:.1f} standard deviations",
+            f"{sigmas:.1f} standard deviations{_other_unit(centre, prior.position_m)}",
             "measure again from the radar's antennas to the lens: forward, left, up; or state a larger uncertainty",
         )
     ]
 
 
-def _away_in_sigmas(fit: SolvedFit, camera_from_radar: RigidTransform, covariance: Matrix66) -> float:
-    """Return the distance of a pose's camera centre from the measured one, in standard deviations of their difference.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Centre:
+    """The camera centre from the pairs alone, (3,) [m], with the covariance (3, 3) of its distance from the measured one."""
 
-    The clicked point may be off the radar's phase centre, which moves the position that the pairs give by as much.
-    """
-    prior = fit.measurements.prior
-    away_m = _camera_centre(camera_from_radar) - prior.position_m
-    centre = prior.rows(camera_from_radar)[1] * prior.sigma_m
-    tape_m2 = prior.sigma_m**2 + fit.options.reflector.offset_sigma_m**2
-    return float(np.sqrt(away_m @ np.linalg.solve(centre @ covariance @ centre.T + tape_m2 * np.eye(3), away_m)))
+    position_m: Vector3
+    covariance_m2: Matrix33
+
+    @classmethod
+    def of(cls, fit: SolvedFit, camera_from_radar: RigidTransform, covariance: Matrix66) -> "_Centre":
+        """Take it from a pose; the clicked point may be off the radar's phase centre, which moves it by as much."""
+        prior = fit.measurements.prior
+        jacobian = prior.rows(camera_from_radar)[1] * prior.sigma_m
+        measured_m2 = prior.sigma_m**2 + fit.options.reflector.offset_sigma_m**2
+        return cls(_camera_centre(camera_from_radar), jacobian @ covariance @ jacobian.T + measured_m2 * np.eye(3))
+
+    def sigmas_from(self, position_m: Vector3) -> float:
+        """Return the distance from a position in standard deviations."""
+        away_m = self.position_m - position_m
+        return float(np.sqrt(away_m @ np.linalg.solve(self.covariance_m2, away_m)))
+
+
+def _other_unit(centre: _Centre, measured_m: Vector3) -> str:
+    """Return in words which other unit would remove the contradiction; empty if none would."""
+    size_m = float(np.linalg.norm(measured_m))
+    for text, factor, least_m in _UNIT_SLIPS:
+        clear = centre.sigmas_from(np.zeros(3)) > _CONTRADICTION_SIGMAS or least_m > 0.0
+        if clear and size_m > least_m and centre.sigmas_from(factor * measured_m) < _AGREEING_SIGMAS:
+            return f"; {text}"
+    return ""
 
 
 def _camera_centre(camera_from_radar: RigidTransform) -> np.ndarray:

@@ -13,6 +13,7 @@ from calib_core.camera import Camera
 from calib_core.estimation.linearization import linearize
 from calib_core.geometry import RigidTransform
 from calib_core.options import CalibrationOptions
+from calib_core.plausibility import implausible_input
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import DataWarning
 
@@ -45,6 +46,7 @@ def warnings_as_printed(
     """
     hidden = np.isnan(camera.project(camera_from_radar @ points_radar_m)).any(axis=1)
     return (
+        *implausible_input(ids, points_radar_m, pixels_px, camera, options),
         *_disagreeing(ids, agreeing, options),
         *_behind(ids, hidden),
         *_excess(points_radar_m[~hidden], pixels_px[~hidden], camera, camera_from_radar, options),
