@@ -8,16 +8,15 @@ from calib_core.arrays import Matrix33, Matrix66, Vector3
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
-from calib_core.estimation.gnc import GncSolution
+from calib_core.estimation.gnc import GncSolution, associate, mixture_cost
 from calib_core.geometry import RigidTransform
 from calib_core.results import DataWarning
 
 __all__ = ["camera_position", "two_poses"]
 
 _ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
-_OTHER_POSE_RAD = np.deg2rad(5.0)
+_WORTH_REFINING = 40.0
 _OTHER_POSE_SIGMAS = 6.0
-_FAR_CAMERA = 3.0
 _CONTRADICTION_SIGMAS = 4.0
 _SCREENING_SIGMAS = 1.8
 _AGREEING_SIGMAS = 3.0
@@ -31,46 +30,98 @@ _UNIT_SLIPS = (
 
 
 def two_poses(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if two poses explain the pairs about equally well (a plane seen from far away has two)."""
-    best = fit.alternatives[0]
+    """Warn if two poses explain the pairs about equally well, or if only the expected distance of the camera decides.
+
+    A plane seen from far away has two poses, and so have returns with a constant companion. The scores of the candidates are
+    left out of one comparison: what makes the companion echo more than the reflector does so at every placement.
+    """
     for other in fit.alternatives[1:]:
         error = other.camera_from_radar.error_from(fit.refined.camera_from_radar)
-        apart_rad = float(np.linalg.norm(error[3:]))
         sigmas = float(np.sqrt(error @ fit.uncertainty.information @ error))
-        if other.cost - best.cost < _ALMOST_AS_LIKELY and apart_rad > _OTHER_POSE_RAD and sigmas > _OTHER_POSE_SIGMAS:
-            return [
-                DataWarning(
-                    "two-poses",
-                    f"another pose, {np.rad2deg(apart_rad):.0f} deg away, explains the pairs almost as well",
-                    "measure the camera position with a tape, or add placements nearer and farther than the present ones",
-                )
-            ]
+        if sigmas <= _OTHER_POSE_SIGMAS:
+            continue
+        away = (
+            f"{np.rad2deg(np.linalg.norm(error[3:])):.1f} deg and {_moved_m(fit, other):.2f} m away ({sigmas:.0f} standard "
+            "deviations)"
+        )
+        if min(other.cost - fit.alternatives[0].cost, _cost_without_scores(fit, other)) < _ALMOST_AS_LIKELY:
+            return [_two_poses(fit, other, away)]
+        if _cost_without_prior(fit, other) < _ALMOST_AS_LIKELY:
+            return [_assumed_distance(fit, other, away)]
     return []
 
 
-def camera_position(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if the camera position contradicts the tape measure, or is much farther away than expected."""
-    if fit.measurements.prior.measured:
-        return _contradicted_position(fit)
-    prior = fit.measurements.prior
-    away_m = float(np.linalg.norm(_camera_centre(fit.refined.camera_from_radar) - prior.position_m))
-    if away_m <= _FAR_CAMERA * prior.sigma_m:
-        return []
-    return [
-        DataWarning(
-            "camera-far-away",
-            f"the solved camera position is {away_m:.1f} m from the radar; about {prior.sigma_m:g} m was expected",
-            "if the sensors really are that far apart, set the nominal distance; otherwise check axes and intrinsics",
+def _two_poses(fit: SolvedFit, other: GncSolution, away: str) -> DataWarning:
+    measurements = fit.refined.measurements
+    changed = associate(measurements, other.camera_from_radar)[0] != fit.refined.rows
+    names = [name for name, differs, inlier in zip(fit.ids, changed, fit.inliers, strict=True) if differs and inlier]
+    if not names:
+        return DataWarning(
+            "two-poses",
+            f"another pose, {away}, explains the pairs almost as well",
+            "measure the camera position with a tape, or add placements nearer and farther than the present ones",
         )
+    return DataWarning(
+        "two-poses",
+        f"another pose, {away}, explains the pairs almost as well, with other radar positions for {len(names)} of them",
+        f"check in the radar view which of the returns is the reflector, for example at {names[0]}: something may always stand "
+        "near it; or measure the camera position with a tape",
+    )
+
+
+def _assumed_distance(fit: SolvedFit, other: GncSolution, away: str) -> DataWarning:
+    here_m, there_m = (
+        float(np.linalg.norm(_camera_centre(one.camera_from_radar))) for one in (fit.alternatives[0], other)
+    )
+    return DataWarning(
+        "camera-far-away",
+        f"another pose, {away}, explains the pairs as well; the one with the camera {here_m:.1f} m from the radar, not "
+        f"{there_m:.1f} m, was chosen only because about {fit.measurements.prior.sigma_m:g} m is expected",
+        "are both sensors on the same rig, or how far apart? Set the nominal distance, or measure the camera position",
+    )
+
+
+def _cost_without_scores(fit: SolvedFit, other: GncSolution) -> float:
+    """Return how much less likely another pose is if all candidates of a pair are equally plausible."""
+    if fit.measurements.one_to_one:
+        return np.inf
+    share = -np.log(np.diff(fit.measurements.first))[fit.measurements.owner]
+    cost = mixture_cost(replace(fit.refined.measurements, log_score=share), fit.refined.camera_from_radar)
+    coarse = mixture_cost(replace(fit.refined.measurements, log_score=share), other.camera_from_radar) - cost
+    if not _ALMOST_AS_LIKELY <= coarse < _WORTH_REFINING:
+        return coarse
+    estimate_scale = fit.options.noise.estimate_scale
+    equal = replace(fit.measurements, log_score=share)
+    there = fit_errors_in_variables(equal, other, estimate_scale=estimate_scale, coarse=True)
+    return mixture_cost(there.measurements, there.camera_from_radar) - cost
+
+
+def _cost_without_prior(fit: SolvedFit, other: GncSolution) -> float:
+    """Return how much less likely another pose is by the pairs alone."""
+    prior = fit.measurements.prior
+    if prior.measured:
+        return np.inf
+    by_pairs = [
+        one.cost - float(prior.costs(one.camera_from_radar.rotation, one.camera_from_radar.translation_m))
+        for one in (other, fit.alternatives[0])
     ]
+    return by_pairs[0] - by_pairs[1]
 
 
-def _contradicted_position(fit: SolvedFit) -> list[DataWarning]:
-    """Compare the measured camera position with the one from the pairs alone.
+def _moved_m(fit: SolvedFit, other: GncSolution) -> float:
+    """Return the distance between the camera centres of the solved pose and another."""
+    here, there = _camera_centre(fit.refined.camera_from_radar), _camera_centre(other.camera_from_radar)
+    return float(np.linalg.norm(here - there))
+
+
+def camera_position(fit: SolvedFit) -> list[DataWarning]:
+    """Warn if the pairs contradict the measured camera position.
 
     A position with a small sigma overrides the pairs and only makes the residuals large, or not even that, so it becomes a
     weak prior here. One step from the solved pose tells whether the fit without it is needed.
     """
+    if not fit.measurements.prior.measured:
+        return []
     prior, refined = fit.refined.measurements.prior, fit.refined
     residual, jacobian = prior.rows(refined.camera_from_radar)
     weak_jacobian = prior.weakened().rows(refined.camera_from_radar)[1]
