@@ -26,7 +26,10 @@ from calib_core.estimation.mirror_test import MIRRORED_GAIN, mirror_gain
 from calib_core.estimation.pair_results import excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.option_checks import checked_options
-from calib_core.options import CalibrationOptions
+from calib_core.options import CalibrationOptions, CameraPositionPrior
+from calib_core.pair_checks import checked_pairs
+from calib_core.plausibility import implausible_input
+from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
 
 __all__ = ["calibrate", "calibrate_pairs", "solve_again"]
@@ -77,12 +80,16 @@ def calibrate_pairs(
         camera: the intrinsics.
         options: None takes the defaults; method "paper" is Algorithm 1 as printed, from its RANSAC on.
         excluded: ids of pairs that are shown, but not used.
+
+    Raises:
+        InputError: a pair contains a number that is impossible, or an id occurs twice.
     """
     options = checked_options(options or CalibrationOptions())
     if options.method == "paper":
         from calib_core.paper.algorithm_1 import solve_pairs_as_printed
 
-        return solve_pairs_as_printed(pairs, camera, options, excluded)
+        return solve_pairs_as_printed(checked_pairs(pairs, with_noise=False), camera, options, excluded)
+    checked_pairs(pairs, with_noise=True)
     shown = sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))
     return _solved(tuple(shown), (), excluded, camera, options)
 
@@ -138,12 +145,12 @@ def _solved(
     measurements = pair_measurements(used, camera, options)
     fit = _best_fit(measurements, options)
     if isinstance(fit, Unsolvable):
-        return fit
+        return _explained(fit, used, measurements, options)
     refined = fit.refined
     uncertainty = pose_covariance(refined, options.radar)
     rotation_sigma_rad = float(np.sqrt(uncertainty.covariance[3:, 3:].diagonal().max()))
     if not rotation_sigma_rad < _UNDETERMINED_ROTATION_RAD:
-        return _degenerate(len(used))
+        return _explained(_degenerate(len(used)), used, measurements, options)
     left_out = leave_one_out(refined, uncertainty.information)
     influential = find_influential_pairs(measurements, refined, uncertainty)
     refined, uncertainty = average_over_influential_pairs(refined, uncertainty, influential)
@@ -159,6 +166,7 @@ def _solved(
         alternatives=fit.found,
         mirror_gain=fit.mirror_gain,
         chi2_per_degree=metrics.chi2 / max(metrics.degrees_of_freedom, 1),
+        options=options,
     )
     results = used_pair_results(used, refined, left_out) | excluded_pair_results(
         shown, excluded, refined, camera, options
@@ -182,6 +190,34 @@ def _solved(
         calibration,
         angle_map=angle_map if angle_map is not None and angle_map.pays else None,
         next_placement=next_placement(calibration),
+    )
+
+
+def _explained(
+    outcome: Unsolvable, used: Sequence[Pair], measurements: PairMeasurements, options: CalibrationOptions
+) -> Unsolvable:
+    """Say what may be the cause: a measured camera position that the pairs contradict, or implausible input."""
+    ids, points = [pair.id for pair in used], cartesian_from_polar(measurements.polar)
+    suspected = implausible_input(ids, points, measurements.pixels_px, measurements.camera, options)
+    if not suspected and options.solving.camera_position is not None:
+        free = replace(options, solving=replace(options.solving, camera_position=None))
+        fit = _best_fit(pair_measurements(used, measurements.camera, free), free)
+        if isinstance(fit, _Fit) and fit.refined.inliers.mean() >= _AGREEING_SHARE:
+            return _contradicted(options.solving.camera_position, fit.refined)
+    hints = [f"{warning.message}; {warning.hint}" for warning in suspected]
+    return replace(outcome, hint="; ".join([*hints, outcome.hint]))
+
+
+def _contradicted(measured: CameraPositionPrior, alone: ErrorsInVariablesFit) -> Unsolvable:
+    given, found = (
+        "(" + ", ".join(f"{value:.2f}" for value in position) + ") m"
+        for position in (measured.position_m, alone.camera_from_radar.inverse().translation_m.tolist())
+    )
+    return Unsolvable(
+        "camera-position-contradicted",
+        f"no pose fits the pairs and the measured camera position {given}; without it, {int(alone.inliers.sum())} of "
+        f"{len(alone.inliers)} pairs agree on a pose with the camera at {found}",
+        "measure again from the radar's antennas to the lens: forward, left, up, in metres",
     )
 
 

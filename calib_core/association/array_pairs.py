@@ -9,6 +9,7 @@ from calib_core.arrays import Points2, Points3
 from calib_core.errors import InputError
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import NoiseOptions
+from calib_core.pair_checks import too_near
 from calib_core.radar import covariance_from_sigma_polar
 
 __all__ = ["pairs_from_arrays"]
@@ -45,11 +46,11 @@ def pairs_from_arrays(
         )
     if len(set(names)) < len(names):
         raise InputError("ids: there are duplicates; give every pair its own id")
-    at_radar = np.flatnonzero(~points.any(axis=1))
-    if len(at_radar):
-        raise InputError(
-            f"points_radar_m[{at_radar[0]}]: is at the radar's origin, which cannot be a return; remove the pair"
-        )
+    for i, point in enumerate(points):
+        if near := too_near(point):
+            raise InputError(f"points_radar_m[{i}]: {near}")
+    if sigma_px is not None and not (np.isfinite(sigma_px) and sigma_px > 0.0):
+        raise InputError(f"sigma_px: is {sigma_px:g}; a standard deviation must be finite and above zero")
     sigmas = _sigma_polar_rows(sigma_polar, noise or NoiseOptions(), len(points))
     covariances = covariance_from_sigma_polar(points, sigmas)
     return tuple(

@@ -7,11 +7,13 @@ import numpy as np
 
 from calib_core.arrays import Vector3
 from calib_core.association.clustering import CLUSTER_SCALE
+from calib_core.diagnostics.handedness import assumed_axes, mirrored_axes
 from calib_core.diagnostics.intrinsics import intrinsics
 from calib_core.diagnostics.pairs import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
-from calib_core.diagnostics.pose import assumed_axes, camera_position, mirrored_axes, two_poses
+from calib_core.diagnostics.pose import camera_position, two_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.geometry import skew
+from calib_core.plausibility import PIXELS_SUSPECTED, implausible_input
 from calib_core.radar import cartesian_from_polar, direction_cosines
 from calib_core.results import DataWarning
 
@@ -23,10 +25,13 @@ _WEAK_POSITION_M = 0.15
 _NOISE_EXCESS = 2.5
 _NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
+_FOLLOWS_FROM_PIXELS = {"mirrored-axes", "handedness-open", "handedness-assumed", "intrinsics-suspected"}
 
 
 def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
     """Run every check; the most serious warnings come first."""
+    points = cartesian_from_polar(fit.measurements.polar)
+    suspected = implausible_input(fit.ids, points, fit.measurements.pixels_px, fit.measurements.camera, fit.options)
     checks = (
         mirrored_axes,
         two_poses,
@@ -44,7 +49,9 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         decisive_pair,
         assumed_axes,
     )
-    return tuple(warning for check in checks for warning in check(fit))
+    wrong_pixels = any(warning.code == PIXELS_SUSPECTED for warning in suspected)
+    found = [warning for check in checks for warning in check(fit)]
+    return (*suspected, *(one for one in found if not (wrong_pixels and one.code in _FOLLOWS_FROM_PIXELS)))
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:

@@ -1,149 +1,183 @@
-"""Warnings about the pose as a whole: mirrored axes, a second pose, and an implausible camera position."""
+"""Warnings about the pose as a whole: a second pose, and an implausible camera position."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calib_core.arrays import Matrix33, Matrix66, Vector3
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.covariance import pose_covariance
 from calib_core.estimation.errors_in_variables import fit_errors_in_variables
-from calib_core.estimation.gnc import GncSolution
-from calib_core.estimation.mirror_test import MIRRORED_GAIN, NOT_MIRRORED_GAIN
+from calib_core.estimation.gnc import GncSolution, associate, mixture_cost
 from calib_core.geometry import RigidTransform
-from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
 from calib_core.results import DataWarning
 
-__all__ = ["assumed_axes", "camera_position", "mirrored_axes", "two_poses"]
+__all__ = ["camera_position", "two_poses"]
 
 _ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
-_OTHER_POSE_RAD = np.deg2rad(5.0)
+_WORTH_REFINING = 40.0
 _OTHER_POSE_SIGMAS = 6.0
-_FAR_CAMERA = 3.0
 _CONTRADICTION_SIGMAS = 4.0
-_LEAST_CHI2_PER_DEGREE = 1.6
-_PLANE_ROUNDS = 6
-_NORMAL_QUANTILE_99 = 2.33
-
-
-def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if mirrored radar axes are more likely, or about as likely."""
-    if fit.mirror_gain > MIRRORED_GAIN:
-        return [
-            DataWarning(
-                "mirrored-axes",
-                "pairs and expected camera position agree better with one radar axis mirrored "
-                f"(log-likelihood ratio {fit.mirror_gain / 2:.1f}): the radar's axes look left-handed",
-                "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) at the source; "
-                "do not use this pose",
-            )
-        ]
-    if fit.mirror_gain > NOT_MIRRORED_GAIN:
-        return [
-            DataWarning(
-                "handedness-open",
-                "a mirrored radar axis would explain the pairs about as well: all placements lie near one plane",
-                "measure the camera position with a tape, or add placements at other heights (a tripod)",
-            )
-        ]
-    return []
-
-
-def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if only the expected camera distance, and not the pairs, rules out mirrored axes."""
-    already_warned = fit.mirror_gain > NOT_MIRRORED_GAIN or fit.measurements.flat
-    if already_warned or fit.measurements.prior.measured or _heights_decide(fit):
-        return []
-    return [
-        DataWarning(
-            "handedness-assumed",
-            "the placements lie near one plane, so mirrored radar axes fit equally well: that none is mirrored is inferred "
-            f"only from the camera being within about {fit.measurements.prior.sigma_m:g} m of the radar",
-            "measure the camera position (0.3 m is enough for this), or add placements at other heights (a tripod)",
-        )
-    ]
-
-
-def _heights_decide(fit: SolvedFit) -> bool:
-    """Return whether the placements are far enough from any plane that the pairs alone rule out mirrored axes.
-
-    Mirrored axes with a rotated camera are a reflection in some plane, which moves a placement by twice its height h above
-    that plane. Twice the log-likelihood therefore falls by about sum (2 h / sigma)^2 with the true heights, by
-    4 (chi2 - (n - 3)) with measured ones; the limit includes the 99 % quantile of the noise of that figure.
-    """
-    measurements, rows = fit.refined.measurements, fit.refined.rows[fit.inliers]
-    points = cartesian_from_polar(measurements.polar[rows])
-    covariances = covariance_from_sigma_polar(points, measurements.sigma_polar[rows])
-    weights, chi2 = np.ones(len(points)), np.inf
-    for _ in range(_PLANE_ROUNDS):
-        offsets = points - (weights @ points) / weights.sum()
-        normal = np.linalg.svd(offsets * np.sqrt(weights)[:, None])[2][2]
-        weights = 1.0 / np.einsum("i,nij,j->n", normal, covariances, normal)
-        chi2 = min(chi2, float(weights @ (offsets @ normal) ** 2))
-    redundancy = max(len(points) - 3, 1)
-    return 4.0 * (chi2 - redundancy) > MIRRORED_GAIN + 4.0 * _NORMAL_QUANTILE_99 * np.sqrt(2.0 * redundancy)
+_SCREENING_SIGMAS = 1.8
+_AGREEING_SIGMAS = 3.0
+_UNIT_SLIPS = (
+    ("the measured position looks like centimetres", 0.01, 2.0),
+    ("the measured position looks like millimetres", 0.001, 2.0),
+    ("the measured position looks like feet", 0.3048, 0.0),
+    ("the radar's ranges look like feet", 1.0 / 0.3048, 0.0),
+)
+"""What would remove a contradiction, the factor on the measured position, and the smallest position [m] it is said of."""
 
 
 def two_poses(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if two poses explain the pairs about equally well (a plane seen from far away has two)."""
-    best = fit.alternatives[0]
+    """Warn if two poses explain the pairs about equally well, or if only the expected distance of the camera decides.
+
+    A plane seen from far away has two poses, and so have returns with a constant companion. The scores of the candidates are
+    left out of one comparison: what makes the companion echo more than the reflector does so at every placement.
+    """
     for other in fit.alternatives[1:]:
         error = other.camera_from_radar.error_from(fit.refined.camera_from_radar)
-        apart_rad = float(np.linalg.norm(error[3:]))
         sigmas = float(np.sqrt(error @ fit.uncertainty.pose_information @ error))
-        if other.cost - best.cost < _ALMOST_AS_LIKELY and apart_rad > _OTHER_POSE_RAD and sigmas > _OTHER_POSE_SIGMAS:
-            return [
-                DataWarning(
-                    "two-poses",
-                    f"another pose, {np.rad2deg(apart_rad):.0f} deg away, explains the pairs almost as well",
-                    "measure the camera position with a tape, or add placements nearer and farther than the present ones",
-                )
-            ]
+        if sigmas <= _OTHER_POSE_SIGMAS:
+            continue
+        away = (
+            f"{np.rad2deg(np.linalg.norm(error[3:])):.1f} deg and {_moved_m(fit, other):.2f} m away ({sigmas:.0f} standard "
+            "deviations)"
+        )
+        if min(other.cost - fit.alternatives[0].cost, _cost_without_scores(fit, other)) < _ALMOST_AS_LIKELY:
+            return [_two_poses(fit, other, away)]
+        if _cost_without_prior(fit, other) < _ALMOST_AS_LIKELY:
+            return [_assumed_distance(fit, other, away)]
     return []
 
 
-def camera_position(fit: SolvedFit) -> list[DataWarning]:
-    """Warn if the camera position contradicts the tape measure, or is much farther away than expected."""
-    if fit.measurements.prior.measured:
-        return _contradicted_position(fit)
-    prior = fit.measurements.prior
-    away_m = float(np.linalg.norm(_camera_centre(fit.refined.camera_from_radar) - prior.position_m))
-    if away_m <= _FAR_CAMERA * prior.sigma_m:
-        return []
-    return [
-        DataWarning(
-            "camera-far-away",
-            f"the solved camera position is {away_m:.1f} m from the radar; about {prior.sigma_m:g} m was expected",
-            "if the sensors really are that far apart, set the nominal distance; otherwise check axes and intrinsics",
+def _two_poses(fit: SolvedFit, other: GncSolution, away: str) -> DataWarning:
+    measurements = fit.refined.measurements
+    changed = associate(measurements, other.camera_from_radar)[0] != fit.refined.rows
+    names = [name for name, differs, inlier in zip(fit.ids, changed, fit.inliers, strict=True) if differs and inlier]
+    if not names:
+        return DataWarning(
+            "two-poses",
+            f"another pose, {away}, explains the pairs almost as well",
+            "measure the camera position with a tape, or add placements nearer and farther than the present ones",
         )
-    ]
+    return DataWarning(
+        "two-poses",
+        f"another pose, {away}, explains the pairs almost as well, with other radar positions for {len(names)} of them",
+        f"check in the radar view which of the returns is the reflector, for example at {names[0]}: something may always stand "
+        "near it; or measure the camera position with a tape",
+    )
 
 
-def _contradicted_position(fit: SolvedFit) -> list[DataWarning]:
-    """Compare the measured camera position with the one from the pairs alone.
+def _assumed_distance(fit: SolvedFit, other: GncSolution, away: str) -> DataWarning:
+    here_m, there_m = (
+        float(np.linalg.norm(_camera_centre(one.camera_from_radar))) for one in (fit.alternatives[0], other)
+    )
+    return DataWarning(
+        "camera-far-away",
+        f"another pose, {away}, explains the pairs as well; the one with the camera {here_m:.1f} m from the radar, not "
+        f"{there_m:.1f} m, was chosen only because about {fit.measurements.prior.sigma_m:g} m is expected",
+        "are both sensors on the same rig, or how far apart? Set the nominal distance, or measure the camera position",
+    )
 
-    A position with a small sigma overrides the pairs and only makes the residuals large, so it becomes a weak prior here.
-    """
+
+def _cost_without_scores(fit: SolvedFit, other: GncSolution) -> float:
+    """Return how much less likely another pose is if all candidates of a pair are equally plausible."""
+    if fit.measurements.one_to_one:
+        return np.inf
+    share = -np.log(np.diff(fit.measurements.first))[fit.measurements.owner]
+    cost = mixture_cost(replace(fit.refined.measurements, log_score=share), fit.refined.camera_from_radar)
+    coarse = mixture_cost(replace(fit.refined.measurements, log_score=share), other.camera_from_radar) - cost
+    if not _ALMOST_AS_LIKELY <= coarse < _WORTH_REFINING:
+        return coarse
+    estimate_scale = fit.options.noise.estimate_scale
+    equal = replace(fit.measurements, log_score=share)
+    there = fit_errors_in_variables(equal, other, estimate_scale=estimate_scale, coarse=True)
+    return mixture_cost(there.measurements, there.camera_from_radar) - cost
+
+
+def _cost_without_prior(fit: SolvedFit, other: GncSolution) -> float:
+    """Return how much less likely another pose is by the pairs alone."""
     prior = fit.measurements.prior
-    if fit.chi2_per_degree < _LEAST_CHI2_PER_DEGREE:
+    if prior.measured:
+        return np.inf
+    by_pairs = [
+        one.cost - float(prior.costs(one.camera_from_radar.rotation, one.camera_from_radar.translation_m))
+        for one in (other, fit.alternatives[0])
+    ]
+    return by_pairs[0] - by_pairs[1]
+
+
+def _moved_m(fit: SolvedFit, other: GncSolution) -> float:
+    """Return the distance between the camera centres of the solved pose and another."""
+    here, there = _camera_centre(fit.refined.camera_from_radar), _camera_centre(other.camera_from_radar)
+    return float(np.linalg.norm(here - there))
+
+
+def camera_position(fit: SolvedFit) -> list[DataWarning]:
+    """Warn if the pairs contradict the measured camera position.
+
+    A position with a small sigma overrides the pairs and only makes the residuals large, or not even that, so it becomes a
+    weak prior here. One step from the solved pose tells whether the fit without it is needed.
+    """
+    if not fit.measurements.prior.measured:
         return []
-    start = GncSolution(fit.refined.camera_from_radar, 0.0, float(fit.refined.noise_scale.max()))
-    alone = fit_errors_in_variables(replace(fit.measurements, prior=prior.weakened()), start, estimate_scale=True)
-    away_m = _camera_centre(alone.camera_from_radar) - prior.position_m
-    centre_jacobian = prior.rows(alone.camera_from_radar)[1] * prior.sigma_m
-    difference_covariance = centre_jacobian @ pose_covariance(
-        alone
-    ).covariance @ centre_jacobian.T + prior.sigma_m**2 * np.eye(3)
-    sigmas = float(np.sqrt(away_m @ np.linalg.solve(difference_covariance, away_m)))
+    prior, refined = fit.refined.measurements.prior, fit.refined
+    residual, jacobian = prior.rows(refined.camera_from_radar)
+    weak_jacobian = prior.weakened().rows(refined.camera_from_radar)[1]
+    information = fit.uncertainty.information.copy()
+    information[:6, :6] += weak_jacobian.T @ weak_jacobian - jacobian.T @ jacobian
+    covariance = np.linalg.inv(information)[:6, :6]
+    moved = refined.camera_from_radar.perturbed(-covariance @ jacobian.T @ residual)
+    if _Centre.of(fit, moved, covariance).sigmas_from(prior.position_m) < _SCREENING_SIGMAS:
+        return []
+    start = GncSolution(refined.camera_from_radar, 0.0, float(refined.noise_scale.max()))
+    weakened = replace(fit.measurements, prior=prior.weakened())
+    alone = fit_errors_in_variables(weakened, start, estimate_scale=fit.options.noise.estimate_scale)
+    centre = _Centre.of(fit, alone.camera_from_radar, pose_covariance(alone).covariance)
+    sigmas = centre.sigmas_from(prior.position_m)
     if sigmas < _CONTRADICTION_SIGMAS:
         return []
+    away_m = float(np.linalg.norm(centre.position_m - prior.position_m))
     return [
         DataWarning(
             "camera-position-contradicted",
-            f"the pairs alone place the camera {100 * np.linalg.norm(away_m):.0f} cm from the measured position, "
-            f"{sigmas:.1f} standard deviations",
+            f"the pairs alone place the camera {100 * away_m:.0f} cm from the measured position, "
+            f"{sigmas:.1f} standard deviations{_other_unit(centre, prior.position_m)}",
             "measure again from the radar's antennas to the lens: forward, left, up; or state a larger uncertainty",
         )
     ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Centre:
+    """The camera centre from the pairs alone, (3,) [m], with the covariance (3, 3) of its distance from the measured one."""
+
+    position_m: Vector3
+    covariance_m2: Matrix33
+
+    @classmethod
+    def of(cls, fit: SolvedFit, camera_from_radar: RigidTransform, covariance: Matrix66) -> "_Centre":
+        """Take it from a pose."""
+        prior = fit.measurements.prior
+        jacobian = prior.centre_jacobian(camera_from_radar)
+        measured_m2 = prior.sigma_m**2 * np.eye(3)
+        return cls(_camera_centre(camera_from_radar), jacobian @ covariance @ jacobian.T + measured_m2)
+
+    def sigmas_from(self, position_m: Vector3) -> float:
+        """Return the distance from a position in standard deviations."""
+        away_m = self.position_m - position_m
+        return float(np.sqrt(away_m @ np.linalg.solve(self.covariance_m2, away_m)))
+
+
+def _other_unit(centre: _Centre, measured_m: Vector3) -> str:
+    """Return in words which other unit would remove the contradiction; empty if none would."""
+    size_m = float(np.linalg.norm(measured_m))
+    for text, factor, least_m in _UNIT_SLIPS:
+        clear = centre.sigmas_from(np.zeros(3)) > _CONTRADICTION_SIGMAS or least_m > 0.0
+        if clear and size_m > least_m and centre.sigmas_from(factor * measured_m) < _AGREEING_SIGMAS:
+            return f"; {text}"
+    return ""
 
 
 def _camera_centre(camera_from_radar: RigidTransform) -> np.ndarray:

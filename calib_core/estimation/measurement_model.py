@@ -39,15 +39,16 @@ class CameraPrior:
         object.__setattr__(self, "position_m", frozen_array(self.position_m, (3,)))
 
     def rows(self, camera_from_radar: RigidTransform) -> tuple[Vector3, Matrix33]:
-        """Return the whitened residual (3,) and its Jacobian (3, 6) with respect to (dt, dtheta).
-
-        The centre is c = -R^T t, so dc = -R^T dt - R^T [t]x dtheta.
-        """
-        rotation, translation_m = camera_from_radar.rotation, camera_from_radar.translation_m
-        away_m = self.position_m + rotation.T @ translation_m
+        """Return the whitened residual (3,) and its Jacobian (3, 6) with respect to (dt, dtheta)."""
+        away_m = self.position_m + camera_from_radar.rotation.T @ camera_from_radar.translation_m
         sigma_m = np.sqrt(self._variance_m2(away_m))
-        jacobian = np.concatenate([-rotation.T, -rotation.T @ skew(translation_m)], axis=1)
-        return away_m / sigma_m, jacobian / sigma_m[:, None]
+        return away_m / sigma_m, self.centre_jacobian(camera_from_radar) / sigma_m[:, None]
+
+    @staticmethod
+    def centre_jacobian(camera_from_radar: RigidTransform) -> np.ndarray:
+        """Return d centre / d (dt, dtheta), (3, 6): the centre is c = -R^T t, so dc = -R^T dt - R^T [t]x dtheta."""
+        turned = camera_from_radar.rotation.T
+        return np.concatenate([-turned, -turned @ skew(camera_from_radar.translation_m)], axis=1)
 
     def _variance_m2(self, away_m: np.ndarray) -> np.ndarray:
         """Return the variance per radar axis (..., 3), for a camera (..., 3) away from the prior's position."""

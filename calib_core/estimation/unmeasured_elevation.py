@@ -9,7 +9,7 @@ the one that maps reported positions to pixels, its covariance that of the radar
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Points3
+from calib_core.arrays import Matrix66, Points3, Values
 from calib_core.geometry import RigidTransform
 from calib_core.options import RadarOptions
 
@@ -21,15 +21,21 @@ OWN_SIGMA_RAD = np.deg2rad(0.5)
 _SAME_ELEVATION_RAD = np.deg2rad(0.01)
 _SAME_HEIGHT_M = 0.001
 _LEAST_POSITIONS = 2
+_NEARLY_ALL = 0.9
 
 
 def is_flat(points_radar_m: Points3) -> bool:
-    """Return whether all radar positions (n, 3) have one elevation or one height, up to rounding."""
+    """Return whether nearly all radar positions (n, 3) have one elevation or one height, up to rounding."""
     if len(points_radar_m) < _LEAST_POSITIONS:
         return False
     height_m = points_radar_m[:, 2]
     elevation_rad = np.arctan2(height_m, np.hypot(points_radar_m[:, 0], points_radar_m[:, 1]))
-    return bool(height_m.std() < _SAME_HEIGHT_M or elevation_rad.std() < _SAME_ELEVATION_RAD)
+    return _apart(height_m) < _SAME_HEIGHT_M or _apart(elevation_rad) < _SAME_ELEVATION_RAD
+
+
+def _apart(values: Values) -> float:
+    """Return how far from their median all but a few of the values lie."""
+    return float(np.quantile(np.abs(values - np.median(values)), _NEARLY_ALL))
 
 
 def mounting_spread(camera_from_radar: RigidTransform, height_m: float, radar: RadarOptions) -> Matrix66:

@@ -5,14 +5,16 @@ method assumes; the pose stays as printed.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from calib_core.arrays import Flags, Points2, Points3
 from calib_core.camera import Camera
-from calib_core.estimation.linearization import linearize
-from calib_core.geometry import RigidTransform
+from calib_core.estimation.linearization import Linearization, linearize
+from calib_core.geometry import RigidTransform, skew
 from calib_core.options import CalibrationOptions
+from calib_core.plausibility import implausible_input
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import DataWarning
 
@@ -21,6 +23,8 @@ __all__ = ["warnings_as_printed"]
 _MOST_DISAGREEING = 0.35
 _NOISE_EXCESS = 2.5  # of the mean squared residual
 _FAR_CAMERA = 3.0  # expected distances
+_WEAK_ROTATION_RAD = np.deg2rad(2.0)  # as in the default method
+_WEAK_POSITION_M = 0.15
 
 
 def warnings_as_printed(
@@ -44,16 +48,60 @@ def warnings_as_printed(
         options: the assumed noise, RANSAC's threshold and the expected distance of the camera.
     """
     hidden = np.isnan(camera.project(camera_from_radar @ points_radar_m)).any(axis=1)
+    fit = _modelled(points_radar_m[~hidden], pixels_px[~hidden], camera, camera_from_radar, options)
     return (
-        *_disagreeing(ids, agreeing, options),
+        *implausible_input(ids, points_radar_m, pixels_px, camera, options),
+        *_disagreeing(ids, agreeing, fit, options),
         *_behind(ids, hidden),
-        *_excess(points_radar_m[~hidden], pixels_px[~hidden], camera, camera_from_radar, options),
+        *_excess(fit),
+        *_spread(fit, camera_from_radar),
         *_far_camera(camera_from_radar, options),
     )
 
 
-def _disagreeing(ids: Sequence[str], agreeing: Flags, options: CalibrationOptions) -> list[DataWarning]:
-    if np.mean(~agreeing) <= _MOST_DISAGREEING:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Modelled:
+    """The pose under the noise that the default method assumes.
+
+    Attributes:
+        model: residuals and Jacobians, whitened by that noise.
+        degrees_of_freedom: of the residuals.
+        excess: the mean squared whitened residual per degree of freedom; 1 if the noise is as assumed.
+    """
+
+    model: Linearization
+    degrees_of_freedom: int
+    excess: float
+
+    @property
+    def noisy(self) -> bool:
+        """Whether the residuals are larger than the assumed noise explains."""
+        degrees = self.degrees_of_freedom
+        return degrees >= 1 and self.excess >= max(_NOISE_EXCESS, 1.0 + 4.0 * np.sqrt(2.0 / degrees))
+
+
+def _modelled(
+    points_radar_m: Points3,
+    pixels_px: Points2,
+    camera: Camera,
+    camera_from_radar: RigidTransform,
+    options: CalibrationOptions,
+) -> _Modelled:
+    noise, degrees = options.noise, 2 * len(points_radar_m) - 6
+    sigma_polar = [noise.sigma_range_m, *np.deg2rad([noise.sigma_azimuth_deg, noise.sigma_elevation_deg])]
+    model = linearize(
+        camera_from_radar,
+        camera,
+        pixels_px=pixels_px,
+        sigma_px=np.full(len(pixels_px), noise.sigma_px),
+        polar=polar_from_cartesian(points_radar_m),
+        sigma_polar=np.tile(sigma_polar, (len(points_radar_m), 1)),
+    )
+    return _Modelled(model, degrees, float(model.squared.sum()) / max(degrees, 1))
+
+
+def _disagreeing(ids: Sequence[str], agreeing: Flags, fit: _Modelled, options: CalibrationOptions) -> list[DataWarning]:
+    if np.mean(~agreeing) <= _MOST_DISAGREEING or not fit.noisy:
         return []
     return [
         DataWarning(
@@ -78,35 +126,45 @@ def _behind(ids: Sequence[str], hidden: Flags) -> list[DataWarning]:
     ]
 
 
-def _excess(
-    points_radar_m: Points3,
-    pixels_px: Points2,
-    camera: Camera,
-    camera_from_radar: RigidTransform,
-    options: CalibrationOptions,
-) -> list[DataWarning]:
-    degrees = 2 * len(points_radar_m) - 6
-    if degrees < 1:
-        return []
-    noise = options.noise
-    sigma_polar = [noise.sigma_range_m, *np.deg2rad([noise.sigma_azimuth_deg, noise.sigma_elevation_deg])]
-    model = linearize(
-        camera_from_radar,
-        camera,
-        pixels_px=pixels_px,
-        sigma_px=np.full(len(pixels_px), noise.sigma_px),
-        polar=polar_from_cartesian(points_radar_m),
-        sigma_polar=np.tile(sigma_polar, (len(points_radar_m), 1)),
-    )
-    excess = float(model.squared.sum()) / degrees
-    if excess < max(_NOISE_EXCESS, 1.0 + 4.0 * np.sqrt(2.0 / degrees)):
+def _excess(fit: _Modelled) -> list[DataWarning]:
+    if not fit.noisy:
         return []
     return [
         DataWarning(
             "residuals-too-large",
-            f"residuals are {np.sqrt(excess):.1f} times what the assumed noise explains "
-            f"(chi2 / degrees of freedom {excess:.1f})",
+            f"residuals are {np.sqrt(fit.excess):.1f} times what the assumed noise explains "
+            f"(chi2 / degrees of freedom {fit.excess:.1f})",
             "some radar positions or clicks are wrong: use the default method, and check the pairs it names",
+        )
+    ]
+
+
+def _spread(fit: _Modelled, camera_from_radar: RigidTransform) -> list[DataWarning]:
+    """Warn if the pairs' noise moves the pose far.
+
+    Algorithm 1 weights all pixels equally, so noise of covariance S in the pixels, as large as its residuals, gives the pose
+    the covariance (J^T J)^-1 J^T S J (J^T J)^-1.
+    """
+    if fit.degrees_of_freedom < 1:
+        return []
+    unwhitened = np.linalg.pinv(fit.model.whitening)
+    jacobian = unwhitened @ fit.model.pose_jacobian
+    inverse = np.linalg.pinv(np.einsum("nij,nik->jk", jacobian, jacobian))
+    carried = np.swapaxes(jacobian, 1, 2) @ unwhitened
+    covariance = fit.excess * inverse @ np.einsum("nij,nkj->ik", carried, carried) @ inverse
+    turned = camera_from_radar.rotation.T
+    centre = np.concatenate([-turned, -turned @ skew(camera_from_radar.translation_m)], axis=1)
+    rotation_rad = float(np.sqrt(np.trace(covariance[3:, 3:])))
+    position_m = float(np.sqrt(np.trace(centre @ covariance @ centre.T)))
+    if rotation_rad <= _WEAK_ROTATION_RAD and position_m <= _WEAK_POSITION_M:
+        return []
+    return [
+        DataWarning(
+            "weak-geometry",
+            f"Algorithm 1 states no uncertainty; by its residuals and the placements it is about {np.rad2deg(rotation_rad):.1f} "
+            f"deg and {100.0 * position_m:.0f} cm (one sigma)",
+            "use the default method, which weights the pairs by their noise; add placements near and far, at both edges of the "
+            "picture",
         )
     ]
 

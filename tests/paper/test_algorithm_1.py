@@ -38,7 +38,7 @@ from calib_core.paper.algorithm_1 import (
 )
 from calib_core.paper.pnp import project_points, refine_lm, solve_pnp_ransac
 from calib_core.results import Calibration
-from calib_core.synthetic import SimulatedPairs, simulate_pairs
+from calib_core.synthetic import FIELD, SimulatedPairs, simulate_pairs
 from calib_core.synthetic.pairs import study_camera
 
 START_NS = 1_700_000_000_123_456_789
@@ -398,10 +398,23 @@ def test_algorithm_1_reports_aed_and_cdsd_over_all_pairs_and_claims_no_uncertain
     assert result.metrics.cdsd_px == pytest.approx(cdsd(lengths))
     assert np.isnan(result.metrics.held_out_aed_px)
     assert np.isnan(result.covariance).all()
-    assert [warning.code for warning in result.warnings] == ["residuals-too-large"]  # two pairs in twenty are wrong
+    # two pairs are wrong
+    assert [warning.code for warning in result.warnings] == ["residuals-too-large", "weak-geometry"]
     assert result.iterative_px > 0.0
     assert result.sqpnp_px > 0.0
     assert all(np.isnan(pair.outlier_probability) for pair in result.pairs)
+
+
+def test_algorithm_1_says_how_far_the_noise_moves_its_pose_and_is_silent_where_that_is_little() -> None:
+    far = replace(FIELD, min_range_m=9.0, max_range_m=12.0, max_azimuth_deg=12.0)
+    for seed in range(3):
+        rng = np.random.default_rng([12, seed])
+        good = simulate_pairs(20, rng=rng, noise="imaging")
+        assert solved(solve_pairs_as_printed(good.pairs, good.camera, OPTIONS)).warnings == ()
+        poor = simulate_pairs(20, rng=rng, noise="imaging", layout=far)
+        (weak,) = solved(solve_pairs_as_printed(poor.pairs, poor.camera, OPTIONS)).warnings
+        assert weak.code == "weak-geometry"
+        assert "cm (one sigma)" in weak.message
 
 
 def test_algorithm_1_does_not_care_about_the_order_of_the_clicks() -> None:

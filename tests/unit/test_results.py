@@ -105,6 +105,8 @@ def test_arrays_become_pairs_that_give_the_same_pose(simulated: SimulatedPairs) 
         (np.full((1, 3), np.nan), np.zeros((1, 2)), {}, r"points_radar_m\[0\]: .* is not finite"),
         (np.ones((1, 3)), np.full((1, 2), np.inf), {}, r"pixels_px\[0\]: .* is not finite"),
         (np.zeros((1, 3)), np.zeros((1, 2)), {}, "is at the radar's origin"),
+        (np.ones((1, 3)), np.zeros((1, 2)), {"sigma_px": np.nan}, "sigma_px: is nan; .* above zero"),
+        (np.ones((1, 3)), np.zeros((1, 2)), {"sigma_px": -2.0}, "sigma_px: is -2; .* above zero"),
         (np.ones((2, 3)), np.zeros((2, 2)), {"ids": ["a", "a"]}, "ids: there are duplicates"),
         (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.1, 0.2]}, "sigma_polar: expected an array of 3"),
         (np.ones((2, 3)), np.zeros((2, 2)), {"sigma_polar": [0.1, 0.2, 0.0]}, "sigma_polar: every standard deviation"),

@@ -23,6 +23,7 @@ from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import parse_document
 from calib_core.measurements import Candidate, Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions
+from calib_core.pair_checks import too_near
 from calib_core.radar import covariance_from_sigma_polar
 
 __all__ = ["PairsFile", "read_pairs", "write_pairs"]
@@ -121,9 +122,9 @@ def _pair(document: PairDocument, sigma_polar: Vector3, *, source: str, place: s
     """Return a pair whose positions are equally likely, because the file does not weight them."""
     positions = np.array([document.radar_m, *document.alternatives_radar_m])
     for index, position in enumerate(positions):
-        if not position.any():
+        if near := too_near(position):
             where = f"{place}.alternatives_radar_m[{index - 1}]" if index else f"{place}.radar_m"
-            raise InputError(f"{source}: {where}: is at the radar itself, so it cannot be a return; remove it")
+            raise InputError(f"{source}: {where}: {near}")
     covariances = covariance_from_sigma_polar(positions, np.broadcast_to(sigma_polar, positions.shape))
     return Pair(
         id=document.id,

@@ -13,6 +13,7 @@ from calib_core.results import Calibration
 from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
 
 FREE = CalibrationOptions()
+ANYWHERE = CalibrationOptions(solving=SolvingOptions(sensors_above_placements=False))
 MEASURED = CalibrationOptions(
     solving=SolvingOptions(camera_position=CameraPositionPrior(RigOptions().camera_offset_m, 0.01))
 )
@@ -57,10 +58,15 @@ def test_the_right_one_of_two_positions_is_chosen_for_every_pair(kind: str, opti
         assert len(named) >= bool(wrong)
 
 
-def test_if_all_elevations_may_be_mirrored_and_the_camera_is_not_measured_a_warning_says_so() -> None:
+def test_if_all_elevations_may_be_mirrored_the_ground_decides_and_without_it_a_warning_says_so() -> None:
     for seed in range(3):
         rng = np.random.default_rng([62, seed])
         simulated = simulate_pairs(20, rng=rng, noise="imaging")
-        outcome = calibrate_pairs(with_alternatives(simulated, "mirrored elevation", rng), simulated.camera, FREE)
+        pairs = with_alternatives(simulated, "mirrored elevation", rng)
+        outcome = calibrate_pairs(pairs, simulated.camera, FREE)
+        assert isinstance(outcome, Calibration)
+        error = simulated.camera_from_radar.error_from(outcome.camera_from_radar)
+        assert np.linalg.norm(error[3:]) < np.deg2rad(1.0)
+        outcome = calibrate_pairs(pairs, simulated.camera, ANYWHERE)
         assert isinstance(outcome, Calibration)
         assert {one.code for one in outcome.warnings} & {"handedness-open", "two-poses", "mirrored-axes"}

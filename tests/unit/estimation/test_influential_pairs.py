@@ -58,12 +58,10 @@ def named(calibration: Calibration) -> set[str]:
     return out | {pair.id for pair in calibration.pairs if any(f"without {pair.id} " in text for text in texts)}
 
 
-def test_the_sample_gives_no_warning_except_that_flat_ground_leaves_the_handedness_open(
-    rooftop: ClickedSample, truth: RigidTransform
-) -> None:
+def test_the_sample_gives_no_warning(rooftop: ClickedSample, truth: RigidTransform) -> None:
     calibration = solved_with(rooftop, "c1")
     assert named(calibration) == set()
-    assert [one.code for one in calibration.warnings] == ["handedness-assumed"]
+    assert calibration.warnings == ()
     assert inside_what_is_stated(calibration, truth)
 
 

@@ -1,0 +1,200 @@
+"""Handedness: is one radar axis mirrored?
+
+Placements near one plane fit a radar with a mirrored axis exactly as well, with the camera reflected in that plane. Radar and
+camera stand on the same side of the floor on which the reflector is placed, so a fit that puts them on different sides has
+a mirrored axis, however far apart they are. Without a plane, or with a measured camera position, the likelihoods of both
+decide (`mirror_test`).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Points3, Vector3
+from calib_core.diagnostics.solved_fit import SolvedFit
+from calib_core.estimation.mirror_test import MIRRORED_GAIN, NOT_MIRRORED_GAIN
+from calib_core.geometry import skew
+from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
+from calib_core.results import DataWarning
+
+__all__ = ["GroundSides", "assumed_axes", "ground_sides", "mirrored_axes"]
+
+_PLANE_ROUNDS = 6
+_NORMAL_QUANTILE_99 = 2.33
+_CLEAR_SIGMAS = 2.0  # of a height above the plane
+_VERY_CLEAR_SIGMAS = 3.0
+_SAME_ELEVATION_RAD = np.deg2rad(0.02)  # far less than any radar's noise of the elevation
+_FLIP = (
+    "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) at the source; rows of the picture "
+    "counted from below look the same; do not use this pose"
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plane:
+    """The plane through the inlier placements, in the radar frame.
+
+    Attributes:
+        origin_m: (3,) their weighted mean.
+        axes: (3, 3) rows: two directions in the plane and its normal.
+        covariance: (3, 3) of its height at the origin [m] and its slopes along both directions.
+        chi2: of the placements' distances from it.
+        redundancy: their number beyond the three that determine it.
+    """
+
+    origin_m: Vector3
+    axes: np.ndarray
+    covariance: np.ndarray
+    chi2: float
+    redundancy: int
+
+    def height_m(self, point_m: Vector3) -> tuple[float, float]:
+        """Return a point's signed height above the plane, and the standard deviation that the plane adds to it."""
+        along, across, height = self.axes @ (point_m - self.origin_m)
+        row = np.array([1.0, along, across])
+        return float(height), float(np.sqrt(row @ self.covariance @ row))
+
+
+@dataclass(frozen=True, slots=True)
+class GroundSides:
+    """Where radar and camera are relative to the plane of the placements.
+
+    Attributes:
+        radar_m: signed height of the radar above the plane.
+        radar_sigma_m: its standard deviation.
+        camera_m: the same for the camera.
+        camera_sigma_m: its standard deviation.
+    """
+
+    radar_m: float
+    radar_sigma_m: float
+    camera_m: float
+    camera_sigma_m: float
+
+    @property
+    def same(self) -> bool:
+        """Whether both are on the same side, as expected."""
+        return self._sigmas() > _CLEAR_SIGMAS
+
+    @property
+    def opposite(self) -> bool:
+        """Whether they are clearly on different sides."""
+        return self._sigmas() < -_VERY_CLEAR_SIGMAS
+
+    def _sigmas(self) -> float:
+        """Return how clear the less certain side is, negative if the sides differ."""
+        radar, camera = self.radar_m / self.radar_sigma_m, self.camera_m / self.camera_sigma_m
+        return float(np.sign(radar * camera) * min(abs(radar), abs(camera)))
+
+
+def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
+    """Warn if mirrored radar axes are more likely, or about as likely."""
+    if fit.measurements.flat:
+        return []  # a mirrored axis is then a rotation, which the pose absorbs
+    sides = _deciding_sides(fit)
+    if sides is not None and sides.same:
+        return []
+    if sides is not None and sides.opposite:
+        return [_on_other_side(sides)]
+    if fit.mirror_gain > MIRRORED_GAIN:
+        return [
+            DataWarning(
+                "mirrored-axes",
+                "pairs and expected camera position agree better with one radar axis mirrored "
+                f"(log-likelihood ratio {fit.mirror_gain / 2:.1f}): the radar's axes look left-handed",
+                _FLIP,
+            )
+        ]
+    if fit.mirror_gain > NOT_MIRRORED_GAIN:
+        return [
+            DataWarning(
+                "handedness-open",
+                "a mirrored radar axis would explain the pairs about as well: all placements lie near one plane",
+                "measure the camera position with a tape, or add placements at other heights (a tripod)",
+            )
+        ]
+    return []
+
+
+def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
+    """Warn if only the expected camera distance, and not the pairs, rules out mirrored axes."""
+    already_warned = fit.mirror_gain > NOT_MIRRORED_GAIN or fit.measurements.flat
+    if already_warned or fit.measurements.prior.measured or _heights_decide(_plane(fit)):
+        return []
+    sides = _deciding_sides(fit)
+    if sides is not None and (sides.same or sides.opposite):
+        return []
+    return [
+        DataWarning(
+            "handedness-assumed",
+            "the placements lie near one plane, so mirrored radar axes fit equally well: that none is mirrored is inferred "
+            f"only from the camera being within about {fit.measurements.prior.sigma_m:g} m of the radar",
+            "measure the camera position (0.3 m is enough for this), or add placements at other heights (a tripod)",
+        )
+    ]
+
+
+def _on_other_side(sides: GroundSides) -> DataWarning:
+    return DataWarning(
+        "mirrored-axes",
+        f"the pose puts the camera {abs(sides.camera_m):.1f} m below the plane of the placements and the radar "
+        f"{abs(sides.radar_m):.1f} m above it; with one radar axis mirrored, both are above: the radar's axes look left-handed",
+        _FLIP + "; if the sensors really are on different sides of the placements, turn sensors_above_placements off",
+    )
+
+
+def _deciding_sides(fit: SolvedFit) -> GroundSides | None:
+    """Return the sides if they are to decide: the sensors are above the placements, and nothing better is known."""
+    if not fit.options.solving.sensors_above_placements or fit.measurements.prior.measured:
+        return None
+    plane = _plane(fit)
+    return None if _heights_decide(plane) else _sides_of(plane, fit)
+
+
+def ground_sides(fit: SolvedFit) -> GroundSides:
+    """Fit the plane of the placements, and return on which side of it radar and camera are."""
+    return _sides_of(_plane(fit), fit)
+
+
+def _sides_of(plane: _Plane, fit: SolvedFit) -> GroundSides:
+    pose = fit.refined.camera_from_radar
+    turned = pose.rotation.T
+    centre_m = pose.inverse().translation_m
+    normal = np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1).T @ plane.axes[2]
+    radar_m, radar_sigma_m = plane.height_m(np.zeros(3))
+    camera_m, plane_sigma_m = plane.height_m(centre_m)
+    camera_sigma_m = float(np.sqrt(plane_sigma_m**2 + normal @ fit.uncertainty.covariance @ normal))
+    return GroundSides(radar_m, radar_sigma_m, camera_m, camera_sigma_m)
+
+
+def _heights_decide(plane: _Plane) -> bool:
+    """Return whether the placements are far enough from any plane that the pairs alone rule out mirrored axes.
+
+    Mirrored axes with a rotated camera are a reflection in some plane, which moves a placement by twice its height h above
+    that plane. Twice the log-likelihood therefore falls by about sum (2 h / sigma)^2 with the true heights, by
+    4 (chi2 - (n - 3)) with measured ones; the limit includes the 99 % quantile of the noise of that figure.
+    """
+    limit = MIRRORED_GAIN + 4.0 * _NORMAL_QUANTILE_99 * np.sqrt(2.0 * plane.redundancy)
+    return bool(4.0 * (plane.chi2 - plane.redundancy) > limit)
+
+
+def _plane(fit: SolvedFit) -> _Plane:
+    points, covariances = _placements(fit)
+    weights, chi2 = np.ones(len(points)), np.inf
+    for _ in range(_PLANE_ROUNDS):
+        origin_m = (weights @ points) / weights.sum()
+        offsets = points - origin_m
+        axes = np.linalg.svd(offsets * np.sqrt(weights)[:, None])[2]
+        weights = 1.0 / np.einsum("i,nij,j->n", axes[2], covariances, axes[2])
+        chi2 = min(chi2, float(weights @ (offsets @ axes[2]) ** 2))
+    redundancy = max(len(points) - 3, 1)
+    rows = np.concatenate([np.ones((len(points), 1)), offsets @ axes[:2].T], axis=1)
+    covariance = np.linalg.pinv((rows * weights[:, None]).T @ rows) * max(chi2 / redundancy, 1.0)
+    return _Plane(origin_m, axes, covariance, chi2, redundancy)
+
+
+def _placements(fit: SolvedFit) -> tuple[Points3, np.ndarray]:
+    """Return the inliers' radar positions (n, 3) [m] and their covariances (n, 3, 3)."""
+    measurements, rows = fit.refined.measurements, fit.refined.rows[fit.inliers]
+    points = cartesian_from_polar(measurements.polar[rows])
+    return points, covariance_from_sigma_polar(points, measurements.sigma_polar[rows])

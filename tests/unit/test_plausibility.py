@@ -1,0 +1,125 @@
+"""Input in other units, pictures and axes is named in words, whether or not a pose can be solved from it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib_core.association.array_pairs import pairs_from_arrays
+from calib_core.calibration import calibrate_pairs
+from calib_core.errors import InputError
+from calib_core.measurements import Candidate, Pair, Unsolvable
+from calib_core.options import CalibrationOptions, CameraPositionPrior, Method, SolvingOptions
+from calib_core.synthetic import RigOptions, SimulatedPairs, simulate_pairs
+
+SUSPECTED = {"units-suspected", "pixels-suspected", "radar-axes-suspected"}
+RIG = RigOptions(camera_offset_m=(0.0, 0.5, 0.1))
+
+
+@pytest.fixture(scope="module")
+def simulated() -> SimulatedPairs:
+    return simulate_pairs(20, rng=np.random.default_rng(91), rig_options=RIG)
+
+
+def arrays(simulated: SimulatedPairs) -> tuple[np.ndarray, np.ndarray]:
+    positions = np.array([pair.candidates[0].position_radar_m for pair in simulated.pairs])
+    return positions, np.array([pair.pixel_px for pair in simulated.pairs])
+
+
+def said(
+    simulated: SimulatedPairs,
+    points: np.ndarray,
+    pixels: np.ndarray,
+    *,
+    position_m: np.ndarray | None = None,
+    method: Method = "default",
+) -> dict[str, str]:
+    """Return what the outcome says, by code."""
+    prior = None if position_m is None else CameraPositionPrior(tuple(position_m.tolist()), 0.01)
+    options = CalibrationOptions(method=method, solving=SolvingOptions(camera_position=prior))
+    outcome = calibrate_pairs(pairs_from_arrays(points, pixels), simulated.camera, options)
+    if isinstance(outcome, Unsolvable):
+        return {outcome.code: f"{outcome.reason}; {outcome.hint}"}
+    return {one.code: one.message for one in outcome.warnings}
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+@pytest.mark.parametrize(
+    ("change", "code", "words"),
+    [
+        (lambda points, pixels: (1000.0 * points, pixels), "units-suspected", "look like millimetres"),
+        (lambda points, pixels: (100.0 * points, pixels), "units-suspected", "look like centimetres"),
+        (lambda points, pixels: (points, pixels[:, ::-1]), "pixels-suspected", "column and row exchanged"),
+        (lambda points, pixels: (points, pixels / 2.0), "pixels-suspected", "picture seems to be smaller"),
+        (
+            lambda points, pixels: (points, pixels + np.array([0.0, 600.0])),
+            "pixels-suspected",
+            "outside the 1920 x 1080 picture",
+        ),
+        (
+            lambda points, pixels: (points[:, [1, 0, 2]] * [-1.0, 1.0, 1.0], pixels),
+            "radar-axes-suspected",
+            "the left of",
+        ),
+        (lambda points, pixels: (points * [-1.0, -1.0, 1.0], pixels), "radar-axes-suspected", "behind the radar"),
+    ],
+)
+def test_what_the_input_looks_like_is_said(simulated, change, code: str, words: str, method: Method) -> None:
+    found = said(simulated, *change(*arrays(simulated)), method=method)
+    assert any(words in text for name, text in found.items() if name == code or name.startswith("no-")), found
+    assert code == "units-suspected" or "mirrored-axes" not in found
+
+
+def test_good_input_is_not_suspected(simulated: SimulatedPairs) -> None:
+    found = said(simulated, *arrays(simulated))
+    assert not set(found) & SUSPECTED
+
+
+@pytest.mark.parametrize(
+    ("in_ranges", "in_tape", "words"),
+    [
+        (1.0 / 0.3048, 1.0, "the radar's ranges look like feet"),
+        (1.0, 1.0 / 0.3048, "the measured position looks like feet"),
+    ],
+)
+def test_feet_are_told_by_a_measured_position(
+    simulated: SimulatedPairs, in_ranges: float, in_tape: float, words: str
+) -> None:
+    points, pixels = arrays(simulated)
+    found = said(simulated, in_ranges * points, pixels, position_m=in_tape * simulated.rig.camera_position_radar_m)
+    assert words in found["camera-position-contradicted"]
+
+
+def test_a_position_in_centimetres_is_blamed_rather_than_the_placements() -> None:
+    for seed in range(3):
+        simulated = simulate_pairs(20, rng=np.random.default_rng([92, seed]), noise="imaging")
+        found = said(simulated, *arrays(simulated), position_m=100.0 * simulated.rig.camera_position_radar_m)
+        assert set(found) & {"camera-position-contradicted", "units-suspected"}
+        assert "degenerate-placements" not in found
+
+
+def changed(pair: Pair, **values: object) -> Pair:
+    candidate: Candidate = replace(pair.candidates[0], **values)  # type: ignore[arg-type]
+    return replace(pair, candidates=(candidate,))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda pair: replace(pair, pixel_px=np.array([np.nan, 1.0])), r"pair p1: pixel \(nan, 1\) is not finite"),
+        (lambda pair: replace(pair, sigma_px=np.nan), "pair p1: sigma_px is nan; .* above zero"),
+        (lambda pair: replace(pair, sigma_px=0.0), "pair p1: sigma_px is 0; .* above zero"),
+        (lambda pair: replace(pair, id="p2"), "pair p2: the id occurs more than once"),
+        (lambda pair: changed(pair, position_radar_m=np.array([0.001, 0, 0])), "p1: .* 1 mm from the radar's origin"),
+        (
+            lambda pair: changed(pair, position_radar_m=np.array([1, np.inf, 0])),
+            "pair p1: radar position .* not finite",
+        ),
+        (lambda pair: changed(pair, sigma_polar=np.array([0.1, np.nan, 0.1])), "pair p1: sigma_polar is .* above zero"),
+        (lambda pair: changed(pair, sigma_polar=np.array([0.1, -0.1, 0.1])), "pair p1: sigma_polar is .* above zero"),
+    ],
+)
+def test_impossible_numbers_in_a_pair_are_refused_with_its_name(simulated, change, words: str) -> None:
+    first, *others = simulated.pairs
+    with pytest.raises(InputError, match=words):
+        calibrate_pairs([change(first), *others], simulated.camera)
