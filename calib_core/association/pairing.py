@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.association.clustering import candidates_of, clusters_of, clusters_wanted, scores_of, window_around
+from calib_core.association.cluster_scale import cluster_scale
+from calib_core.association.clustering import candidates_of, clusters_of, clusters_wanted, window_around
 from calib_core.association.gating import static_returns
+from calib_core.association.novelty import background_windows, scores_of
 from calib_core.association.placement_groups import linked_clicks
 from calib_core.measurements import NS_PER_S, Pair, RadarScans, ReflectorClick, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
@@ -60,9 +62,13 @@ def _paired(
     clicks: Sequence[ReflectorClick], windows: Sequence[RadarScans], static: RadarScans, options: CalibrationOptions
 ) -> tuple[list[Pair], list[tuple[ReflectorClick, RadarScans]]]:
     """Make the pairs of clicks and their windows; also return the clicks whose window is empty."""
+    most, scale = clusters_wanted(options.locating), cluster_scale(static)
     distinct = list({id(window): window for window in windows}.values())  # clicks of one placement share a window
-    clusters = [clusters_of(window, most=clusters_wanted(options.locating)) for window in distinct]
-    scores = scores_of(distinct, clusters)
+    background = background_windows(static, distinct, window_s=options.locating.window_s)
+    clusters, elsewhere = (
+        [clusters_of(window, most=most, scale=scale) for window in some] for some in (distinct, background)
+    )
+    scores = scores_of(distinct, clusters, scale=scale, background=elsewhere)
     row = {id(window): i for i, window in enumerate(distinct)}
     pairs, empty = [], []
     for click, window in zip(clicks, windows, strict=True):
