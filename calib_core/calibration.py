@@ -10,6 +10,7 @@ from calib_core.advice.next_placement import next_placement
 from calib_core.arrays import Values
 from calib_core.association.clustering import candidate_at
 from calib_core.association.pairing import pair_clicks
+from calib_core.association.placement_groups import click_results, placement_groups
 from calib_core.camera import Camera
 from calib_core.diagnostics.checks import warnings_of
 from calib_core.diagnostics.clocks import CLOCK_CODES, clocks
@@ -139,9 +140,13 @@ def _solved(
     camera: Camera,
     options: CalibrationOptions,
 ) -> Calibration | Unsolvable:
-    used = sorted((pair for pair in shown if pair.id not in excluded), key=_canonical)
+    clicked = sorted((pair for pair in shown if pair.id not in excluded), key=_canonical)
+    if len(clicked) < MIN_PAIRS:
+        return _too_few(len(clicked), len(excluded), len(unpaired))
+    groups = placement_groups(clicked, options)
+    used = [group.pair for group in groups]
     if len(used) < MIN_PAIRS:
-        return _too_few(len(used), len(excluded), len(unpaired))
+        return _one_place(len(clicked), len(used))
     measurements = pair_measurements(used, camera, options)
     fit = _best_fit(measurements, options)
     if isinstance(fit, Unsolvable):
@@ -176,7 +181,7 @@ def _solved(
         covariance=uncertainty.covariance,
         camera=camera,
         metrics=metrics,
-        pairs=tuple(results[pair.id] for pair in shown),
+        pairs=tuple(results[pair.id] for pair in shown if pair.id in results),
         unpaired=unpaired,
         warnings=warnings_of(solved_fit),
         options=options,
@@ -188,6 +193,7 @@ def _solved(
     angle_map = learn_angle_map(calibration)
     return replace(
         calibration,
+        pairs=click_results(calibration, groups, shown),
         angle_map=angle_map if angle_map is not None and angle_map.pays else None,
         next_placement=next_placement(calibration),
     )
@@ -298,6 +304,15 @@ def _degenerate(count: int) -> Unsolvable:
         "degenerate-placements",
         f"the {count} placements do not determine the pose: they lie at one place or on one line",
         "spread the placements: near and far, left and right",
+    )
+
+
+def _one_place(clicks: int, placements: int) -> Unsolvable:
+    return Unsolvable(
+        "degenerate-placements",
+        f"the {clicks} clicks show {placements} of at least {MIN_PAIRS} required placements: clicks of one placement count "
+        "as one",
+        "move the reflector between clicks: near and far, left and right",
     )
 
 

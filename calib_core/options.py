@@ -53,7 +53,9 @@ class LocatingOptions:
     window_s: float = option(
         3.0, "Length of the window centred on the scan nearest to the click [s] (paper: 3 s).", low=0.01, high=60.0
     )
-    max_candidates: int = option(6, "Largest number of candidates per click.", low=1, high=50)
+    max_candidates: int = option(
+        16, "Largest number of candidates per click; fewer are kept where one return stands out.", low=1, high=50
+    )
     max_time_gap_s: float = option(
         1.5, "A click farther than this from every scan stays unpaired [s].", low=0.0, high=60.0
     )

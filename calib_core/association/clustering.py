@@ -6,29 +6,31 @@ Averaging within a cluster does not reduce the errors of angle bins, clutter and
 """
 
 import hashlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points3, Values, Vector3, frozen_array
+from calib_core.arrays import Flags, Points3, Values, Vector3, frozen_array
 from calib_core.measurements import NS_PER_S, Candidate, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
 from calib_core.radar import covariance_from_sigma_polar, direction_cosines
 
-__all__ = ["Cluster", "candidate_at", "candidates_of", "clusters_of", "scores_of", "window_around"]
+__all__ = ["Cluster", "candidate_at", "candidates_of", "clusters_of", "window_around"]
 
 CLUSTER_SCALE = np.array([0.06, np.deg2rad(1.2), np.deg2rad(2.5)])
-"""One step of distance in range [m], u and w: about a range bin, an angle bin, and an elevation error."""
+"""The least step of distance in range [m], u and w: about a range bin, an angle bin, and an elevation error.
+
+`cluster_scale` finds the step of a radar that scatters more.
+"""
 
 _REACH = 2.0  # steps from a cluster's centre to its farthest member
-_SAME_PLACE = 1.5  # steps within which a cluster of another window is the same object
+_NEIGHBOURS = 1.5  # steps between cells whose masses add up
 _MEAN_SHIFTS = 3
 _MOST_CELLS = 400
-_CLUSTERS_PER_CANDIDATE = 4
-_NOVELTY_FLOOR = 0.002
+_CLUSTERS_PER_CANDIDATE = 3
 _LEAST_RELATIVE_SCORE = 0.001
+_KEPT_SHARE = 0.99  # of the score of a window
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +85,7 @@ class _WindowKey:
         return isinstance(other, _WindowKey) and self.digest == other.digest
 
 
-def clusters_of(window: RadarScans, *, most: int) -> tuple[Cluster, ...]:
+def clusters_of(window: RadarScans, *, most: int, scale: Vector3 = CLUSTER_SCALE) -> tuple[Cluster, ...]:
     """Find the clusters of a window, the densest first.
 
     Results are cached, because the solve after each click looks at all windows again.
@@ -91,23 +93,24 @@ def clusters_of(window: RadarScans, *, most: int) -> tuple[Cluster, ...]:
     Args:
         window: the static returns around one click.
         most: largest number of clusters.
+        scale: (3,) one step of distance in range [m], u and w.
     """
     if not len(window.points_radar_m):
         return ()
     content = hashlib.blake2b()
-    for column in (window.first_return, window.points_radar_m, window.snr_db, window.sigma_polar):
+    for column in (window.first_return, window.points_radar_m, window.snr_db, window.sigma_polar, scale):
         content.update(np.ascontiguousarray(column).data)
-    return _found_clusters(_WindowKey(window, content.digest()), most)
+    return _found_clusters(_WindowKey(window, content.digest()), most, tuple(scale.tolist()))
 
 
-@lru_cache(maxsize=256)
-def _found_clusters(key: _WindowKey, most: int) -> tuple[Cluster, ...]:
-    window = key.window
-    steps = direction_cosines(window.points_radar_m) / CLUSTER_SCALE
+@lru_cache(maxsize=512)
+def _found_clusters(key: _WindowKey, most: int, scale: tuple[float, ...]) -> tuple[Cluster, ...]:
+    window, step = key.window, np.array(scale)
+    steps = direction_cosines(window.points_radar_m) / step
     amplitude = _amplitudes(window.snr_db)
     free = np.ones(len(steps), dtype=bool)
     cells, mass = _cells(steps, amplitude)
-    neighbours = ((cells[:, None] - cells[None]) ** 2).sum(axis=2) <= _SAME_PLACE**2
+    neighbours = ((cells[:, None] - cells[None]) ** 2).sum(axis=2) <= _NEIGHBOURS**2
     clusters: list[Cluster] = []
     while len(clusters) < most and mass.any():
         densest = int(np.argmax(np.where(mass > 0, neighbours @ mass, 0.0)))
@@ -118,7 +121,7 @@ def _found_clusters(key: _WindowKey, most: int) -> tuple[Cluster, ...]:
         mass[densest] = 0.0
         if members.any():
             free &= ~members
-            clusters.append(_cluster(window, steps, amplitude, members))
+            clusters.append(_cluster(window, steps, amplitude, members, step))
     return tuple(clusters)
 
 
@@ -153,16 +156,16 @@ def _mean_shifted(centre: Vector3, steps: Points3, weight: Values) -> Vector3:
     return centre
 
 
-def _cluster(window: RadarScans, steps: Points3, amplitude: Values, members: Flags) -> Cluster:
+def _cluster(window: RadarScans, steps: Points3, amplitude: Values, members: Flags, scale: Vector3) -> Cluster:
     inside, weight = steps[members], amplitude[members]
     centre = weight @ inside / weight.sum()
     scatter = np.sqrt(weight @ (inside - centre) ** 2 / weight.sum())
     scans = len(np.unique(window.scan_of_return()[members]))
     snr_db, own_sigma = window.snr_db[members], window.sigma_polar[members]
     return Cluster(
-        centre=centre * CLUSTER_SCALE,
+        centre=centre * scale,
         forward=1.0 if weight @ window.points_radar_m[members, 0] >= 0 else -1.0,
-        scatter=scatter * CLUSTER_SCALE,
+        scatter=scatter * scale,
         message_sigma=own_sigma.mean(axis=0),  # NaN if any return has none
         amplitude=float(weight.mean()),
         snr_db=float(snr_db.mean()),
@@ -172,53 +175,18 @@ def _cluster(window: RadarScans, steps: Points3, amplitude: Values, members: Fla
     )
 
 
-def scores_of(windows: Sequence[RadarScans], clusters: Sequence[tuple[Cluster, ...]]) -> tuple[Values, ...]:
-    """Score every cluster of every window: amplitude x persistence x novelty, (k,) per window, each summing to 1.
-
-    Novelty is the share of the other windows in which the place is empty; it separates the reflector, which moves, from
-    what is always there. Windows that overlap show the same placement and are not compared.
-    """
-    places = np.array([cluster.centre for own in clusters for cluster in own]).reshape(-1, 3) / CLUSTER_SCALE
-    persistence = np.array([cluster.persistence for own in clusters for cluster in own])
-    first = np.concatenate([[0], np.cumsum([len(own) for own in clusters])]).astype(np.int64)
-    spans = np.array([(window.times_ns[0], window.times_ns[-1]) for window in windows], dtype=np.int64).reshape(-1, 2)
-    scores = []
-    for i, own in enumerate(clusters):
-        others = (spans[:, 0] > spans[i, 1]) | (spans[:, 1] < spans[i, 0])
-        plain = np.array([cluster.amplitude * cluster.persistence**2 for cluster in own])
-        score = plain * _novelty(places[first[i] : first[i + 1]], places, persistence, first, others)
-        scores.append(score / score.sum() if len(score) else score)
-    return tuple(scores)
-
-
-def _novelty(own: Points3, places: Points3, persistence: Values, first: Indices, others: Flags) -> Values:
-    """Return the novelty (k,) of each place of one window, 1 if no other window shows it.
-
-    Args:
-        own: (k, 3) in steps.
-        places: (n, 3) of all windows, concatenated.
-        persistence: (n,).
-        first: (m + 1,) window j owns the rows first[j] to first[j + 1].
-        others: (m,) the windows to compare with.
-    """
-    if not len(own) or not others.any():
-        return np.ones(len(own))
-    filled = np.flatnonzero(np.diff(first) > 0)
-    same = ((own[:, None] - places[None]) ** 2).sum(axis=2) <= _SAME_PLACE**2
-    seen = np.maximum.reduceat(same * persistence, first[filled], axis=1)
-    occupied = seen[:, others[filled]].sum(axis=1) / others.sum()
-    return np.asarray(np.maximum((1.0 - np.minimum(occupied, 1.0)) ** 4, _NOVELTY_FLOOR))
-
-
 def candidates_of(
     clusters: tuple[Cluster, ...], scores: Values, options: LocatingOptions, noise: NoiseOptions
 ) -> tuple[Candidate, ...]:
-    """Turn the best clusters of one window into candidates, the most plausible first."""
-    order = np.argsort(-scores, kind="stable")[: options.max_candidates]
+    """Turn the best clusters of one window into candidates, the most plausible first.
+
+    As many are kept as hold nearly all of the score: few where one return stands out, many in a busy scene.
+    """
+    order = np.argsort(-scores, kind="stable")
+    before = np.cumsum(scores[order]) - scores[order]
+    kept = (before < _KEPT_SHARE) & (scores[order] >= _LEAST_RELATIVE_SCORE * scores[order[0]])
     return tuple(
-        _candidate(clusters[k], float(scores[k]), noise)
-        for k in order
-        if scores[k] >= _LEAST_RELATIVE_SCORE * scores[order[0]]
+        _candidate(clusters[k], float(scores[k]), noise) for k in order[kept][: options.max_candidates].tolist()
     )
 
 

@@ -5,8 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.association.clustering import candidates_of, clusters_of, clusters_wanted, scores_of, window_around
+from calib_core.association.cluster_scale import cluster_scale
+from calib_core.association.clustering import candidates_of, clusters_of, clusters_wanted, window_around
 from calib_core.association.gating import static_returns
+from calib_core.association.novelty import background_windows, scores_of
+from calib_core.association.placement_groups import linked_clicks
 from calib_core.measurements import NS_PER_S, Pair, RadarScans, ReflectorClick, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 
@@ -46,24 +49,75 @@ def pair_clicks(clicks: Sequence[ReflectorClick], scans: RadarScans, options: Ca
         else:
             unpaired.append(problem)
     windows = [window_around(static, click.image_time, window_s=options.locating.window_s) for click in reachable]
-    clusters = [clusters_of(window, most=clusters_wanted(options.locating)) for window in windows]
-    pairs: list[Pair] = []
-    for click, window, found, scores in zip(reachable, windows, clusters, scores_of(windows, clusters), strict=True):
+    pairs, empty = _paired(reachable, windows, static, options)
+    shared = _windows_of_placements(reachable, windows, pairs, static, options)
+    if shared is not windows:
+        pairs, empty = _paired(reachable, shared, static, options)
+    unpaired += [_nothing_static(click, window, options) for click, window in empty]
+    rank = {click.id: place for place, click in enumerate(sorted(clicks))}
+    return Pairing(tuple(pairs), tuple(sorted(unpaired, key=lambda one: rank[one.id])))
+
+
+def _paired(
+    clicks: Sequence[ReflectorClick], windows: Sequence[RadarScans], static: RadarScans, options: CalibrationOptions
+) -> tuple[list[Pair], list[tuple[ReflectorClick, RadarScans]]]:
+    """Make the pairs of clicks and their windows; also return the clicks whose window is empty."""
+    most, scale = clusters_wanted(options.locating), cluster_scale(static)
+    distinct = list({id(window): window for window in windows}.values())  # clicks of one placement share a window
+    background = background_windows(static, distinct, window_s=options.locating.window_s)
+    clusters, elsewhere = (
+        [clusters_of(window, most=most, scale=scale) for window in some] for some in (distinct, background)
+    )
+    scores = scores_of(distinct, clusters, scale=scale, background=elsewhere)
+    row = {id(window): i for i, window in enumerate(distinct)}
+    pairs, empty = [], []
+    for click, window in zip(clicks, windows, strict=True):
+        found = clusters[row[id(window)]]
         if not found:
-            unpaired.append(_nothing_static(click, window, options))
+            empty.append((click, window))
             continue
         pairs.append(
             Pair(
                 id=click.id,
                 pixel_px=np.array([click.u_px, click.v_px]),
-                candidates=candidates_of(found, scores, options.locating, options.noise),
+                candidates=candidates_of(found, scores[row[id(window)]], options.locating, options.noise),
                 sigma_px=click.sigma_px,
                 image_time=click.image_time,
                 radar_time=TimeNs(int(static.times_ns[static.nearest(click.image_time)])),
             )
         )
-    rank = {click.id: place for place, click in enumerate(sorted(clicks))}
-    return Pairing(tuple(pairs), tuple(sorted(unpaired, key=lambda one: rank[one.id])))
+    return pairs, empty
+
+
+def _windows_of_placements(
+    clicks: Sequence[ReflectorClick],
+    windows: list[RadarScans],
+    pairs: Sequence[Pair],
+    static: RadarScans,
+    options: CalibrationOptions,
+) -> list[RadarScans]:
+    """Give the clicks of one placement the scans of all their windows; the same list if each has a placement of its own."""
+    excluded = {click.id for click in clicks if click.excluded}
+    used = [pair for pair in pairs if pair.id not in excluded]
+    groups = [rows for rows in linked_clicks(used, options) if len(rows) > 1]
+    if not groups:
+        return windows
+    row = {click.id: i for i, click in enumerate(clicks)}
+    shared = list(windows)
+    for rows in groups:
+        members = [row[used[i].id] for i in rows]
+        pooled = _union([windows[i] for i in members], static)
+        for i in members:
+            shared[i] = pooled
+    return shared
+
+
+def _union(windows: Sequence[RadarScans], static: RadarScans) -> RadarScans:
+    """Collect the scans that lie in any of some windows, each once."""
+    inside = np.zeros(len(static), dtype=np.bool_)
+    for window in windows:
+        inside |= (static.times_ns >= window.times_ns[0]) & (static.times_ns <= window.times_ns[-1])
+    return RadarScans.from_scans([static.scan(i) for i in np.flatnonzero(inside).tolist()])
 
 
 def _gap_problem(click: ReflectorClick, scans: RadarScans, max_gap_s: float) -> Unpaired | None:

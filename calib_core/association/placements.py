@@ -1,38 +1,33 @@
 """Placement detection: where and when the reflector stood still, found from the radar alone.
 
 A placement is a strong static return that appears, stays in one place for seconds, and disappears. What is there all the
-time is clutter. What appears together with something stronger is its multipath ghost, or the person waiting next to the
-reflector: there is one reflector, so of two simultaneous dwells only one is a placement. The timeline shows the
-placements, and the N and P keys step through them.
+time is clutter. What appears and disappears together with something stronger is its multipath ghost or what carries it, and
+what is much weaker is the person waiting next to it. Two reflectors that stand at the same time are as strong as each other
+and are moved in turn. The timeline shows the placements, and the N and P keys step through them.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3, frozen_array
-from calib_core.association.gating import static_returns
+from calib_core.arrays import Vector3, frozen_array
+from calib_core.association.dwells import Dwell, find_dwells
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import direction_cosines
 
 __all__ = ["Placement", "find_placements"]
 
-CELL = np.array([0.08, 0.04, 0.08])
-"""Size of a cell in range [m], u = y / r and w = z / r: the reflector's returns scatter over a few of them."""
-
-_REACH = np.array([0.07, 0.035, 0.09])  # of a dwell's returns about their median, in the same coordinates
-_LARGEST_GAP_S = 0.7  # a longer gap ends a dwell
-_SEED_GAP_S = 1.2  # within one cell, because the returns may alternate between neighbouring cells
-_SEED_SHARE_OF_DWELL = 0.5
-_LEAST_PRESENCE = 0.4  # share of a dwell's scans that show it
-_MOST_PRESENCE_OUTSIDE = 0.25  # the same for the rest of the recording, relative to the dwell's
-_MOST_OF_RECORDING = 0.5  # what stays longer is part of the scene
-_MARGIN_S = 1.0  # around a dwell, where the reflector is being put down or picked up
 _SHORTEST_OVERLAP_S = 0.5
 _WEAKER_DB = 10.0  # below the typical placement: a person standing still, or a door that moved
-_MOST_SEEDS = 4000
+_WEAKER_AT_ONCE_DB = 7.0  # the same while something stronger stands
+_SAME_MOMENT_S = 1.2  # between the starts, and between the ends, of dwells that belong together
+_SAME_RETURN = 1.5  # reaches, between two simultaneous dwells of one return
+_NOT_MOVED = 0.5  # reaches, between the two parts of an interrupted dwell
+_LONGEST_BREAK_S = 6.0  # while somebody walks between radar and reflector
+_LEAST_SCORE = 0.5  # times that of a good placement of this recording
+_GOOD_SHARE = 0.75  # of the placements score less than a good one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +53,7 @@ class Placement:
 
 
 def find_placements(scans: RadarScans, options: GatingOptions, *, min_dwell_s: float = 2.0) -> tuple[Placement, ...]:
-    """Find the intervals during which the reflector stood still, sorted by start. They do not overlap.
+    """Find the intervals during which a reflector stood still, sorted by start. They overlap if two stood at once.
 
     Takes O(n log n) time for n returns.
 
@@ -68,210 +63,83 @@ def find_placements(scans: RadarScans, options: GatingOptions, *, min_dwell_s: f
         options: which returns are static and in range.
         min_dwell_s: the shortest placement [s].
     """
-    grid = _Grid.of(static_returns(scans, options))
-    dwells = [dwell for seed in _seeds(grid, min_dwell_s) if (dwell := _dwell_of(grid, seed, min_dwell_s)) is not None]
+    dwells = find_dwells(scans, options, min_dwell_s=min_dwell_s)
     alone = _one_at_a_time(dwells)
     typical_db = float(np.median([dwell.strength_db for dwell in alone])) if alone else 0.0
     strong = [dwell for dwell in alone if not dwell.strength_db < typical_db - _WEAKER_DB]
-    return tuple(_placement(dwell, typical_db) for dwell in sorted(strong, key=lambda dwell: dwell.start))
+    all_of_them = _without_breaks([*strong, *_at_once(dwells, strong, typical_db)])
+    return _good([_placement(dwell, typical_db) for dwell in sorted(all_of_them, key=lambda dwell: dwell.start)])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Grid:
-    """Static returns sorted by cell, and by time within a cell.
-
-    Attributes:
-        times_s: (m,) of all scans, from the first.
-        times_ns: (m,) the same as stamps.
-        cells: (k, 3) the occupied cells in the order of their keys.
-        keys: (k,) ascending.
-        first: (k + 1,) cell i owns the rows first[i] to first[i + 1].
-        scan: (n,) the scan of each row.
-        cosines: (n, 3) range [m], u, w.
-        points_radar_m: (n, 3).
-        snr_db: (n,) NaN where unknown.
-    """
-
-    times_s: Values
-    times_ns: TimesNs
-    cells: Indices
-    keys: Indices
-    first: Indices
-    scan: Indices
-    cosines: Points3
-    points_radar_m: Points3
-    snr_db: Values
-
-    @classmethod
-    def of(cls, static: RadarScans) -> "_Grid":
-        cosines = direction_cosines(static.points_radar_m)
-        cells = np.floor(cosines / CELL).astype(np.int64)
-        keys = _keys(cells)
-        order = np.argsort(keys, kind="stable")
-        unique, first = np.unique(keys[order], return_index=True)
-        start_ns = static.times_ns[0] if len(static) else 0
-        return cls(
-            times_s=(static.times_ns - start_ns) / NS_PER_S,
-            times_ns=static.times_ns,
-            cells=cells[order][first],
-            keys=unique,
-            first=np.append(first, len(order)),
-            scan=static.scan_of_return()[order],
-            cosines=cosines[order],
-            points_radar_m=static.points_radar_m[order],
-            snr_db=static.snr_db[order],
-        )
-
-    def around(self, cell: Indices) -> Indices:
-        """Return the rows of a cell and of its 26 neighbours."""
-        keys = _keys(cell + _NEIGHBOURS)
-        places = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
-        owned = places[self.keys[places] == keys]
-        return np.concatenate([np.arange(self.first[i], self.first[i + 1]) for i in owned.tolist()])
-
-
-_NEIGHBOURS = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], [-1, 0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
-_U_CELLS = 64  # u and w lie in -1 to 1: 51 and 26 cells, and a margin for neighbours
-_W_CELLS = 64
-
-
-def _keys(cells: Indices) -> Indices:
-    return (cells[..., 0] * _U_CELLS + cells[..., 1] + _U_CELLS // 2) * _W_CELLS + cells[..., 2] + _W_CELLS // 2
-
-
-@dataclass(frozen=True, slots=True)
-class _Seed:
-    """A run of returns in one cell: rows first to last of the grid."""
-
-    first: int
-    last: int
-
-
-def _seeds(grid: _Grid, min_dwell_s: float) -> Iterator[_Seed]:
-    """Yield the runs that may belong to a placement, those with the most scans first."""
-    if not len(grid.scan):
-        return
-    times_s = grid.times_s[grid.scan]
-    breaks = np.diff(times_s) > _SEED_GAP_S
-    breaks[grid.first[1:-1] - 1] = True
-    start = np.concatenate([[0], np.flatnonzero(breaks) + 1])
-    end = np.append(start[1:], len(times_s))
-    lasted_s = times_s[end - 1] - times_s[start]
-    in_cell = np.diff(grid.first)[np.searchsorted(grid.first, start, side="right") - 1]
-    inside = (end - start) / (lasted_s + _MARGIN_S)
-    presence_outside = (in_cell - (end - start)) / np.maximum(grid.times_s[-1] - lasted_s, _MARGIN_S)
-    likely = (lasted_s >= _SEED_SHARE_OF_DWELL * min_dwell_s) & (
-        presence_outside <= 2.0 * _MOST_PRESENCE_OUTSIDE * inside
-    )
-    rows = np.flatnonzero(likely)
-    for i in rows[np.argsort(start[rows] - end[rows], kind="stable")][:_MOST_SEEDS].tolist():
-        yield _Seed(int(start[i]), int(end[i]))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Dwell:
-    """A placement before it is compared with the others.
-
-    Attributes:
-        start: first stamp.
-        end: last stamp.
-        position_radar_m: (3,) median.
-        presence: share of its scans that show it.
-        presence_outside: share of the other scans that show the same place.
-        snr_db: mean of its returns; NaN when unknown.
-        strength_db: SNR corrected for range, a measure of the radar cross-section; 0 if unknown.
-    """
-
-    start: TimeNs
-    end: TimeNs
-    position_radar_m: Vector3
-    presence: float
-    presence_outside: float
-    snr_db: float
-    strength_db: float
-
-    @property
-    def weight(self) -> float:
-        """Rank among simultaneous dwells: strength, presence and duration [dB]."""
-        lasted_s = (self.end - self.start) / NS_PER_S
-        return self.strength_db + float(10.0 * np.log10(self.presence * lasted_s))
-
-
-def _dwell_of(grid: _Grid, seed: _Seed, min_dwell_s: float) -> _Dwell | None:
-    """Extend a seed beyond its cell: collect the returns around its median and find when they are present."""
-    centre = np.median(grid.cosines[seed.first : seed.last], axis=0)
-    rows = grid.around(np.floor(centre / CELL).astype(np.int64))
-    seed_times_s = grid.times_s[grid.scan[seed.first : seed.last]]
-    members = rows[:0]
-    span: tuple[int, int] | None = None
-    for _ in range(2):  # the second time around the median of the dwell itself
-        members = rows[(np.abs(grid.cosines[rows] - centre) <= _REACH).all(axis=1)]
-        span = _span(grid, members, float(np.median(seed_times_s)))
-        if span is None:
-            return None
-        in_span = (grid.scan[members] >= span[0]) & (grid.scan[members] <= span[1])
-        centre = np.median(grid.cosines[members[in_span]], axis=0)
-    if span is None or grid.times_s[span[1]] - grid.times_s[span[0]] < min_dwell_s:
-        return None
-    return _checked_dwell(grid, members, span)
-
-
-def _span(grid: _Grid, members: Indices, within_s: float) -> tuple[int, int] | None:
-    """Return the first and last scan of the uninterrupted presence around a time; None if there is none."""
-    shown = np.unique(grid.scan[members])
-    if not len(shown):
-        return None
-    nearest = int(np.argmin(np.abs(grid.times_s[shown] - within_s)))
-    ends = np.flatnonzero(np.diff(grid.times_s[shown]) > _LARGEST_GAP_S)
-    after = int(np.searchsorted(ends, nearest))
-    first = int(ends[after - 1]) + 1 if after > 0 else 0
-    last = int(ends[after]) if after < len(ends) else len(shown) - 1
-    return int(shown[first]), int(shown[last])
-
-
-def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> _Dwell | None:
-    """Measure the presence inside and outside a dwell's span; None if the dwell is clutter or chance."""
-    shown = np.unique(grid.scan[members])
-    inside = (shown >= span[0]) & (shown <= span[1])
-    presence = float(inside.sum()) / (span[1] - span[0] + 1)
-    start_s, end_s = grid.times_s[span[0]], grid.times_s[span[1]]
-    others = _outside(grid.times_s, start_s, end_s)
-    presence_outside = float(_outside(grid.times_s[shown], start_s, end_s).sum()) / max(float(others.sum()), 1.0)
-    stays = end_s - start_s > _MOST_OF_RECORDING * grid.times_s[-1]
-    if stays or presence < _LEAST_PRESENCE or presence_outside > _MOST_PRESENCE_OUTSIDE * presence:
-        return None
-    mine = members[(grid.scan[members] >= span[0]) & (grid.scan[members] <= span[1])]
-    position_radar_m = np.median(grid.points_radar_m[mine], axis=0)
-    snr_db = grid.snr_db[mine]
-    known = snr_db[np.isfinite(snr_db)]
-    mean_db = float(known.mean()) if len(known) else float("nan")
-    range_m = float(np.linalg.norm(position_radar_m))
-    return _Dwell(
-        start=TimeNs(int(grid.times_ns[span[0]])),
-        end=TimeNs(int(grid.times_ns[span[1]])),
-        position_radar_m=position_radar_m,
-        presence=presence,
-        presence_outside=presence_outside,
-        snr_db=mean_db,
-        strength_db=mean_db + 40.0 * float(np.log10(max(range_m, 1e-3))) if len(known) else 0.0,
-    )
-
-
-def _outside(times_s: Values, start_s: float, end_s: float) -> Flags:
-    return (times_s < start_s - _MARGIN_S) | (times_s > end_s + _MARGIN_S)
-
-
-def _one_at_a_time(dwells: Sequence[_Dwell]) -> list[_Dwell]:
-    """Keep only the dwell of largest weight among those that overlap in time: there is one reflector."""
-    kept: list[_Dwell] = []
-    shortest_ns = _SHORTEST_OVERLAP_S * NS_PER_S
-    for dwell in sorted(dwells, key=lambda dwell: (-dwell.weight, dwell.start, dwell.end)):
-        if all(min(dwell.end, other.end) - max(dwell.start, other.start) < shortest_ns for other in kept):
+def _one_at_a_time(dwells: Sequence[Dwell]) -> list[Dwell]:
+    """Keep only the dwell of largest weight among those that overlap in time."""
+    kept: list[Dwell] = []
+    for dwell in _heaviest_first(dwells):
+        if all(_overlap_s(dwell, other) < _SHORTEST_OVERLAP_S for other in kept):
             kept.append(dwell)
     return kept
 
 
-def _placement(dwell: _Dwell, typical_db: float) -> Placement:
+def _at_once(dwells: Sequence[Dwell], kept: Sequence[Dwell], typical_db: float) -> list[Dwell]:
+    """Find the dwells of further reflectors: as strong as the kept ones, elsewhere, and moved at other times."""
+    found = list(kept)
+    for dwell in _heaviest_first(dwells):
+        strong = np.isfinite(dwell.snr_db) and dwell.strength_db >= typical_db - _WEAKER_AT_ONCE_DB
+        rivals = [other for other in found if _overlap_s(dwell, other) >= _SHORTEST_OVERLAP_S]
+        if strong and not any(_belong_together(dwell, other) for other in rivals):
+            found.append(dwell)
+    return found[len(kept) :]
+
+
+def _heaviest_first(dwells: Sequence[Dwell]) -> list[Dwell]:
+    return sorted(dwells, key=lambda dwell: (-dwell.weight, dwell.start, dwell.end))
+
+
+def _overlap_s(one: Dwell, other: Dwell) -> float:
+    return (min(one.end, other.end) - max(one.start, other.start)) / NS_PER_S
+
+
+def _belong_together(one: Dwell, other: Dwell) -> bool:
+    """Return whether two simultaneous dwells are one return, or come and go together as far as the scans show."""
+    together = [
+        abs(first - second) < _SAME_MOMENT_S * NS_PER_S
+        for first, second, shown in (
+            (one.start, other.start, one.begins or other.begins),
+            (one.end, other.end, one.ends or other.ends),
+        )
+        if shown
+    ]
+    return _near(one, other, _SAME_RETURN) or (bool(together) and all(together))
+
+
+def _near(one: Dwell, other: Dwell, reaches: float) -> bool:
+    apart = direction_cosines(one.position_radar_m) - direction_cosines(other.position_radar_m)
+    return bool((np.abs(apart) <= reaches * one.reach).all())
+
+
+def _without_breaks(dwells: Sequence[Dwell]) -> list[Dwell]:
+    """Join the dwells of one place that a short break separates; the longest says where it is."""
+    joined: list[Dwell] = []
+    for dwell in sorted(dwells, key=lambda dwell: (dwell.start, dwell.end)):
+        for i, other in enumerate(joined):
+            if _near(dwell, other, _NOT_MOVED) and -_overlap_s(dwell, other) < _LONGEST_BREAK_S:
+                longest = max(dwell, other, key=lambda one: one.end - one.start)
+                joined[i] = replace(longest, start=min(dwell.start, other.start), end=TimeNs(max(dwell.end, other.end)))
+                break
+        else:
+            joined.append(dwell)
+    return joined
+
+
+def _good(placements: Sequence[Placement]) -> tuple[Placement, ...]:
+    """Leave out the placements that score far below a good one of the same recording."""
+    if not placements:
+        return ()
+    good = float(np.quantile([placement.score for placement in placements], _GOOD_SHARE))
+    return tuple(placement for placement in placements if placement.score >= _LEAST_SCORE * good)
+
+
+def _placement(dwell: Dwell, typical_db: float) -> Placement:
     strength = float(np.clip(1.0 + (dwell.strength_db - typical_db) / (2.0 * _WEAKER_DB), 0.0, 1.0))
     novelty = 1.0 - dwell.presence_outside / dwell.presence
     return Placement(

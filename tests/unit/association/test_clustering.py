@@ -8,9 +8,9 @@ from calib_core.association.clustering import (
     candidates_of,
     clusters_of,
     floor_sigma_polar,
-    scores_of,
     window_around,
 )
+from calib_core.association.novelty import scores_of
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
 

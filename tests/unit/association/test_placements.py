@@ -1,6 +1,7 @@
 """Placement detection from the radar alone."""
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,14 @@ import pytest
 from calib_core.association.placements import Placement, find_placements
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs, time_from_parts
 from calib_core.options import GatingOptions
+from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.recordings import open_recording
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.scans import SimulatedPlacement, simulate_scans
 
 REFLECTOR = (6.0, 1.0, -0.8)
 RATE_HZ = 10.0
+COLUMNS = ("points_radar_m", "doppler_mps", "snr_db", "sigma_polar")
 
 
 def scans_with(
@@ -109,6 +112,67 @@ def test_of_two_simultaneous_objects_the_stronger_is_the_reflector() -> None:
     person = (21.0, 26.0, (6.5, -0.5, 0.2), 12.0)
     (placement,) = found_in((20.0, 27.0, REFLECTOR, 25.0), person)
     np.testing.assert_allclose(placement.position_radar_m, REFLECTOR, atol=0.02)
+
+
+def in_turn(count: int, *, snr_db: float = 25.0) -> list[tuple[float, float, tuple[float, float, float], float]]:
+    """Two reflectors that are moved in turn every six seconds: each stays for twelve."""
+    return [(6.0 * i + 2.0, 6.0 * i + 13.5, (6.0 + 0.4 * i, 1.5 - 0.5 * i, -0.8), snr_db) for i in range(count)]
+
+
+def test_two_reflectors_moved_in_turn_are_all_found_and_nothing_else() -> None:
+    truth = in_turn(8)
+    ghosts = [(start, end, (x + 1.5, y, z), 12.0) for start, end, (x, y, z), _ in truth]
+    person = [(start + 3.0, start + 6.0, (x - 0.5, y + 1.0, z), 11.0) for start, _, (x, y, z), _ in truth]
+    found = found_in(*truth, *ghosts, *person)
+    assert len(found) == 8
+    for placement, (start, end, position, _) in zip(found, truth, strict=True):
+        assert (placement.start / NS_PER_S, placement.end / NS_PER_S) == pytest.approx((start, end), abs=0.7)
+        np.testing.assert_allclose(placement.position_radar_m, position, atol=0.02)
+
+
+def test_what_comes_and_goes_with_something_stronger_belongs_to_it() -> None:
+    placements = found_in((20.0, 27.0, REFLECTOR, 25.0), (20.0, 27.0, (7.2, 1.2, -0.8), 22.0))
+    assert [placement.position_radar_m[0] < 6.5 for placement in placements] == [True]
+
+
+def test_two_reflectors_that_fill_a_piece_of_recording_are_two_placements() -> None:
+    both = scans_with([(0.0, 100.0, REFLECTOR, 25.0), (0.0, 100.0, (8.0, -2.0, -0.8), 20.0)], length_s=5.0)
+    nothing = scans_with([], length_s=60.0)
+    later = RadarScans(
+        nothing.times_ns + 100 * NS_PER_S, nothing.first_return, *(getattr(nothing, name) for name in COLUMNS)
+    )
+    pieces = RadarScans.from_scans([part.scan(i) for part in (both, later) for i in range(len(part))])
+    assert len(find_placements(pieces, GatingOptions())) == 2
+
+
+def test_a_dwell_that_somebody_hides_for_a_moment_is_one_placement() -> None:
+    (placement,) = found_in((10.0, 15.0, REFLECTOR, 25.0), (17.0, 23.0, REFLECTOR, 25.0))
+    assert (placement.start / NS_PER_S, placement.end / NS_PER_S) == pytest.approx((10.0, 23.0), abs=0.5)
+
+
+def test_without_snr_only_one_placement_stands_at_a_time() -> None:
+    scans = scans_with(in_turn(6))
+    silent = RadarScans(
+        scans.times_ns,
+        scans.first_return,
+        scans.points_radar_m,
+        scans.doppler_mps,
+        np.full(len(scans.snr_db), np.nan),
+        scans.sigma_polar,
+    )
+    found = find_placements(silent, GatingOptions())
+    assert all(one.end <= other.start + NS_PER_S for one, other in pairwise(found))
+
+
+def test_a_radar_that_scatters_widely_shows_its_placements_too() -> None:
+    fine = scans_with([(5.0 + 12.0 * i, 13.0 + 12.0 * i, (6.0 + i, 1.0 - i, -0.8), 25.0) for i in range(4)])
+    rng = np.random.default_rng(3)
+    polar = polar_from_cartesian(fine.points_radar_m)
+    polar += rng.standard_normal(polar.shape) * [0.15, np.deg2rad(1.5), np.deg2rad(3.0)]
+    rough = RadarScans(
+        fine.times_ns, fine.first_return, cartesian_from_polar(polar), *(getattr(fine, name) for name in COLUMNS[1:])
+    )
+    assert len(find_placements(rough, GatingOptions())) == 4
 
 
 def test_strength_is_corrected_for_range_so_that_a_far_reflector_counts() -> None:

@@ -132,12 +132,14 @@ def test_few_pairs_are_reported() -> None:
 def test_many_clicks_of_few_places_are_reported() -> None:
     simulated = simulate_pairs(5, rng=np.random.default_rng(10), noise="imaging")
     rng = np.random.default_rng(1)
-    repeated = [
-        replace(pair, id=f"{pair.id}-{k}", pixel_px=pair.pixel_px + rng.standard_normal(2))
+    returned = [  # the reflector was carried away and put back, each time to a few centimetres
+        replace(pair, id=f"{pair.id}-{k}", pixel_px=pair.pixel_px + rng.standard_normal(2), candidates=(moved,))
         for pair in simulated.pairs
         for k in range(4)
+        for own in pair.candidates
+        for moved in (replace(own, position_radar_m=own.position_radar_m * (1.0 + 0.002 * k)),)
     ]
-    assert "repeated-placements" in codes(repeated, simulated.camera, measured())
+    assert "repeated-placements" in codes(returned, simulated.camera, measured())
 
 
 def test_two_radar_positions_that_fit_one_click_are_reported() -> None:
