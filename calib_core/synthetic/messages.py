@@ -18,7 +18,7 @@ from calib_core.recordings.containers.writing import (
     RecordedMessage,
 )
 from calib_core.synthetic.antennas import Antenna
-from calib_core.synthetic.defects import second_azimuths
+from calib_core.synthetic.radar_defects import second_azimuths
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
 
 __all__ = [

@@ -9,10 +9,10 @@ from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.synthetic.antennas import Antenna, antennas_of
-from calib_core.synthetic.defects import radar_from_reported
 from calib_core.synthetic.options import IntrinsicsErrors, SimulationOptions
 from calib_core.synthetic.pairs import draw_positions
 from calib_core.synthetic.passers_by import draw_passers_by
+from calib_core.synthetic.radar_defects import radar_from_reported
 from calib_core.synthetic.radar_profiles import RadarProfile, profile_with
 from calib_core.synthetic.rig import Rig, random_rig, typical_camera
 from calib_core.synthetic.scenes import Scatterer, Scene, scene_named
