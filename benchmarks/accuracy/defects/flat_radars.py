@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 
-from benchmarks.accuracy.adversaries import draw_flat
+from benchmarks.accuracy.defects.adversaries import draw_flat
 from benchmarks.accuracy.figures import Measured, at_most, column, fewest, share, summed_up
 from benchmarks.accuracy.outcomes import outcome_figures
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from benchmarks.accuracy.adversaries import Adversary, Solved, generator
 from benchmarks.accuracy.cases import tape_measured
+from benchmarks.accuracy.defects.adversaries import Adversary, Solved, generator
 from benchmarks.accuracy.scenes import Scene, draw_windows
 from calib_core.calibration import calibrate
 from calib_core.measurements import ReflectorClick
