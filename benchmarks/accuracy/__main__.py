@@ -5,22 +5,8 @@ import os
 import sys
 from pathlib import Path
 
-from benchmarks.accuracy import (
-    adversarial,
-    advice,
-    clutter,
-    coverage,
-    crying_wolf,
-    dragging,
-    efficiency,
-    flat_radars,
-    handedness,
-    many,
-    mirrored,
-    real,
-    shared_errors,
-    smooth,
-)
+from benchmarks.accuracy import advice, clutter, coverage, efficiency, many, mirrored, real, smooth
+from benchmarks.accuracy.defects import adversarial, crying_wolf, dragging, flat_radars, handedness, shared_errors
 from benchmarks.accuracy.fresh_seeds import fresh_seeds, last_fresh_seeds
 from benchmarks.accuracy.keeping import Keeper, digest_of_sources
 from benchmarks.accuracy.page import page

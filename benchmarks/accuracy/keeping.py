@@ -25,7 +25,7 @@ def digest_of_sources() -> str:
 def sources() -> list[Path]:
     """Return the files of code that the figures depend on."""
     files = [path for path in (_ROOT / "calib_core").rglob("*.py") if not _without_figures(path)]
-    return files + [path for path in Path(__file__).parent.glob("*.py") if path.name not in _WRITING_ONLY]
+    return files + [path for path in Path(__file__).parent.rglob("*.py") if path.name not in _WRITING_ONLY]
 
 
 def _without_figures(path: Path) -> bool:

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scipy.special import bdtr, fdtri
 
-from benchmarks.accuracy.adversarial import ALL, highest_share, measure_adversary, silent
-from benchmarks.accuracy.adversaries import draw_flat
-from benchmarks.accuracy.crying_wolf import measure_apart
-from benchmarks.accuracy.flat_radars import measure_flat
-from benchmarks.accuracy.handedness import Hand, measure_hand
+from benchmarks.accuracy.defects.adversarial import ALL, highest_share, measure_adversary, silent
+from benchmarks.accuracy.defects.adversaries import draw_flat
+from benchmarks.accuracy.defects.crying_wolf import measure_apart
+from benchmarks.accuracy.defects.flat_radars import measure_flat
+from benchmarks.accuracy.defects.handedness import Hand, measure_hand
+from benchmarks.accuracy.defects.shared_errors import Shared, draw_shared, measure_clean, measure_shared
 from benchmarks.accuracy.outcomes import codes_in, outcome_figures, quantile_999, silently_wrong, solved_or_refused
 from benchmarks.accuracy.rows import Figures
-from benchmarks.accuracy.shared_errors import Shared, draw_shared, measure_clean, measure_shared
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Unsolvable

@@ -5,9 +5,9 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.accuracy.adversaries import Adversary
-from benchmarks.accuracy.adversaries_of_pairs import ADVERSARIES_OF_PAIRS
-from benchmarks.accuracy.adversaries_of_scans import ADVERSARIES_OF_SCANS
+from benchmarks.accuracy.defects.adversaries import Adversary
+from benchmarks.accuracy.defects.adversaries_of_pairs import ADVERSARIES_OF_PAIRS
+from benchmarks.accuracy.defects.adversaries_of_scans import ADVERSARIES_OF_SCANS
 from benchmarks.accuracy.figures import MET, MISSED, UNDECIDED, column, share
 from benchmarks.accuracy.outcomes import codes_in, named, outcome_figures, silently_wrong
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section

@@ -6,10 +6,10 @@ from itertools import product
 
 import numpy as np
 
+from benchmarks.accuracy.defects.shared_errors import Shared, measure_shared
 from benchmarks.accuracy.figures import MET, UNDECIDED, Measured, at_most, share, worst
 from benchmarks.accuracy.outcomes import codes_in, outcome_figures
 from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
-from benchmarks.accuracy.shared_errors import Shared, measure_shared
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.synthetic import simulate_pairs

@@ -5,8 +5,8 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.accuracy.adversaries import FLAT, Adversary, Change, Draw, Solved, draw_flat, generator
 from benchmarks.accuracy.cases import tape_measured
+from benchmarks.accuracy.defects.adversaries import FLAT, Adversary, Change, Draw, Solved, draw_flat, generator
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions, CameraPositionPrior
 from calib_core.synthetic import AISLE, PairsLayout, SimulatedPairs, SystematicErrors, simulate_pairs

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from benchmarks.accuracy.adversaries import Adversary, Solved, generator
 from benchmarks.accuracy.cases import tape_measured
+from benchmarks.accuracy.defects.adversaries import Adversary, Solved, generator
 from benchmarks.accuracy.scenes import Scene, draw_windows
 from calib_core.calibration import calibrate
 from calib_core.measurements import ReflectorClick
@@ -15,6 +15,7 @@ __all__ = ["ADVERSARIES_OF_SCANS"]
 _COARSE = (0.15, 0.026, 0.052)  # 15 cm, 1.5 deg, 3 deg
 _ANOTHER = ("uncertain-association", "two-poses", "doubtful-pair", "one-pair-decides")
 _FIRST_SEED = 880_001
+_RATE_HZ = 5.0  # half the usual rate, for speed
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,8 @@ def _second(click: ReflectorClick, right_px: float, down_px: float) -> Reflector
 
 def _heavy_aisle(trial: int) -> Solved:
     """Solve a simulated session in a cluttered aisle with its own clicks."""
-    simulated = simulate_scans(SimulationOptions(seed=_FIRST_SEED + trial, scene="aisle", clutter="heavy"))
+    options = SimulationOptions(seed=_FIRST_SEED + trial, scene="aisle", clutter="heavy", radar_rate_hz=_RATE_HZ)
+    simulated = simulate_scans(options)
     return Solved(
         calibrate(simulated.clicks, simulated.scans, simulated.camera, CalibrationOptions()),
         simulated.camera_from_radar,
