@@ -23,8 +23,8 @@ __all__ = ["warnings_as_printed"]
 _MOST_DISAGREEING = 0.35
 _NOISE_EXCESS = 2.5  # of the mean squared residual
 _FAR_CAMERA = 3.0  # expected distances
-_WEAK_ROTATION_RAD = np.deg2rad(2.0)  # as in the default method
-_WEAK_POSITION_M = 0.15
+_WEAK_ROTATION_RAD = np.deg2rad(2.0)
+_WEAK_POSITION_M = 0.15  # less than in the default method, which states its uncertainty anyway
 
 
 def warnings_as_printed(
