@@ -23,8 +23,9 @@ __all__ = ["warnings_as_printed"]
 _MOST_DISAGREEING = 0.35
 _NOISE_EXCESS = 2.5  # of the mean squared residual
 _FAR_CAMERA = 3.0  # expected distances
-_WEAK_ROTATION_RAD = np.deg2rad(2.0)  # as in the default method
-_WEAK_POSITION_M = 0.15
+_TRUSTED_ROTATION_RAD = np.deg2rad(1.0)  # an error of a method that states no uncertainty is not expected to be larger
+_TRUSTED_POSITION_M = 0.25
+_SURE_SIGMAS = 2.9  # exceeded in 1 of 300 poses
 
 
 def warnings_as_printed(
@@ -140,7 +141,7 @@ def _excess(fit: _Modelled) -> list[DataWarning]:
 
 
 def _spread(fit: _Modelled, camera_from_radar: RigidTransform) -> list[DataWarning]:
-    """Warn if the pairs' noise moves the pose far.
+    """Warn if the pairs' noise may move the pose farther than somebody who is told no uncertainty expects.
 
     Algorithm 1 weights all pixels equally, so noise of covariance S in the pixels, as large as its residuals, gives the pose
     the covariance (J^T J)^-1 J^T S J (J^T J)^-1.
@@ -156,7 +157,7 @@ def _spread(fit: _Modelled, camera_from_radar: RigidTransform) -> list[DataWarni
     centre = np.concatenate([-turned, -turned @ skew(camera_from_radar.translation_m)], axis=1)
     rotation_rad = float(np.sqrt(np.trace(covariance[3:, 3:])))
     position_m = float(np.sqrt(np.trace(centre @ covariance @ centre.T)))
-    if rotation_rad <= _WEAK_ROTATION_RAD and position_m <= _WEAK_POSITION_M:
+    if _SURE_SIGMAS * rotation_rad <= _TRUSTED_ROTATION_RAD and _SURE_SIGMAS * position_m <= _TRUSTED_POSITION_M:
         return []
     return [
         DataWarning(

@@ -409,7 +409,7 @@ def test_algorithm_1_says_how_far_the_noise_moves_its_pose_and_is_silent_where_t
     far = replace(FIELD, min_range_m=9.0, max_range_m=12.0, max_azimuth_deg=12.0)
     for seed in range(3):
         rng = np.random.default_rng([12, seed])
-        good = simulate_pairs(20, rng=rng, noise="imaging")
+        good = simulate_pairs(40, rng=rng, noise="imaging")
         assert solved(solve_pairs_as_printed(good.pairs, good.camera, OPTIONS)).warnings == ()
         poor = simulate_pairs(20, rng=rng, noise="imaging", layout=far)
         (weak,) = solved(solve_pairs_as_printed(poor.pairs, poor.camera, OPTIONS)).warnings
