@@ -1,47 +1,41 @@
 """The whole pipeline: clicks and radar returns go in, camera_from_radar comes out."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calib_core import unsolved
 from calib_core.advice.angle_map import learn_angle_map
 from calib_core.advice.next_placement import next_placement
 from calib_core.arrays import Values
 from calib_core.association.clustering import candidate_at
 from calib_core.association.pairing import pair_clicks
-from calib_core.association.placement_groups import click_results, placement_groups
+from calib_core.association.placement_groups import PlacementGroup, click_results, placement_groups
 from calib_core.camera import Camera
 from calib_core.diagnostics.checks import warnings_of
 from calib_core.diagnostics.clocks import CLOCK_CODES, clocks
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.errors import InputError
-from calib_core.estimation.covariance import pose_covariance
-from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit, fit_errors_in_variables
-from calib_core.estimation.gnc import GncSolution, associate, solve_gnc
+from calib_core.estimation.best_fit import BestFit, best_fit, quick_fit
+from calib_core.estimation.covariance import PoseCovariance, pose_covariance
+from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.influential_pairs import average_over_influential_pairs, find_influential_pairs
-from calib_core.estimation.initialization import initial_poses
-from calib_core.estimation.leave_one_out import leave_one_out
+from calib_core.estimation.leave_one_out import LeaveOneOut, leave_one_out
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
-from calib_core.estimation.mirror_test import MIRRORED_GAIN, mirror_gain
 from calib_core.estimation.pair_results import excluded_pair_results, fit_metrics, used_pair_results
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.option_checks import checked_options
-from calib_core.options import CalibrationOptions, CameraPositionPrior
+from calib_core.options import CalibrationOptions
 from calib_core.pair_checks import checked_pairs
 from calib_core.plausibility import implausible_input
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
 
-__all__ = ["calibrate", "calibrate_pairs", "solve_again"]
+__all__ = ["calibrate", "calibrate_pairs", "calibration_steps", "solve_again"]
 
-_STARTS_MEASURED = 3
-_STARTS_FREE = 6
 _UNDETERMINED_ROTATION_RAD = 0.5  # a larger standard deviation means that the pairs do not determine the rotation
 _AGREEING_SHARE = 0.9
-_PLAUSIBLE_SCALE = 1.8
-_NEAR_PRIOR = 4.0  # standard deviations
-_PAIRS_TO_START = 150  # more do not improve the initialization
 
 
 def calibrate(
@@ -55,17 +49,48 @@ def calibrate(
         camera: the intrinsics.
         options: None takes the defaults; method "paper" is Algorithm 1 as printed.
     """
+    *_, outcome = calibration_steps(clicks, scans, camera, options, preview=False)
+    return outcome
+
+
+def calibration_steps(
+    clicks: Sequence[ReflectorClick],
+    scans: RadarScans,
+    camera: Camera,
+    options: CalibrationOptions | None = None,
+    *,
+    previous: Calibration | None = None,
+    preview: bool = True,
+) -> Iterator[Calibration | Unsolvable]:
+    """Calibrate in two steps: first a preview with pose and local covariance, then the answer, the same as `calibrate`'s.
+
+    The preview is marked as being checked: tests for mirrored axes, pairs that all rests on and other poses follow with
+    the answer, and may change it. No preview is made with the paper's method.
+
+    Args:
+        clicks: in any order; excluded ones are paired and shown, but not used.
+        scans: at least those around the clicks.
+        camera: the intrinsics.
+        options: None takes the defaults.
+        previous: the answer to nearly the same clicks, to start the preview from.
+        preview: make one.
+    """
     options = checked_options(options or CalibrationOptions())
     if options.method == "paper":
         from calib_core.paper.algorithm_1 import calibrate_as_printed
 
-        return calibrate_as_printed(clicks, scans, camera, options)
+        yield calibrate_as_printed(clicks, scans, camera, options)
+        return
     pairing = pair_clicks(clicks, scans, options)
     excluded = frozenset(click.id for click in clicks if click.excluded)
-    outcome = _solved(pairing.pairs, pairing.unpaired, excluded, camera, options)
-    if isinstance(outcome, Unsolvable):
-        return replace(outcome, unpaired=pairing.unpaired)
-    return replace(outcome, warnings=(*outcome.warnings, *clocks(outcome, scans)))
+    task = _Task.of(pairing.pairs, pairing.unpaired, excluded, camera, options)
+    for outcome in _steps(task, previous=previous, preview=preview):
+        if isinstance(outcome, Unsolvable):
+            yield replace(outcome, unpaired=pairing.unpaired)
+        elif outcome.checking:
+            yield outcome
+        else:
+            yield replace(outcome, warnings=(*outcome.warnings, *clocks(outcome, scans)))
 
 
 def calibrate_pairs(
@@ -92,7 +117,8 @@ def calibrate_pairs(
         return solve_pairs_as_printed(checked_pairs(pairs, with_noise=False), camera, options, excluded)
     checked_pairs(pairs, with_noise=True)
     shown = sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))
-    return _solved(tuple(shown), (), excluded, camera, options)
+    *_, outcome = _steps(_Task.of(tuple(shown), (), excluded, camera, options), previous=None, preview=False)
+    return outcome
 
 
 def solve_again(calibration: Calibration, options: CalibrationOptions | None = None) -> Calibration | Unsolvable:
@@ -133,39 +159,77 @@ def _with_noise(pair: Pair, options: CalibrationOptions) -> Pair:
     return replace(pair, candidates=tuple(candidate_at(one.position_radar_m, options.noise) for one in pair.candidates))
 
 
-def _solved(
-    shown: tuple[Pair, ...],
-    unpaired: tuple[Unpaired, ...],
-    excluded: frozenset[str],
-    camera: Camera,
-    options: CalibrationOptions,
-) -> Calibration | Unsolvable:
-    clicked = sorted((pair for pair in shown if pair.id not in excluded), key=_canonical)
-    if len(clicked) < MIN_PAIRS:
-        return _too_few(len(clicked), len(excluded), len(unpaired))
-    groups = placement_groups(clicked, options)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """What is to be solved.
+
+    Attributes:
+        shown: all pairs, excluded ones included, in the order of the results.
+        unpaired: clicks without a pair.
+        excluded: ids of pairs that are shown, but not used.
+        clicked: the pairs that are used, in an order that the input order does not change.
+        camera: the intrinsics.
+        options: checked.
+    """
+
+    shown: tuple[Pair, ...]
+    unpaired: tuple[Unpaired, ...]
+    excluded: frozenset[str]
+    clicked: tuple[Pair, ...]
+    camera: Camera
+    options: CalibrationOptions
+
+    @classmethod
+    def of(
+        cls,
+        shown: tuple[Pair, ...],
+        unpaired: tuple[Unpaired, ...],
+        excluded: frozenset[str],
+        camera: Camera,
+        options: CalibrationOptions,
+    ) -> "_Task":
+        clicked = sorted((pair for pair in shown if pair.id not in excluded), key=_canonical)
+        return cls(shown, unpaired, excluded, tuple(clicked), camera, options)
+
+
+def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Iterator[Calibration | Unsolvable]:
+    """Yield the preview, if one is wanted and a pose is found, then the answer."""
+    if len(task.clicked) < MIN_PAIRS:
+        yield unsolved.too_few(len(task.clicked), len(task.excluded), len(task.unpaired))
+        return
+    groups = placement_groups(task.clicked, task.options)
+    if len(groups) < MIN_PAIRS:
+        yield unsolved.one_place(len(task.clicked), len(groups))
+        return
+    measurements = pair_measurements([group.pair for group in groups], task.camera, task.options)
+    if preview:
+        quick = quick_fit(measurements, task.options, None if previous is None else previous.camera_from_radar)
+        if quick is not None:
+            yield replace(_described(task, groups, measurements, _Solution.local(quick, task.options)), checking=True)
+    yield _answer(task, groups, measurements)
+
+
+def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMeasurements) -> Calibration | Unsolvable:
+    options = task.options
+    fit = best_fit(measurements, options)
     used = [group.pair for group in groups]
-    if len(used) < MIN_PAIRS:
-        return _one_place(len(clicked), len(used))
-    measurements = pair_measurements(used, camera, options)
-    fit = _best_fit(measurements, options)
     if isinstance(fit, Unsolvable):
         return _explained(fit, used, measurements, options)
-    refined = fit.refined
-    uncertainty = pose_covariance(refined, options.radar)
-    rotation_sigma_rad = float(np.sqrt(uncertainty.covariance[3:, 3:].diagonal().max()))
+    solution = _Solution.local(fit.refined, options)
+    rotation_sigma_rad = float(np.sqrt(solution.uncertainty.covariance[3:, 3:].diagonal().max()))
     if not rotation_sigma_rad < _UNDETERMINED_ROTATION_RAD:
-        return _explained(_degenerate(len(used)), used, measurements, options)
-    left_out = leave_one_out(refined, uncertainty.information)
-    influential = find_influential_pairs(measurements, refined, uncertainty)
-    refined, uncertainty = average_over_influential_pairs(refined, uncertainty, influential)
-    metrics = fit_metrics(measurements, refined, left_out)
+        return _explained(unsolved.degenerate(len(used)), used, measurements, options)
+    influential = find_influential_pairs(measurements, solution.refined, solution.uncertainty)
+    refined, uncertainty = average_over_influential_pairs(solution.refined, solution.uncertainty, influential)
+    solution = replace(solution, refined=refined, uncertainty=uncertainty)
+    calibration = _described(task, groups, measurements, solution)
+    metrics = calibration.metrics
     solved_fit = SolvedFit(
         ids=tuple(pair.id for pair in used),
         measurements=measurements,
         refined=refined,
         uncertainty=uncertainty,
-        left_out=left_out,
+        left_out=solution.left_out,
         influential_pairs=influential,
         inliers=refined.inliers,
         alternatives=fit.found,
@@ -173,30 +237,53 @@ def _solved(
         chi2_per_degree=metrics.chi2 / max(metrics.degrees_of_freedom, 1),
         options=options,
     )
-    results = used_pair_results(used, refined, left_out) | excluded_pair_results(
-        shown, excluded, refined, camera, options
+    angle_map = learn_angle_map(calibration)
+    return replace(
+        calibration,
+        warnings=warnings_of(solved_fit),
+        angle_map=angle_map if angle_map is not None and angle_map.pays else None,
+        next_placement=next_placement(calibration),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solution:
+    """A fit, its covariance and what leaving out each pair does."""
+
+    refined: ErrorsInVariablesFit
+    uncertainty: PoseCovariance
+    left_out: LeaveOneOut
+
+    @classmethod
+    def local(cls, refined: ErrorsInVariablesFit, options: CalibrationOptions) -> "_Solution":
+        uncertainty = pose_covariance(refined, options.radar)
+        return cls(refined, uncertainty, leave_one_out(refined, uncertainty.information))
+
+
+def _described(
+    task: _Task, groups: Sequence[PlacementGroup], measurements: PairMeasurements, solution: _Solution
+) -> Calibration:
+    """Return the solution as a calibration, without warnings and advice."""
+    refined, uncertainty = solution.refined, solution.uncertainty
+    used = [group.pair for group in groups]
+    results = used_pair_results(used, refined, solution.left_out) | excluded_pair_results(
+        task.shown, task.excluded, refined, task.camera, task.options
     )
     calibration = Calibration(
         camera_from_radar=refined.camera_from_radar,
         covariance=uncertainty.covariance,
-        camera=camera,
-        metrics=metrics,
-        pairs=tuple(results[pair.id] for pair in shown if pair.id in results),
-        unpaired=unpaired,
-        warnings=warnings_of(solved_fit),
-        options=options,
+        camera=task.camera,
+        metrics=fit_metrics(measurements, refined, solution.left_out),
+        pairs=tuple(results[pair.id] for pair in task.shown if pair.id in results),
+        unpaired=task.unpaired,
+        warnings=(),
+        options=task.options,
         noise_scale=_four(refined.noise_scale),
         covariance_quantile=uncertainty.quantile,
         radar_errors=refined.measurements.errors.radar,
         systematic_errors=uncertainty.systematic_errors,
     )
-    angle_map = learn_angle_map(calibration)
-    return replace(
-        calibration,
-        pairs=click_results(calibration, groups, shown),
-        angle_map=angle_map if angle_map is not None and angle_map.pays else None,
-        next_placement=next_placement(calibration),
-    )
+    return replace(calibration, pairs=click_results(calibration, groups, task.shown))
 
 
 def _explained(
@@ -207,24 +294,13 @@ def _explained(
     suspected = implausible_input(ids, points, measurements.pixels_px, measurements.camera, options)
     if not suspected and options.solving.camera_position is not None:
         free = replace(options, solving=replace(options.solving, camera_position=None))
-        fit = _best_fit(pair_measurements(used, measurements.camera, free), free)
-        if isinstance(fit, _Fit) and fit.refined.inliers.mean() >= _AGREEING_SHARE:
-            return _contradicted(options.solving.camera_position, fit.refined)
+        fit = best_fit(pair_measurements(used, measurements.camera, free), free)
+        if isinstance(fit, BestFit) and fit.refined.inliers.mean() >= _AGREEING_SHARE:
+            found_m = fit.refined.camera_from_radar.inverse().translation_m
+            agreeing = fit.refined.inliers
+            return unsolved.contradicted(options.solving.camera_position, found_m, int(agreeing.sum()), len(agreeing))
     hints = [f"{warning.message}; {warning.hint}" for warning in suspected]
     return replace(outcome, hint="; ".join([*hints, outcome.hint]))
-
-
-def _contradicted(measured: CameraPositionPrior, alone: ErrorsInVariablesFit) -> Unsolvable:
-    given, found = (
-        "(" + ", ".join(f"{value:.2f}" for value in position) + ") m"
-        for position in (measured.position_m, alone.camera_from_radar.inverse().translation_m.tolist())
-    )
-    return Unsolvable(
-        "camera-position-contradicted",
-        f"no pose fits the pairs and the measured camera position {given}; without it, {int(alone.inliers.sum())} of "
-        f"{len(alone.inliers)} pairs agree on a pose with the camera at {found}",
-        "measure again from the radar's antennas to the lens: forward, left, up, in metres",
-    )
 
 
 def _four(values: Values) -> tuple[float, float, float, float]:
@@ -235,91 +311,3 @@ def _four(values: Values) -> tuple[float, float, float, float]:
 def _canonical(pair: Pair) -> tuple[int, str, float, float]:
     """Return a sort key, so that the input order cannot change a bit of the result."""
     return (pair.image_time or 0, pair.id, float(pair.pixel_px[0]), float(pair.pixel_px[1]))
-
-
-def _too_few(used: int, excluded: int, unpaired: int) -> Unsolvable:
-    others = "".join(f", {count} {what}" for count, what in ((excluded, "excluded"), (unpaired, "unpaired")) if count)
-    return Unsolvable(
-        "too-few-pairs",
-        f"{used} of at least {MIN_PAIRS} required pairs{others}",
-        "click the reflector at more placements: ten or more, near and far, spread over the picture",
-    )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Fit:
-    """The fit, the GNC solutions of all starts, and the likelihood gain of mirrored axes."""
-
-    refined: ErrorsInVariablesFit
-    found: tuple[GncSolution, ...]
-    mirror_gain: float
-
-
-def _best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> _Fit | Unsolvable:
-    """Run GNC from several initial poses and fit errors in variables from the most likely solution."""
-    estimate_scale, seed = options.noise.estimate_scale, options.solving.seed
-    few = _some_pairs(measurements)
-    most = _STARTS_MEASURED if measurements.prior.measured else _STARTS_FREE
-    starts = initial_poses(few, most=most, rng=np.random.default_rng(seed))
-    found = solve_gnc(few, starts, estimate_scale=estimate_scale)
-    if not found:
-        return _degenerate(len(measurements))
-    refined = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale)
-    gain = -np.inf
-    if not _clearly_not_mirrored(measurements, refined):
-        fitted = refined if few is measurements else None
-        gain = mirror_gain(few, found[0], plain=fitted, estimate_scale=estimate_scale, seed=seed)
-    inliers = int(refined.inliers.sum())
-    if inliers < MIN_PAIRS:
-        reason = f"only {inliers} of {len(measurements)} pairs agree on any pose"
-        return _mirrored(reason) if gain > MIRRORED_GAIN else _no_pose(reason)
-    return _Fit(refined, found, gain)
-
-
-def _clearly_not_mirrored(measurements: PairMeasurements, refined: ErrorsInVariablesFit) -> bool:
-    """Return whether pairs and a measured camera position agree so well that mirrored axes need no test."""
-    agreeing = refined.inliers.mean() >= _AGREEING_SHARE and float(refined.noise_scale.max()) < _PLAUSIBLE_SCALE
-    assumed = associate(measurements, refined.camera_from_radar)[1].squared.mean() / 2.0
-    agreeing = agreeing and float(assumed) < _PLAUSIBLE_SCALE**2
-    prior_residual = measurements.prior.rows(refined.camera_from_radar)[0]
-    return measurements.prior.measured and bool(agreeing) and float(np.linalg.norm(prior_residual)) < _NEAR_PRIOR
-
-
-def _mirrored(reason: str) -> Unsolvable:
-    return Unsolvable(
-        "mirrored-axes",
-        f"{reason}; with one radar axis mirrored they fit better",
-        "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) at the source",
-    )
-
-
-def _some_pairs(measurements: PairMeasurements) -> PairMeasurements:
-    if len(measurements) <= _PAIRS_TO_START:
-        return measurements
-    return measurements.some(np.linspace(0, len(measurements) - 1, _PAIRS_TO_START).round().astype(np.int64))
-
-
-def _degenerate(count: int) -> Unsolvable:
-    return Unsolvable(
-        "degenerate-placements",
-        f"the {count} placements do not determine the pose: they lie at one place or on one line",
-        "spread the placements: near and far, left and right",
-    )
-
-
-def _one_place(clicks: int, placements: int) -> Unsolvable:
-    return Unsolvable(
-        "degenerate-placements",
-        f"the {clicks} clicks show {placements} of at least {MIN_PAIRS} required placements: clicks of one placement count "
-        "as one",
-        "move the reflector between clicks: near and far, left and right",
-    )
-
-
-def _no_pose(reason: str) -> Unsolvable:
-    return Unsolvable(
-        "no-pose",
-        reason,
-        "check that clicks and radar data are from the same times, that the intrinsics belong to this camera at this "
-        "image size, and that the placements are spread over the picture",
-    )

@@ -211,6 +211,7 @@ class Calibration:
         next_placement: where the next placement would help most; None if no place is known.
         radar_errors: the radar's systematic errors, estimated with the pose.
         systematic_errors: every error that the pairs share, and its part in the uncertainty.
+        checking: whether this is a preview: the checks, warnings and advice are yet to come.
     """
 
     camera_from_radar: RigidTransform
@@ -229,6 +230,7 @@ class Calibration:
     next_placement: NextPlacement | None = None
     radar_errors: RadarErrors = field(default_factory=RadarErrors)
     systematic_errors: tuple[SystematicErrorResult, ...] = ()
+    checking: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "covariance", frozen_array(self.covariance, (6, 6)))

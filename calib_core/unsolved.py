@@ -1,0 +1,69 @@
+"""The outcomes of a solve without an answer: what is missing, with figures, and what to do."""
+
+from calib_core.arrays import Vector3
+from calib_core.measurements import MIN_PAIRS, Unsolvable
+from calib_core.options import CameraPositionPrior
+
+__all__ = ["contradicted", "degenerate", "mirrored", "no_pose", "one_place", "too_few"]
+
+
+def too_few(used: int, excluded: int, unpaired: int) -> Unsolvable:
+    """Fewer pairs than a pose needs."""
+    others = "".join(f", {count} {what}" for count, what in ((excluded, "excluded"), (unpaired, "unpaired")) if count)
+    return Unsolvable(
+        "too-few-pairs",
+        f"{used} of at least {MIN_PAIRS} required pairs{others}",
+        "click the reflector at more placements: ten or more, near and far, spread over the picture",
+    )
+
+
+def mirrored(reason: str) -> Unsolvable:
+    """Mirrored axes would fit."""
+    return Unsolvable(
+        "mirrored-axes",
+        f"{reason}; with one radar axis mirrored they fit better",
+        "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) at the source",
+    )
+
+
+def degenerate(count: int) -> Unsolvable:
+    """The placements leave part of the pose open."""
+    return Unsolvable(
+        "degenerate-placements",
+        f"the {count} placements do not determine the pose: they lie at one place or on one line",
+        "spread the placements: near and far, left and right",
+    )
+
+
+def one_place(clicks: int, placements: int) -> Unsolvable:
+    """Most clicks show the same placement."""
+    return Unsolvable(
+        "degenerate-placements",
+        f"the {clicks} clicks show {placements} of at least {MIN_PAIRS} required placements: clicks of one placement count "
+        "as one",
+        "move the reflector between clicks: near and far, left and right",
+    )
+
+
+def no_pose(reason: str) -> Unsolvable:
+    """The pairs disagree."""
+    return Unsolvable(
+        "no-pose",
+        reason,
+        "check that clicks and radar data are from the same times, that the intrinsics belong to this camera at this "
+        "image size, and that the placements are spread over the picture",
+    )
+
+
+def contradicted(measured: CameraPositionPrior, found_m: Vector3, agreeing: int, count: int) -> Unsolvable:
+    """The pairs agree on a pose, but not with the measured camera position."""
+    given, found = (
+        "(" + ", ".join(f"{value:.2f}" for value in position) + ") m"
+        for position in (measured.position_m, found_m.tolist())
+    )
+    return Unsolvable(
+        "camera-position-contradicted",
+        f"no pose fits the pairs and the measured camera position {given}; without it, {agreeing} of {count} "
+        f"pairs agree on a pose with the camera at {found}",
+        "measure again from the radar's antennas to the lens: forward, left, up, in metres",
+    )
