@@ -203,9 +203,12 @@ def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Itera
         return
     measurements = pair_measurements([group.pair for group in groups], task.camera, task.options)
     if preview:
-        quick = quick_fit(measurements, task.options, None if previous is None else previous.camera_from_radar)
+        quick = quick_fit(measurements, task.options, previous)
         if quick is not None:
-            yield replace(_described(task, groups, measurements, _Solution.local(quick, task.options)), checking=True)
+            yield replace(
+                _described(task, groups, measurements, _Solution.local(quick, task.options, smooth=False)),
+                checking=True,
+            )
     yield _answer(task, groups, measurements)
 
 
@@ -255,8 +258,8 @@ class _Solution:
     left_out: LeaveOneOut
 
     @classmethod
-    def local(cls, refined: ErrorsInVariablesFit, options: CalibrationOptions) -> "_Solution":
-        uncertainty = pose_covariance(refined, options.radar)
+    def local(cls, refined: ErrorsInVariablesFit, options: CalibrationOptions, *, smooth: bool = True) -> "_Solution":
+        uncertainty = pose_covariance(refined, options.radar, smooth=smooth)
         return cls(refined, uncertainty, leave_one_out(refined, uncertainty.information))
 
 

@@ -3,7 +3,7 @@
 Radar frame: x forward, y left, z up (docs/conventions.md). Azimuth is positive to the left, elevation upwards.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -109,8 +109,7 @@ class RadarErrors:
     @classmethod
     def named(cls, values: dict[str, float]) -> "RadarErrors":
         """Take the errors of these names; other names are ignored."""
-        known = {one.name for one in fields(cls)}
-        return cls(**{name: value for name, value in values.items() if name in known})
+        return cls(**{name: value for name, value in values.items() if name in cls.__dataclass_fields__})
 
     def corrected(self, points_radar_m: Points3) -> Points3:
         """Return reported positions (n, 3) with these errors taken out."""

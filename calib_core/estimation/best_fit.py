@@ -9,9 +9,9 @@ from calib_core.estimation.gnc import GncSolution, associate, solve_gnc
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.estimation.mirror_test import MIRRORED_GAIN, mirror_gain
-from calib_core.geometry import RigidTransform
 from calib_core.measurements import MIN_PAIRS, Unsolvable
 from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
 from calib_core.unsolved import degenerate, mirrored, no_pose
 
 __all__ = ["BestFit", "best_fit"]
@@ -63,19 +63,23 @@ def best_fit(measurements: PairMeasurements, options: CalibrationOptions) -> Bes
 
 
 def quick_fit(
-    measurements: PairMeasurements, options: CalibrationOptions, start: RigidTransform | None
+    measurements: PairMeasurements, options: CalibrationOptions, previous: Calibration | None
 ) -> ErrorsInVariablesFit | None:
     """Fit once, coarsely, from a known pose, or from the most likely of a few starts; None if too few pairs agree.
 
     Args:
         measurements: the pairs.
         options: of the solver.
-        start: a pose that is probably near; it is left if too few pairs agree on it.
+        previous: the answer to nearly the same pairs; it is left if too few pairs agree on its pose.
     """
     estimate_scale = options.noise.estimate_scale
-    if start is not None:
+    if previous is not None:
         near = fit_errors_in_variables(
-            measurements, GncSolution(start, 0.0, 1.0), estimate_scale=estimate_scale, coarse=True
+            measurements,
+            GncSolution(previous.camera_from_radar, 0.0, 1.0),
+            estimate_scale=estimate_scale,
+            coarse=True,
+            noise_scale=previous.noise_scale if estimate_scale else None,
         )
         if near.inliers.mean() >= _STILL_AGREEING_SHARE:
             return near
@@ -91,7 +95,8 @@ def quick_fit(
 def _clearly_not_mirrored(measurements: PairMeasurements, refined: ErrorsInVariablesFit) -> bool:
     """Return whether pairs and a measured camera position agree so well that mirrored axes need no test."""
     agreeing = refined.inliers.mean() >= _AGREEING_SHARE and float(refined.noise_scale.max()) < _PLAUSIBLE_SCALE
-    assumed = associate(measurements, refined.camera_from_radar)[1].squared.mean() / 2.0
+    corrected = measurements.with_errors(refined.measurements.errors.values)
+    assumed = associate(corrected, refined.camera_from_radar)[1].squared.mean() / 2.0
     agreeing = agreeing and float(assumed) < _PLAUSIBLE_SCALE**2
     prior_residual = measurements.prior.rows(refined.camera_from_radar)[0]
     return measurements.prior.measured and bool(agreeing) and float(np.linalg.norm(prior_residual)) < _NEAR_PRIOR

@@ -45,7 +45,9 @@ class PoseCovariance:
         return np.asarray(np.linalg.inv(_symmetric_inverse(self.information)[:6, :6]))
 
 
-def pose_covariance(refined: ErrorsInVariablesFit, radar: RadarOptions | None = None) -> PoseCovariance:
+def pose_covariance(
+    refined: ErrorsInVariablesFit, radar: RadarOptions | None = None, *, smooth: bool = True
+) -> PoseCovariance:
     """Invert the observed information of the mixture at the optimum, and widen it by errors that the pairs share.
 
     Pairs that may be outliers (0 < w < 1) contribute less than w of their Gauss-Newton information: by Louis' identity
@@ -55,6 +57,7 @@ def pose_covariance(refined: ErrorsInVariablesFit, radar: RadarOptions | None = 
     Args:
         refined: the fit.
         radar: priors of the mounting of a radar that measures no elevation; None takes the defaults.
+        smooth: look for smooth angle errors of the radar.
     """
     plain, _ = normal_equations(refined.measurements, refined.camera_from_radar, refined.model, refined.weights)
     gradients = (np.swapaxes(refined.model.jacobian, 1, 2) @ refined.model.residual[:, :, None])[:, :, 0]
@@ -63,7 +66,7 @@ def pose_covariance(refined: ErrorsInVariablesFit, radar: RadarOptions | None = 
     information = _floored(plain, lost)
     prior_information = _prior_information(refined)
     independent = _symmetric_inverse(information)
-    spread = pose_spread(refined, plain)
+    spread = pose_spread(refined, plain) if smooth else None
     covariance = independent if spread is None else _widened(independent, plain, spread)
     growth = float(np.sqrt(np.trace(covariance[3:6, 3:6]) / np.trace(independent[3:6, 3:6])))
     wide, found = _shared_errors(refined, plain, covariance)

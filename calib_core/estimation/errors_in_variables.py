@@ -11,6 +11,7 @@ explains. Each pair is judged by its leave-one-out prediction (`leave_one_out_pr
 against a fit and a noise level that it has itself distorted.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -111,7 +112,12 @@ class _State:
 
 
 def fit_errors_in_variables(
-    measurements: PairMeasurements, start: GncSolution, *, estimate_scale: bool, coarse: bool = False
+    measurements: PairMeasurements,
+    start: GncSolution,
+    *,
+    estimate_scale: bool,
+    coarse: bool = False,
+    noise_scale: Sequence[float] | None = None,
 ) -> ErrorsInVariablesFit:
     """Fit pose, true positions, inlier probabilities and, optionally, the noise level.
 
@@ -120,9 +126,10 @@ def fit_errors_in_variables(
         start: the solution of graduated non-convexity.
         estimate_scale: estimate variance components once there are enough pairs.
         coarse: stop when pose and noise level are known to a few hundredths of a standard deviation.
+        noise_scale: (4,) to start from; None takes the start's.
     """
     tolerances = _COARSE_TOLERANCES if coarse else _TOLERANCES
-    scale = np.full(4, start.noise_scale)
+    scale = np.array(noise_scale or [start.noise_scale] * 4)
     noisy = measurements.without_errors().scaled(scale)
     rows = associate(noisy, start.camera_from_radar)[0]
     state = _State(start.camera_from_radar, None, rows, noisy.measured(rows), scale, 0.8, measurements.errors.values)

@@ -64,16 +64,22 @@ class CameraPrior:
         In camera axes the residual is -(R c0 + t), its Jacobian (I, [t]x) and its precision R diag(1 / sigma^2) R^T.
         """
         missed = -(rotations @ self.position_m + translations_m)
-        to_radar = np.swapaxes(rotations, -1, -2)
-        variance = self._variance_m2((to_radar @ missed[..., None])[..., 0])
-        precision = (rotations / variance[..., None, :]) @ to_radar
         x, y, z = translations_m[..., 0], translations_m[..., 1], translations_m[..., 2]
         jacobian = np.zeros((*translations_m.shape, 6))
         jacobian[..., 0, 0] = jacobian[..., 1, 1] = jacobian[..., 2, 2] = 1.0
         jacobian[..., 0, 4], jacobian[..., 0, 5], jacobian[..., 1, 5] = -z, y, -x
         jacobian[..., 1, 3], jacobian[..., 2, 3], jacobian[..., 2, 4] = z, -y, x
-        weighted = np.swapaxes(jacobian, -1, -2) @ precision
+        weighted = np.swapaxes(jacobian, -1, -2) @ self._precision(rotations, missed)
         return weighted @ jacobian, (weighted @ missed[..., None])[..., 0]
+
+    def _precision(self, rotations: np.ndarray, missed_m: np.ndarray) -> np.ndarray:
+        """Return the precision (..., 3, 3) in camera axes, for a camera missed by (..., 3)."""
+        if not self.height_sigma_m:  # the same along all axes, so the rotation cancels
+            farther = 0.0 if self.measured else (missed_m**2).sum(axis=-1)[..., None, None]
+            return np.asarray(np.eye(3) / (self.sigma_m**2 + farther))
+        to_radar = np.swapaxes(rotations, -1, -2)
+        variance = self._variance_m2((to_radar @ missed_m[..., None])[..., 0])
+        return np.asarray((rotations / variance[..., None, :]) @ to_radar)
 
     def weakened(self) -> "CameraPrior":
         """Return the same position as a weak prior, with a sigma of at least 1 m."""
@@ -151,9 +157,7 @@ class PairMeasurements:
     def measured(self, rows: Indices) -> MeasurementPlanes:
         """Take one candidate row per pair (n,), as planes."""
         polar = self.errors.radar.corrected_polar(self.reported[rows].T)
-        return MeasurementPlanes(
-            self.pixels_px.T.copy(), self.sigma_px, polar, self.sigma_polar[rows].T.copy(), self.errors
-        )
+        return MeasurementPlanes(self.pixels_px.T, self.sigma_px, polar, self.sigma_polar[rows].T, self.errors)
 
     def candidates_apart(self) -> "PairMeasurements":
         """Make every candidate a pair of its own, with its pair's click."""

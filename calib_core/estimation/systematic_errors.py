@@ -26,6 +26,7 @@ from calib_core.radar import RadarErrors
 __all__ = ["NO_ERRORS", "Sensitivity", "SystematicError", "SystematicErrors", "systematic_errors"]
 
 _RADAR_ERRORS = {one.name for one in fields(RadarErrors)}
+_EXACT = RadarErrors()
 _SMALL = 1e-4  # standard deviations over which a derivative is taken
 
 
@@ -119,6 +120,8 @@ class SystematicErrors:
     @property
     def radar(self) -> RadarErrors:
         """The values of the radar's errors."""
+        if not self.estimated:
+            return _EXACT
         return RadarErrors.named(
             {one.name: value for one, value in zip(self.estimated, self.values.tolist(), strict=True)}
         )
