@@ -7,6 +7,7 @@ import numpy as np
 
 from calib_core.association.cluster_scale import cluster_scale
 from calib_core.association.clustering import candidates_of, clusters_of, clusters_wanted, window_around
+from calib_core.association.companions import balanced_pairs
 from calib_core.association.gating import static_returns
 from calib_core.association.novelty import background_windows, scores_of
 from calib_core.association.placement_groups import linked_clicks
@@ -55,7 +56,7 @@ def pair_clicks(clicks: Sequence[ReflectorClick], scans: RadarScans, options: Ca
         pairs, empty = _paired(reachable, shared, static, options)
     unpaired += [_nothing_static(click, window, options) for click, window in empty]
     rank = {click.id: place for place, click in enumerate(sorted(clicks))}
-    return Pairing(tuple(pairs), tuple(sorted(unpaired, key=lambda one: rank[one.id])))
+    return Pairing(balanced_pairs(pairs), tuple(sorted(unpaired, key=lambda one: rank[one.id])))
 
 
 def _paired(
