@@ -20,8 +20,8 @@ from calib_core.results import DataWarning
 __all__ = ["warnings_of"]
 
 _NARROW_CONDITION = 5e5
-_WEAK_ROTATION_RAD = np.deg2rad(2.0)
-_WEAK_POSITION_M = 0.25
+_WEAK_ROTATION_RAD = np.deg2rad(2.5)
+_WEAK_POSITION_M = 0.3
 _NOISE_EXCESS = 2.5
 _NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
