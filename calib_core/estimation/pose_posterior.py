@@ -1,0 +1,242 @@
+"""Pose posterior: how likely any pose and noise level is, given all pairs, without linearizing about one solution.
+
+The covariance of a fit describes one peak by a parabola. With few or many wrong pairs, or placements in a narrow strip, the
+posterior is curved, has heavy tails or several peaks. A pair is an inlier with noise S, a near outlier (k times noisier), or
+an outlier, and its candidates are alternatives:
+
+    p(pixel | pose, noise) = q sum_c score_c [(1 - a) N(e_c; 0, S_c) + a N(e_c; 0, k^2 S_c)] + (1 - q) o(pixel).    (6)
+
+Most outliers have a good click and a radar position of something else, so their pixels are spread as those of all clicks are:
+o is the density of the other clicks, mixed with an even one for clicks that are anywhere. In an aisle, where all clicks are
+close together, an even density alone would take agreement by chance as evidence. The share q of inliers is integrated out.
+The noise level is unknown too: one factor each on the sigmas of click, range, azimuth and elevation, normal in the logarithm,
+the last three with a part in common. All functions take many states at once.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Flags, Matrix66, Values, Vector3
+from calib_core.estimation.leave_one_out_prediction import PSEUDO_REDUNDANCY, PSEUDO_SHARED
+from calib_core.estimation.linearization import Linearization, MeasurementPlanes
+from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.geometry import RigidTransform, rotation_exp, skew
+
+__all__ = ["NEAR_OUTLIER_FACTOR", "PairTerms", "PosePosterior", "Poses", "pose_posterior", "replace_noise"]
+
+NEAR_OUTLIER_FACTOR = 5.0
+"""How many times noisier a near outlier is."""
+
+_NEAR_OUTLIER_SHARE = 0.01
+_SHARES = np.array([0.25, 0.4, 0.55, 0.7, 0.8, 0.88, 0.94, 0.98])
+_PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # of a beta distribution of the share
+_ANYWHERE = 0.3  # share of the outliers whose click is anywhere on the image
+_LEAST_WIDTH = 5.0  # standard deviations of a click
+_TAIL = 4.0  # the weak camera prior is a Cauchy distribution in three dimensions: density (1 + d^2 / sigma^2)^-2
+_ROWS_AT_ONCE = 20_000  # whose intermediate arrays fit into the processor's cache
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """Poses camera_from_radar as arrays.
+
+    Attributes:
+        rotations: (s, 3, 3).
+        translations_m: (s, 3).
+    """
+
+    rotations: np.ndarray
+    translations_m: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+    def perturbed(self, errors: np.ndarray) -> "Poses":
+        """Apply an error (s, 6) to each pose: t = t_hat + dt, R = Exp(dtheta) R_hat."""
+        return Poses(rotation_exp(errors[:, 3:]) @ self.rotations, self.translations_m + errors[:, :3])
+
+    def some(self, which: np.ndarray | slice) -> "Poses":
+        """Keep the poses of the given indices."""
+        return Poses(self.rotations[which], self.translations_m[which])
+
+    def transform(self, index: int) -> RigidTransform:
+        """Return one of them, re-orthonormalised."""
+        u, _, vt = np.linalg.svd(self.rotations[index])
+        return RigidTransform(u @ vt, self.translations_m[index])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairTerms:
+    """The parts of equation (6) at some states, as logarithms relative to the density of an outlier.
+
+    Attributes:
+        model: the candidate rows, linearized and whitened by the assumed noise.
+        inlier: (s, m) log density of each candidate row as an inlier, score included.
+        near: (s, m) the same as a near outlier.
+        pair: (s, n) logarithm of the sum over a pair's candidates and both kinds.
+    """
+
+    model: Linearization
+    inlier: np.ndarray
+    near: np.ndarray
+    pair: np.ndarray
+
+    def outlier_probabilities(self, share: float) -> np.ndarray:
+        """Return the probability (s, n) that each pair is an outlier anywhere, for a share of inliers."""
+        return np.asarray(1.0 / (1.0 + share / (1.0 - share) * np.exp(np.minimum(self.pair, 500.0))))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosePosterior:
+    """The posterior of states: where a point among the placements moves (3) [m], rotation vector (3), log noise scales (4).
+
+    The rotation is about that point (the pivot), because rotating about the camera would shift all pixels along. Without
+    noise scales a state has six entries.
+
+    Attributes:
+        measurements: the pairs with the assumed noise.
+        candidates: every candidate row with its pair's click.
+        log_outlier: (m,) logarithm of the density of each row's click if it is an outlier [1/px^2].
+        reference: the pose of state zero.
+        pivot_radar_m: (3,).
+    """
+
+    measurements: PairMeasurements
+    candidates: MeasurementPlanes
+    log_outlier: Values
+    reference: RigidTransform
+    pivot_radar_m: Vector3
+
+    def poses(self, states: np.ndarray) -> Poses:
+        """Return the poses of states (s, 6 or 10)."""
+        rotations = rotation_exp(states[:, 3:6]) @ self.reference.rotation
+        pivots_m = self.reference.rotation @ self.pivot_radar_m + self.reference.translation_m + states[:, :3]
+        return Poses(rotations, pivots_m - rotations @ self.pivot_radar_m)
+
+    def state_of(self, camera_from_radar: RigidTransform) -> Values:
+        """Return the six entries of a pose."""
+        error = camera_from_radar.error_from(self.reference)
+        turned = (camera_from_radar.rotation - self.reference.rotation) @ self.pivot_radar_m
+        return np.asarray(np.concatenate([error[:3] + turned, error[3:]]))
+
+    def state_jacobian(self, camera_from_radar: RigidTransform) -> Matrix66:
+        """Return d state / d (dt, dtheta) at a pose, which is exact for poses near the reference."""
+        jacobian = np.eye(6)
+        jacobian[:3, 3:] = -skew(camera_from_radar.rotation @ self.pivot_radar_m)
+        rotation_vector = self.state_of(camera_from_radar)[3:]
+        cross, angle = skew(rotation_vector), float(np.linalg.norm(rotation_vector))
+        half = 0.5 * angle
+        second = 1.0 / 12.0 if angle < 1e-4 else (1.0 - half / np.tan(half)) / angle**2
+        jacobian[3:, 3:] = np.eye(3) - 0.5 * cross + second * cross @ cross
+        return jacobian
+
+    def costs(self, states: np.ndarray) -> Values:
+        """Return twice the negative log posterior (s,) of states, up to a constant."""
+        at_once = max(_ROWS_AT_ONCE // self.candidates.polar.shape[1], 1)
+        parts = [self._costs(states[start : start + at_once]) for start in range(0, len(states), at_once)]
+        return np.concatenate(parts)
+
+    def _costs(self, states: np.ndarray) -> Values:
+        half = 0.5 * np.linalg.norm(states[:, 3:6], axis=1)  # equal volumes of rotations: Haar's measure
+        return self.pose_costs(self.poses(states), states[:, 6:]) - 4.0 * np.log(np.abs(np.sinc(half / np.pi)) + 1e-9)
+
+    def pose_costs(self, poses: Poses, log_scales: np.ndarray) -> Values:
+        """Return the same (s,) of poses and noise, per unit volume of translations and rotations: the one place for it."""
+        ratio = np.exp(np.minimum(self.pair_terms(poses, log_scales).pair, 500.0))
+        mixed = np.log(_SHARES[:, None, None] * (ratio - 1.0) + 1.0).sum(axis=-1)
+        costs = -2.0 * np.logaddexp.reduce(mixed + _LOG_SHARE_PRIOR[:, None], axis=0) + self.prior_costs(poses)
+        if log_scales.shape[1]:
+            costs += ((log_scales @ _SCALES_INFORMATION) * log_scales).sum(axis=1)
+        return np.asarray(costs)
+
+    def prior_costs(self, poses: Poses) -> Values:
+        """Return the share (s,) of the camera prior in the costs."""
+        prior = self.measurements.prior
+        squared = prior.costs(poses.rotations, poses.translations_m)
+        return squared if prior.measured else np.asarray(_TAIL * np.log1p(squared))
+
+    def prior_information(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+        """Return its Hessians (s, 6, 6) and right-hand sides (s, 6) for Gauss-Newton steps."""
+        prior = self.measurements.prior
+        hessians, gradients = prior.information(poses.rotations, poses.translations_m)
+        factor = 1.0 if prior.measured else _TAIL
+        return factor * hessians, factor * gradients
+
+    def pair_terms(self, poses: Poses, log_scales: np.ndarray) -> PairTerms:
+        """Evaluate equation (6) at poses; log_scales is (s, 4), or (s, 0) for the assumed noise."""
+        measurements = self.measurements
+        model = self.candidates.linearize(measurements.camera, poses.rotations, poses.translations_m)
+        uu, uv, vv = self._noise(model, np.exp(2.0 * log_scales) if log_scales.shape[1] else np.ones((len(poses), 4)))
+        u, v = model.planes[..., 0, 0, :], model.planes[..., 0, 1, :]
+        determinant = uu * vv - uv * uv
+        squared = (vv * u * u - 2.0 * uv * u * v + uu * v * v) / determinant
+        level = measurements.log_score - self.log_outlier - np.log(2.0 * np.pi)
+        level = level - 0.5 * (np.log(determinant) + model.log_determinant)
+        inlier = level - 0.5 * squared + np.log1p(-_NEAR_OUTLIER_SHARE)
+        wider = NEAR_OUTLIER_FACTOR**2
+        near = level - 0.5 * squared / wider + np.log(_NEAR_OUTLIER_SHARE / wider)
+        pair = np.logaddexp(inlier, near)
+        if not measurements.one_to_one:
+            pair = np.logaddexp.reduceat(pair, measurements.first[:-1], axis=-1)
+        return PairTerms(model, inlier, near, pair)
+
+    def _noise(self, model: Linearization, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the noise, whitened by the assumed one, whose variances are multiplied by factors (s, 4): uu, uv, vv."""
+        first, across, second = (model.whitening_planes[..., entry, :] for entry in range(3))
+        click = factors[:, :1] * self.candidates.sigma_px**2
+        noisy = model.planes[..., 7:, :, :] * self.candidates.sigma_polar[:, None, :]
+        u, v, each = noisy[..., 0, :], noisy[..., 1, :], factors[:, 1:, None]
+        uu = click * first**2 + (each * u * u).sum(axis=-2)
+        uv = click * first * across + (each * u * v).sum(axis=-2)
+        vv = click * (across**2 + second**2) + (each * v * v).sum(axis=-2)
+        unseen: Flags = first == 0.0
+        return np.where(unseen, 1.0, uu), uv, np.where(unseen, 1.0, vv)
+
+
+def pose_posterior(measurements: PairMeasurements, reference: RigidTransform, pivot_radar_m: Vector3) -> PosePosterior:
+    """Prepare the posterior of all pairs.
+
+    Args:
+        measurements: with the assumed noise.
+        reference: the pose of state zero.
+        pivot_radar_m: (3,) a point among the placements.
+    """
+    each = measurements if measurements.one_to_one else measurements.candidates_apart()
+    log_outlier = np.log(_click_density(measurements))[measurements.owner]
+    return PosePosterior(measurements, each.measured(np.arange(len(each.polar))), log_outlier, reference, pivot_radar_m)
+
+
+def replace_noise(posterior: PosePosterior, measurements: PairMeasurements) -> PosePosterior:
+    """Return the posterior with the assumed noise of other measurements of the same pairs."""
+    return pose_posterior(measurements, posterior.reference, posterior.pivot_radar_m)
+
+
+def _click_density(measurements: PairMeasurements) -> Values:
+    """Return the density (n,) of the other clicks at each click [1/px^2], smoothed as far as their neighbours are apart."""
+    pixels_px, count = measurements.pixels_px, len(measurements)
+    even = 1.0 / (measurements.camera.width_px * measurements.camera.height_px)
+    squared = ((pixels_px[:, None] - pixels_px) ** 2).sum(axis=2)
+    nth = min(max(round(count**0.5), 1), count - 1)
+    width2 = np.maximum(np.sort(squared, axis=1)[:, nth], (_LEAST_WIDTH * measurements.sigma_px) ** 2)
+    kernels = np.exp(-0.5 * squared / width2) / (2.0 * np.pi * width2)
+    np.fill_diagonal(kernels, 0.0)
+    return np.asarray(_ANYWHERE * even + (1.0 - _ANYWHERE) * kernels.sum(axis=1) / max(count - 1, 1))
+
+
+def _log_share_prior() -> Values:
+    """Return the logarithm of the beta prior's weight of each of the shares, which are spaced in their log odds."""
+    odds = np.log(_SHARES / (1.0 - _SHARES))
+    weights = _PRIOR_INLIERS * np.log(_SHARES) + _PRIOR_OUTLIERS * np.log1p(-_SHARES) + np.log(np.gradient(odds))
+    return np.asarray(weights - np.logaddexp.reduce(weights))
+
+
+def _scales_information() -> np.ndarray:
+    """Invert the prior covariance (4, 4) of the log scales; a variance known from nu samples has a log scale of 1 / (2 nu)."""
+    covariance = np.eye(4) / (2.0 * PSEUDO_REDUNDANCY)
+    covariance[1:, 1:] += 1.0 / (2.0 * PSEUDO_SHARED)
+    return np.linalg.inv(covariance)
+
+
+_LOG_SHARE_PRIOR = _log_share_prior()
+_SCALES_INFORMATION = _scales_information()
