@@ -17,13 +17,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Flags, Matrix66, Values, Vector3
+from calib_core.arrays import Matrix66, Values, Vector3
 from calib_core.estimation.leave_one_out_prediction import PSEUDO_REDUNDANCY, PSEUDO_SHARED
-from calib_core.estimation.linearization import Linearization, MeasurementPlanes
+from calib_core.estimation.linearization import MeasurementPlanes
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.geometry import RigidTransform, rotation_exp, skew
+from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian, skew
+from calib_core.radar import position_planes
 
-__all__ = ["NEAR_OUTLIER_FACTOR", "PairTerms", "PosePosterior", "Poses", "pose_posterior", "replace_noise"]
+__all__ = ["NEAR_OUTLIER_FACTOR", "PairTerms", "PosePosterior", "Poses", "pose_posterior"]
 
 NEAR_OUTLIER_FACTOR = 5.0
 """How many times noisier a near outlier is."""
@@ -34,7 +35,9 @@ _PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # of a beta distribution of the shar
 _ANYWHERE = 0.3  # share of the outliers whose click is anywhere on the image
 _LEAST_WIDTH = 5.0  # standard deviations of a click
 _TAIL = 4.0  # the weak camera prior is a Cauchy distribution in three dimensions: density (1 + d^2 / sigma^2)^-2
-_ROWS_AT_ONCE = 20_000  # whose intermediate arrays fit into the processor's cache
+_NEAR = 6.0  # standard deviations beyond which a pair does not move its own true position
+_FAR_PX = 1e6  # residual of a position the camera cannot see
+_ROWS_AT_ONCE = 10_000  # whose intermediate arrays fit into the processor's cache
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,17 +70,42 @@ class Poses:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class _Linear:
+    """The candidate rows linearized at some positions: e ~ N(0, S) as in equation (2), not whitened.
+
+    Attributes:
+        residual_px: (s, 2, m) e.
+        d_polar: (s, 2, 3, m) d pixel / d polar.
+        noise: uu, uv, vv of S, each (s, m) [px^2].
+        d_point: (s, 3, 2, m) d pixel / d camera point.
+        turned_m: (s, 3, m) the points in camera axes before the translation.
+    """
+
+    residual_px: np.ndarray
+    d_polar: np.ndarray
+    noise: tuple[np.ndarray, np.ndarray, np.ndarray]
+    d_point: np.ndarray
+    turned_m: np.ndarray
+
+    def solved(self) -> np.ndarray:
+        """Return S^-1 e (s, 2, m)."""
+        uu, uv, vv = self.noise
+        u, v = self.residual_px[:, 0], self.residual_px[:, 1]
+        return np.stack([vv * u - uv * v, uu * v - uv * u], axis=1) / (uu * vv - uv * uv)[:, None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PairTerms:
     """The parts of equation (6) at some states, as logarithms relative to the density of an outlier.
 
     Attributes:
-        model: the candidate rows, linearized and whitened by the assumed noise.
+        linear: the candidate rows, linearized.
         inlier: (s, m) log density of each candidate row as an inlier, score included.
         near: (s, m) the same as a near outlier.
         pair: (s, n) logarithm of the sum over a pair's candidates and both kinds.
     """
 
-    model: Linearization
+    linear: _Linear
     inlier: np.ndarray
     near: np.ndarray
     pair: np.ndarray
@@ -85,6 +113,19 @@ class PairTerms:
     def outlier_probabilities(self, share: float) -> np.ndarray:
         """Return the probability (s, n) that each pair is an outlier anywhere, for a share of inliers."""
         return np.asarray(1.0 / (1.0 + share / (1.0 - share) * np.exp(np.minimum(self.pair, 500.0))))
+
+    def whitened(self) -> np.ndarray:
+        """Return residual and d pixel / d (dt, dtheta), whitened by the noise: (s, 7, 2, m)."""
+        linear = self.linear
+        rows = np.empty((len(linear.residual_px), 7, *linear.residual_px.shape[1:]))
+        rows[:, 0], rows[:, 1:4] = linear.residual_px, linear.d_point
+        rotation_jacobian(linear.turned_m, linear.d_point, out=rows[:, 4:7])
+        uu, uv, vv = linear.noise
+        root = np.sqrt(uu)[:, None]
+        rows[:, :, 0] /= root
+        rows[:, :, 1] -= rows[:, :, 0] * (uv[:, None] / root)
+        rows[:, :, 1] /= np.sqrt(vv - uv * uv / uu)[:, None]
+        return rows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,32 +207,59 @@ class PosePosterior:
     def pair_terms(self, poses: Poses, log_scales: np.ndarray) -> PairTerms:
         """Evaluate equation (6) at poses; log_scales is (s, 4), or (s, 0) for the assumed noise."""
         measurements = self.measurements
-        model = self.candidates.linearize(measurements.camera, poses.rotations, poses.translations_m)
-        uu, uv, vv = self._noise(model, np.exp(2.0 * log_scales) if log_scales.shape[1] else np.ones((len(poses), 4)))
-        u, v = model.planes[..., 0, 0, :], model.planes[..., 0, 1, :]
-        determinant = uu * vv - uv * uv
-        squared = (vv * u * u - 2.0 * uv * u * v + uu * v * v) / determinant
+        factors = np.exp(2.0 * log_scales) if log_scales.shape[1] else np.ones((len(poses), 4))
+        linear = self._linearized(poses, factors)
+        uu, uv, vv = linear.noise
+        squared = (linear.residual_px * linear.solved()).sum(axis=1)
         level = measurements.log_score - self.log_outlier - np.log(2.0 * np.pi)
-        level = level - 0.5 * (np.log(determinant) + model.log_determinant)
+        level = level - 0.5 * np.log(uu * vv - uv * uv)
         inlier = level - 0.5 * squared + np.log1p(-_NEAR_OUTLIER_SHARE)
         wider = NEAR_OUTLIER_FACTOR**2
         near = level - 0.5 * squared / wider + np.log(_NEAR_OUTLIER_SHARE / wider)
         pair = np.logaddexp(inlier, near)
         if not measurements.one_to_one:
             pair = np.logaddexp.reduceat(pair, measurements.first[:-1], axis=-1)
-        return PairTerms(model, inlier, near, pair)
+        return PairTerms(linear, inlier, near, pair)
 
-    def _noise(self, model: Linearization, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the noise, whitened by the assumed one, whose variances are multiplied by factors (s, 4): uu, uv, vv."""
-        first, across, second = (model.whitening_planes[..., entry, :] for entry in range(3))
-        click = factors[:, :1] * self.candidates.sigma_px**2
-        noisy = model.planes[..., 7:, :, :] * self.candidates.sigma_polar[:, None, :]
-        u, v, each = noisy[..., 0, :], noisy[..., 1, :], factors[:, 1:, None]
-        uu = click * first**2 + (each * u * u).sum(axis=-2)
-        uv = click * first * across + (each * u * v).sum(axis=-2)
-        vv = click * (across**2 + second**2) + (each * v * v).sum(axis=-2)
-        unseen: Flags = first == 0.0
-        return np.where(unseen, 1.0, uu), uv, np.where(unseen, 1.0, vv)
+    def _linearized(self, poses: Poses, factors: np.ndarray) -> _Linear:
+        """Linearize at the measured positions, then at the true positions mu = m + V J^T S^-1 e that follow from that.
+
+        At the measured ones alone the camera would be drawn away from the placements, as in plain PnP.
+        """
+        measured = self.candidates.polar
+        first = self._linearized_at(poses, factors, measured[:, None])
+        solved = first.solved()
+        near = (first.residual_px * solved).sum(axis=1) < _NEAR**2
+        pull = (first.d_polar * solved[:, :, None]).sum(axis=1).transpose(1, 0, 2)  # (3, s, m)
+        variances = factors.T[1:, :, None] * self.candidates.sigma_polar[:, None] ** 2
+        return self._linearized_at(poses, factors, measured[:, None] + np.where(near, variances * pull, 0.0))
+
+    def _linearized_at(self, poses: Poses, factors: np.ndarray, polar: np.ndarray) -> _Linear:
+        """Linearize at polar positions (3, s, m) or (3, 1, m)."""
+        position_m, turning = position_planes(polar.reshape(3, -1))
+        position_m = position_m.reshape(polar.shape).transpose(1, 0, 2)
+        turning = turning.reshape(3, 3, *polar.shape[1:]).transpose(2, 0, 1, 3)
+        turned_m = poses.rotations @ position_m
+        projected_px, d_point = self.measurements.camera.project_planes(turned_m + poses.translations_m[..., None])
+        turned_axes = poses.rotations @ turning.reshape(len(turning), 3, -1)
+        turned_axes = turned_axes.reshape(len(poses), 3, 3, -1)
+        d_polar = np.einsum("sirm,sikm->srkm", d_point, turned_axes)
+        residual_px = self.candidates.pixels_px - projected_px
+        residual_px -= (d_polar * (self.candidates.polar[:, None] - polar).transpose(1, 0, 2)[:, None]).sum(axis=2)
+        noisy = d_polar * self.candidates.sigma_polar
+        each, click = factors[:, 1:, None], factors[:, :1] * self.candidates.sigma_px**2
+        u, v = noisy[:, 0], noisy[:, 1]
+        noise = (each * u * u).sum(axis=1) + click, (each * u * v).sum(axis=1), (each * v * v).sum(axis=1) + click
+        unseen = ~np.isfinite(residual_px).all(axis=1)
+        if unseen.any():
+            residual_px = np.where(unseen[:, None], _FAR_PX, residual_px)
+            d_polar, d_point = (np.where(unseen[:, None, None], 0.0, one) for one in (d_polar, d_point))
+            noise = (
+                np.where(unseen, 1.0, noise[0]),
+                np.where(unseen, 0.0, noise[1]),
+                np.where(unseen, 1.0, noise[2]),
+            )
+        return _Linear(residual_px, d_polar, noise, d_point, turned_m)
 
 
 def pose_posterior(measurements: PairMeasurements, reference: RigidTransform, pivot_radar_m: Vector3) -> PosePosterior:
@@ -205,11 +273,6 @@ def pose_posterior(measurements: PairMeasurements, reference: RigidTransform, pi
     each = measurements if measurements.one_to_one else measurements.candidates_apart()
     log_outlier = np.log(_click_density(measurements))[measurements.owner]
     return PosePosterior(measurements, each.measured(np.arange(len(each.polar))), log_outlier, reference, pivot_radar_m)
-
-
-def replace_noise(posterior: PosePosterior, measurements: PairMeasurements) -> PosePosterior:
-    """Return the posterior with the assumed noise of other measurements of the same pairs."""
-    return pose_posterior(measurements, posterior.reference, posterior.pivot_radar_m)
 
 
 def _click_density(measurements: PairMeasurements) -> Values:

@@ -47,24 +47,30 @@ def joined_poses(several: Sequence[Poses]) -> Poses:
 
 
 def refine_poses(
-    posterior: PosePosterior, poses: Poses, *, share: float, used: Flags | None = None, rounds: int
+    posterior: PosePosterior,
+    poses: Poses,
+    log_scales: np.ndarray,
+    *,
+    share: float,
+    used: Flags | None = None,
+    rounds: int,
 ) -> Modes:
-    """Refine poses at a fixed noise level by expectation-maximisation, with one Gauss-Newton step per round.
+    """Refine poses at given noise levels by expectation-maximisation, with one Gauss-Newton step per round.
 
     Args:
-        posterior: of the pairs, whose assumed noise is the estimated one.
+        posterior: of the pairs.
         poses: where to start, k of them.
+        log_scales: (k, 4) logarithm of the noise over the assumed one.
         share: of inliers, before any pair is looked at.
         used: (k, n) the pairs that count for each pose; None uses all.
         rounds: number of steps.
     """
     counts = np.ones((len(poses), len(posterior.measurements)), dtype=bool) if used is None else used
-    as_assumed = np.zeros((len(poses), 0))
     for _ in range(rounds):
-        terms = posterior.pair_terms(poses, as_assumed)
+        terms = posterior.pair_terms(poses, log_scales)
         hessians, gradients = _normal_equations(posterior, poses, terms, share, counts)
         poses = poses.perturbed(_steps(hessians, gradients))
-    terms = posterior.pair_terms(poses, as_assumed)
+    terms = posterior.pair_terms(poses, log_scales)
     hessians, _ = _normal_equations(posterior, poses, terms, share, counts)
     mixed = np.log1p(share * np.expm1(np.minimum(terms.pair, 500.0)))
     evidence = np.where(counts, mixed, 0.0).sum(axis=1) - 0.5 * posterior.prior_costs(poses)
@@ -78,7 +84,7 @@ def _normal_equations(
     outlier = terms.outlier_probabilities(share) / (1.0 - share) * share * counts
     per_row = outlier if posterior.measurements.one_to_one else outlier[:, posterior.measurements.owner]
     kinds = np.exp(np.minimum(terms.inlier, 500.0)) + np.exp(np.minimum(terms.near, 500.0)) / NEAR_OUTLIER_FACTOR**2
-    rows = terms.model.planes[:, :7] * np.sqrt(per_row * kinds)[:, None, None, :]
+    rows = terms.whitened() * np.sqrt(per_row * kinds)[:, None, None, :]
     rows = rows.reshape(*rows.shape[:2], -1)
     product = rows @ np.swapaxes(rows, 1, 2)
     prior_hessians, prior_gradients = posterior.prior_information(poses)

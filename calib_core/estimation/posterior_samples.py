@@ -13,7 +13,7 @@ from calib_core.arrays import Matrix66, Values, Vector3
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.importance_sampling import Mixture, WeightedSamples, importance_samples
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.estimation.pose_posterior import PosePosterior, Poses, pose_posterior, replace_noise
+from calib_core.estimation.pose_posterior import PosePosterior, Poses, pose_posterior
 from calib_core.estimation.posterior_modes import batch_of, joined_poses, refine_poses
 from calib_core.geometry import RigidTransform, rotation_log
 from calib_core.radar import cartesian_from_polar
@@ -132,21 +132,17 @@ def _peaks(
     The other solutions are refined at the fit's noise level and at the assumed one: a wrong fit has a wrong noise level.
     """
     inliers = np.flatnonzero(refined.inliers)
-    fit = batch_of([refined.camera_from_radar])
-    whole = batch_of([refined.camera_from_radar, *others])
-    starts = whole.some(np.concatenate([np.arange(len(whole)), np.zeros(len(inliers), dtype=np.int64)]))
+    others = [refined.camera_from_radar, *others]
+    starts = batch_of([*others, *[refined.camera_from_radar] * len(inliers), *others])
+    log_scales = np.zeros((len(starts), 4))
+    log_scales[: -len(others)] = np.log(refined.noise_scale)
     used = np.ones((len(starts), len(posterior.measurements)), dtype=bool)
-    used[len(whole) + np.arange(len(inliers)), inliers] = False
-    share, rounds = refined.inlier_share, _REFINING_ROUNDS
-    at_noise = replace_noise(posterior, refined.measurements)
-    estimated = refine_poses(at_noise, starts, share=share, used=used, rounds=rounds)
-    assumed = refine_poses(posterior, whole, share=share, rounds=rounds)
-    log_scales = np.zeros((1 + len(starts) + len(whole), 4))
-    log_scales[: 1 + len(starts)] = np.log(refined.noise_scale)
-    hessians = np.concatenate([estimated.hessians, assumed.hessians])
+    used[len(others) + np.arange(len(inliers)), inliers] = False
+    modes = refine_poses(posterior, starts, log_scales, share=refined.inlier_share, used=used, rounds=_REFINING_ROUNDS)
+    log_scales = np.concatenate([log_scales[:1], log_scales])
     return _Peaks(
-        joined_poses([fit, estimated.poses, assumed.poses]),
-        np.concatenate([covariance[None], np.linalg.pinv(hessians, hermitian=True)]),
+        joined_poses([batch_of(others[:1]), modes.poses]),
+        np.concatenate([covariance[None], np.linalg.pinv(modes.hessians, hermitian=True)]),
         log_scales if refined.degrees_of_freedom > 0 else log_scales[:, :0],
     )
 
