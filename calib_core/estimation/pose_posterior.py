@@ -9,11 +9,12 @@ an outlier, and its candidates are alternatives:
 Most outliers have a good click and a radar position of something else, so their pixels are spread as those of all clicks are:
 o is the density of the other clicks, mixed with an even one for clicks that are anywhere. In an aisle, where all clicks are
 close together, an even density alone would take agreement by chance as evidence. The share q of inliers is integrated out.
-The noise level is unknown too: one factor each on the sigmas of click, range, azimuth and elevation, normal in the logarithm,
+The determinant of S is that at a reference pose: a determinant that follows the pose is right only if placements are spread
+evenly over the radar's polar coordinates, and draws the camera backwards, where the same noise covers fewer pixels. The noise level is unknown too: one factor each on the sigmas of click, range, azimuth and elevation, normal in the logarithm,
 the last three with a part in common. All functions take many states at once.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -141,6 +142,7 @@ class PosePosterior:
         log_outlier: (m,) logarithm of the density of each row's click if it is an outlier [1/px^2].
         reference: the pose of state zero.
         pivot_radar_m: (3,).
+        d_polar: (2, 3, m) d pixel / d polar of each row at the reference; zeros where it does not see the position.
     """
 
     measurements: PairMeasurements
@@ -148,6 +150,13 @@ class PosePosterior:
     log_outlier: Values
     reference: RigidTransform
     pivot_radar_m: Vector3
+    d_polar: np.ndarray
+
+    def about(self, reference: RigidTransform) -> "PosePosterior":
+        """Return the same posterior with another reference."""
+        poses = Poses(reference.rotation[None], reference.translation_m[None])
+        linear = self._linearized_at(poses, np.ones((1, 4)), self.candidates.polar[:, None])
+        return replace(self, reference=reference, d_polar=linear.d_polar[0])
 
     def poses(self, states: np.ndarray) -> Poses:
         """Return the poses of states (s, 6 or 10)."""
@@ -209,10 +218,9 @@ class PosePosterior:
         measurements = self.measurements
         factors = np.exp(2.0 * log_scales) if log_scales.shape[1] else np.ones((len(poses), 4))
         linear = self._linearized(poses, factors)
-        uu, uv, vv = linear.noise
         squared = (linear.residual_px * linear.solved()).sum(axis=1)
         level = measurements.log_score - self.log_outlier - np.log(2.0 * np.pi)
-        level = level - 0.5 * np.log(uu * vv - uv * uv)
+        level = level - 0.5 * self._log_volumes(factors)
         inlier = level - 0.5 * squared + np.log1p(-_NEAR_OUTLIER_SHARE)
         wider = NEAR_OUTLIER_FACTOR**2
         near = level - 0.5 * squared / wider + np.log(_NEAR_OUTLIER_SHARE / wider)
@@ -220,6 +228,20 @@ class PosePosterior:
         if not measurements.one_to_one:
             pair = np.logaddexp.reduceat(pair, measurements.first[:-1], axis=-1)
         return PairTerms(linear, inlier, near, pair)
+
+    def _log_volumes(self, factors: np.ndarray) -> np.ndarray:
+        """Return log det S (s, m) at the reference pose; that of a position it does not see is taken from the others."""
+        uu, uv, vv = self._noise(self.d_polar[None], factors)
+        logs = np.log(uu * vv - uv * uv)
+        seen = self.d_polar.any(axis=(0, 1))
+        return logs if seen.all() or not seen.any() else np.where(seen, logs, np.median(logs[:, seen], axis=1)[:, None])
+
+    def _noise(self, d_polar: np.ndarray, factors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the entries uu, uv, vv (s, m) of S = C + J V J^T with variances multiplied by factors (s, 4)."""
+        noisy = d_polar * self.candidates.sigma_polar
+        each, click = factors[:, 1:, None], factors[:, :1] * self.candidates.sigma_px**2
+        u, v = noisy[:, 0], noisy[:, 1]
+        return (each * u * u).sum(axis=1) + click, (each * u * v).sum(axis=1), (each * v * v).sum(axis=1) + click
 
     def _linearized(self, poses: Poses, factors: np.ndarray) -> _Linear:
         """Linearize at the measured positions, then at the true positions mu = m + V J^T S^-1 e that follow from that.
@@ -246,19 +268,11 @@ class PosePosterior:
         d_polar = np.einsum("sirm,sikm->srkm", d_point, turned_axes)
         residual_px = self.candidates.pixels_px - projected_px
         residual_px -= (d_polar * (self.candidates.polar[:, None] - polar).transpose(1, 0, 2)[:, None]).sum(axis=2)
-        noisy = d_polar * self.candidates.sigma_polar
-        each, click = factors[:, 1:, None], factors[:, :1] * self.candidates.sigma_px**2
-        u, v = noisy[:, 0], noisy[:, 1]
-        noise = (each * u * u).sum(axis=1) + click, (each * u * v).sum(axis=1), (each * v * v).sum(axis=1) + click
         unseen = ~np.isfinite(residual_px).all(axis=1)
         if unseen.any():
             residual_px = np.where(unseen[:, None], _FAR_PX, residual_px)
             d_polar, d_point = (np.where(unseen[:, None, None], 0.0, one) for one in (d_polar, d_point))
-            noise = (
-                np.where(unseen, 1.0, noise[0]),
-                np.where(unseen, 0.0, noise[1]),
-                np.where(unseen, 1.0, noise[2]),
-            )
+        noise = self._noise(d_polar, factors)
         return _Linear(residual_px, d_polar, noise, d_point, turned_m)
 
 
@@ -272,7 +286,9 @@ def pose_posterior(measurements: PairMeasurements, reference: RigidTransform, pi
     """
     each = measurements if measurements.one_to_one else measurements.candidates_apart()
     log_outlier = np.log(_click_density(measurements))[measurements.owner]
-    return PosePosterior(measurements, each.measured(np.arange(len(each.polar))), log_outlier, reference, pivot_radar_m)
+    candidates = each.measured(np.arange(len(each.polar)))
+    nothing = np.zeros((2, *candidates.polar.shape))
+    return PosePosterior(measurements, candidates, log_outlier, reference, pivot_radar_m, nothing).about(reference)
 
 
 def _click_density(measurements: PairMeasurements) -> Values:

@@ -5,7 +5,7 @@ stated ellipsoid holds its share of the posterior, nothing is changed.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -77,9 +77,7 @@ def sample_posterior(
     pivot_m = refined.weights @ points_m / refined.weights.sum()
     posterior = pose_posterior(measurements, refined.camera_from_radar, pivot_m)
     peaks = _likeliest(posterior, _peaks(posterior, refined, covariance, others))
-    posterior = replace(
-        posterior, reference=peaks.poses.transform(0)
-    )  # so that the best peak is where charts are exact
+    posterior = posterior.about(peaks.poses.transform(0))
     start = _mixture(posterior, peaks, refined.degrees_of_freedom)
     samples = importance_samples(posterior.costs, start, per_round=_PER_ROUND, rounds=_ROUNDS, enough=_ENOUGH, rng=rng)
     return PosteriorSamples(posterior, samples)
