@@ -3,16 +3,15 @@
 All poses are refined together as one batch, and each may use another set of pairs: without one pair in turn, or only some.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from calib_core.arrays import Flags, Values
-from calib_core.estimation.pose_posterior import NEAR_OUTLIER_FACTOR, PairTerms, PosePosterior, Poses
-from calib_core.geometry import RigidTransform
+from calib_core.estimation.posterior.pose_batch import Poses
+from calib_core.estimation.posterior.pose_posterior import NEAR_OUTLIER_FACTOR, PairTerms, PosePosterior
 
-__all__ = ["Modes", "batch_of", "joined_poses", "refine_poses"]
+__all__ = ["Modes", "refine_poses"]
 
 _LARGEST_TURN_RAD, _LARGEST_SHIFT_M = 0.3, 1.0
 
@@ -32,18 +31,6 @@ class Modes:
     hessians: np.ndarray
     inlier: np.ndarray
     evidence: Values
-
-
-def batch_of(transforms: Sequence[RigidTransform]) -> Poses:
-    """Stack poses."""
-    return Poses(np.array([one.rotation for one in transforms]), np.array([one.translation_m for one in transforms]))
-
-
-def joined_poses(several: Sequence[Poses]) -> Poses:
-    """Concatenate batches of poses."""
-    return Poses(
-        np.concatenate([one.rotations for one in several]), np.concatenate([one.translations_m for one in several])
-    )
 
 
 def refine_poses(

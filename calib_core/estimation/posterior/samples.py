@@ -11,10 +11,11 @@ import numpy as np
 
 from calib_core.arrays import Matrix66, Values, Vector3
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
-from calib_core.estimation.importance_sampling import Mixture, WeightedSamples, importance_samples
 from calib_core.estimation.measurement_model import PairMeasurements
-from calib_core.estimation.pose_posterior import PosePosterior, Poses, pose_posterior
-from calib_core.estimation.posterior_modes import batch_of, joined_poses, refine_poses
+from calib_core.estimation.posterior.importance_sampling import Mixture, WeightedSamples, importance_samples
+from calib_core.estimation.posterior.modes import refine_poses
+from calib_core.estimation.posterior.pose_batch import Poses, batch_of, joined_poses
+from calib_core.estimation.posterior.pose_posterior import PosePosterior, pose_posterior
 from calib_core.geometry import RigidTransform, rotation_log
 from calib_core.radar import cartesian_from_polar
 

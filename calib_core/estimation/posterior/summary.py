@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Matrix66, Values
-from calib_core.estimation.importance_sampling import WeightedSamples
-from calib_core.estimation.posterior_samples import PosteriorSamples
+from calib_core.estimation.posterior.importance_sampling import WeightedSamples
+from calib_core.estimation.posterior.samples import PosteriorSamples
 from calib_core.geometry import RigidTransform
 
 __all__ = ["PossiblePose", "PosteriorSummary", "possible_poses", "summarize_posterior"]

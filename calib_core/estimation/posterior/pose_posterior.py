@@ -10,7 +10,9 @@ Most outliers have a good click and a radar position of something else, so their
 o is the density of the other clicks, mixed with an even one for clicks that are anywhere. In an aisle, where all clicks are
 close together, an even density alone would take agreement by chance as evidence. The share q of inliers is integrated out.
 The determinant of S is that at a reference pose: a determinant that follows the pose is right only if placements are spread
-evenly over the radar's polar coordinates, and draws the camera backwards, where the same noise covers fewer pixels. The noise level is unknown too: one factor each on the sigmas of click, range, azimuth and elevation, normal in the logarithm,
+evenly over the radar's polar coordinates, and draws the camera backwards, where the same noise covers fewer pixels.
+
+The noise level is unknown too: one factor each on the sigmas of click, range, azimuth and elevation, normal in the logarithm,
 the last three with a part in common. All functions take many states at once.
 """
 
@@ -19,13 +21,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Matrix66, Values, Vector3
+from calib_core.estimation.click_density import click_density
 from calib_core.estimation.leave_one_out_prediction import PSEUDO_REDUNDANCY, PSEUDO_SHARED
 from calib_core.estimation.linearization import MeasurementPlanes
 from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.estimation.posterior.pose_batch import Poses
 from calib_core.geometry import RigidTransform, rotation_exp, rotation_jacobian, skew
 from calib_core.radar import position_planes
 
-__all__ = ["NEAR_OUTLIER_FACTOR", "PairTerms", "PosePosterior", "Poses", "pose_posterior"]
+__all__ = ["NEAR_OUTLIER_FACTOR", "PairTerms", "PosePosterior", "pose_posterior"]
 
 NEAR_OUTLIER_FACTOR = 5.0
 """How many times noisier a near outlier is."""
@@ -33,41 +37,10 @@ NEAR_OUTLIER_FACTOR = 5.0
 _NEAR_OUTLIER_SHARE = 0.01
 _SHARES = np.array([0.25, 0.4, 0.55, 0.7, 0.8, 0.88, 0.94, 0.98])
 _PRIOR_INLIERS, _PRIOR_OUTLIERS = 3.0, 0.5  # of a beta distribution of the share
-_ANYWHERE = 0.3  # share of the outliers whose click is anywhere on the image
-_LEAST_WIDTH = 5.0  # standard deviations of a click
 _TAIL = 4.0  # the weak camera prior is a Cauchy distribution in three dimensions: density (1 + d^2 / sigma^2)^-2
 _NEAR = 6.0  # standard deviations beyond which a pair does not move its own true position
 _FAR_PX = 1e6  # residual of a position the camera cannot see
 _ROWS_AT_ONCE = 10_000  # whose intermediate arrays fit into the processor's cache
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Poses:
-    """Poses camera_from_radar as arrays.
-
-    Attributes:
-        rotations: (s, 3, 3).
-        translations_m: (s, 3).
-    """
-
-    rotations: np.ndarray
-    translations_m: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.rotations)
-
-    def perturbed(self, errors: np.ndarray) -> "Poses":
-        """Apply an error (s, 6) to each pose: t = t_hat + dt, R = Exp(dtheta) R_hat."""
-        return Poses(rotation_exp(errors[:, 3:]) @ self.rotations, self.translations_m + errors[:, :3])
-
-    def some(self, which: np.ndarray | slice) -> "Poses":
-        """Keep the poses of the given indices."""
-        return Poses(self.rotations[which], self.translations_m[which])
-
-    def transform(self, index: int) -> RigidTransform:
-        """Return one of them, re-orthonormalised."""
-        u, _, vt = np.linalg.svd(self.rotations[index])
-        return RigidTransform(u @ vt, self.translations_m[index])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -285,22 +258,10 @@ def pose_posterior(measurements: PairMeasurements, reference: RigidTransform, pi
         pivot_radar_m: (3,) a point among the placements.
     """
     each = measurements if measurements.one_to_one else measurements.candidates_apart()
-    log_outlier = np.log(_click_density(measurements))[measurements.owner]
+    log_outlier = np.log(click_density(measurements))[measurements.owner]
     candidates = each.measured(np.arange(len(each.polar)))
     nothing = np.zeros((2, *candidates.polar.shape))
     return PosePosterior(measurements, candidates, log_outlier, reference, pivot_radar_m, nothing).about(reference)
-
-
-def _click_density(measurements: PairMeasurements) -> Values:
-    """Return the density (n,) of the other clicks at each click [1/px^2], smoothed as far as their neighbours are apart."""
-    pixels_px, count = measurements.pixels_px, len(measurements)
-    even = 1.0 / (measurements.camera.width_px * measurements.camera.height_px)
-    squared = ((pixels_px[:, None] - pixels_px) ** 2).sum(axis=2)
-    nth = min(max(round(count**0.5), 1), count - 1)
-    width2 = np.maximum(np.sort(squared, axis=1)[:, nth], (_LEAST_WIDTH * measurements.sigma_px) ** 2)
-    kernels = np.exp(-0.5 * squared / width2) / (2.0 * np.pi * width2)
-    np.fill_diagonal(kernels, 0.0)
-    return np.asarray(_ANYWHERE * even + (1.0 - _ANYWHERE) * kernels.sum(axis=1) / max(count - 1, 1))
 
 
 def _log_share_prior() -> Values:
