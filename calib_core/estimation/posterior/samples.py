@@ -11,6 +11,7 @@ import numpy as np
 
 from calib_core.arrays import Matrix66, Values, Vector3
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
+from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements
 from calib_core.estimation.posterior.importance_sampling import Mixture, WeightedSamples, importance_samples
 from calib_core.estimation.posterior.modes import refine_poses
@@ -26,6 +27,7 @@ _ENOUGH = 600.0  # effective samples: the share inside the 95 % ellipsoid is the
 _WIDER = 1.2  # factor on the covariance of a peak to start from
 _EVENING = 0.25  # power of the peaks' probabilities
 _UNLIKELY = 25.0  # a peak less likely than the best by this log factor is not sampled
+_HYPOTHESES, _REFINED_HYPOTHESES = 80, 16
 _MOST_PEAKS = 8
 _SAME = 4.0  # squared distance, in standard deviations
 _REFINING_ROUNDS = 8
@@ -71,17 +73,27 @@ def sample_posterior(
         measurements: all pairs with the assumed noise.
         refined: their fit.
         covariance: (6, 6) of its pose.
-        others: poses that other starts end in.
+        others: other poses to look at, such as those that other starts end in.
         rng: random generator.
     """
     points_m = cartesian_from_polar(measurements.polar[refined.rows])
     pivot_m = refined.weights @ points_m / refined.weights.sum()
     posterior = pose_posterior(measurements, refined.camera_from_radar, pivot_m)
+    others = (*others, *_hypotheses(posterior, rng))
     peaks = _likeliest(posterior, _peaks(posterior, refined, covariance, others))
     posterior = posterior.about(peaks.poses.transform(0))
     start = _mixture(posterior, peaks, refined.degrees_of_freedom)
     samples = importance_samples(posterior.costs, start, per_round=_PER_ROUND, rounds=_ROUNDS, enough=_ENOUGH, rng=rng)
     return PosteriorSamples(posterior, samples)
+
+
+def _hypotheses(posterior: PosePosterior, rng: np.random.Generator) -> tuple[RigidTransform, ...]:
+    """Draw poses from few pairs each, and keep the most likely."""
+    drawn = initial_poses(posterior.measurements, most=_HYPOTHESES, rng=rng)
+    if not drawn:
+        return ()
+    costs = posterior.pose_costs(batch_of(drawn), np.zeros((len(drawn), 4)))
+    return tuple(drawn[k] for k in np.argsort(costs, kind="stable")[:_REFINED_HYPOTHESES])
 
 
 def _differences(rotation_vectors: np.ndarray, subtracted: Vector3) -> np.ndarray:
