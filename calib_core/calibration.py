@@ -24,6 +24,7 @@ from calib_core.estimation.influential_pairs import average_over_influential_pai
 from calib_core.estimation.leave_one_out import LeaveOneOut, leave_one_out
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.estimation.pair_results import excluded_pair_results, fit_metrics, used_pair_results
+from calib_core.estimation.posterior.beyond_the_fit import look_beyond
 from calib_core.measurements import MIN_PAIRS, Pair, RadarScans, ReflectorClick, Unpaired, Unsolvable
 from calib_core.option_checks import checked_options
 from calib_core.options import CalibrationOptions
@@ -223,7 +224,8 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
     if not rotation_sigma_rad < _UNDETERMINED_ROTATION_RAD:
         return _explained(unsolved.degenerate(len(used)), used, measurements, options)
     influential = find_influential_pairs(measurements, solution.refined, solution.uncertainty)
-    refined, uncertainty = average_over_influential_pairs(solution.refined, solution.uncertainty, influential)
+    beyond = look_beyond(measurements, solution.refined, solution.uncertainty, fit.found, seed=options.solving.seed)
+    refined, uncertainty = average_over_influential_pairs(beyond.refined, beyond.uncertainty, influential)
     solution = replace(solution, refined=refined, uncertainty=uncertainty)
     calibration = _described(task, groups, measurements, solution)
     metrics = calibration.metrics
@@ -239,6 +241,7 @@ def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMea
         mirror_gain=fit.mirror_gain,
         chi2_per_degree=metrics.chi2 / max(metrics.degrees_of_freedom, 1),
         options=options,
+        beyond=beyond,
     )
     angle_map = learn_angle_map(calibration)
     return replace(

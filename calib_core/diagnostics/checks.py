@@ -11,6 +11,7 @@ from calib_core.diagnostics.handedness import assumed_axes, mirrored_axes
 from calib_core.diagnostics.intrinsics import intrinsics
 from calib_core.diagnostics.pairs import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
 from calib_core.diagnostics.pose import camera_position, two_poses
+from calib_core.diagnostics.posterior import agreeing_outliers, pivotal_pair, possible_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.geometry import skew
 from calib_core.plausibility import PIXELS_SUSPECTED, implausible_input
@@ -34,7 +35,7 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
     suspected = implausible_input(fit.ids, points, fit.measurements.pixels_px, fit.measurements.camera, fit.options)
     checks = (
         mirrored_axes,
-        two_poses,
+        _other_poses,
         camera_position,
         _flat_radar,
         _many_outliers,
@@ -46,12 +47,19 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         _same_places,
         ambiguous_candidates,
         contradicted_pairs,
+        pivotal_pair,
+        agreeing_outliers,
         decisive_pair,
         assumed_axes,
     )
     wrong_pixels = any(warning.code == PIXELS_SUSPECTED for warning in suspected)
     found = [warning for check in checks for warning in check(fit)]
     return (*suspected, *(one for one in found if not (wrong_pixels and one.code in _FOLLOWS_FROM_PIXELS)))
+
+
+def _other_poses(fit: SolvedFit) -> list[DataWarning]:
+    """Warn of a second pose, found from other starts or among the samples of the posterior."""
+    return two_poses(fit) or possible_poses(fit)
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:

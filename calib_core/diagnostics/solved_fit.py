@@ -10,6 +10,7 @@ from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.influential_pairs import InfluentialPair
 from calib_core.estimation.leave_one_out import LeaveOneOut
 from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.estimation.posterior.beyond_the_fit import BeyondTheFit
 from calib_core.options import CalibrationOptions
 
 __all__ = ["SolvedFit"]
@@ -31,6 +32,7 @@ class SolvedFit:
         mirror_gain: gain in twice the log-likelihood with mirrored radar axes; negative if they fit worse.
         chi2_per_degree: chi2 per degree of freedom under the assumed noise.
         options: of the calibration.
+        beyond: what the fit and its covariance do not show.
     """
 
     ids: tuple[str, ...]
@@ -44,3 +46,4 @@ class SolvedFit:
     mirror_gain: float
     chi2_per_degree: float
     options: CalibrationOptions
+    beyond: BeyondTheFit

@@ -235,7 +235,10 @@ class PosePosterior:
         position_m = position_m.reshape(polar.shape).transpose(1, 0, 2)
         turning = turning.reshape(3, 3, *polar.shape[1:]).transpose(2, 0, 1, 3)
         turned_m = poses.rotations @ position_m
-        projected_px, d_point = self.measurements.camera.project_planes(turned_m + poses.translations_m[..., None])
+        offset_m = self.measurements.errors.offset_m
+        projected_px, d_point = self.measurements.camera.project_planes(
+            turned_m + (poses.translations_m + offset_m)[..., None]
+        )
         turned_axes = poses.rotations @ turning.reshape(len(turning), 3, -1)
         turned_axes = turned_axes.reshape(len(poses), 3, 3, -1)
         d_polar = np.einsum("sirm,sikm->srkm", d_point, turned_axes)
