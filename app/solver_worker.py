@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from app.session import Solved
-from app.solving import RadarSource, check_clicks, solve_clicks
+from app.solving import RadarSource, check_clicks, solve_in_steps
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError
 from calib_core.measurements import ReflectorClick, Unsolvable
@@ -38,6 +38,7 @@ class SolverWorker:
         self._lock = threading.Lock()
         self._newest_revision = -1
         self._closed = False
+        self._latest: Calibration | None = None
         self._executor = ThreadPoolExecutor(max_workers=1, thread_name_prefix="solver")
 
     def request(
@@ -49,11 +50,13 @@ class SolverWorker:
     ) -> None:
         """Solve this revision and drop older requests; returns immediately, and does nothing after `close`.
 
+        A preview of the answer comes first, where there is one.
+
         Args:
             revision: echoed in the answer; larger means newer.
             clicks: of this revision.
             options: of this revision.
-            when_done: called with the answer, without any lock held; not called when a newer request came in time.
+            when_done: called with each answer, without any lock held; not called when a newer request came in time.
         """
         request = _Request(revision, tuple(clicks), options, when_done)
         with self._lock:
@@ -73,7 +76,14 @@ class SolverWorker:
     def _answer(self, request: _Request) -> Solved | None:
         if request.revision != self._newest_revision:
             return None
-        outcome = solve_clicks(self._recording, request.clicks, self._camera, request.options)
+        steps = solve_in_steps(self._recording, request.clicks, self._camera, request.options, previous=self._latest)
+        for outcome in steps:
+            if not (isinstance(outcome, Calibration) and outcome.checking):
+                break
+            if request.revision != self._newest_revision:
+                return None
+            request.when_done(Solved(request.revision, outcome))
+        self._latest = outcome if isinstance(outcome, Calibration) else self._latest
         checked: tuple[PairResult, ...] = ()
         if isinstance(outcome, Unsolvable) and self._reference is not None:
             checked = check_clicks(self._recording, request.clicks, self._reference, request.options)

@@ -3,7 +3,7 @@
 import dataclasses
 import hashlib
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from operator import attrgetter
 from pathlib import Path
 from typing import Protocol
@@ -13,7 +13,7 @@ import numpy as np
 from app.resources import version
 from app.session import Outcome
 from calib_core.association.pairing import pair_clicks
-from calib_core.calibration import calibrate, calibrate_pairs, solve_again
+from calib_core.calibration import calibrate_pairs, calibration_steps, solve_again
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
 from calib_core.interchange import (
@@ -40,6 +40,7 @@ __all__ = [
     "check_clicks",
     "half_window_s",
     "solve_clicks",
+    "solve_in_steps",
     "solve_pairs",
 ]
 
@@ -68,16 +69,44 @@ def solve_clicks(
         OptionError: an option is out of range.
         CalibrationError: the recording cannot be read at the clicks.
     """
+    *_, outcome = solve_in_steps(recording, clicks, camera, options, preview=False)
+    return outcome
+
+
+def solve_in_steps(
+    recording: RadarSource,
+    clicks: Sequence[ReflectorClick],
+    camera: Camera | None,
+    options: CalibrationOptions,
+    *,
+    previous: Calibration | None = None,
+    preview: bool = True,
+) -> Iterator[Outcome]:
+    """Solve, with a preview of the answer first if there can be one; the last step is what `solve_clicks` returns.
+
+    Args:
+        recording: where the radar scans come from.
+        clicks: in any order.
+        camera: the intrinsics.
+        options: of the calibration.
+        previous: the answer to nearly the same clicks.
+        preview: make one.
+
+    Raises:
+        OptionError: an option is out of range.
+        CalibrationError: the recording cannot be read at the clicks.
+    """
     checked_options(options)
     if camera is None:
-        return Unsolvable(
+        yield Unsolvable(
             "no-camera",
             "the camera intrinsics are missing: the recording contains none that can be used",
             "calibrate the camera with OpenCV, Kalibr or ROS camera_calibration, then start again with --camera FILE",
         )
+        return
     times = sorted({click.image_time for click in clicks})
     scans = recording.radar_scans_around(times, half_window_s(options))
-    return calibrate(clicks, scans, camera, options)
+    yield from calibration_steps(clicks, scans, camera, options, previous=previous, preview=preview)
 
 
 def check_clicks(

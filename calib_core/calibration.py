@@ -65,8 +65,8 @@ def calibration_steps(
 ) -> Iterator[Calibration | Unsolvable]:
     """Calibrate in two steps: first a preview with pose and local covariance, then the answer, the same as `calibrate`'s.
 
-    The preview is marked as being checked: tests for mirrored axes, pairs that all rests on and other poses follow with
-    the answer, and may change it. No preview is made with the paper's method.
+    The preview is marked as being checked: the tests for mirrored axes, for pairs that all rests on and for other poses
+    follow with the answer, and may change it. No preview is made with the paper's method.
 
     Args:
         clicks: in any order; excluded ones are paired and shown, but not used.
@@ -211,6 +211,19 @@ def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Itera
                 checking=True,
             )
     yield _answer(task, groups, measurements)
+
+
+def _preview(calibration: Calibration, previous: Calibration | None) -> Calibration:
+    """Mark a calibration as being checked; warnings and advice are still those of the previous answer."""
+    if previous is None:
+        return replace(calibration, checking=True)
+    return replace(
+        calibration,
+        checking=True,
+        warnings=previous.warnings,
+        angle_map=previous.angle_map,
+        next_placement=previous.next_placement,
+    )
 
 
 def _answer(task: _Task, groups: Sequence[PlacementGroup], measurements: PairMeasurements) -> Calibration | Unsolvable:

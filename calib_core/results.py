@@ -211,7 +211,7 @@ class Calibration:
         next_placement: where the next placement would help most; None if no place is known.
         radar_errors: the radar's systematic errors, estimated with the pose.
         systematic_errors: every error that the pairs share, and its part in the uncertainty.
-        checking: whether this is a preview: the checks, warnings and advice are yet to come.
+        checking: whether this is a preview: its warnings and advice are those of the previous answer.
     """
 
     camera_from_radar: RigidTransform

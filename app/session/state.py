@@ -70,8 +70,14 @@ class Session:
 
     @property
     def is_solved(self) -> bool:
-        """Whether the outcome answers the current clicks and options."""
-        return self.outcome is not None and self.outcome_revision == self.revision
+        """Whether the outcome answers the current clicks and options, and has been checked."""
+        return self.outcome is not None and self.outcome_revision == self.revision and not self.is_checking
+
+    @property
+    def is_checking(self) -> bool:
+        """Whether the outcome is a preview of the answer to the current clicks and options."""
+        preview = isinstance(self.outcome, Calibration) and self.outcome.checking
+        return preview and self.outcome_revision == self.revision
 
     @property
     def needs_solving(self) -> bool:
