@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points3, Vector3
+from calib_core.arrays import Points3, Values, Vector3
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.estimation.mirror_test import MIRRORED_GAIN, NOT_MIRRORED_GAIN
 from calib_core.geometry import skew
@@ -21,6 +21,7 @@ __all__ = ["GroundSides", "assumed_axes", "ground_sides", "mirrored_axes"]
 
 _PLANE_ROUNDS = 6
 _NORMAL_QUANTILE_99 = 2.33
+_WRONG_SHARE = 0.1  # of the inliers
 _CLEAR_SIGMAS = 2.0  # of a height above the plane
 _VERY_CLEAR_SIGMAS = 3.0
 _SAME_ELEVATION_RAD = np.deg2rad(0.02)  # far less than any radar's noise of the elevation
@@ -38,15 +39,18 @@ class _Plane:
         origin_m: (3,) their weighted mean.
         axes: (3, 3) rows: two directions in the plane and its normal.
         covariance: (3, 3) of its height at the origin [m] and its slopes along both directions.
-        chi2: of the placements' distances from it.
-        redundancy: their number beyond the three that determine it.
+        distances: (n,) squared distances of the placements from it, in standard deviations.
     """
 
     origin_m: Vector3
     axes: np.ndarray
     covariance: np.ndarray
-    chi2: float
-    redundancy: int
+    distances: Values
+
+    @property
+    def redundancy(self) -> int:
+        """The number of placements beyond the three that determine it."""
+        return max(len(self.distances) - 3, 1)
 
     def height_m(self, point_m: Vector3) -> tuple[float, float]:
         """Return a point's signed height above the plane, and the standard deviation that the plane adds to it."""
@@ -91,10 +95,11 @@ def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
     """Warn if mirrored radar axes are more likely, or about as likely."""
     if fit.measurements.flat:
         return []  # a mirrored axis is then a rotation, which the pose absorbs
-    sides = _deciding_sides(fit)
-    if sides is not None and sides.same:
+    plane = _plane(fit)
+    sides, heights_decide = _expected_sides(plane, fit), _heights_decide(plane)
+    if sides is not None and sides.same and not heights_decide:
         return []
-    if sides is not None and sides.opposite:
+    if sides is not None and sides.opposite and not heights_decide:
         return [_on_other_side(sides)]
     if fit.mirror_gain > MIRRORED_GAIN:
         return [
@@ -105,11 +110,11 @@ def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
                 _FLIP,
             )
         ]
-    if fit.mirror_gain > NOT_MIRRORED_GAIN:
+    if fit.mirror_gain > NOT_MIRRORED_GAIN or (sides is not None and sides.opposite):
         return [
             DataWarning(
                 "handedness-open",
-                "a mirrored radar axis would explain the pairs about as well: all placements lie near one plane",
+                "a mirrored radar axis would explain the pairs about as well, or better fits where radar and camera stand",
                 "measure the camera position with a tape, or add placements at other heights (a tripod)",
             )
         ]
@@ -119,9 +124,10 @@ def mirrored_axes(fit: SolvedFit) -> list[DataWarning]:
 def assumed_axes(fit: SolvedFit) -> list[DataWarning]:
     """Warn if only the expected camera distance, and not the pairs, rules out mirrored axes."""
     already_warned = fit.mirror_gain > NOT_MIRRORED_GAIN or fit.measurements.flat
-    if already_warned or fit.measurements.prior.measured or _heights_decide(_plane(fit)):
+    plane = _plane(fit)
+    if already_warned or fit.measurements.prior.measured or _heights_decide(plane):
         return []
-    sides = _deciding_sides(fit)
+    sides = _expected_sides(plane, fit)
     if sides is not None and (sides.same or sides.opposite):
         return []
     return [
@@ -143,12 +149,11 @@ def _on_other_side(sides: GroundSides) -> DataWarning:
     )
 
 
-def _deciding_sides(fit: SolvedFit) -> GroundSides | None:
-    """Return the sides if they are to decide: the sensors are above the placements, and nothing better is known."""
+def _expected_sides(plane: _Plane, fit: SolvedFit) -> GroundSides | None:
+    """Return the sides if they tell something: the sensors are above the placements, and the camera is not measured."""
     if not fit.options.solving.sensors_above_placements or fit.measurements.prior.measured:
         return None
-    plane = _plane(fit)
-    return None if _heights_decide(plane) else _sides_of(plane, fit)
+    return _sides_of(plane, fit)
 
 
 def ground_sides(fit: SolvedFit) -> GroundSides:
@@ -172,25 +177,28 @@ def _heights_decide(plane: _Plane) -> bool:
 
     Mirrored axes with a rotated camera are a reflection in some plane, which moves a placement by twice its height h above
     that plane. Twice the log-likelihood therefore falls by about sum (2 h / sigma)^2 with the true heights, by
-    4 (chi2 - (n - 3)) with measured ones; the limit includes the 99 % quantile of the noise of that figure.
+    4 (chi2 - (n - 3)) with measured ones; the limit includes the 99 % quantile of the noise of that figure. The placements
+    farthest from the plane are left out: among them may be a wrong pair.
     """
+    wrong = int(np.ceil(_WRONG_SHARE * len(plane.distances)))
+    chi2 = float(np.sort(plane.distances)[: len(plane.distances) - wrong].sum())
     limit = MIRRORED_GAIN + 4.0 * _NORMAL_QUANTILE_99 * np.sqrt(2.0 * plane.redundancy)
-    return bool(4.0 * (plane.chi2 - plane.redundancy) > limit)
+    return bool(4.0 * (chi2 - plane.redundancy) > limit)
 
 
 def _plane(fit: SolvedFit) -> _Plane:
     points, covariances = _placements(fit)
-    weights, chi2 = np.ones(len(points)), np.inf
+    weights = np.ones(len(points))
     for _ in range(_PLANE_ROUNDS):
         origin_m = (weights @ points) / weights.sum()
         offsets = points - origin_m
         axes = np.linalg.svd(offsets * np.sqrt(weights)[:, None])[2]
         weights = 1.0 / np.einsum("i,nij,j->n", axes[2], covariances, axes[2])
-        chi2 = min(chi2, float(weights @ (offsets @ axes[2]) ** 2))
-    redundancy = max(len(points) - 3, 1)
+    distances = weights * (offsets @ axes[2]) ** 2
+    excess = float(distances.sum()) / max(len(points) - 3, 1)
     rows = np.concatenate([np.ones((len(points), 1)), offsets @ axes[:2].T], axis=1)
-    covariance = np.linalg.pinv((rows * weights[:, None]).T @ rows) * max(chi2 / redundancy, 1.0)
-    return _Plane(origin_m, axes, covariance, chi2, redundancy)
+    covariance = np.linalg.pinv((rows * weights[:, None]).T @ rows) * max(excess, 1.0)
+    return _Plane(origin_m, axes, covariance, distances)
 
 
 def _placements(fit: SolvedFit) -> tuple[Points3, np.ndarray]:

@@ -54,6 +54,14 @@ def test_the_side_of_the_ground_tells_mirrored_axes_from_right_ones(
             assert handedness(mirrored, simulated, apart(distance_m)) == {"mirrored-axes"}
 
 
+def test_a_wrong_pair_off_the_plane_does_not_acquit_mirrored_axes() -> None:
+    rng = np.random.default_rng([9301, 40, 0, ord("e"), 3])
+    simulated = simulate_pairs(40, rng=rng, noise="imaging", outlier_share=0.1)
+    assert handedness(simulated.pairs, simulated, apart(1.0)) == set()
+    mirrored = moved(simulated.pairs, np.array([1.0, -1.0, 1.0]))
+    assert handedness(mirrored, simulated, apart(1.0)) & {"mirrored-axes", "handedness-open"}
+
+
 def test_without_the_assumption_flat_ground_is_never_called_good() -> None:
     for seed in range(3):
         simulated = simulate_pairs(20, rng=np.random.default_rng([82, seed]))
