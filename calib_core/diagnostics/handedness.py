@@ -24,7 +24,6 @@ _NORMAL_QUANTILE_99 = 2.33
 _WRONG_SHARE = 0.1  # of the inliers
 _CLEAR_SIGMAS = 2.0  # of a height above the plane
 _VERY_CLEAR_SIGMAS = 3.0
-_SAME_ELEVATION_RAD = np.deg2rad(0.02)  # far less than any radar's noise of the elevation
 _FLIP = (
     "radar axes must be x forward, y left, z up: flip the sign of y (or of the elevation) at the source; rows of the picture "
     "counted from below look the same; do not use this pose"

@@ -1,23 +1,37 @@
-"""Click density: where the pixels of outliers are to be expected."""
+"""Click density: where the pixels of outliers are to be expected.
+
+Most outliers have a good click and a radar position of something else, so their pixels are spread as those of all clicks are.
+In an aisle, where all clicks are close together, an even density would take agreement by chance as evidence.
+"""
 
 import numpy as np
 
-from calib_core.arrays import Values
-from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.arrays import Points2, Values
+from calib_core.camera import Camera
 
 __all__ = ["click_density"]
 
 _ANYWHERE = 0.3  # share of the outliers whose click is anywhere on the image
 _LEAST_WIDTH = 5.0  # standard deviations of a click
+_MOST_OTHERS = 300  # more do not change a density, and all would make the work grow with the square
 
 
-def click_density(measurements: PairMeasurements) -> Values:
-    """Return the density (n,) of the other clicks at each click [1/px^2], smoothed as far as their neighbours are apart."""
-    pixels_px, count = measurements.pixels_px, len(measurements)
-    even = 1.0 / (measurements.camera.width_px * measurements.camera.height_px)
-    squared = ((pixels_px[:, None] - pixels_px) ** 2).sum(axis=2)
-    nth = min(max(round(count**0.5), 1), count - 1)
-    width2 = np.maximum(np.sort(squared, axis=1)[:, nth], (_LEAST_WIDTH * measurements.sigma_px) ** 2)
+def click_density(pixels_px: Points2, sigma_px: Values, camera: Camera) -> Values:
+    """Return the density (n,) of the other clicks at each click [1/px^2], smoothed as far as their neighbours are apart.
+
+    Args:
+        pixels_px: (n, 2) the clicks.
+        sigma_px: (n,) their standard deviations.
+        camera: with the size of the image.
+    """
+    count = len(pixels_px)
+    even = np.full(count, 1.0 / (camera.width_px * camera.height_px))
+    if count < 2:
+        return even
+    chosen = np.linspace(0, count - 1, min(count, _MOST_OTHERS)).round().astype(np.int64)
+    squared = ((pixels_px[:, None] - pixels_px[chosen]) ** 2).sum(axis=2)
+    nth = min(max(round(len(chosen) ** 0.5), 1), len(chosen) - 1)
+    width2 = np.maximum(np.partition(squared, nth, axis=1)[:, nth], (_LEAST_WIDTH * sigma_px) ** 2)[:, None]
     kernels = np.exp(-0.5 * squared / width2) / (2.0 * np.pi * width2)
-    np.fill_diagonal(kernels, 0.0)
-    return np.asarray(_ANYWHERE * even + (1.0 - _ANYWHERE) * kernels.sum(axis=1) / max(count - 1, 1))
+    kernels[chosen, np.arange(len(chosen))] = 0.0
+    return np.asarray(_ANYWHERE * even + (1.0 - _ANYWHERE) * kernels.sum(axis=1) / max(len(chosen) - 1, 1))

@@ -127,6 +127,7 @@ def _shared_errors(
         return np.zeros((6, 6)), found
     planes = measurements.measured(refined.rows)
     columns = planes.columns(measurements.camera, refined.camera_from_radar, errors.widening, refined.polar)
+    columns = np.where(np.isfinite(columns), columns, 0.0)  # of a position that the camera does not see
     whitened = refined.model.whitening @ columns.transpose(2, 1, 0)  # (n, 2, e)
     jacobian, weights = refined.model.jacobian, refined.weights[:, None, None]
     mixed = (np.swapaxes(jacobian, 1, 2) @ (weights * whitened)).sum(axis=0)

@@ -190,9 +190,8 @@ def _log_odds(
     measurements: PairMeasurements, state: _State, model: Linearization, predicted: LeaveOneOutPrediction
 ) -> Values:
     """Return log odds (n,) of an inlier against a near outlier or an outlier anywhere on the image."""
-    area_px2 = measurements.camera.width_px * measurements.camera.height_px
     prior = np.log(state.share) - np.log1p(-state.share) + measurements.log_score[state.rows]
-    anywhere = -prior + 0.5 * model.log_determinant - np.log(area_px2)
+    anywhere = -prior + 0.5 * model.log_determinant + measurements.log_outlier
     near = np.log(_NEAR_OUTLIER_SHARE) - np.log1p(-_NEAR_OUTLIER_SHARE) + predicted.log_density(_NEAR_OUTLIER_FACTOR)
     return np.asarray(predicted.log_density() - np.logaddexp(anywhere, near))
 

@@ -180,7 +180,7 @@ def _damped(hessians: np.ndarray, gradients: np.ndarray) -> np.ndarray:
 
 
 def log_odds_of(measurements: PairMeasurements, model: Linearization, log_score: Values, inlier_share: float) -> Values:
-    """Return log odds (n,) of inlier against outlier: normal noise against a click anywhere on the image."""
+    """Return log odds (n,) of inlier against outlier: normal noise against a click of another place."""
     return np.asarray(_log_odds(measurements, model.squared + model.log_determinant, log_score, inlier_share))
 
 
@@ -188,9 +188,8 @@ def _log_odds(
     measurements: PairMeasurements, deviance: np.ndarray, log_score: np.ndarray, inlier_share: float
 ) -> np.ndarray:
     """Return the same from the deviance: squared distance plus log det S."""
-    area_px2 = measurements.camera.width_px * measurements.camera.height_px
     prior = np.log(inlier_share) - np.log1p(-inlier_share)
-    return np.asarray(log_score - 0.5 * deviance + (prior - np.log(2.0 * np.pi) + np.log(area_px2)))
+    return np.asarray(log_score - 0.5 * deviance + (prior - np.log(2.0 * np.pi) - measurements.log_outlier))
 
 
 def mixture_cost(measurements: PairMeasurements, pose: RigidTransform) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 
 from calib_core.arrays import Indices, Matrix33, Points2, Points3, Values, Vector3, frozen_array
 from calib_core.camera import Camera
+from calib_core.estimation.click_density import click_density
 from calib_core.estimation.linearization import MeasurementPlanes
 from calib_core.estimation.systematic_errors import NO_ERRORS, SystematicErrors, systematic_errors
 from calib_core.estimation.unmeasured_elevation import OWN_SIGMA_RAD, is_flat
@@ -106,6 +107,7 @@ class PairMeasurements:
         sigma_polar: (m, 3) their standard deviations.
         log_score: (m,) logarithm of each candidate's plausibility before any pose.
         prior: of the camera centre.
+        log_outlier: (n,) logarithm of the density of each click if its pair is an outlier [1/px^2].
         errors: that all pairs share, with their present values.
         flat: whether the radar does not measure elevation.
     """
@@ -119,6 +121,7 @@ class PairMeasurements:
     sigma_polar: Points3
     log_score: Values
     prior: CameraPrior
+    log_outlier: Values
     errors: SystematicErrors = NO_ERRORS
     flat: bool = False
 
@@ -148,6 +151,7 @@ class PairMeasurements:
             pixels_px=self.pixels_px[pairs],
             sigma_px=self.sigma_px[pairs],
             rays=self.rays[pairs],
+            log_outlier=self.log_outlier[pairs],
             first=np.concatenate([[0], np.cumsum(np.diff(self.first)[pairs])]),
             reported=self.reported[rows],
             sigma_polar=self.sigma_polar[rows],
@@ -167,6 +171,7 @@ class PairMeasurements:
             pixels_px=self.pixels_px[owner],
             sigma_px=self.sigma_px[owner],
             rays=self.rays[owner],
+            log_outlier=self.log_outlier[owner],
             first=np.arange(len(owner) + 1),
         )
 
@@ -202,18 +207,19 @@ def pair_measurements(pairs: Sequence[Pair], camera: Camera, options: Calibratio
     if flat:
         sigma_polar[:, 2] = OWN_SIGMA_RAD
     score = np.array([candidate.score for candidate in candidates])
-    sigma_px = [options.noise.sigma_px if pair.sigma_px is None else pair.sigma_px for pair in pairs]
     pixels_px = np.array([pair.pixel_px for pair in pairs]).reshape(-1, 2)
+    sigma_px = np.array([options.noise.sigma_px if pair.sigma_px is None else pair.sigma_px for pair in pairs])
     return PairMeasurements(
         camera=camera,
         pixels_px=pixels_px,
-        sigma_px=np.array(sigma_px, dtype=np.float64),
+        sigma_px=sigma_px,
         rays=camera.rays(pixels_px),
         first=np.concatenate([[0], np.cumsum([len(pair.candidates) for pair in pairs])]).astype(np.int64),
         reported=polar_from_cartesian(points),
         sigma_polar=sigma_polar,
         log_score=np.log(np.clip(score, 1e-6, 1.0)),
         prior=_prior(options, flat=flat),
+        log_outlier=np.log(click_density(pixels_px, sigma_px, camera)),
         errors=systematic_errors(options, camera, flat=flat),
         flat=flat,
     )

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Matrix66, Values, Vector3
-from calib_core.estimation.click_density import click_density
 from calib_core.estimation.leave_one_out_prediction import PSEUDO_REDUNDANCY, PSEUDO_SHARED
 from calib_core.estimation.linearization import MeasurementPlanes
 from calib_core.estimation.measurement_model import PairMeasurements
@@ -261,7 +260,7 @@ def pose_posterior(measurements: PairMeasurements, reference: RigidTransform, pi
         pivot_radar_m: (3,) a point among the placements.
     """
     each = measurements if measurements.one_to_one else measurements.candidates_apart()
-    log_outlier = np.log(click_density(measurements))[measurements.owner]
+    log_outlier = measurements.log_outlier[measurements.owner]
     candidates = each.measured(np.arange(len(each.polar)))
     nothing = np.zeros((2, *candidates.polar.shape))
     return PosePosterior(measurements, candidates, log_outlier, reference, pivot_radar_m, nothing).about(reference)
