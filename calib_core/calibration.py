@@ -42,7 +42,12 @@ _PAIRS_TO_START = 150  # more do not improve the initialization
 
 
 def calibrate(
-    clicks: Sequence[ReflectorClick], scans: RadarScans, camera: Camera, options: CalibrationOptions | None = None
+    clicks: Sequence[ReflectorClick],
+    scans: RadarScans,
+    camera: Camera,
+    options: CalibrationOptions | None = None,
+    *,
+    background: RadarScans | None = None,
 ) -> Calibration | Unsolvable:
     """Calibrate from clicks and radar scans.
 
@@ -51,13 +56,14 @@ def calibrate(
         scans: at least those around the clicks.
         camera: the intrinsics.
         options: None takes the defaults; method "paper" is Algorithm 1 as printed.
+        background: scans of the whole recording, to tell what stands there before and after each placement; optional.
     """
     options = checked_options(options or CalibrationOptions())
     if options.method == "paper":
         from calib_core.paper.algorithm_1 import calibrate_as_printed
 
         return calibrate_as_printed(clicks, scans, camera, options)
-    pairing = pair_clicks(clicks, scans, options)
+    pairing = pair_clicks(clicks, scans, options, background=background)
     excluded = frozenset(click.id for click in clicks if click.excluded)
     outcome = _solved(pairing.pairs, pairing.unpaired, excluded, camera, options)
     if isinstance(outcome, Unsolvable):
