@@ -40,7 +40,12 @@ _AGREEING_SHARE = 0.9
 
 
 def calibrate(
-    clicks: Sequence[ReflectorClick], scans: RadarScans, camera: Camera, options: CalibrationOptions | None = None
+    clicks: Sequence[ReflectorClick],
+    scans: RadarScans,
+    camera: Camera,
+    options: CalibrationOptions | None = None,
+    *,
+    background: RadarScans | None = None,
 ) -> Calibration | Unsolvable:
     """Calibrate from clicks and radar scans.
 
@@ -49,8 +54,9 @@ def calibrate(
         scans: at least those around the clicks.
         camera: the intrinsics.
         options: None takes the defaults; method "paper" is Algorithm 1 as printed.
+        background: scans of the whole recording, to tell what stands there before and after each placement; optional.
     """
-    *_, outcome = calibration_steps(clicks, scans, camera, options, preview=False)
+    *_, outcome = calibration_steps(clicks, scans, camera, options, background=background, preview=False)
     return outcome
 
 
@@ -60,6 +66,7 @@ def calibration_steps(
     camera: Camera,
     options: CalibrationOptions | None = None,
     *,
+    background: RadarScans | None = None,
     previous: Calibration | None = None,
     preview: bool = True,
 ) -> Iterator[Calibration | Unsolvable]:
@@ -73,6 +80,7 @@ def calibration_steps(
         scans: at least those around the clicks.
         camera: the intrinsics.
         options: None takes the defaults.
+        background: scans of the whole recording, to tell what stands there before and after each placement; optional.
         previous: the answer to nearly the same clicks, to start the preview from.
         preview: make one.
     """
@@ -82,7 +90,7 @@ def calibration_steps(
 
         yield calibrate_as_printed(clicks, scans, camera, options)
         return
-    pairing = pair_clicks(clicks, scans, options)
+    pairing = pair_clicks(clicks, scans, options, background=background)
     excluded = frozenset(click.id for click in clicks if click.excluded)
     task = _Task.of(pairing.pairs, pairing.unpaired, excluded, camera, options)
     for outcome in _steps(task, previous=previous, preview=preview):

@@ -5,6 +5,8 @@ object. The differences between two such returns show the scatter of a single on
 positions lie on the radar's bins, an object between two bins alternates between them, which the median does not show.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from calib_core.arrays import Points3, Values, Vector3
@@ -19,6 +21,7 @@ _STEPS_PER_SIGMA = 1.75  # a cluster reaches two steps, so three and a half stan
 _STEPS_PER_BIN = 0.6  # so that a cluster holds two neighbouring bins
 _WITHIN = 8.0  # steps from a return to the same object's in the next scan
 _MOST_SCANS = 200
+_LEAST_SCANS = 4  # of each window
 _LEAST_DIFFERENCES = 30
 _MEDIAN_OF_DIFFERENCE = 0.954  # of two normal values, in their standard deviation
 _ROUNDING = 0.01  # steps
@@ -26,13 +29,14 @@ _LEAST_UNCHANGED = 0.2  # share of the differences, for values on a lattice
 _LEAST_CHANGES = 10
 
 
-def cluster_scale(static: RadarScans) -> Vector3:
+def cluster_scale(windows: Sequence[RadarScans]) -> Vector3:
     """Return one step of distance (3,) in range [m], u and w: CLUSTER_SCALE, or more for a radar that scatters more.
 
     Args:
-        static: the static returns of as many scans as there are.
+        windows: the static returns of some parts of a recording, or of all of it.
     """
-    differences = _differences(static)
+    most = max(_MOST_SCANS // max(len(windows), 1), _LEAST_SCANS)
+    differences = np.concatenate([np.zeros((0, 3)), *(_differences(window, most) for window in windows)])
     if len(differences) < _LEAST_DIFFERENCES:
         return CLUSTER_SCALE
     scatter = np.median(differences, axis=0) / _MEDIAN_OF_DIFFERENCE
@@ -41,11 +45,16 @@ def cluster_scale(static: RadarScans) -> Vector3:
     return np.asarray(CLUSTER_SCALE * np.clip(steps, 1.0, _LARGEST))
 
 
-def _differences(static: RadarScans) -> Points3:
-    """Return the differences (n, 3), in steps, between returns of neighbouring scans that are each other's nearest."""
+def _differences(static: RadarScans, most: int) -> Points3:
+    """Return the differences (n, 3), in steps, between returns of neighbouring scans that are each other's nearest.
+
+    Args:
+        static: the static returns of some scans.
+        most: how many scans to compare with the next one.
+    """
     filled = np.flatnonzero(np.diff(static.first_return) > 0)
     earlier = filled[:-1][np.diff(filled) == 1]
-    chosen = earlier[np.linspace(0, len(earlier) - 1, min(len(earlier), _MOST_SCANS)).round().astype(np.int64)]
+    chosen = earlier[np.linspace(0, len(earlier) - 1, min(len(earlier), most)).round().astype(np.int64)]
     steps, first = direction_cosines(static.points_radar_m) / CLUSTER_SCALE, static.first_return
     found = [np.zeros((0, 3))]
     for k in chosen.tolist():

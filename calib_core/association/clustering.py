@@ -185,8 +185,21 @@ def candidates_of(
     order = np.argsort(-scores, kind="stable")
     before = np.cumsum(scores[order]) - scores[order]
     kept = (before < _KEPT_SHARE) & (scores[order] >= _LEAST_RELATIVE_SCORE * scores[order[0]])
+    chosen = order[kept][: options.max_candidates].tolist()
+    positions = np.array([_position(clusters[k]) for k in chosen])
+    sigmas = np.array([_sigma_polar(clusters[k], at, noise) for k, at in zip(chosen, positions, strict=True)])
+    covariances = covariance_from_sigma_polar(positions, sigmas)
     return tuple(
-        _candidate(clusters[k], float(scores[k]), noise) for k in order[kept][: options.max_candidates].tolist()
+        Candidate(
+            position_radar_m=position,
+            sigma_polar=sigma_polar,
+            covariance_m2=covariance,
+            score=float(scores[k]),
+            returns=clusters[k].returns,
+            scans=clusters[k].scans,
+            snr_db=clusters[k].snr_db,
+        )
+        for k, position, sigma_polar, covariance in zip(chosen, positions, sigmas, covariances, strict=True)
     )
 
 
@@ -195,22 +208,19 @@ def clusters_wanted(options: LocatingOptions) -> int:
     return _CLUSTERS_PER_CANDIDATE * options.max_candidates
 
 
-def _candidate(cluster: Cluster, score: float, noise: NoiseOptions) -> Candidate:
+def _position(cluster: Cluster) -> Vector3:
     range_m, u, w = cluster.centre
     x_m = range_m * np.sqrt(max(1.0 - u * u - w * w, 0.0)) * cluster.forward
-    position = np.array([x_m, range_m * u, range_m * w])
-    floor = np.where(np.isfinite(cluster.message_sigma), cluster.message_sigma, floor_sigma_polar(position, noise))
-    scatter = cluster.scatter / _cosines(position) / np.sqrt(cluster.scans)
-    sigma_polar = np.hypot(floor, scatter)
-    return Candidate(
-        position_radar_m=position,
-        sigma_polar=sigma_polar,
-        covariance_m2=covariance_from_sigma_polar(position, sigma_polar),
-        score=score,
-        returns=cluster.returns,
-        scans=cluster.scans,
-        snr_db=cluster.snr_db,
+    return np.array([x_m, range_m * u, range_m * w])
+
+
+def _sigma_polar(cluster: Cluster, position_radar_m: Vector3, noise: NoiseOptions) -> Vector3:
+    """Return the standard deviations of a cluster's mean: what the message or the options state, and its own scatter."""
+    floor = np.where(
+        np.isfinite(cluster.message_sigma), cluster.message_sigma, floor_sigma_polar(position_radar_m, noise)
     )
+    scatter = cluster.scatter / _cosines(position_radar_m) / np.sqrt(cluster.scans)
+    return np.asarray(np.hypot(floor, scatter))
 
 
 def candidate_at(position_radar_m: Vector3, noise: NoiseOptions, *, score: float = 1.0) -> Candidate:

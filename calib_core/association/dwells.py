@@ -46,7 +46,7 @@ def find_dwells(scans: RadarScans, options: GatingOptions, *, min_dwell_s: float
         min_dwell_s: the shortest dwell [s].
     """
     static = static_returns(scans, options)
-    grid = _Grid.of(static, cluster_scale(static) / CLUSTER_SCALE)
+    grid = _Grid.of(static, cluster_scale([static]) / CLUSTER_SCALE)
     return [dwell for seed in _seeds(grid, min_dwell_s) if (dwell := _dwell_of(grid, seed, min_dwell_s)) is not None]
 
 

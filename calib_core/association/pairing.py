@@ -30,15 +30,23 @@ class Pairing:
     unpaired: tuple[Unpaired, ...]
 
 
-def pair_clicks(clicks: Sequence[ReflectorClick], scans: RadarScans, options: CalibrationOptions) -> Pairing:
+def pair_clicks(
+    clicks: Sequence[ReflectorClick],
+    scans: RadarScans,
+    options: CalibrationOptions,
+    *,
+    background: RadarScans | None = None,
+) -> Pairing:
     """Pair every click with the candidate positions in the window around the nearest scan (paper section III).
 
     Excluded clicks are paired too; the caller keeps them out of the solution.
 
     Args:
         clicks: in any order; they are sorted by time, then id.
-        scans: at least those around the clicks.
+        scans: at least those around the clicks; more of them change nothing.
         options: gating, window and assumed noise.
+        background: scans of the same recording, such as all of it: what they show far from every click stood there before
+            and after. It helps most while there are fewer than four clicks.
     """
     static = static_returns(scans, options.gating)
     reachable: list[ReflectorClick] = []
@@ -50,26 +58,37 @@ def pair_clicks(clicks: Sequence[ReflectorClick], scans: RadarScans, options: Ca
         else:
             unpaired.append(problem)
     windows = [window_around(static, click.image_time, window_s=options.locating.window_s) for click in reachable]
-    pairs, empty = _paired(reachable, windows, static, options)
+    elsewhere = () if background is None else _elsewhere(background, windows, options)
+    pairs, empty = _paired(reachable, windows, static, elsewhere, options)
     shared = _windows_of_placements(reachable, windows, pairs, static, options)
     if shared is not windows:
-        pairs, empty = _paired(reachable, shared, static, options)
+        pairs, empty = _paired(reachable, shared, static, elsewhere, options)
     unpaired += [_nothing_static(click, window, options) for click, window in empty]
     rank = {click.id: place for place, click in enumerate(sorted(clicks))}
     return Pairing(balanced_pairs(pairs), tuple(sorted(unpaired, key=lambda one: rank[one.id])))
 
 
+def _elsewhere(
+    background: RadarScans, windows: Sequence[RadarScans], options: CalibrationOptions
+) -> tuple[RadarScans, ...]:
+    """Cut windows clear of the clicks from the scans of a recording."""
+    return background_windows(static_returns(background, options.gating), windows, window_s=options.locating.window_s)
+
+
 def _paired(
-    clicks: Sequence[ReflectorClick], windows: Sequence[RadarScans], static: RadarScans, options: CalibrationOptions
+    clicks: Sequence[ReflectorClick],
+    windows: Sequence[RadarScans],
+    static: RadarScans,
+    elsewhere: Sequence[RadarScans],
+    options: CalibrationOptions,
 ) -> tuple[list[Pair], list[tuple[ReflectorClick, RadarScans]]]:
     """Make the pairs of clicks and their windows; also return the clicks whose window is empty."""
-    most, scale = clusters_wanted(options.locating), cluster_scale(static)
     distinct = list({id(window): window for window in windows}.values())  # clicks of one placement share a window
-    background = background_windows(static, distinct, window_s=options.locating.window_s)
-    clusters, elsewhere = (
-        [clusters_of(window, most=most, scale=scale) for window in some] for some in (distinct, background)
+    most, scale = clusters_wanted(options.locating), cluster_scale(distinct)
+    clusters, background = (
+        [clusters_of(window, most=most, scale=scale) for window in some] for some in (distinct, elsewhere)
     )
-    scores = scores_of(distinct, clusters, scale=scale, background=elsewhere)
+    scores = scores_of(distinct, clusters, scale=scale, background=background)
     row = {id(window): i for i, window in enumerate(distinct)}
     pairs, empty = [], []
     for click, window in zip(clicks, windows, strict=True):

@@ -36,19 +36,19 @@ def scans_by(profile: RadarProfile, *, scans: int = 30, seed: int = 0, things: n
 @pytest.mark.parametrize("name", ["awr1843", "imaging"])
 def test_fine_radars_keep_the_least_scale(name: str) -> None:
     scans = scans_by(RADAR_PROFILES[name])  # type: ignore[index]
-    assert cluster_scale(scans).tolist() == CLUSTER_SCALE.tolist()
+    assert cluster_scale([scans]).tolist() == CLUSTER_SCALE.tolist()
 
 
 def test_a_radar_that_scatters_more_gets_a_wider_scale() -> None:
     sigma = np.array([0.15, COARSE.azimuth_sigma, COARSE.elevation_sigma])
-    assert cluster_scale(scans_by(COARSE)) == pytest.approx(1.75 * sigma, rel=0.3)
+    assert cluster_scale([scans_by(COARSE)]) == pytest.approx(1.75 * sigma, rel=0.3)
 
 
 def test_nearly_all_scans_of_a_coarse_radar_are_in_the_clusters() -> None:
     kept: list[float] = []
     for seed in range(5):
         scans = scans_by(COARSE, seed=seed)
-        found = clusters_of(scans, most=20, scale=cluster_scale(scans))
+        found = clusters_of(scans, most=20, scale=cluster_scale([scans]))
         kept += sorted((cluster.persistence for cluster in found), reverse=True)[: len(THINGS)]
         assert max(cluster.persistence for cluster in clusters_of(scans, most=20)) < 0.6
     assert np.mean(np.array(kept) >= 0.85) >= 0.95
@@ -59,16 +59,17 @@ def test_coarse_bins_widen_the_scale_although_most_differences_are_zero() -> Non
     profile = replace(RADAR_PROFILES["awr1843"], range_bin_m=0.2)
     between_bins = np.array([[6.1, 0.0, 0.0]])
     scans = scans_by(profile, scans=60, things=np.concatenate([THINGS, between_bins]))
-    assert cluster_scale(scans)[0] == pytest.approx(0.12, rel=0.05)
-    assert max(cluster.persistence for cluster in clusters_of(scans, most=20, scale=cluster_scale(scans))) > 0.9
+    assert cluster_scale([scans])[0] == pytest.approx(0.12, rel=0.05)
+    assert max(cluster.persistence for cluster in clusters_of(scans, most=20, scale=cluster_scale([scans]))) > 0.9
 
 
 def test_the_scale_has_a_limit() -> None:
     wild = replace(COARSE, range_sigma_m=3.0, azimuth_sigma=0.5, elevation_sigma=0.5)
-    assert (cluster_scale(scans_by(wild)) <= 5.0 * CLUSTER_SCALE + 1e-12).all()
+    assert (cluster_scale([scans_by(wild)]) <= 5.0 * CLUSTER_SCALE + 1e-12).all()
 
 
 def test_no_scans_one_scan_and_empty_scans_keep_the_least_scale() -> None:
     empty = RadarScan(TimeNs(0), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros((0, 3)))
     for scans in (RadarScans(), scans_by(COARSE, scans=1), RadarScans.from_scans([empty, empty])):
-        assert cluster_scale(scans).tolist() == CLUSTER_SCALE.tolist()
+        assert cluster_scale([scans]).tolist() == CLUSTER_SCALE.tolist()
+    assert cluster_scale([]).tolist() == CLUSTER_SCALE.tolist()

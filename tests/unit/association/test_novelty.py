@@ -45,7 +45,7 @@ def test_what_other_windows_show_too_is_no_candidate() -> None:
 
 
 def test_one_click_is_enough_where_the_rest_of_the_recording_shows_the_background() -> None:
-    (pair,) = pair_clicks([click(3)], recording(), CalibrationOptions()).pairs
+    (pair,) = pair_clicks([click(3)], recording(), CalibrationOptions(), background=recording()).pairs
     assert pair.candidates[0].position_radar_m == pytest.approx(PLACES[3], abs=0.02)
     assert pair.candidates[0].score > 0.95
 
