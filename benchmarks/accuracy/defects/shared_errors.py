@@ -206,8 +206,8 @@ an offset of all clicks and of the reflector's clicked point are drawn for every
 options state (`cocalib solve --help`), and the estimator is given the default options. `c` is the share of trials whose true
 pose lies inside the stated 95 % ellipsoid. "Stated over RMSE" is the mean stated sigma over the RMSE, for rotation and
 position: well below 1 is overconfident, above 1.15 is too cautious. The last ratio compares the RMSE of the position with that
-of an earlier version (c35a642), which took radar and lens to be exact, on the fixed draws. The aisle is 2 m wide and 2 to 20 m
-long."""
+of an earlier version (c35a642), which took radar and lens to be exact, on the fixed draws (`baseline.json`). The aisle is 2 m
+wide and 2 to 20 m long; a single draw without a usable pose can decide its RMSE."""
 
 
 def clean_section(kept: Kept) -> Section:
