@@ -6,7 +6,15 @@ import sys
 from pathlib import Path
 
 from benchmarks.accuracy import advice, clutter, coverage, efficiency, many, mirrored, real, smooth
-from benchmarks.accuracy.defects import adversarial, crying_wolf, dragging, flat_radars, handedness, shared_errors
+from benchmarks.accuracy.defects import (
+    adversarial,
+    crying_wolf,
+    dragging,
+    flat_radars,
+    handedness,
+    shared_errors,
+    two_reflectors,
+)
 from benchmarks.accuracy.fresh_seeds import fresh_seeds, last_fresh_seeds
 from benchmarks.accuracy.keeping import Keeper, digest_of_sources
 from benchmarks.accuracy.page import page
@@ -20,6 +28,7 @@ TABLES: dict[str, tuple[Row, ...]] = {
     "real": real.ROWS,
     "handedness": handedness.ROWS,
     "drag": dragging.ROWS,
+    "placements": two_reflectors.ROWS,
     "wolf": crying_wolf.ROWS,
     "shared": shared_errors.ROWS,
     "clean": shared_errors.CLEAN_ROWS,
@@ -47,6 +56,7 @@ def sections(kept: Kept) -> tuple[Section, ...]:
         flat_radars.section(kept),
         handedness.section(kept),
         dragging.section(kept),
+        two_reflectors.section(kept),
         efficiency.section(kept),
         efficiency.peer_section(kept),
         coverage.section(kept),

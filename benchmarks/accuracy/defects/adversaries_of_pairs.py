@@ -87,7 +87,7 @@ def _told(draw: Draw) -> str:
 _MODES = ("doubtful-pair", "one-pair-decides", "two-poses")
 _HAND = ("mirrored-axes", "handedness-open")
 _LENS = ("intrinsics-suspected",)
-_UNITS = ("camera-position-contradicted",)
+_UNITS = ("units-suspected", "camera-position-contradicted")
 
 _SHARED = (
     *_rows(
