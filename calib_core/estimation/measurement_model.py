@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Indices, Matrix33, Points2, Points3, Values, Vector3, frozen_array
+from calib_core.association.exclusive_returns import shared_returns
 from calib_core.camera import Camera
 from calib_core.estimation.click_density import click_density
 from calib_core.estimation.linearization import MeasurementPlanes
@@ -108,6 +109,7 @@ class PairMeasurements:
         log_score: (m,) logarithm of each candidate's plausibility before any pose.
         prior: of the camera centre.
         log_outlier: (n,) logarithm of the density of each click if its pair is an outlier [1/px^2].
+        returns: (m,) equal labels are one return that several pairs of one moment have in common; -1 is a pair's own.
         errors: that all pairs share, with their present values.
         flat: whether the radar does not measure elevation.
     """
@@ -122,6 +124,7 @@ class PairMeasurements:
     log_score: Values
     prior: CameraPrior
     log_outlier: Values
+    returns: Indices
     errors: SystematicErrors = NO_ERRORS
     flat: bool = False
 
@@ -156,6 +159,7 @@ class PairMeasurements:
             reported=self.reported[rows],
             sigma_polar=self.sigma_polar[rows],
             log_score=self.log_score[rows],
+            returns=self.returns[rows],
         )
 
     def measured(self, rows: Indices) -> MeasurementPlanes:
@@ -173,6 +177,7 @@ class PairMeasurements:
             rays=self.rays[owner],
             log_outlier=self.log_outlier[owner],
             first=np.arange(len(owner) + 1),
+            returns=np.full(len(owner), -1),
         )
 
     def mirrored(self) -> "PairMeasurements":
@@ -220,6 +225,7 @@ def pair_measurements(pairs: Sequence[Pair], camera: Camera, options: Calibratio
         log_score=np.log(np.clip(score, 1e-6, 1.0)),
         prior=_prior(options, flat=flat),
         log_outlier=np.log(click_density(pixels_px, sigma_px, camera)),
+        returns=shared_returns(pairs, window_s=options.locating.window_s),
         errors=systematic_errors(options, camera, flat=flat),
         flat=flat,
     )
