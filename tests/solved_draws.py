@@ -11,7 +11,13 @@ from calib_core.estimation.gnc import solve_gnc
 from calib_core.estimation.initialization import initial_poses
 from calib_core.estimation.measurement_model import PairMeasurements, pair_measurements
 from calib_core.measurements import Pair
-from calib_core.options import CalibrationOptions, CameraPositionPrior, NoiseOptions, SolvingOptions
+from calib_core.options import (
+    CalibrationOptions,
+    CameraPositionPrior,
+    NoiseOptions,
+    SolvingOptions,
+    without_systematic_errors,
+)
 from calib_core.synthetic import SimulatedPairs
 from calib_core.synthetic.pairs import PairsLayout
 
@@ -31,12 +37,13 @@ class SolvedDraw:
 def solve_draw(
     simulated: SimulatedPairs, *, pairs: Sequence[Pair] | None = None, tape: bool = False, estimate_scale: bool = True
 ) -> SolvedDraw:
-    """Fit simulated pairs, or others with the same camera, as the default method does."""
+    """Fit simulated pairs of exact instruments, or others with the same camera, as the default method does."""
     prior = CameraPositionPrior((0.0, 0.0, 0.045), 0.01) if tape else None
     options = CalibrationOptions(
         noise=NoiseOptions(estimate_scale=estimate_scale), solving=SolvingOptions(camera_position=prior)
     )
-    measurements = pair_measurements(simulated.pairs if pairs is None else pairs, simulated.camera, options)
+    exact = without_systematic_errors(options)
+    measurements = pair_measurements(simulated.pairs if pairs is None else pairs, simulated.camera, exact)
     starts = initial_poses(measurements, most=6, rng=np.random.default_rng(1))
     found = solve_gnc(measurements, starts, estimate_scale=estimate_scale)
     refined = fit_errors_in_variables(measurements, found[0], estimate_scale=estimate_scale)

@@ -17,7 +17,8 @@ __all__ = ["camera_position", "two_poses"]
 _ALMOST_AS_LIKELY = 6.0  # a difference of twice the log-likelihood
 _WORTH_REFINING = 40.0
 _OTHER_POSE_SIGMAS = 6.0
-_CONTRADICTION_SIGMAS = 4.0
+_CONTRADICTION_LEVEL = 0.99
+_OTHER_UNIT_SIGMAS = 4.0
 _SCREENING_SIGMAS = 1.8
 _AGREEING_SIGMAS = 3.0
 _UNIT_SLIPS = (
@@ -136,7 +137,7 @@ def camera_position(fit: SolvedFit) -> list[DataWarning]:
     alone = fit_errors_in_variables(weakened, start, estimate_scale=fit.options.noise.estimate_scale)
     centre = _Centre.of(fit, alone.camera_from_radar, pose_covariance(alone).covariance)
     sigmas = centre.sigmas_from(prior.position_m)
-    if sigmas < _CONTRADICTION_SIGMAS:
+    if sigmas < _contradiction_sigmas(alone.degrees_of_freedom):
         return []
     away_m = float(np.linalg.norm(centre.position_m - prior.position_m))
     return [
@@ -147,6 +148,15 @@ def camera_position(fit: SolvedFit) -> list[DataWarning]:
             "measure again from the radar's antennas to the lens: forward, left, up; or state a larger uncertainty",
         )
     ]
+
+
+def _contradiction_sigmas(degrees_of_freedom: float) -> float:
+    """Return the distance in standard deviations that a right position exceeds in 1 % of the sets: 3 F(3, nu), or chi-square."""
+    from scipy.special import chdtri, fdtri
+
+    if degrees_of_freedom <= 0:
+        return float(np.sqrt(chdtri(3.0, 1.0 - _CONTRADICTION_LEVEL)))
+    return float(np.sqrt(3.0 * fdtri(3.0, degrees_of_freedom, _CONTRADICTION_LEVEL)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,7 +184,7 @@ def _other_unit(centre: _Centre, measured_m: Vector3) -> str:
     """Return in words which other unit would remove the contradiction; empty if none would."""
     size_m = float(np.linalg.norm(measured_m))
     for text, factor, least_m in _UNIT_SLIPS:
-        clear = centre.sigmas_from(np.zeros(3)) > _CONTRADICTION_SIGMAS or least_m > 0.0
+        clear = centre.sigmas_from(np.zeros(3)) > _OTHER_UNIT_SIGMAS or least_m > 0.0
         if clear and size_m > least_m and centre.sigmas_from(factor * measured_m) < _AGREEING_SIGMAS:
             return f"; {text}"
     return ""

@@ -47,7 +47,7 @@ def with_another(fit: SolvedFit, step_m: float, *, worse_by_pairs: float) -> Sol
 def test_a_pose_that_differs_in_position_only_is_said(fit: SolvedFit) -> None:
     (warning,) = two_poses(with_another(fit, 0.5, worse_by_pairs=1.0))
     assert warning.code == "two-poses"
-    assert "0.1 deg and 0.49 m away" in warning.message
+    assert "0.1 deg and 0.50 m away" in warning.message
     assert two_poses(with_another(fit, 0.5, worse_by_pairs=30.0)) == []
     assert two_poses(with_another(fit, 0.001, worse_by_pairs=0.0)) == []
 
