@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from calib_core.calibration import calibrate_pairs
-from calib_core.measurements import Pair
+from calib_core.estimation.gnc import associate
+from calib_core.estimation.measurement_model import pair_measurements
+from calib_core.measurements import Pair, TimeNs
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
@@ -70,3 +72,16 @@ def test_if_all_elevations_may_be_mirrored_the_ground_decides_and_without_it_a_w
         outcome = calibrate_pairs(pairs, simulated.camera, ANYWHERE)
         assert isinstance(outcome, Calibration)
         assert {one.code for one in outcome.warnings} & {"handedness-open", "two-poses", "mirrored-axes"}
+
+
+def test_two_clicks_of_one_moment_do_not_take_the_same_return() -> None:
+    """Both would explain both clicks well enough; the second reflector's own return is a little worse, and right."""
+    simulated = simulate_pairs(12, rng=np.random.default_rng(31), noise="imaging")
+    pairs = [replace(pair, image_time=TimeNs(k * 60 * 10**9)) for k, pair in enumerate(simulated.pairs)]
+    first, second = pairs[0], pairs[1]
+    both = (*first.candidates, *second.candidates)
+    wrong_first = replace(second, image_time=first.image_time, candidates=both, pixel_px=first.pixel_px + [1.0, 0.0])
+    measurements = pair_measurements([replace(first, candidates=both), wrong_first, *pairs[2:]], simulated.camera, FREE)
+    assert (measurements.returns[:4] >= 0).all()
+    rows, _ = associate(measurements, simulated.camera_from_radar)
+    assert sorted(rows[:2] % 2) == [0, 1]
