@@ -12,6 +12,7 @@ from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.measurements import Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.radar import AngleMap, RadarErrors
+from calib_core.shared_errors import SystematicErrorResult
 
 __all__ = [
     "Calibration",
@@ -161,31 +162,6 @@ class NextPlacement:
     def __post_init__(self) -> None:
         object.__setattr__(self, "position_radar_m", frozen_array(self.position_radar_m, (3,)))
         object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
-
-
-@dataclass(frozen=True, slots=True)
-class SystematicErrorResult:
-    """One error that all pairs share: what is known of it, and its part in the uncertainty of the pose.
-
-    Attributes:
-        name: key in files, with its unit; scales and shares have none.
-        text: what it is, for users.
-        value: estimated; for an error that is not taken out of the pose, what the residuals suggest.
-        sigma: standard deviation of that value.
-        prior_sigma: the same before any pair, as the options state it.
-        estimated: whether the pose was estimated together with it; otherwise it only widens the covariance.
-        position_share: its part of the variance of the translation, 0 to 1.
-        rotation_share: the same of the rotation.
-    """
-
-    name: str
-    text: str
-    value: float
-    sigma: float
-    prior_sigma: float
-    estimated: bool
-    position_share: float
-    rotation_share: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
