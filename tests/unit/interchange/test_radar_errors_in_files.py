@@ -8,7 +8,15 @@ import pytest
 
 from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError
-from calib_core.interchange import calibration_text, check, read_any, read_calibration, write_calibration
+from calib_core.interchange import (
+    calibration_text,
+    check,
+    export,
+    read_any,
+    read_calibration,
+    read_check_pairs,
+    write_calibration,
+)
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
@@ -38,6 +46,19 @@ def test_the_file_applies_its_errors_when_it_is_checked(solved: Calibration) -> 
     document = json.loads(text)
     del document["radar_errors"]
     assert "pairs-disagree" in [result.code for result in check(read_any(json.dumps(document))).results]
+
+
+def test_a_check_against_its_own_pairs_gives_its_aed(solved: Calibration) -> None:
+    text = calibration_text(solved)
+    report = check(read_any(text), pairs=read_check_pairs(text))
+    assert f"AED {solved.metrics.aed_px:.3g} px" in str(report)
+
+
+def test_a_bare_export_is_checked_with_the_errors_that_the_pairs_file_states(solved: Calibration) -> None:
+    text = calibration_text(solved)
+    bare = read_any(export(read_calibration(text), "tf2").data.decode())
+    report = check(bare, pairs=read_check_pairs(text))
+    assert f"AED {solved.metrics.aed_px:.3g} px" in str(report)
 
 
 def test_the_plain_transform_takes_the_check_point_to_its_pixel(solved: Calibration) -> None:
