@@ -85,7 +85,7 @@ def _thinned(pairs: list[PairResult]) -> list[PairResult]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _AngleErrors:
-    """Pixels (n, 2), measured polar positions without radar_errors (n, 3), clicked minus measured angles (n, 2), their sigma from the click (n,)."""
+    """Pixels (n, 2), polar positions (n, 3), clicked minus measured angles (n, 2), their sigma from the click (n,)."""
 
     pixels_px: Points2
     polar: Points3

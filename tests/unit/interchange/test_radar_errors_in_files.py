@@ -9,6 +9,7 @@ import pytest
 from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError
 from calib_core.interchange import (
+    FORMATS,
     calibration_text,
     check,
     export,
@@ -59,6 +60,17 @@ def test_a_bare_export_is_checked_with_the_errors_that_the_pairs_file_states(sol
     bare = read_any(export(read_calibration(text), "tf2").data.decode())
     report = check(bare, pairs=read_check_pairs(text))
     assert f"AED {solved.metrics.aed_px:.3g} px" in str(report)
+
+
+def test_every_export_with_comments_states_the_errors_and_reads_back(solved: Calibration) -> None:
+    file = read_calibration(calibration_text(solved))
+    for form in FORMATS:
+        if form.comment not in ("#", "<!-- -->"):
+            continue
+        text = export(file, form.name, rectified=form.is_for_rectified).data.decode()
+        assert f"azimuth_scale {solved.radar_errors.azimuth_scale:.6g}" in text, form.name
+        if form.reads is not None:
+            assert check(read_any(text), camera=solved.camera).ok, form.name
 
 
 def test_the_plain_transform_takes_the_check_point_to_its_pixel(solved: Calibration) -> None:
