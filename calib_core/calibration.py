@@ -13,6 +13,7 @@ from calib_core.association.pairing import pair_clicks
 from calib_core.camera import Camera
 from calib_core.diagnostics.checks import warnings_of
 from calib_core.diagnostics.clocks import CLOCK_CODES, clocks
+from calib_core.diagnostics.picture import picture_sigma_px
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.errors import InputError
 from calib_core.estimation.covariance import pose_covariance
@@ -167,7 +168,7 @@ def _solved(
         camera_from_radar=refined.camera_from_radar,
         covariance=uncertainty.covariance,
         camera=camera,
-        metrics=metrics,
+        metrics=replace(metrics, picture_sigma_px=picture_sigma_px(refined, uncertainty)),
         pairs=tuple(results[pair.id] for pair in shown),
         unpaired=unpaired,
         warnings=warnings_of(solved_fit),

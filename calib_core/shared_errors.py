@@ -4,20 +4,21 @@ The estimate takes them from `estimation/systematic_errors`; a file keeps their 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib_core.arrays import Matrix66
+from calib_core.error_words import error_words
 
 __all__ = [
-    "ERROR_WORDS",
     "DominantError",
-    "ErrorWords",
     "SystematicErrorResult",
+    "dominance_text",
     "dominant_errors",
-    "error_words",
+    "is_determined",
     "knowledge_text",
+    "rescaled",
 ]
 
 _DOMINANT_SHARE = 1.0 / 3.0
@@ -57,139 +58,19 @@ class SystematicErrorResult:
 
 
 @dataclass(frozen=True, slots=True)
-class ErrorWords:
-    """How an error is shown.
-
-    Attributes:
-        label: a few words, for tables.
-        text: what it is, within a sentence.
-        factor: from its own unit to the one shown.
-        unit: shown behind the number; "" if it has none.
-        remedy: what would reduce its part in the uncertainty.
-        remedy_with_tape: the same if the camera position is measured already; "" if it is no different.
-        family: what errors along several axes are called together; "" if it stands alone.
-    """
-
-    label: str
-    text: str
-    factor: float
-    unit: str
-    remedy: str
-    remedy_with_tape: str = ""
-    family: str = ""
-
-
-_PERCENT = (100.0, "%")
-_CENTIMETRES = (100.0, "cm")
-_EDGES = "placements at both edges of the picture"
-_HEIGHTS = "placements at several heights (a tripod)"
-_TAPE = "a tape-measured camera position"
-_PHASE_CENTRE = "the distance of the clicked point from the radar's phase centre"
-_CLICKED = "the principal point, or what one person's clicks are all off by"
-_APEX = (
-    "clicking the reflector's apex, where its three sheets meet, and stating a smaller sigma for it, would reduce it"
-)
-_PRINCIPAL_POINT = (
-    "a camera calibration that determines the principal point well, and its sigma among the options, would reduce it"
-)
-_LENS = "a better camera calibration, and its sigma among the options, would reduce it"
-
-ERROR_WORDS: dict[str, ErrorWords] = {
-    "azimuth_scale": ErrorWords(
-        "azimuth scale",
-        "the radar's azimuth scale",
-        *_PERCENT,
-        f"{_TAPE}, or {_EDGES}, would reduce it",
-        f"{_EDGES} would reduce it",
-    ),
-    "elevation_scale": ErrorWords(
-        "elevation scale",
-        "the radar's elevation scale",
-        *_PERCENT,
-        f"{_TAPE}, or {_HEIGHTS}, would reduce it",
-        f"{_HEIGHTS} would reduce it",
-    ),
-    "squared_height_m2": ErrorWords(
-        "height, squared",
-        "the height of the placements",
-        1.0,
-        "m²",
-        "near placements, and the reflector's centre at the radar's height, would reduce it",
-    ),
-    "range_bias_m": ErrorWords(
-        "range bias",
-        "a constant range error",
-        *_CENTIMETRES,
-        "comparing one placement's range with a tape, and stating a smaller sigma for it, would reduce it",
-    ),
-    "range_scale": ErrorWords(
-        "range scale",
-        "the radar's range scale",
-        *_PERCENT,
-        "comparing a far placement's range with a tape, and stating a smaller sigma for it, would reduce it",
-    ),
-    "reflector_right_m": ErrorWords(
-        "clicks right of the phase centre",
-        "clicks to the right of the radar's phase centre",
-        *_CENTIMETRES,
-        _APEX,
-        family=_PHASE_CENTRE,
-    ),
-    "reflector_down_m": ErrorWords(
-        "clicks below the phase centre",
-        "clicks below the radar's phase centre",
-        *_CENTIMETRES,
-        _APEX,
-        family=_PHASE_CENTRE,
-    ),
-    "reflector_forward_m": ErrorWords(
-        "clicks beyond the phase centre",
-        "clicks beyond the radar's phase centre",
-        *_CENTIMETRES,
-        _APEX,
-        family=_PHASE_CENTRE,
-    ),
-    "click_right_px": ErrorWords(
-        "clicks or principal point, right",
-        "clicks or the principal point too far to the right",
-        1.0,
-        "px",
-        _PRINCIPAL_POINT,
-        family=_CLICKED,
-    ),
-    "click_down_px": ErrorWords(
-        "clicks or principal point, down",
-        "clicks or the principal point too far down",
-        1.0,
-        "px",
-        _PRINCIPAL_POINT,
-        family=_CLICKED,
-    ),
-    "focal_length": ErrorWords("focal length", "the focal length", *_PERCENT, _LENS),
-    "distortion": ErrorWords("distortion (k1)", "the lens distortion", 1.0, "", _LENS),
-}
-"""By the name of the error."""
-
-
-def error_words(name: str) -> ErrorWords:
-    """Return how an error is shown; one of a later version by its name."""
-    return ERROR_WORDS.get(name) or ErrorWords(name, name, 1.0, "", "more placements may reduce it")
-
-
-@dataclass(frozen=True, slots=True)
 class DominantError:
     """An error, or one along several axes, with a third or more of the variance of the position, the rotation or both.
 
     Attributes:
         position_share: its part of the variance of the translation; 0 if below a third.
         rotation_share: the same of the rotation.
-        text: a few words: which error it is, and what is known of it.
+        label: a few words: which error it is, and what is known of it.
         sentence: its part in the uncertainty, what is known of it, and what would reduce it.
     """
 
     position_share: float
     rotation_share: float
-    text: str
+    label: str
     sentence: str
 
 
@@ -205,7 +86,7 @@ def dominant_errors(
     """
     families: dict[str, list[SystematicErrorResult]] = {}
     for one in errors:
-        families.setdefault(error_words(one.name).family or one.name, []).append(one)
+        families.setdefault("".join(error_words(one.name).family) or one.name, []).append(one)
     shares = {
         name: (_sum_of(rows, "position_share"), _sum_of(rows, "rotation_share")) for name, rows in families.items()
     }
@@ -221,6 +102,16 @@ def dominant_errors(
     return tuple(sorted(found, key=lambda one: -max(one.position_share, one.rotation_share)))
 
 
+def rescaled(
+    errors: Sequence[SystematicErrorResult], position: float, rotation: float
+) -> tuple[SystematicErrorResult, ...]:
+    """Multiply the shares of the position's and of the rotation's variance, as when only a part of that variance is meant."""
+    return tuple(
+        replace(one, position_share=position * one.position_share, rotation_share=rotation * one.rotation_share)
+        for one in errors
+    )
+
+
 def _sum_of(rows: Sequence[SystematicErrorResult], share: str) -> float:
     return min(float(sum(getattr(row, share) for row in rows)), 1.0)
 
@@ -232,8 +123,8 @@ def _dominant(
     covariance: Matrix66,
     measured: bool,
 ) -> DominantError:
-    words = error_words(rows[0].name)
-    known = knowledge_text(max(rows, key=lambda row: row.position_share + row.rotation_share))
+    largest = max(rows, key=lambda row: row.position_share + row.rotation_share)
+    words, known = error_words(largest.name), knowledge_text(largest)
     position_cm = 100.0 * float(np.sqrt(np.trace(covariance[:3, :3])))
     rotation_deg = float(np.rad2deg(np.sqrt(np.trace(covariance[3:, 3:]))))
     parts = []
@@ -243,15 +134,26 @@ def _dominant(
         parts.append(f"{_share_text(rotation_share)} of that of the rotation ({rotation_deg:.2g} deg)")
     if not position_share:
         parts = [parts[0].replace("that of", "the variance of")]
-    name = words.family or words.text
+    label, name = words.family or (words.label, words.text)
     come = "come" if len(parts) > 1 else "comes"
     remedy = (words.remedy_with_tape if measured else "") or words.remedy
     return DominantError(
-        position_share,
-        rotation_share,
-        f"{name}, {known}",
-        f"{' and '.join(parts)} {come} from {name}: {known}; {remedy}",
+        position_share=position_share,
+        rotation_share=rotation_share,
+        label=f"{label} {_value_text(largest) if is_determined(largest) else known.partition(' assumed')[0]}",
+        sentence=f"{' and '.join(parts)} {come} from {name}: {known}; {remedy}",
     )
+
+
+def dominance_text(dominant: Sequence[DominantError]) -> str:
+    """Name these errors with their shares, in one line."""
+    parts = [
+        f"{100 * share:.0f} % of the {what}: {one.label}"
+        for one in dominant
+        for what, share in (("position", one.position_share), ("rotation", one.rotation_share))
+        if share
+    ]
+    return "; ".join(parts) or "none with a third of the uncertainty"
 
 
 def _share_text(share: float) -> str:
@@ -261,10 +163,19 @@ def _share_text(share: float) -> str:
 def knowledge_text(error: SystematicErrorResult) -> str:
     """Say what is known of an error: "+1.2 ± 0.9 %, ± 2 % before any pair", or that the pairs do not determine it."""
     words = error_words(error.name)
-    unit = f" {words.unit}" if words.unit else ""
-    prior = f"± {words.factor * error.prior_sigma:.2g}{unit}"
-    if error.sigma > _UNDETERMINED * error.prior_sigma:
+    prior = f"± {words.factor * error.prior_sigma:.2g} {words.unit}".rstrip()
+    if not is_determined(error):
         return f"{prior} assumed, the pairs do not determine it"
+    return f"{_value_text(error)}, {prior} before any pair"
+
+
+def is_determined(error: SystematicErrorResult) -> bool:
+    """Return whether the pairs say anything about an error."""
+    return error.sigma <= _UNDETERMINED * error.prior_sigma
+
+
+def _value_text(error: SystematicErrorResult) -> str:
+    words = error_words(error.name)
     sigma = words.factor * error.sigma
     decimals = max(0, 1 - int(np.floor(np.log10(sigma)))) if sigma > 0.0 else 2
-    return f"{words.factor * error.value:+.{decimals}f} ± {sigma:.{decimals}f}{unit}, {prior} before any pair"
+    return f"{words.factor * error.value:+.{decimals}f} ± {sigma:.{decimals}f} {words.unit}".rstrip()

@@ -127,6 +127,8 @@ def write_calibration(file: CalibrationFile) -> str:
         provenance=provenance_document(file.provenance),
     )
     content = msgspec.to_builtins(document)
+    if content["metrics"]["picture_sigma_px"] is None:
+        del content["metrics"]["picture_sigma_px"]
     for pair in content["pairs"]:
         if not pair["candidates"]:
             for key in SOLVED_FROM_KEYS:
@@ -253,6 +255,7 @@ def _metrics_document(metrics: Metrics) -> documents.MetricsDocument:
         n=metrics.n,
         chi2=finite_or_none(metrics.chi2),
         degrees_of_freedom=metrics.degrees_of_freedom,
+        picture_sigma_px=finite_or_none(metrics.picture_sigma_px),
     )
 
 
@@ -266,4 +269,5 @@ def _metrics(document: documents.MetricsDocument) -> Metrics:
         acc=document.acc,
         chi2=nan_if_none(document.chi2),
         degrees_of_freedom=document.degrees_of_freedom,
+        picture_sigma_px=nan_if_none(document.picture_sigma_px),
     )

@@ -179,6 +179,7 @@ class MetricsDocument(Struct, frozen=True):
     n: Count = 0
     chi2: float | None = None
     degrees_of_freedom: Count = 0
+    picture_sigma_px: float | None = None
 
 
 class CandidateDocument(Struct, frozen=True):
