@@ -160,6 +160,7 @@ def _solved(
         alternatives=fit.found,
         mirror_gain=fit.mirror_gain,
         chi2_per_degree=metrics.chi2 / max(metrics.degrees_of_freedom, 1),
+        options=options,
     )
     results = used_pair_results(used, refined, left_out) | excluded_pair_results(
         shown, excluded, refined, camera, options

@@ -10,6 +10,7 @@ from calib_core.estimation.gnc import GncSolution
 from calib_core.estimation.influential_pairs import InfluentialPair
 from calib_core.estimation.leave_one_out import LeaveOneOut
 from calib_core.estimation.measurement_model import PairMeasurements
+from calib_core.options import CalibrationOptions
 
 __all__ = ["SolvedFit"]
 
@@ -29,6 +30,7 @@ class SolvedFit:
         alternatives: the GNC solutions of all starts, the most likely first.
         mirror_gain: gain in twice the log-likelihood with mirrored radar axes; negative if they fit worse.
         chi2_per_degree: chi2 per degree of freedom under the assumed noise.
+        options: the options it was solved with.
     """
 
     ids: tuple[str, ...]
@@ -41,3 +43,4 @@ class SolvedFit:
     alternatives: Sequence[GncSolution]
     mirror_gain: float
     chi2_per_degree: float
+    options: CalibrationOptions
