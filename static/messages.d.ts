@@ -149,6 +149,26 @@ export interface Advice {
   words: string;
 }
 
+/** One error that all pairs share, as a row of a table. */
+export interface SharedError {
+  key: string;
+  label: string;
+  value: string;
+  prior: string;
+  unit: string;
+  position_percent: number;
+  rotation_percent: number;
+  hint: string;
+  level: "plain" | "good" | "warning";
+}
+
+/** The errors that all pairs share. */
+export interface SharedErrors {
+  rows: SharedError[];
+  note: string;
+  sentences: string[];
+}
+
 /** Everything a client draws about the session. */
 export interface View {
   type: "view";
@@ -171,6 +191,8 @@ export interface View {
   advice: Advice | null;
   reference: string;
   comparison: Figure[];
+  pose_assumed: Figure[];
+  shared_errors: SharedErrors;
 }
 
 /** The recording is being opened: there is at most a preview, and nothing can be clicked yet. */

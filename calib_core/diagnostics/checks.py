@@ -126,7 +126,10 @@ def _smooth_angle_errors(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _weak_geometry(fit: SolvedFit) -> list[DataWarning]:
-    sigma = np.sqrt(np.diag(fit.uncertainty.covariance))
+    covariance = fit.uncertainty.covariance
+    if fit.measurements.flat:  # `_flat_radar` says what its tilt and height add
+        covariance = without_mounting(fit.refined.camera_from_radar, covariance, fit.options.radar)
+    sigma = np.sqrt(np.diag(covariance))
     rotation_rad, position_m = float(np.linalg.norm(sigma[3:])), float(np.linalg.norm(sigma[:3]))
     narrow = fit.uncertainty.condition > _NARROW_CONDITION and not fit.measurements.prior.measured
     if rotation_rad <= _WEAK_ROTATION_RAD and position_m <= _WEAK_POSITION_M and not narrow:

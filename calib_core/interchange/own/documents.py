@@ -307,8 +307,8 @@ class SystematicErrorDocument(Struct, frozen=True):
     sigma: float
     prior_sigma: float
     estimated: bool = True
-    position_share: float | None = None
-    rotation_share: float | None = None
+    position_share: float = 0.0
+    rotation_share: float = 0.0
 
 
 class AngleMapDocument(Struct, frozen=True):

@@ -2,7 +2,7 @@
 
 from calib_core.error_words import error_words
 from calib_core.interchange.own.documents import RadarErrorsDocument, SystematicErrorDocument
-from calib_core.interchange.own.numbers import finite_or_none, nan_if_none
+from calib_core.interchange.own.numbers import finite_or_none
 from calib_core.radar import RadarErrors
 from calib_core.shared_errors import SystematicErrorResult
 
@@ -31,8 +31,8 @@ def systematic_error_document(error: SystematicErrorResult) -> SystematicErrorDo
         sigma=error.sigma,
         prior_sigma=error.prior_sigma,
         estimated=error.estimated,
-        position_share=finite_or_none(error.position_share),
-        rotation_share=finite_or_none(error.rotation_share),
+        position_share=finite_or_none(error.position_share) or 0.0,
+        rotation_share=finite_or_none(error.rotation_share) or 0.0,
     )
 
 
@@ -45,6 +45,6 @@ def systematic_error_of(document: SystematicErrorDocument) -> SystematicErrorRes
         sigma=document.sigma,
         prior_sigma=document.prior_sigma,
         estimated=document.estimated,
-        position_share=nan_if_none(document.position_share),
-        rotation_share=nan_if_none(document.rotation_share),
+        position_share=document.position_share,
+        rotation_share=document.rotation_share,
     )
