@@ -73,7 +73,7 @@ export interface NoiseOptions {
   estimate_scale: boolean;
 }
 
-/** Systematic errors of the radar, as standard deviations; 0 means exact. */
+/** What a radar gets wrong at every placement alike: standard deviations before any pair; 0 means exact. */
 export interface RadarOptions {
   azimuth_scale_sigma: number;
   elevation_scale_sigma: number;
@@ -85,14 +85,14 @@ export interface RadarOptions {
   height_sigma_m: number;
 }
 
-/** Errors of the intrinsics, as standard deviations; 0 means exact. The camera file's own values take precedence. */
+/** How far off the intrinsics may be: standard deviations; 0 means exact. */
 export interface LensOptions {
   focal_length_sigma: number;
   principal_point_sigma_px: number;
   distortion_sigma: number;
 }
 
-/** What is wrong with every click alike, as standard deviations; 0 means exact. */
+/** What is wrong with every click alike: standard deviations before any pair; 0 means exact. */
 export interface ReflectorOptions {
   offset_sigma_m: number;
   click_offset_sigma_px: number;

@@ -86,7 +86,9 @@ def test_a_radar_without_elevation_shows_first_what_is_firm(flat: Calibration) -
     assert [one.key for one in assumed_figures(flat)] == ["camera_z", "roll", "pitch"]
     lines = summary_lines(flat)
     assert [line.split("  ")[0] for line in lines[:4]] == ["camera forward", "camera left", "yaw", "in the picture"]
-    assert "assumed, because this radar measures no elevation: camera up" in next(line for line in lines if "assumed" in line)
+    assert "assumed, because this radar measures no elevation: camera up" in next(
+        line for line in lines if "assumed" in line
+    )
     assert firm_text(flat).startswith("camera forward ")
     assert firm_text(flat).endswith(" px")
 
