@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calib_core.advice.angle_map import AngleMap
 from calib_core.interchange import (
     FORMATS,
     Content,
@@ -20,6 +19,7 @@ from calib_core.interchange import (
     write_calibration,
 )
 from calib_core.interchange.own.schemas import schema_texts
+from calib_core.radar import AngleMap, RadarErrors
 
 
 @pytest.mark.parametrize("name", ["clicks-1.schema.json", "pairs-1.schema.json", "calibration-1.schema.json"])
