@@ -66,7 +66,8 @@ def _flat_radar(fit: SolvedFit) -> list[DataWarning]:
             f"and yaw ± {yaw:.1f} deg in the plane of the placements, and where its returns appear in the picture, "
             f"± {picture_sigma_px(fit.refined, fit.uncertainty):.0f} px; up ± {up:.0f} cm, pitch ± {pitch:.1f} and roll "
             f"± {roll:.1f} deg are assumptions about how it is mounted",
-            "state among the options how well the radar's tilt and height are known, or measure the camera position; if the radar does measure elevation, find out why it is missing",
+            "state among the options how well the radar's tilt and height are known, or measure the camera position; if the "
+            "radar does measure elevation, find out why it is missing",
         )
     ]
 
