@@ -27,7 +27,7 @@ _SHARES = (
     (0.9, "nearly all"),
     (0.71, "about three quarters"),
     (0.58, "about two thirds"),
-    (0.42, "about half"),
+    (0.44, "about half"),
     (0.0, "about a third"),
 )
 
