@@ -13,7 +13,7 @@ from calib_core.measurements import Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.radar import AngleMap, RadarErrors
 from calib_core.radar_axes import camera_axes_text, sigma_in_radar_axes, without_mounting
-from calib_core.shared_errors import DominantError, SystematicErrorResult, dominance_text, dominant_errors, rescaled
+from calib_core.systematic_errors import DominantError, SystematicErrorResult, dominance_text, dominant_errors, rescaled
 
 __all__ = [
     "Calibration",
@@ -219,7 +219,8 @@ class Calibration:
     def pixel_covariance(self, points_radar_m: Points3) -> np.ndarray:
         """Return the covariance (n, 2, 2) [px^2] of where true radar points project; NaN where the lens does not see them.
 
-        It covers the uncertainty of the pose only; the noise of a measured radar position is not included.
+        It covers the uncertainty of the pose only, for a radar without elevation that of the map from its plane to the picture;
+        the noise of a measured radar position is not included.
 
         Args:
             points_radar_m: (n, 3).
@@ -231,7 +232,7 @@ class Calibration:
         if points.ndim != 2 or points.shape[1] != 3:
             raise InputError(f"points_radar_m: expected an array of n x 3, got {' x '.join(map(str, points.shape))}")
         jacobian = self.camera.pose_jacobian(self.camera_from_radar, points)
-        return np.asarray(jacobian @ self.covariance @ np.swapaxes(jacobian, 1, 2))
+        return np.asarray(jacobian @ self.firm_covariance @ np.swapaxes(jacobian, 1, 2))
 
     def pixel_sigma(self, points_radar_m: Points3) -> Points2:
         """Return the standard deviations (n, 2) [px] of column and row where true radar points (n, 3) [m] project."""
@@ -297,11 +298,11 @@ class Calibration:
         stated, firm = self.covariance, self.firm_covariance
         if not np.isfinite(stated).all():
             unknown = "unknown: this method has no noise model"
-            return f"one sigma       {unknown}", "shared errors   unknown"
+            return f"one sigma       {unknown}", "systematic      unknown"
         if self.sees_elevation:
             lines: tuple[str, ...] = (f"one sigma       {camera_axes_text(stated)}",)
         else:
             known, assumed = (sigma_in_radar_axes(self.camera_from_radar, one) for one in (firm, stated))
             picture = f"in the picture {self.metrics.picture_sigma_px:.1f} px"
             lines = (f"one sigma       {known.firm_text}; {picture}", f"not measured    {assumed.open_text}")
-        return (*lines, "shared errors   " + dominance_text(self.dominant_errors()))
+        return (*lines, "systematic      " + dominance_text(self.dominant_errors()))

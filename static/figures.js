@@ -24,10 +24,10 @@ const apartTable = make("table", "", []);
 const apart = make("div", "apart", []);
 const assumedHead = make("div", "pose-head", "Not measured by this radar, assumed");
 const assumedTable = make("table", "", []);
-const sharedTable = make("tbody", "", []);
-const sharedWords = make("div", "", []);
-const sharedNote = make("p", "note", "");
-const shared = make("div", "shared", []);
+const systematicTable = make("tbody", "", []);
+const systematicWords = make("div", "", []);
+const systematicNote = make("p", "note", "");
+const systematic = make("div", "systematic", []);
 const adviceLine = make("p", "advice", "");
 const axesLine = make("p", "advice axes", "Relative to the radar's axes: x forward, y left, z up. With all angles at 0, the camera looks along x.");
 let warningText = "";
@@ -36,8 +36,8 @@ export function startFigures() {
   const pose = make("div", "pose", [make("div", "", [poseTable, assumedHead, assumedTable]), axesLine, adviceLine]);
   const heads = [["error", ""], ["estimate", "From the pairs, ± one standard deviation"], ["before", "Assumed before any pair: Options"], ["position", "Part of the variance of the position"], ["rotation", "Part of the variance of the rotation"]];
   const head = make("tr", "", heads.map(([name, hint]) => hinted(make("th", "", name), hint)));
-  shared.append(make("div", "pose-head", "Errors that all pairs share"), sharedWords, make("table", "", [make("thead", "", [head]), sharedTable]), sharedNote);
-  posePage.append(poseHead, apart, pose, shared);
+  systematic.append(make("div", "pose-head", "Errors that all pairs share"), systematicWords, make("table", "", [make("thead", "", [head]), systematicTable]), systematicNote);
+  posePage.append(poseHead, apart, pose, systematic);
   on(["view", "recording"], draw);
 }
 
@@ -50,7 +50,7 @@ function draw() {
   poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Available after the first calibration.")])]));
   assumedHead.hidden = assumedTable.hidden = view.pose_assumed.length === 0;
   assumedTable.replaceChildren(...view.pose_assumed.map(row));
-  drawShared(view.shared_errors);
+  drawSystematic(view.systematic_errors);
   adviceLine.textContent = view.advice?.words ?? "";
   drawReference(view);
   const failure = view.stage === "unsolvable" ? [{ code: "unsolvable", message: view.status, hint: view.hint }] : [];
@@ -66,16 +66,16 @@ function drawReference(view) {
   apartTable.replaceChildren(...view.comparison.map(row));
 }
 
-/** The errors that do not average out: what is known of each, and its part in the uncertainty. @param {import("./messages.js").SharedErrors} errors */
-function drawShared(errors) {
-  shared.hidden = errors.rows.length === 0;
-  sharedTable.replaceChildren(...errors.rows.map(sharedRow));
-  sharedWords.replaceChildren(...errors.sentences.map((text) => make("p", "", text)));
-  sharedNote.textContent = errors.note;
+/** The errors that do not average out: what is known of each, and its part in the uncertainty. @param {import("./messages.js").SystematicErrorTable} errors */
+function drawSystematic(errors) {
+  systematic.hidden = errors.rows.length === 0;
+  systematicTable.replaceChildren(...errors.rows.map(systematicRow));
+  systematicWords.replaceChildren(...errors.sentences.map((text) => make("p", "", text)));
+  systematicNote.textContent = errors.note;
 }
 
-/** @param {import("./messages.js").SharedError} error */
-function sharedRow(error) {
+/** @param {import("./messages.js").SystematicErrorRow} error */
+function systematicRow(error) {
   const bar = (/** @type {number} */ percent) => {
     const part = make("b", "", []);
     part.style.width = `${Math.min(percent, 100)}%`;

@@ -150,7 +150,7 @@ export interface Advice {
 }
 
 /** One error that all pairs share, as a row of a table. */
-export interface SharedError {
+export interface SystematicErrorRow {
   key: string;
   label: string;
   value: string;
@@ -163,8 +163,8 @@ export interface SharedError {
 }
 
 /** The errors that all pairs share. */
-export interface SharedErrors {
-  rows: SharedError[];
+export interface SystematicErrorTable {
+  rows: SystematicErrorRow[];
   note: string;
   sentences: string[];
 }
@@ -192,7 +192,7 @@ export interface View {
   reference: string;
   comparison: Figure[];
   pose_assumed: Figure[];
-  shared_errors: SharedErrors;
+  systematic_errors: SystematicErrorTable;
 }
 
 /** The recording is being opened: there is at most a preview, and nothing can be clicked yet. */

@@ -4,9 +4,9 @@ from app.session import History, RecordingFacts, Session
 from app.view.advice import advice_for
 from app.view.click_rows import click_rows
 from app.view.figures import assumed_figures, firm_text, metric_figures, pose_figures, residual_limit_px
-from app.view.model import SharedErrors, Stage, View
+from app.view.model import Stage, SystematicErrorTable, View
 from app.view.reference import Reference, comparison_figures, reference_words, shown_calibration
-from app.view.shared_errors import shared_errors
+from app.view.systematic_errors import systematic_errors
 from app.view.wording import sentence, warning_in_sentences
 from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
 from calib_core.results import Calibration, DataWarning
@@ -43,7 +43,7 @@ def view(history: History, facts: RecordingFacts, reference: Reference | None = 
         metrics=metric_figures(calibration) if calibration else (),
         pose=pose_figures(shown) if shown else (),
         pose_assumed=assumed_figures(shown) if shown else (),
-        shared_errors=shared_errors(shown) if shown else SharedErrors(),
+        systematic_errors=systematic_errors(shown) if shown else SystematicErrorTable(),
         warnings=_warnings(calibration) if calibration else (),
         options=session.options,
         residual_limit_px=residual_limit_px(calibration) if calibration else None,

@@ -14,9 +14,9 @@ __all__ = [
     "Ellipse",
     "Figure",
     "Level",
-    "SharedError",
-    "SharedErrors",
     "Stage",
+    "SystematicErrorRow",
+    "SystematicErrorTable",
     "View",
 ]
 
@@ -101,7 +101,7 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
-class SharedError:
+class SystematicErrorRow:
     """One error that all pairs share, as a row of a table.
 
     Attributes:
@@ -128,7 +128,7 @@ class SharedError:
 
 
 @dataclass(frozen=True, slots=True)
-class SharedErrors:
+class SystematicErrorTable:
     """The errors that all pairs share.
 
     Attributes:
@@ -137,7 +137,7 @@ class SharedErrors:
         sentences: what the largest of them mean, and what would reduce them.
     """
 
-    rows: tuple[SharedError, ...] = ()
+    rows: tuple[SystematicErrorRow, ...] = ()
     note: str = ""
     sentences: tuple[str, ...] = ()
 
@@ -184,7 +184,7 @@ class View:
         metrics: how well the pairs agree.
         pose: the camera's position and angles relative to the radar, and the uncertainty in the picture.
         pose_assumed: the part of the pose that a radar without elevation does not show; empty for others.
-        shared_errors: the errors that all pairs share, and their parts in the uncertainty.
+        systematic_errors: the errors that all pairs share, and their parts in the uncertainty.
         warnings: of the latest outcome.
         options: the current ones; changes are sent as a part of this tree.
         residual_limit_px: residuals above this should be checked; None without a calibration.
@@ -213,4 +213,4 @@ class View:
     reference: str = ""
     comparison: tuple[Figure, ...] = ()
     pose_assumed: tuple[Figure, ...] = ()
-    shared_errors: SharedErrors = field(default_factory=SharedErrors)
+    systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)

@@ -3,7 +3,7 @@
 from app.view.figures import assumed_figures, metric_figures, pose_figures
 from app.view.model import Figure
 from app.view.number_format import plain
-from app.view.shared_errors import uncertainty_sentences
+from app.view.systematic_errors import uncertainty_sentences
 from app.view.wording import sentence
 from calib_core.results import Calibration
 

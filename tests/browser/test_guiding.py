@@ -90,10 +90,10 @@ def test_a_failure_of_the_papers_method_is_shown_in_the_warning_box(page: Driver
 
 def test_the_pose_tab_lists_the_errors_that_all_pairs_share(page: Driver, truth: Any) -> None:
     page.page.click("#tab-pose")
-    assert page.page.locator(".shared").is_hidden()
+    assert page.page.locator(".systematic").is_hidden()
     page.click_sample(truth)
-    errors = page.view["shared_errors"]
-    rows = page.page.locator(".shared tbody tr")
+    errors = page.view["systematic_errors"]
+    rows = page.page.locator(".systematic tbody tr")
     assert rows.count() == len(errors["rows"]) > 0
     for index, row in enumerate(errors["rows"]):
         text = rows.nth(index).inner_text()
@@ -101,7 +101,7 @@ def test_the_pose_tab_lists_the_errors_that_all_pairs_share(page: Driver, truth:
         assert row["prior"] in text
         assert rows.nth(index).get_attribute("data-hint") == row["hint"]
     for sentence in errors["sentences"]:
-        assert sentence in page.text(".shared")
+        assert sentence in page.text(".systematic")
     assert (
         page.value(
             "(() => { const tab = document.getElementById('page-pose'); return tab.scrollWidth - tab.clientWidth; })()"

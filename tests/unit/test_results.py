@@ -49,7 +49,7 @@ def test_a_calibration_prints_as_nine_lines(simulated: SimulatedPairs, method: s
         "translation",
         "quaternion wxyz",
         "one sigma",
-        "shared errors",
+        "systematic",
         "AED",
         "held-out",
         "warnings",

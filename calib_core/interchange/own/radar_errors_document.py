@@ -4,7 +4,7 @@ from calib_core.error_words import error_words
 from calib_core.interchange.own.documents import RadarErrorsDocument, SystematicErrorDocument
 from calib_core.interchange.own.numbers import finite_or_none
 from calib_core.radar import RadarErrors
-from calib_core.shared_errors import SystematicErrorResult
+from calib_core.systematic_errors import SystematicErrorResult
 
 __all__ = ["radar_errors_document", "radar_errors_of", "systematic_error_document", "systematic_error_of"]
 

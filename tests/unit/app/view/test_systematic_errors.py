@@ -7,13 +7,13 @@ import pytest
 
 from app.view import summary_lines
 from app.view.figures import assumed_figures, firm_text, pose_figures
-from app.view.shared_errors import shared_errors
+from app.view.systematic_errors import systematic_errors
 from calib_core.calibration import calibrate_pairs
 from calib_core.interchange import calibration_text, read_calibration
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
-from calib_core.shared_errors import SystematicErrorResult
 from calib_core.synthetic import simulate_pairs
+from calib_core.systematic_errors import SystematicErrorResult
 
 
 def solved(*, flat: bool = False, options: CalibrationOptions | None = None) -> Calibration:
@@ -48,7 +48,7 @@ def test_the_table_shows_what_matters_or_is_determined_the_largest_first(calibra
         error("azimuth_scale", 0.0, 0.02, sigma=0.004),
         error("elevation_scale", 0.4, 0.1),
     )
-    table = shared_errors(replace(calibration, systematic_errors=known))
+    table = systematic_errors(replace(calibration, systematic_errors=known))
     assert [row.key for row in table.rows] == ["elevation_scale", "azimuth_scale"]
     assert [row.level for row in table.rows] == ["warning", "plain"]
     assert [(row.position_percent, row.rotation_percent) for row in table.rows] == [(40, 10), (0, 2)]
@@ -62,10 +62,10 @@ def test_the_table_shows_what_matters_or_is_determined_the_largest_first(calibra
 
 def test_axes_that_the_pairs_do_not_determine_share_a_row(calibration: Calibration) -> None:
     axes = (error("reflector_right_m", 0.05, 0.0), error("reflector_down_m", 0.04, 0.01))
-    (row,) = shared_errors(replace(calibration, systematic_errors=axes)).rows
+    (row,) = systematic_errors(replace(calibration, systematic_errors=axes)).rows
     assert (row.label, row.position_percent, row.rotation_percent) == ("clicks off the phase centre", 9, 1)
     apart = (replace(axes[0], sigma=0.01), axes[1])
-    assert [row.label for row in shared_errors(replace(calibration, systematic_errors=apart)).rows] == [
+    assert [row.label for row in systematic_errors(replace(calibration, systematic_errors=apart)).rows] == [
         "clicks right of centre",
         "clicks below centre",
     ]
@@ -74,7 +74,7 @@ def test_axes_that_the_pairs_do_not_determine_share_a_row(calibration: Calibrati
 def test_the_command_line_says_the_same_as_the_page(calibration: Calibration) -> None:
     lines = summary_lines(calibration)
     assert [line.removeprefix("uncertainty: ") for line in lines if line.startswith("uncertainty: ")] == list(
-        shared_errors(calibration).sentences
+        systematic_errors(calibration).sentences
     )
     assert any(line.startswith("in the picture") for line in lines)
     assert assumed_figures(calibration) == ()
@@ -96,12 +96,12 @@ def test_a_radar_without_elevation_shows_first_what_is_firm(flat: Calibration) -
 def test_a_calibration_from_a_file_looks_the_same(calibration: Calibration, flat: Calibration) -> None:
     for one in (calibration, flat):
         read = read_calibration(calibration_text(one)).calibration
-        assert shared_errors(read) == shared_errors(one)
+        assert systematic_errors(read) == systematic_errors(one)
         assert summary_lines(read) == summary_lines(one)
         assert str(read).partition("next")[0] == str(one).partition("next")[0]
 
 
 def test_the_papers_method_has_no_table() -> None:
     paper = solved(options=CalibrationOptions(method="paper"))
-    assert not shared_errors(paper).rows
-    assert not shared_errors(paper).sentences
+    assert not systematic_errors(paper).rows
+    assert not systematic_errors(paper).sentences

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 
-from app.view.model import SharedError, SharedErrors
+from app.view.model import SystematicErrorRow, SystematicErrorTable
 from app.view.number_format import plain, with_sigma
 from app.view.wording import sentence
 from calib_core.error_words import error_words
 from calib_core.results import Calibration, SystematicErrorResult
-from calib_core.shared_errors import is_determined
+from calib_core.systematic_errors import is_determined
 
-__all__ = ["shared_errors", "uncertainty_sentences"]
+__all__ = ["systematic_errors", "uncertainty_sentences"]
 
 _SHOWN_SHARE = 0.03
 _DOMINANT_SHARE = 1.0 / 3.0
@@ -20,13 +20,13 @@ def uncertainty_sentences(calibration: Calibration) -> tuple[str, ...]:
     return tuple(sentence(one.sentence) for one in calibration.dominant_errors())
 
 
-def shared_errors(calibration: Calibration) -> SharedErrors:
+def systematic_errors(calibration: Calibration) -> SystematicErrorTable:
     """Return the table: errors that the pairs determine or that matter, the largest share first."""
     groups = sorted(_groups(calibration.errors_of_firm), key=_largest_share, reverse=True)
     shown = [group for group in groups if _largest_share(group) >= _SHOWN_SHARE or is_determined(group[0])]
     rest = len(groups) - len(shown)
     note = f"{rest} more: the pairs do not determine them, and each has less than 3 % of the variance." if rest else ""
-    return SharedErrors(tuple(map(_row, shown)), note, uncertainty_sentences(calibration))
+    return SystematicErrorTable(tuple(map(_row, shown)), note, uncertainty_sentences(calibration))
 
 
 def _groups(errors: Sequence[SystematicErrorResult]) -> list[list[SystematicErrorResult]]:
@@ -46,12 +46,12 @@ def _largest_share(group: Sequence[SystematicErrorResult]) -> float:
     return max(_shares(group))
 
 
-def _row(group: Sequence[SystematicErrorResult]) -> SharedError:
+def _row(group: Sequence[SystematicErrorResult]) -> SystematicErrorRow:
     one, (position, rotation) = group[0], _shares(group)
     words = error_words(one.name)
     label = words.family[0] if len(group) > 1 and words.family else words.label
     known = "Estimated with the pose." if one.estimated else "Not taken out of the pose, but part of its uncertainty."
-    return SharedError(
+    return SystematicErrorRow(
         key=one.name,
         label=label,
         value=with_sigma(words.factor * one.value, words.factor * one.sigma) if is_determined(one) else "–",
