@@ -47,9 +47,10 @@ if TYPE_CHECKING:
         ReflectorOptions,
         SolvingOptions,
     )
-    from calib_core.radar import AngleMap
+    from calib_core.radar import AngleMap, RadarErrors
     from calib_core.recordings import Recording, RecordingOptions, open_recording
     from calib_core.results import Calibration, DataWarning, Metrics, NextPlacement, PairResult
+    from calib_core.systematic_errors import SystematicErrorResult
 
 __all__ = [
     "AngleMap",
@@ -79,6 +80,7 @@ __all__ = [
     "PaperOptions",
     "Placement",
     "Provenance",
+    "RadarErrors",
     "RadarOptions",
     "RadarScan",
     "RadarScans",
@@ -89,6 +91,7 @@ __all__ = [
     "ReflectorOptions",
     "RigidTransform",
     "SolvingOptions",
+    "SystematicErrorResult",
     "Unpaired",
     "Unsolvable",
     "UnsolvableError",
@@ -131,9 +134,10 @@ _MODULES = {
         *("CalibrationOptions", "CameraPositionPrior", "GatingOptions", "LensOptions", "LocatingOptions"),
         *("NoiseOptions", "PaperOptions", "RadarOptions", "ReflectorOptions", "SolvingOptions"),
     ),
-    "radar": ("AngleMap",),
+    "radar": ("AngleMap", "RadarErrors"),
     "recordings": ("Recording", "RecordingOptions", "open_recording"),
     "results": ("Calibration", "DataWarning", "Metrics", "NextPlacement", "PairResult"),
+    "systematic_errors": ("SystematicErrorResult",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -15,6 +15,7 @@ from calib_core.association.placement_groups import PlacementGroup, click_result
 from calib_core.camera import Camera
 from calib_core.diagnostics.checks import warnings_of
 from calib_core.diagnostics.clocks import CLOCK_CODES, clocks
+from calib_core.diagnostics.picture import picture_sigma_px
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.errors import InputError
 from calib_core.estimation.best_fit import BestFit, best_fit, quick_fit
@@ -296,11 +297,12 @@ def _described(
     results = used_pair_results(used, refined, solution.left_out) | excluded_pair_results(
         task.shown, task.excluded, refined, task.camera, task.options
     )
+    metrics = fit_metrics(measurements, refined, solution.left_out)
     calibration = Calibration(
         camera_from_radar=refined.camera_from_radar,
         covariance=uncertainty.covariance,
         camera=task.camera,
-        metrics=fit_metrics(measurements, refined, solution.left_out),
+        metrics=replace(metrics, picture_sigma_px=picture_sigma_px(refined, uncertainty)),
         pairs=tuple(results[pair.id] for pair in task.shown if pair.id in results),
         unpaired=task.unpaired,
         warnings=(),

@@ -83,30 +83,34 @@ class NoiseOptions:
 
 @dataclass(frozen=True, slots=True)
 class RadarOptions:
-    """Systematic errors of the radar, as standard deviations; 0 means exact."""
+    """What a radar gets wrong at every placement alike: standard deviations before any pair; 0 means exact."""
 
     azimuth_scale_sigma: float = option(
         0.02,
-        "Of the azimuth's scale, as a share: element spacing and wavelength are known to a few percent.",
+        "Standard deviation of the azimuth's scale, as a share (0.02 is 2 %): element spacing and wavelength are known roughly.",
         low=0.0,
         high=0.5,
     )
-    elevation_scale_sigma: float = option(0.03, "Of the elevation's scale, as a share.", low=0.0, high=0.5)
-    range_bias_sigma_m: float = option(0.03, "Of a constant range error [m].", low=0.0, high=5.0)
-    range_scale_sigma: float = option(0.003, "Of the range's scale, as a share.", low=0.0, high=0.5)
+    elevation_scale_sigma: float = option(
+        0.03, "Standard deviation of the elevation's scale, as a share (0.03 is 3 %).", low=0.0, high=0.5
+    )
+    range_bias_sigma_m: float = option(0.03, "Standard deviation of a constant range error [m].", low=0.0, high=5.0)
+    range_scale_sigma: float = option(0.003, "Standard deviation of the range's scale, as a share.", low=0.0, high=0.5)
     azimuth_bias_sigma_deg: float = option(
         1.0,
-        "Of a constant azimuth error [deg]; it is a rotation of the radar, so it counts only for the pose of the housing.",
+        "Standard deviation of a constant azimuth error [deg]; it is a rotation, so it counts only for the pose of the housing.",
         low=0.0,
         high=45.0,
     )
-    elevation_bias_sigma_deg: float = option(1.0, "The same for the elevation [deg].", low=0.0, high=45.0)
+    elevation_bias_sigma_deg: float = option(
+        1.0, "Standard deviation of a constant elevation error [deg]; likewise.", low=0.0, high=45.0
+    )
     tilt_sigma_deg: float = option(
-        10.0, "Of the tilt of a radar that measures no elevation, up or down [deg].", low=0.0, high=45.0
+        10.0, "Standard deviation of the tilt of a radar that measures no elevation [deg].", low=0.0, high=45.0
     )
     height_sigma_m: float = option(
         1.0,
-        "Of the height of the placements above or below a radar that measures no elevation [m].",
+        "Standard deviation of the height of the placements above or below a radar that measures no elevation [m].",
         low=0.0,
         high=20.0,
     )
@@ -114,30 +118,34 @@ class RadarOptions:
 
 @dataclass(frozen=True, slots=True)
 class LensOptions:
-    """Errors of the intrinsics, as standard deviations; 0 means exact. The camera file's own values take precedence."""
+    """How far off the intrinsics may be: standard deviations; 0 means exact."""
 
-    focal_length_sigma: float = option(0.003, "Of the focal length, as a share.", low=0.0, high=0.5)
+    focal_length_sigma: float = option(
+        0.003, "Standard deviation of the focal length, as a share (0.003 is 0.3 %).", low=0.0, high=0.5
+    )
     principal_point_sigma_px: float = option(
         5.0,
-        "Of the principal point, per axis [px of a picture 1920 px wide; scaled to the width].",
+        "Standard deviation of the principal point, per axis [px of a picture 1920 px wide; scaled to the width].",
         low=0.0,
         high=1000.0,
     )
-    distortion_sigma: float = option(0.005, "Of the first radial distortion coefficient.", low=0.0, high=1.0)
+    distortion_sigma: float = option(
+        0.005, "Standard deviation of the first radial distortion coefficient.", low=0.0, high=1.0
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class ReflectorOptions:
-    """What is wrong with every click alike, as standard deviations; 0 means exact."""
+    """What is wrong with every click alike: standard deviations before any pair; 0 means exact."""
 
     offset_sigma_m: float = option(
         0.02,
-        "Of the clicked point from the radar's phase centre, per axis of the camera [m]: a trihedral's apex is behind its mouth.",
+        "Standard deviation of the clicked point from the radar's phase centre, per camera axis [m]; a mouth is 0.1 m off.",
         low=0.0,
         high=1.0,
     )
     click_offset_sigma_px: float = option(
-        2.0, "Of what one person's clicks are all off by, per axis [px].", low=0.0, high=100.0
+        2.0, "Standard deviation of what one person's clicks are all off by, per axis [px].", low=0.0, high=100.0
     )
 
 

@@ -5,13 +5,15 @@ from typing import Self
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Points2, Points3, Values, Vector2, Vector3, frozen_array
+from calib_core.arrays import Matrix66, Points2, Points3, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.measurements import Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.radar import AngleMap, RadarErrors
+from calib_core.radar_axes import camera_axes_text, sigma_in_radar_axes, without_mounting
+from calib_core.systematic_errors import DominantError, SystematicErrorResult, dominance_text, dominant_errors, rescaled
 
 __all__ = [
     "Calibration",
@@ -64,6 +66,7 @@ class Metrics:
         cdsd_px: corrected standard deviation of the distances, divided by N - 1 (paper, CDSD); NaN below 2 pairs.
         rms_px: root mean square distance.
         held_out_aed_px: AED with each pair predicted from the others (leave-one-out); NaN if not computed.
+        picture_sigma_px: standard deviation per axis of a reprojection at the placements; NaN if not computed.
         acc: share of reprojected points inside detection boxes (paper, Acc), 0 to 1; None without boxes.
         n: number of pairs.
         chi2: sum of squared whitened residuals; NaN if the method has no noise model.
@@ -78,6 +81,7 @@ class Metrics:
     acc: float | None = None
     chi2: float = float("nan")
     degrees_of_freedom: int = 0
+    picture_sigma_px: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,31 +167,6 @@ class NextPlacement:
         object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
 
 
-@dataclass(frozen=True, slots=True)
-class SystematicErrorResult:
-    """One error that all pairs share: what is known of it, and its part in the uncertainty of the pose.
-
-    Attributes:
-        name: key in files, with its unit; scales and shares have none.
-        text: what it is, for users.
-        value: estimated; for an error that is not taken out of the pose, what the residuals suggest.
-        sigma: standard deviation of that value.
-        prior_sigma: the same before any pair, as the options state it.
-        estimated: whether the pose was estimated together with it; otherwise it only widens the covariance.
-        position_share: its part of the variance of the translation, 0 to 1.
-        rotation_share: the same of the rotation.
-    """
-
-    name: str
-    text: str
-    value: float
-    sigma: float
-    prior_sigma: float
-    estimated: bool
-    position_share: float
-    rotation_share: float
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
     """A solved extrinsic calibration: p_camera = R p_radar + t.
@@ -242,7 +221,8 @@ class Calibration:
     def pixel_covariance(self, points_radar_m: Points3) -> np.ndarray:
         """Return the covariance (n, 2, 2) [px^2] of where true radar points project; NaN where the lens does not see them.
 
-        It covers the uncertainty of the pose only; the noise of a measured radar position is not included.
+        It covers the uncertainty of the pose only, for a radar without elevation that of the map from its plane to the picture;
+        the noise of a measured radar position is not included.
 
         Args:
             points_radar_m: (n, 3).
@@ -254,21 +234,44 @@ class Calibration:
         if points.ndim != 2 or points.shape[1] != 3:
             raise InputError(f"points_radar_m: expected an array of n x 3, got {' x '.join(map(str, points.shape))}")
         jacobian = self.camera.pose_jacobian(self.camera_from_radar, points)
-        return np.asarray(jacobian @ self.covariance @ np.swapaxes(jacobian, 1, 2))
+        return np.asarray(jacobian @ self.firm_covariance @ np.swapaxes(jacobian, 1, 2))
 
     def pixel_sigma(self, points_radar_m: Points3) -> Points2:
         """Return the standard deviations (n, 2) [px] of column and row where true radar points (n, 3) [m] project."""
         return np.sqrt(np.diagonal(self.pixel_covariance(points_radar_m), axis1=1, axis2=2))
+
+    @property
+    def sees_elevation(self) -> bool:
+        """Whether the radar measures elevation; if not, tilt and height of the pose rest on assumptions."""
+        return all(warning.code != "flat-radar" for warning in self.warnings)
+
+    @property
+    def firm_covariance(self) -> Matrix66:
+        """The covariance (6, 6) without what no pair can show: tilt and height of a radar that measures no elevation."""
+        if self.sees_elevation or not np.isfinite(self.covariance).all():
+            return self.covariance
+        return without_mounting(self.camera_from_radar, self.covariance, self.options.radar)
+
+    @property
+    def errors_of_firm(self) -> tuple[SystematicErrorResult, ...]:
+        """The systematic errors, with their shares of the firm covariance."""
+        stated, firm = np.diag(self.covariance), np.diag(self.firm_covariance)
+        position, rotation = (stated[part].sum() / firm[part].sum() for part in (slice(0, 3), slice(3, 6)))
+        return rescaled(self.systematic_errors, float(position), float(rotation))
+
+    def dominant_errors(self) -> tuple[DominantError, ...]:
+        """Name the errors that make up a third or more of the uncertainty, with what would reduce them."""
+        measured = self.options.solving.camera_position is not None
+        return dominant_errors(self.errors_of_firm, self.firm_covariance, measured=measured)
 
     def unwrap(self) -> Self:
         """Return itself; `Unsolvable.unwrap` raises."""
         return self
 
     def __str__(self) -> str:
-        """Summarize the calibration in eight lines."""
+        """Summarize the calibration in nine lines; a radar that measures no elevation adds one."""
         used = [pair for pair in self.pairs if not pair.excluded]
         agreeing = sum(pair.inlier for pair in used)
-        sigma = np.sqrt(np.diag(self.covariance))
         place, quaternion = (
             self.camera_from_radar.translation_m,
             quaternion_wxyz_from_matrix(self.camera_from_radar.rotation),
@@ -284,7 +287,7 @@ class Calibration:
                 f"camera_from_radar, method {self.options.method}: {agreeing} of {len(used)} pairs agree",
                 "  translation     " + " ".join(f"{value:.4f}" for value in place) + " m",
                 "  quaternion wxyz " + " ".join(f"{value:.6f}" for value in quaternion),
-                f"  one sigma       {_sigma_text(sigma)}",
+                *(f"  {line}" for line in self._uncertainty_lines()),
                 f"  residuals       AED {metrics.aed_px:.2f} px, CDSD {metrics.cdsd_px:.2f} px, RMS {metrics.rms_px:.2f} px",
                 "  held-out AED    " + (f"{held_out_px:.2f} px" if np.isfinite(held_out_px) else "unknown"),
                 "  warnings        " + (", ".join(warning.code for warning in self.warnings) or "none"),
@@ -292,11 +295,16 @@ class Calibration:
             )
         )
 
-
-def _sigma_text(sigma: Values) -> str:
-    """Write the standard deviations of the translation and of the rotation about the camera's x, y and z axes."""
-    if not np.isfinite(sigma).all():
-        return "unknown: this method has no noise model"
-    x, y, z = 100.0 * sigma[:3]
-    about_x, about_y, about_z = np.rad2deg(sigma[3:])
-    return f"x {x:.2f}, y {y:.2f}, z {z:.2f} cm; about x {about_x:.3f}, y {about_y:.3f}, z {about_z:.3f} deg"
+    def _uncertainty_lines(self) -> tuple[str, ...]:
+        """Say how certain the pose is, and which errors make up a third or more of that."""
+        stated, firm = self.covariance, self.firm_covariance
+        if not np.isfinite(stated).all():
+            unknown = "unknown: this method has no noise model"
+            return f"one sigma       {unknown}", "systematic      unknown"
+        if self.sees_elevation:
+            lines: tuple[str, ...] = (f"one sigma       {camera_axes_text(stated)}",)
+        else:
+            known, assumed = (sigma_in_radar_axes(self.camera_from_radar, one) for one in (firm, stated))
+            picture = f"in the picture {self.metrics.picture_sigma_px:.1f} px"
+            lines = (f"one sigma       {known.firm_text}; {picture}", f"not measured    {assumed.open_text}")
+        return (*lines, "systematic      " + dominance_text(self.dominant_errors()))

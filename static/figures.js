@@ -22,13 +22,22 @@ export const poseTable = make("table", "", []);
 const poseHead = make("div", "pose-head", "");
 const apartTable = make("table", "", []);
 const apart = make("div", "apart", []);
+const assumedHead = make("div", "pose-head", "Not measured by this radar, assumed");
+const assumedTable = make("table", "", []);
+const systematicTable = make("tbody", "", []);
+const systematicWords = make("div", "", []);
+const systematicNote = make("p", "note", "");
+const systematic = make("div", "systematic", []);
 const adviceLine = make("p", "advice", "");
 const axesLine = make("p", "advice axes", "Relative to the radar's axes: x forward, y left, z up. With all angles at 0, the camera looks along x.");
 let warningText = "";
 
 export function startFigures() {
-  const pose = make("div", "pose", [poseTable, axesLine, adviceLine]);
-  posePage.append(poseHead, apart, pose);
+  const pose = make("div", "pose", [make("div", "", [poseTable, assumedHead, assumedTable]), axesLine, adviceLine]);
+  const heads = [["error", ""], ["estimate", "From the pairs, ± one standard deviation"], ["before", "Assumed before any pair: Options"], ["position", "Part of the variance of the position"], ["rotation", "Part of the variance of the rotation"]];
+  const head = make("tr", "", heads.map(([name, hint]) => hinted(make("th", "", name), hint)));
+  systematic.append(make("div", "pose-head", "Errors that all pairs share"), systematicWords, make("table", "", [make("thead", "", [head]), systematicTable]), systematicNote);
+  posePage.append(poseHead, apart, pose, systematic);
   on(["view", "recording"], draw);
 }
 
@@ -39,6 +48,9 @@ function draw() {
   const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Available after the first calibration.", level: "none" }));
   figures.replaceChildren(...shown.map(cell));
   poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Available after the first calibration.")])]));
+  assumedHead.hidden = assumedTable.hidden = view.pose_assumed.length === 0;
+  assumedTable.replaceChildren(...view.pose_assumed.map(row));
+  drawSystematic(view.systematic_errors);
   adviceLine.textContent = view.advice?.words ?? "";
   drawReference(view);
   const failure = view.stage === "unsolvable" ? [{ code: "unsolvable", message: view.status, hint: view.hint }] : [];
@@ -52,6 +64,38 @@ function drawReference(view) {
   apart.hidden = view.comparison.length === 0;
   apart.replaceChildren(make("div", "pose-head", `Difference from ${view.reference}`), apartTable);
   apartTable.replaceChildren(...view.comparison.map(row));
+}
+
+/** The errors that do not average out: what is known of each, and its part in the uncertainty. @param {import("./messages.js").SystematicErrorTable} errors */
+function drawSystematic(errors) {
+  systematic.hidden = errors.rows.length === 0;
+  systematicTable.replaceChildren(...errors.rows.map(systematicRow));
+  systematicWords.replaceChildren(...errors.sentences.map((text) => make("p", "", text)));
+  systematicNote.textContent = errors.note;
+}
+
+/** @param {import("./messages.js").SystematicErrorRow} error */
+function systematicRow(error) {
+  const bar = (/** @type {number} */ percent) => {
+    const part = make("b", "", []);
+    part.style.width = `${Math.min(percent, 100)}%`;
+    return make("td", "", [make("span", "part", [make("i", "", [part]), make("span", "", percent > 0 ? `${percent} %` : "–")])]);
+  };
+  const line = make("tr", error.level, [
+    make("td", "", error.label),
+    make("td", "", error.value === "–" ? error.value : [error.value, make("span", "unit", error.unit)]),
+    make("td", "", [error.prior, make("span", "unit", error.unit)]),
+    bar(error.position_percent),
+    bar(error.rotation_percent),
+  ]);
+  line.dataset.key = error.key;
+  return hinted(line, error.hint);
+}
+
+/** @template {HTMLElement} T @param {T} element @param {string} hint @returns {T} */
+function hinted(element, hint) {
+  if (hint) element.dataset.hint = hint;
+  return element;
 }
 
 /** @param {Omit<Figure, "level"> & {level: string}} figure */

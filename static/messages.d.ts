@@ -73,7 +73,7 @@ export interface NoiseOptions {
   estimate_scale: boolean;
 }
 
-/** Systematic errors of the radar, as standard deviations; 0 means exact. */
+/** What a radar gets wrong at every placement alike: standard deviations before any pair; 0 means exact. */
 export interface RadarOptions {
   azimuth_scale_sigma: number;
   elevation_scale_sigma: number;
@@ -85,14 +85,14 @@ export interface RadarOptions {
   height_sigma_m: number;
 }
 
-/** Errors of the intrinsics, as standard deviations; 0 means exact. The camera file's own values take precedence. */
+/** How far off the intrinsics may be: standard deviations; 0 means exact. */
 export interface LensOptions {
   focal_length_sigma: number;
   principal_point_sigma_px: number;
   distortion_sigma: number;
 }
 
-/** What is wrong with every click alike, as standard deviations; 0 means exact. */
+/** What is wrong with every click alike: standard deviations before any pair; 0 means exact. */
 export interface ReflectorOptions {
   offset_sigma_m: number;
   click_offset_sigma_px: number;
@@ -149,6 +149,26 @@ export interface Advice {
   words: string;
 }
 
+/** One error that all pairs share, as a row of a table. */
+export interface SystematicErrorRow {
+  key: string;
+  label: string;
+  value: string;
+  prior: string;
+  unit: string;
+  position_percent: number;
+  rotation_percent: number;
+  hint: string;
+  level: "plain" | "good" | "warning";
+}
+
+/** The errors that all pairs share. */
+export interface SystematicErrorTable {
+  rows: SystematicErrorRow[];
+  note: string;
+  sentences: string[];
+}
+
 /** Everything a client draws about the session. */
 export interface View {
   type: "view";
@@ -171,6 +191,8 @@ export interface View {
   advice: Advice | null;
   reference: string;
   comparison: Figure[];
+  pose_assumed: Figure[];
+  systematic_errors: SystematicErrorTable;
 }
 
 /** The recording is being opened: there is at most a preview, and nothing can be clicked yet. */

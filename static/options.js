@@ -27,6 +27,26 @@ const LABELS = {
   "paper.window_s": "Radar window around a click",
   "paper.max_range_m": "Maximum range",
   method: "Method",
+  "radar.azimuth_scale_sigma": "Azimuth scale (0.02 = 2 %)",
+  "radar.elevation_scale_sigma": "Elevation scale (0.03 = 3 %)",
+  "radar.range_bias_sigma_m": "Range bias",
+  "radar.range_scale_sigma": "Range scale",
+  "radar.azimuth_bias_sigma_deg": "Azimuth bias",
+  "radar.elevation_bias_sigma_deg": "Elevation bias",
+  "radar.tilt_sigma_deg": "Tilt, if it measures no elevation",
+  "radar.height_sigma_m": "Height, if it measures no elevation",
+  "lens.focal_length_sigma": "Focal length (0.003 = 0.3 %)",
+  "lens.principal_point_sigma_px": "Principal point",
+  "lens.distortion_sigma": "Distortion (k1)",
+  "reflector.offset_sigma_m": "Clicked point to phase centre",
+  "reflector.click_offset_sigma_px": "One person's clicks",
+  "solving.sensors_above_placements": "Sensors above the placements",
+};
+/** Headings that say more than the group's name. @type {Record<string, string>} */
+const HEADINGS = {
+  radar: "Radar: errors that all pairs share, ± before any pair",
+  lens: "Lens: errors of the intrinsics, ±",
+  reflector: "Reflector: what all clicks are off by, ±",
 };
 /** @type {Record<string, string>} */
 const METHODS = { default: "Default", paper: "Paper" };
@@ -59,7 +79,7 @@ function build() {
   for (const group of groups) {
     const others = group.options.filter((field) => !FIRST.includes(field.path) && field.path !== "method");
     if (!others.length) continue;
-    const title = make("div", "group", group.name);
+    const title = make("div", "group", HEADINGS[group.name] ?? sentence(group.name));
     title.dataset.hint = group.hint;
     rest.append(make("div", "part", [title, ...others.map(control)]));
   }

@@ -3,9 +3,10 @@
 from app.session import History, RecordingFacts, Session
 from app.view.advice import advice_for
 from app.view.click_rows import click_rows
-from app.view.figures import metric_figures, pose_figures, residual_limit_px
-from app.view.model import Stage, View
+from app.view.figures import assumed_figures, firm_text, metric_figures, pose_figures, residual_limit_px
+from app.view.model import Stage, SystematicErrorTable, View
 from app.view.reference import Reference, comparison_figures, reference_words, shown_calibration
+from app.view.systematic_errors import systematic_errors
 from app.view.wording import sentence, warning_in_sentences
 from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
 from calib_core.results import Calibration, DataWarning
@@ -41,6 +42,8 @@ def view(history: History, facts: RecordingFacts, reference: Reference | None = 
         clicks=click_rows(session, facts),
         metrics=metric_figures(calibration) if calibration else (),
         pose=pose_figures(shown) if shown else (),
+        pose_assumed=assumed_figures(shown) if shown else (),
+        systematic_errors=systematic_errors(shown) if shown else SystematicErrorTable(),
         warnings=_warnings(calibration) if calibration else (),
         options=session.options,
         residual_limit_px=residual_limit_px(calibration) if calibration else None,
@@ -124,9 +127,9 @@ def _next_click(session: Session) -> str:
 def _agreement(calibration: Calibration) -> str:
     used = [pair for pair in calibration.pairs if not pair.excluded]
     agreeing = sum(pair.inlier for pair in used)
-    if agreeing == len(used):
-        return f"Solved: all {len(used)} pairs agree"
-    return f"Solved: {agreeing} of {len(used)} pairs agree"
+    agreed = f"all {len(used)}" if agreeing == len(used) else f"{agreeing} of {len(used)}"
+    firm = "" if calibration.sees_elevation else f"; {firm_text(calibration)}"
+    return f"Solved: {agreed} pairs agree{firm}"
 
 
 def _warnings(calibration: Calibration) -> tuple[DataWarning, ...]:

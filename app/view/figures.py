@@ -8,9 +8,11 @@ from app.view.click_rows import ellipse_of
 from app.view.model import Figure
 from app.view.mounting import mounting_of
 from app.view.number_format import plain, with_sigma
+from app.view.wording import sentence
+from calib_core.radar_axes import sigma_in_radar_axes
 from calib_core.results import Calibration
 
-__all__ = ["metric_figures", "pose_figures", "residual_limit_px"]
+__all__ = ["assumed_figures", "firm_text", "metric_figures", "pose_figures", "residual_limit_px"]
 
 _HELD_OUT_RATIO = 1.5
 """A higher ratio of held-out to fitted error means that the pose depends too much on single pairs."""
@@ -58,20 +60,62 @@ def _held_out_figure(calibration: Calibration) -> Figure:
 
 
 def pose_figures(calibration: Calibration) -> tuple[Figure, ...]:
-    """Return the camera's position and angles relative to the radar, with one standard deviation."""
+    """Return the camera's position and angles relative to the radar, with one standard deviation, and that in the picture.
+
+    For a radar without elevation only what the pairs determine; `assumed_figures` returns the rest.
+    """
+    figures = _mounting_figures(calibration)
+    shown = figures if calibration.sees_elevation else tuple(one for one in figures if one.key in _FIRM)
+    return (*shown, *_picture_figures(calibration), *_radar_figures(calibration))
+
+
+def assumed_figures(calibration: Calibration) -> tuple[Figure, ...]:
+    """Return what a radar without elevation leaves to assumptions: height, roll and pitch; empty for other radars."""
+    if calibration.sees_elevation:
+        return ()
+    why = " This radar measures no elevation: the value holds if it is level and at the height of the placements."
+    return tuple(replace(one, hint=one.hint + why) for one in _mounting_figures(calibration) if one.key not in _FIRM)
+
+
+def firm_text(calibration: Calibration) -> str:
+    """Return what a radar without elevation determines, in one line."""
+    figures = [one for one in pose_figures(calibration) if one.key in (*_FIRM, "picture")]
+    return ", ".join(f"{one.label} {one.value} {one.unit}" for one in figures)
+
+
+def _mounting_figures(calibration: Calibration) -> tuple[Figure, ...]:
     mounting = mounting_of(calibration)
+    position_sigma_m, angle_sigma_rad = mounting.position_sigma_m.copy(), mounting.roll_pitch_yaw_sigma_rad.copy()
+    if not calibration.sees_elevation:
+        firm = sigma_in_radar_axes(calibration.camera_from_radar, calibration.firm_covariance)
+        position_sigma_m[:2], angle_sigma_rad[2] = firm.position_m[:2], firm.rotation_rad[2]
+    causes = calibration.dominant_errors()
+    of_position, of_rotation = (
+        "".join(f" {sentence(one.sentence)}" for one in causes if getattr(one, f"{part}_share"))
+        for part in ("position", "rotation")
+    )
     figures = [
-        Figure(key, label, with_sigma(100 * float(value), 100 * float(sigma)), "cm", hint)
-        for (key, label, hint), value, sigma in zip(
-            _POSITION, mounting.position_m, mounting.position_sigma_m, strict=True
-        )
+        Figure(key, label, with_sigma(100 * float(value), 100 * float(sigma)), "cm", hint + of_position)
+        for (key, label, hint), value, sigma in zip(_POSITION, mounting.position_m, position_sigma_m, strict=True)
     ]
-    degrees, sigmas = np.rad2deg(mounting.roll_pitch_yaw_rad), np.rad2deg(mounting.roll_pitch_yaw_sigma_rad)
+    degrees, sigmas = np.rad2deg(mounting.roll_pitch_yaw_rad), np.rad2deg(angle_sigma_rad)
     figures += [
-        Figure(key, label, with_sigma(float(value), float(sigma)), "deg", hint)
+        Figure(key, label, with_sigma(float(value), float(sigma)), "deg", hint + of_rotation)
         for (key, label, hint), value, sigma in zip(_ANGLES, degrees, sigmas, strict=True)
     ]
-    return (*figures, *_radar_figures(calibration))
+    return tuple(figures)
+
+
+def _picture_figures(calibration: Calibration) -> tuple[Figure, ...]:
+    """Return how far off a reprojection may be, if that is known."""
+    sigma_px = calibration.metrics.picture_sigma_px
+    if not np.isfinite(sigma_px):
+        return ()
+    hint = (
+        "One standard deviation, per axis, of where a radar position at the placements reprojects. Errors of pose and radar "
+        "mostly cancel there; the noise of a single radar position is not included."
+    )
+    return (Figure("picture", "in the picture", f"± {plain(sigma_px, 2)}", "px", hint),)
 
 
 def _radar_figures(calibration: Calibration) -> tuple[Figure, ...]:
@@ -100,6 +144,9 @@ def residual_limit_px(calibration: Calibration) -> float | None:
     lengths = [ellipse.semi_major_px for ellipse in ellipses if ellipse is not None]
     return float(np.median(lengths)) if lengths else None
 
+
+_FIRM = ("camera_x", "camera_y", "yaw")
+"""What a radar without elevation determines."""
 
 _POSITION = (
     (

@@ -1,13 +1,24 @@
 """What a client draws: plain numbers and final text, with nothing left to decide."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from calib_core.measurements import Stamp
 from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning
 
-__all__ = ["Advice", "ClickRow", "ClickState", "Ellipse", "Figure", "Level", "Stage", "View"]
+__all__ = [
+    "Advice",
+    "ClickRow",
+    "ClickState",
+    "Ellipse",
+    "Figure",
+    "Level",
+    "Stage",
+    "SystematicErrorRow",
+    "SystematicErrorTable",
+    "View",
+]
 
 ClickState: TypeAlias = Literal["pending", "inlier", "outlier", "excluded", "unpaired"]
 Level: TypeAlias = Literal["plain", "good", "warning"]
@@ -90,6 +101,48 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
+class SystematicErrorRow:
+    """One error that all pairs share, as a row of a table.
+
+    Attributes:
+        key: its name in files.
+        label: for display.
+        value: with its standard deviation; a dash if the pairs do not determine it.
+        prior: its standard deviation before any pair.
+        unit: of both; "" if it has none.
+        position_percent: its part of the variance of the position.
+        rotation_percent: the same of the rotation.
+        hint: what it is and what would reduce it, shown on hover.
+        level: "warning" if it makes up a third or more of either.
+    """
+
+    key: str
+    label: str
+    value: str
+    prior: str
+    unit: str
+    position_percent: int
+    rotation_percent: int
+    hint: str
+    level: Level = "plain"
+
+
+@dataclass(frozen=True, slots=True)
+class SystematicErrorTable:
+    """The errors that all pairs share.
+
+    Attributes:
+        rows: those that matter, the largest first.
+        note: on those left out; "" if there are none.
+        sentences: what the largest of them mean, and what would reduce them.
+    """
+
+    rows: tuple[SystematicErrorRow, ...] = ()
+    note: str = ""
+    sentences: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Advice:
     """Where to put the reflector next.
 
@@ -129,7 +182,9 @@ class View:
         method: the one in the options.
         clicks: in order of image time.
         metrics: how well the pairs agree.
-        pose: the camera's position and angles relative to the radar.
+        pose: the camera's position and angles relative to the radar, and the uncertainty in the picture.
+        pose_assumed: the part of the pose that a radar without elevation does not show; empty for others.
+        systematic_errors: the errors that all pairs share, and their parts in the uncertainty.
         warnings: of the latest outcome.
         options: the current ones; changes are sent as a part of this tree.
         residual_limit_px: residuals above this should be checked; None without a calibration.
@@ -157,3 +212,5 @@ class View:
     advice: Advice | None = None
     reference: str = ""
     comparison: tuple[Figure, ...] = ()
+    pose_assumed: tuple[Figure, ...] = ()
+    systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)

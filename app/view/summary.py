@@ -1,8 +1,9 @@
 """A calibration in a few lines of text, for the command line: the same figures as on the page."""
 
-from app.view.figures import metric_figures, pose_figures
+from app.view.figures import assumed_figures, metric_figures, pose_figures
 from app.view.model import Figure
 from app.view.number_format import plain
+from app.view.systematic_errors import uncertainty_sentences
 from app.view.wording import sentence
 from calib_core.results import Calibration
 
@@ -10,10 +11,18 @@ __all__ = ["summary_lines"]
 
 
 def summary_lines(calibration: Calibration) -> tuple[str, ...]:
-    """Return the figures, one per line and aligned, then the pairs that disagree and the warnings."""
-    figures = (*metric_figures(calibration), *pose_figures(calibration))
+    """Return the figures, one per line and aligned, then what they rest on, the pairs that disagree and the warnings.
+
+    For a radar without elevation what it determines comes first, and what it does not follows in one line.
+    """
+    metrics, pose, assumed = metric_figures(calibration), pose_figures(calibration), assumed_figures(calibration)
+    figures = (*pose, *metrics) if assumed else (*metrics, *pose)
     width = max(len(figure.label) for figure in figures)
     lines = [_line(figure, width) for figure in figures]
+    if assumed:
+        parts = ", ".join(f"{figure.label} {figure.value} {figure.unit}" for figure in assumed)
+        lines.insert(len(pose), f"assumed, because this radar measures no elevation: {parts}")
+    lines += [f"uncertainty: {line}" for line in uncertainty_sentences(calibration)]
     lines += [
         f"disagrees: {pair.id}: {plain(pair.distance_px)} px from its radar position"
         for pair in calibration.pairs

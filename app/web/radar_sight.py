@@ -67,7 +67,7 @@ def overlay_of(
 
 
 def _returns(calibration: Calibration, scan: RadarScan, options: GatingOptions) -> tuple[OverlayReturn, ...]:
-    points_camera = calibration.camera_from_radar @ scan.points_radar_m
+    points_camera = calibration.camera_from_radar @ calibration.radar_errors.corrected(scan.points_radar_m)
     seen = calibration.camera.sees(points_camera)
     pixels = calibration.camera.project(points_camera[seen])
     ranges = np.linalg.norm(scan.points_radar_m[seen], axis=1)
@@ -88,8 +88,7 @@ def _returns(calibration: Calibration, scan: RadarScan, options: GatingOptions) 
 def _guesses(calibration: Calibration, placements: Sequence[Placement]) -> tuple[tuple[float, float], ...]:
     if not placements:
         return ()
-    points_camera = calibration.camera_from_radar @ np.stack([placement.position_radar_m for placement in placements])
-    pixels = calibration.camera.project(points_camera)
+    pixels = calibration.reproject(np.stack([placement.position_radar_m for placement in placements]))
     return tuple((float(u), float(v)) for u, v in pixels[calibration.camera.in_image(pixels)])
 
 

@@ -72,7 +72,9 @@ def _with_map(calibration: Calibration) -> Callable[[np.ndarray], np.ndarray]:
     learnt = learn_angle_map(calibration)
     if learnt is None or not learnt.pays:
         return calibration.reproject
-    return lambda points: calibration.reproject(learnt.corrected(points))
+    return lambda points: calibration.camera.project(
+        calibration.camera_from_radar @ learnt.corrected(calibration.radar_errors.corrected(points))
+    )
 
 
 def _angle_errors(rng: np.random.Generator, simulated: SimulatedPairs) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,8 @@ the radar's range. Each of the two angles is modelled as a Gaussian process over
     y_i = f(x_i) + e_i,   f ~ GP(0, a^2 exp(-|x - x'|^2 / 2 l^2)),   e_i ~ N(0, s^2 + click_i^2),              (7)
 
 and every (a, l, s) of a grid is weighted by its marginal likelihood; the grid includes a = 0, so that the map is flat where
-the pairs show nothing but independent noise. The pose is fixed: the map is valid for this pose only.
+the pairs show nothing but independent noise. The map belongs to positions with `radar_errors` taken out, which the estimate
+has found already. Pose and errors are fixed: the map is valid for them only.
 """
 
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ import numpy as np
 
 from calib_core.arrays import Points2, Points3, Values
 from calib_core.camera import Camera
+from calib_core.estimation.unmeasured_elevation import is_flat
 from calib_core.geometry import RigidTransform
 from calib_core.radar import AngleMap, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, PairResult
@@ -58,7 +60,9 @@ def learn_angle_map(calibration: Calibration) -> AngleMap | None:
     elevation, azimuth = (_axis(directions[:, angle]) for angle in (1, 0))
     grid = np.stack([*np.meshgrid(azimuth, elevation)], axis=-1).reshape(-1, 2)
     fields = [_learn(directions, observed.off_rad[:, angle], observed.click_rad, grid) for angle in (0, 1)]
-    if np.ptp(directions[:, 1]) == 0.0:  # a radar without elevation does not show its elevation error
+    if is_flat(
+        np.array([pair.point_radar_m for pair in pairs])
+    ):  # a radar without elevation does not show its elevation error
         fields[1] = _Field(*(np.zeros_like(part) for part in (fields[1].mean, fields[1].sigma, fields[1].held_out)))
     polar = observed.polar.copy()
     polar[:, 1:] += np.stack([field.held_out for field in fields], axis=1)
@@ -81,7 +85,7 @@ def _thinned(pairs: list[PairResult]) -> list[PairResult]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _AngleErrors:
-    """Pixels (n, 2), measured polar positions (n, 3), clicked minus measured angles (n, 2), their sigma from the click (n,)."""
+    """Pixels (n, 2), polar positions (n, 3), clicked minus measured angles (n, 2), their sigma from the click (n,)."""
 
     pixels_px: Points2
     polar: Points3
@@ -92,7 +96,8 @@ class _AngleErrors:
 def _angle_errors(calibration: Calibration, pairs: list[PairResult]) -> _AngleErrors:
     """Measure the angle errors: the reflector lies on the click's ray at the radar's range."""
     pixels = np.array([pair.pixel_px for pair in pairs])
-    polar = polar_from_cartesian(np.array([pair.point_radar_m for pair in pairs]))
+    reported = np.array([pair.point_radar_m for pair in pairs])
+    polar = polar_from_cartesian(calibration.radar_errors.corrected(reported))
     by_click, distance_m = _on_the_rays(calibration.camera, calibration.camera_from_radar, pixels, polar[:, 0])
     shifted, _ = _on_the_rays(calibration.camera, calibration.camera_from_radar, pixels + _ONE_PX, polar[:, 0])
     one_px = np.hypot(*(shifted - by_click).T)

@@ -1,12 +1,16 @@
 """Next placement: where a further pair would reduce the pose's uncertainty most, and when to stop."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib_core.arrays import Points3, Values
-from calib_core.geometry import RigidTransform
-from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
+from calib_core.estimation.linearization import MeasurementPlanes
+from calib_core.estimation.measurement_model import pair_measurements
+from calib_core.estimation.systematic_errors import SystematicErrors
+from calib_core.measurements import Pair
+from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, NextPlacement
 
 __all__ = ["PlacementLimits", "next_placement"]
@@ -32,24 +36,65 @@ class PlacementLimits:
 def next_placement(calibration: Calibration, *, limits: PlacementLimits | None = None) -> NextPlacement | None:
     """Find the place whose pair would reduce the uncertainty most (A-optimal design); None if no place is free.
 
+    Places are true positions. Every error that the pairs share is an unknown next to the pose, so that no placement is said to
+    remove what placements cannot show; what no pair can show, such as the tilt of a radar without elevation, is left out.
+
     Args:
         calibration: of the default method, with its covariance.
         limits: where the reflector can go.
     """
-    used = np.array([pair.point_radar_m for pair in calibration.pairs if pair.inlier]).reshape(-1, 3)
-    if not len(used) or not np.isfinite(calibration.covariance).all():
+    inliers = [
+        _as_chosen(pair.measured, pair.candidate)
+        for pair in calibration.pairs
+        if pair.inlier and pair.measured is not None
+    ]
+    if not inliers or not np.isfinite(calibration.covariance).all():
         return None
-    limits = limits or PlacementLimits()
+    design = _design(inliers, calibration)
+    limits, used = limits or PlacementLimits(), cartesian_from_polar(design.planes.polar.T)
     places = _free_places(calibration, used, limits)
     if not len(places):
         return None
     distance_m = float(np.median(np.linalg.norm(used, axis=1)))
-    now = _spread(calibration.covariance[None], distance_m)[0]
-    then = _spread(_covariances_after(calibration, places), distance_m)
+    now = _spread(design.covariance.diagonal()[None, :6], distance_m)[0]
+    then = _spread(_variances_after(design, calibration, places), distance_m)
     best = int(np.argmin(then))
     gain = float(np.sqrt(now / then[best]))
-    pixel = calibration.reproject(places[best : best + 1])[0]
+    pixel = calibration.camera.project(calibration.camera_from_radar @ places[best : best + 1])[0]
     return NextPlacement(places[best], pixel, gain, may_stop=gain < _ENOUGH_GAIN)
+
+
+def _as_chosen(pair: Pair, candidate: int) -> Pair:
+    """Return a pair with the chosen candidate alone."""
+    return replace(pair, candidates=pair.candidates[candidate : candidate + 1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Design:
+    """The used places at their true positions, and the covariance (6 + k, 6 + k) of the pose and all k shared errors."""
+
+    planes: MeasurementPlanes
+    covariance: np.ndarray
+
+
+def _design(used: Sequence[Pair], calibration: Calibration) -> _Design:
+    """Invert the information of the used pairs and of all priors, with the estimated noise."""
+    pose, camera = calibration.camera_from_radar, calibration.camera
+    measurements = pair_measurements(used, camera, calibration.options).scaled(calibration.noise_scale)
+    errors = SystematicErrors((*measurements.errors.estimated, *measurements.errors.widening))
+    planes = MeasurementPlanes(
+        measurements.pixels_px.T,
+        measurements.sigma_px,
+        calibration.radar_errors.corrected_polar(measurements.reported.T),
+        measurements.sigma_polar.T,
+        errors,
+    )
+    jacobian = planes.linearize(camera, pose.rotation, pose.translation_m).jacobian.reshape(-1, 6 + len(errors))
+    information = jacobian.T @ jacobian
+    position = measurements.prior.rows(pose)[1]
+    information[:6, :6] += position.T @ position
+    information[6:, 6:] += np.diag(errors.sigma**-2.0)
+    return _Design(planes, np.linalg.inv(information))
 
 
 def _free_places(calibration: Calibration, used: Points3, limits: PlacementLimits) -> Points3:
@@ -75,25 +120,23 @@ def _heights(places: np.ndarray, used: Points3) -> Values:
     return np.asarray(np.column_stack([places, np.ones(len(places))]) @ plane)
 
 
-def _covariances_after(calibration: Calibration, places: Points3) -> np.ndarray:
-    """Return the covariance (n, 6, 6) after one more pair at each place: (P^-1 + J^T S^-1 J)^-1."""
-    jacobian = calibration.camera.pose_jacobian(calibration.camera_from_radar, places)
-    noise = _pixel_noise(calibration, places)
-    added = np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(noise, jacobian)
-    return np.linalg.inv(np.linalg.inv(calibration.covariance) + added)
+def _variances_after(design: _Design, calibration: Calibration, places: Points3) -> np.ndarray:
+    """Return the variances (n, 6) of the pose after one more pair at each place: P - P J^T (I + J P J^T)^-1 J P."""
+    pose, count = calibration.camera_from_radar, len(places)
+    planes = MeasurementPlanes(
+        np.zeros((2, count)),
+        np.full(count, np.median(design.planes.sigma_px)),
+        polar_from_cartesian(places).T,
+        np.tile(np.median(design.planes.sigma_polar, axis=1)[:, None], count),
+        design.planes.errors,
+    )
+    jacobian = planes.linearize(calibration.camera, pose.rotation, pose.translation_m).jacobian
+    moved = jacobian @ design.covariance
+    innovation = np.eye(2) + moved @ np.swapaxes(jacobian, 1, 2)
+    removed = (moved * np.linalg.solve(innovation, moved)).sum(axis=1)
+    return np.asarray((design.covariance.diagonal() - removed)[:, :6])
 
 
-def _pixel_noise(calibration: Calibration, places: Points3) -> np.ndarray:
-    """Return S = C + J V J^T (n, 2, 2) of a pair at each place, with the estimated noise."""
-    noise, scale = calibration.options.noise, np.array(calibration.noise_scale)
-    sigma = np.array([noise.sigma_range_m, np.deg2rad(noise.sigma_azimuth_deg), np.deg2rad(noise.sigma_elevation_deg)])
-    covariance = covariance_from_sigma_polar(places, np.tile(sigma * scale[1:], (len(places), 1)))
-    pose: RigidTransform = calibration.camera_from_radar
-    d_point = calibration.camera.project_with_jacobian(pose @ places)[1] @ pose.rotation
-    return np.asarray(d_point @ covariance @ np.swapaxes(d_point, 1, 2) + (noise.sigma_px * scale[0]) ** 2 * np.eye(2))
-
-
-def _spread(covariances: np.ndarray, distance_m: float) -> Values:
-    """Reduce covariances (n, 6, 6) to (n,) [rad^2]: rotation variance, plus position variance at the typical distance."""
-    variances = np.diagonal(covariances, axis1=1, axis2=2)
+def _spread(variances: np.ndarray, distance_m: float) -> Values:
+    """Reduce variances (n, 6) to (n,) [rad^2]: rotation variance, plus position variance at the typical distance."""
     return np.asarray(variances[:, 3:].sum(axis=1) + variances[:, :3].sum(axis=1) / distance_m**2)

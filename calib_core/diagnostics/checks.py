@@ -5,17 +5,18 @@ A check returns an empty list if all is well. The texts are for people; the code
 
 import numpy as np
 
-from calib_core.arrays import Vector3
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.diagnostics.handedness import assumed_axes, mirrored_axes
 from calib_core.diagnostics.intrinsics import intrinsics
 from calib_core.diagnostics.pairs import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
+from calib_core.diagnostics.picture import picture_sigma_px
 from calib_core.diagnostics.pose import camera_position, two_poses
 from calib_core.diagnostics.posterior import agreeing_outliers, pivotal_pair, possible_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
-from calib_core.geometry import skew
+from calib_core.diagnostics.systematic import angle_scale, clicks_off_centre
 from calib_core.plausibility import PIXELS_SUSPECTED, implausible_input
 from calib_core.radar import cartesian_from_polar, direction_cosines
+from calib_core.radar_axes import sigma_in_radar_axes, without_mounting
 from calib_core.results import DataWarning
 
 __all__ = ["warnings_of"]
@@ -41,6 +42,8 @@ def warnings_of(fit: SolvedFit) -> tuple[DataWarning, ...]:
         _many_outliers,
         _few_inliers,
         intrinsics,
+        angle_scale,
+        clicks_off_centre,
         _noise_excess,
         _smooth_angle_errors,
         _weak_geometry,
@@ -63,35 +66,25 @@ def _other_poses(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:
-    """Warn of a radar without elevation: say what the pairs determine and what depends on the reflector's assumed height."""
+    """Warn of a radar without elevation: say what the pairs determine and what depends on how it is mounted."""
     if not fit.measurements.flat:
         return []
-    position_cm, turn_deg = _sigmas_in_radar_axes(fit)
-    determined = (
-        f"range and azimuth determine forward ± {position_cm[0]:.0f} cm, left ± {position_cm[1]:.0f} cm and the rotation "
-        f"about the radar's up axis ± {turn_deg[2]:.1f} deg; up ± {position_cm[2]:.0f} cm and the rotations about left ± "
-        f"{turn_deg[1]:.1f} and forward ± {turn_deg[0]:.1f} deg depend on the clicks' rows and on the assumed height of "
-        "the reflector"
-    )
+    pose, stated = fit.refined.camera_from_radar, fit.uncertainty.covariance
+    firm = sigma_in_radar_axes(pose, without_mounting(pose, stated, fit.options.radar))
+    (forward, left), yaw = 100.0 * firm.position_m[:2], np.rad2deg(firm.rotation_rad[2])
+    assumed = sigma_in_radar_axes(pose, stated)
+    up, (roll, pitch) = 100.0 * assumed.position_m[2], np.rad2deg(assumed.rotation_rad[:2])
     return [
         DataWarning(
             "flat-radar",
-            "every radar position has elevation 0: this radar does not measure elevation, and the true one is unknown. One "
-            f"sigma: {determined}",
-            "measure the camera position, and put the reflector's centre at the radar's height at every placement: the pose "
-            "is then better than stated; if the radar does measure elevation, find out why it is missing",
+            f"this radar measures no elevation. One sigma: the pairs determine forward ± {forward:.0f} cm, left ± {left:.0f} cm "
+            f"and yaw ± {yaw:.1f} deg in the plane of the placements, and where its returns appear in the picture, "
+            f"± {picture_sigma_px(fit.refined, fit.uncertainty):.0f} px; up ± {up:.0f} cm, pitch ± {pitch:.1f} and roll "
+            f"± {roll:.1f} deg are assumptions about how it is mounted",
+            "state among the options how well the radar's tilt and height are known, or measure the camera position; if the "
+            "radar does measure elevation, find out why it is missing",
         )
     ]
-
-
-def _sigmas_in_radar_axes(fit: SolvedFit) -> tuple[Vector3, Vector3]:
-    """Return one sigma of the camera centre [cm], and of the rotation [deg], about forward, left and up."""
-    pose = fit.refined.camera_from_radar
-    turned = pose.rotation.T
-    centre = np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1)
-    covariance = fit.uncertainty.covariance
-    position_m = np.sqrt(np.diag(centre @ covariance @ centre.T))
-    return 100.0 * position_m, np.rad2deg(np.sqrt(np.diag(turned @ covariance[3:, 3:] @ turned.T)))
 
 
 def _many_outliers(fit: SolvedFit) -> list[DataWarning]:
@@ -149,7 +142,10 @@ def _smooth_angle_errors(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _weak_geometry(fit: SolvedFit) -> list[DataWarning]:
-    sigma = np.sqrt(np.diag(fit.uncertainty.covariance))
+    covariance = fit.uncertainty.covariance
+    if fit.measurements.flat:  # `_flat_radar` says what its tilt and height add
+        covariance = without_mounting(fit.refined.camera_from_radar, covariance, fit.options.radar)
+    sigma = np.sqrt(np.diag(covariance))
     rotation_rad, position_m = float(np.linalg.norm(sigma[3:])), float(np.linalg.norm(sigma[:3]))
     narrow = fit.uncertainty.condition > _NARROW_CONDITION and not fit.measurements.prior.measured
     if rotation_rad <= _WEAK_ROTATION_RAD and position_m <= _WEAK_POSITION_M and not narrow:

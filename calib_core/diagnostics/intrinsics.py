@@ -2,13 +2,16 @@
 
 To first order, a focal length longer by a share a moves a pixel by a d, with d its offset from the principal point; a
 radial distortion that is off by b moves it by b |d / f|^2 d, whatever the lens model. With whitened residuals e, whitened
-Jacobians J of the pose and g of such an unknown, and M = I - J (J^T J)^-1 J^T, which removes what the pose can explain,
+Jacobians J of the pose and of the estimated errors, priors included, g of such an unknown, and M = I - J (J^T J)^-1 J^T,
+which removes what these can explain,
 
     a = g^T M e / g^T M g,    var a = 1 / g^T M g,    F(1, nu - 1) = (a^2 / var a) (nu - 1) / (nu - a^2 / var a),       (8)
 
 because the noise was estimated with nu degrees of freedom from residuals that the wrong intrinsics had made larger. A score
 test takes one step from the optimum and needs no second fit. A wrong principal point cannot be detected: the rotation
-absorbs it. A radar without elevation is not tested: its own residuals grow towards the near placements.
+absorbs it. A scale of the radar's azimuths looks like a focal length and has a prior of its own, so it is not blamed on the
+lens (`systematic.angle_scale` names both). A radar without elevation is not tested: its own residuals grow towards the near
+placements.
 """
 
 from dataclasses import dataclass
@@ -17,6 +20,7 @@ import numpy as np
 
 from calib_core.arrays import Values
 from calib_core.diagnostics.solved_fit import SolvedFit
+from calib_core.estimation.prior_rows import prior_rows
 from calib_core.results import DataWarning
 
 __all__ = ["LensError", "intrinsics", "lens_errors"]
@@ -82,13 +86,14 @@ def lens_errors(fit: SolvedFit) -> tuple[LensError, LensError]:
     refined = fit.refined
     offset_px, share = _offsets(fit)
     root = np.sqrt(refined.weights)[:, None]
-    prior_residual, prior_jacobian = refined.measurements.prior.rows(refined.camera_from_radar)
+    prior_residual, prior_jacobian = prior_rows(refined.measurements, refined.camera_from_radar)
     moves_px = np.stack([offset_px, offset_px * share[:, None]], axis=2)
     gains = ((refined.model.whitening @ moves_px) * root[:, :, None]).reshape(-1, 2)
-    pose = np.concatenate([(refined.model.pose_jacobian * root[:, :, None]).reshape(-1, 6), prior_jacobian])
+    unknowns = prior_jacobian.shape[1]
+    fitted = np.concatenate([(refined.model.jacobian * root[:, :, None]).reshape(-1, unknowns), prior_jacobian])
     residual = np.concatenate([(refined.model.residual * root).reshape(-1), prior_residual])
-    explained, _ = np.linalg.qr(pose)
-    gains = np.concatenate([gains, np.zeros((3, 2))])
+    explained, _ = np.linalg.qr(fitted)
+    gains = np.concatenate([gains, np.zeros((len(prior_residual), 2))])
     gains = gains - explained @ (explained.T @ gains)
     focal, radial = (_lens_error(gain, residual, refined.degrees_of_freedom) for gain in gains.T)
     return focal, radial

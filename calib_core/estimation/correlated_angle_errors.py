@@ -15,6 +15,7 @@ import numpy as np
 
 from calib_core.arrays import Points2, Values
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
+from calib_core.estimation.prior_rows import prior_rows
 from calib_core.radar import polar_from_cartesian
 
 __all__ = ["pose_spread"]
@@ -45,7 +46,7 @@ def pose_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> np.nd
         return None
     inliers = np.flatnonzero(refined.weights > 0.5)  # an outlier's down-weighted residual would look like a perfect one
     residual, jacobian = _weighted_rows(refined, inliers)
-    prior = _prior_rows(refined)
+    prior = prior_rows(refined.measurements, refined.camera_from_radar)
     levels = [(independent, smooth) for independent in _INDEPENDENT for smooth in _SMOOTH]
     nothing = np.zeros((len(residual), 0))
     likelihoods = [_log_likelihoods(residual, jacobian, prior, nothing, [(1.0, 0.0)]) + _INDEPENDENT_LOG_ODDS]
@@ -64,17 +65,6 @@ def pose_spread(refined: ErrorsInVariablesFit, information: np.ndarray) -> np.nd
     middle = np.tensordot(probability, np.concatenate(middles), axes=1) + prior[1].T @ prior[1]
     inverse = np.linalg.inv(information)
     return np.asarray(inverse @ middle @ inverse)
-
-
-def _prior_rows(refined: ErrorsInVariablesFit) -> tuple[Values, np.ndarray]:
-    """Return the whitened residuals (3 + k,) and Jacobian (3 + k, 6 + k) of the priors of camera centre and errors."""
-    errors = refined.measurements.errors
-    residual, jacobian = refined.measurements.prior.rows(refined.camera_from_radar)
-    rows = np.zeros((3 + len(errors), 6 + len(errors)))
-    rows[:3, :6] = jacobian
-    if len(errors):
-        rows[3:, 6:] = np.diag(1.0 / errors.sigma)
-    return np.concatenate([residual, -errors.values / errors.sigma if len(errors) else []]), rows
 
 
 def _weighted_rows(refined: ErrorsInVariablesFit, inliers: np.ndarray) -> tuple[Values, np.ndarray]:

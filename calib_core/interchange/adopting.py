@@ -8,6 +8,7 @@ from calib_core.interchange.calibration_file import CalibrationFile, FrameNames,
 from calib_core.interchange.check.report import check
 from calib_core.interchange.imported import TRUTH_FORMAT, ImportedCalibration
 from calib_core.options import CalibrationOptions
+from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, DataWarning, Metrics
 
 __all__ = ["adopt", "adopted_calibration"]
@@ -66,6 +67,8 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
         unpaired=(),
         warnings=(*assumed, _imported_warning(found, source)),
         options=CalibrationOptions(),
+        radar_errors=found.file.calibration.radar_errors if found.file else RadarErrors(),
+        systematic_errors=found.file.calibration.systematic_errors if found.file else (),
     )
 
 

@@ -124,14 +124,16 @@ class CalibrationFile:
 
 
 def choose_check_point(calibration: Calibration) -> CheckPoint | None:
-    """Choose the inlier radar position, rounded to a millimetre, that projects nearest to the image centre.
+    """Choose the inlier's true position, rounded to a millimetre, that projects nearest to the image centre.
 
-    If no inlier is in the image, use a point ten metres along a ray off the centre. None if the lens images neither.
+    The plain transform applies to it, because the radar's errors are taken out. If no inlier is in the image, use a point ten
+    metres along a ray off the centre. None if the lens images neither.
     """
     camera = calibration.camera
     centre_px = np.array([camera.width_px - 1, camera.height_px - 1]) / 2
     inliers = sorted((pair for pair in calibration.pairs if pair.inlier), key=_id)
-    points_radar_m = np.round([pair.point_radar_m for pair in inliers], 3).reshape(-1, 3)
+    reported_radar_m = np.array([pair.point_radar_m for pair in inliers]).reshape(-1, 3)
+    points_radar_m = np.round(calibration.radar_errors.corrected(reported_radar_m), 3)
     if not _indices_seen(calibration, points_radar_m).size:
         ray = camera.rays(centre_px[None] * (0.9, 1.15))
         points_radar_m = np.round(calibration.camera_from_radar.inverse() @ (ray * _FALLBACK_RANGE_M), 3)
@@ -139,7 +141,7 @@ def choose_check_point(calibration: Calibration) -> CheckPoint | None:
     if not seen.size:
         return None
     points_radar_m = points_radar_m[seen]
-    pixels_px = calibration.reproject(points_radar_m)
+    pixels_px = calibration.camera.project(calibration.camera_from_radar @ points_radar_m)
     nearest = int(np.argmin(np.linalg.norm(pixels_px - centre_px, axis=1)))
     return CheckPoint(points_radar_m[nearest], pixels_px[nearest])
 

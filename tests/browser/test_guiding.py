@@ -86,3 +86,30 @@ def test_a_failure_of_the_papers_method_is_shown_in_the_warning_box(page: Driver
     assert page.view["hint"] in box
     assert page.text('[data-method="default"]').lower() in page.view["hint"]
     assert page.page.get_attribute("#connection", "data-stage") == "unsolvable"
+
+
+def test_the_pose_tab_lists_the_errors_that_all_pairs_share(page: Driver, truth: Any) -> None:
+    page.page.click("#tab-pose")
+    assert page.page.locator(".systematic").is_hidden()
+    page.click_sample(truth)
+    errors = page.view["systematic_errors"]
+    rows = page.page.locator(".systematic tbody tr")
+    assert rows.count() == len(errors["rows"]) > 0
+    for index, row in enumerate(errors["rows"]):
+        text = rows.nth(index).inner_text()
+        assert row["label"] in text
+        assert row["prior"] in text
+        assert rows.nth(index).get_attribute("data-hint") == row["hint"]
+    for sentence in errors["sentences"]:
+        assert sentence in page.text(".systematic")
+    assert (
+        page.value(
+            "(() => { const tab = document.getElementById('page-pose'); return tab.scrollWidth - tab.clientWidth; })()"
+        )
+        <= 0
+    )
+    assert page.page.locator(".pose table").nth(1).is_hidden(), "this radar measures elevation"
+    page.page.click("#tab-options")
+    page.page.locator("#page-options details summary").click()
+    assert "errors that all pairs share" in page.text("#page-options")
+    assert page.page.get_by_label("Azimuth scale").input_value() == "0.02"

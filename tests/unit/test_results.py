@@ -40,11 +40,21 @@ def test_unwrap_gives_the_calibration_or_raises_with_reason_and_hint(simulated: 
 
 
 @pytest.mark.parametrize("method", ["default", "paper"])
-def test_a_calibration_prints_as_eight_lines(simulated: SimulatedPairs, method: str) -> None:
+def test_a_calibration_prints_as_nine_lines(simulated: SimulatedPairs, method: str) -> None:
     lines = str(solved(simulated, CalibrationOptions(method=method))).splitlines()
-    assert len(lines) == 8
-    assert max(map(len, lines)) < 110
-    for word in ("pairs agree", "translation", "quaternion wxyz", "one sigma", "AED", "held-out", "warnings", "next"):
+    assert len(lines) == 9
+    assert max(map(len, lines)) < 120
+    for word in (
+        "pairs agree",
+        "translation",
+        "quaternion wxyz",
+        "one sigma",
+        "systematic",
+        "AED",
+        "held-out",
+        "warnings",
+        "next",
+    ):
         assert word in "\n".join(lines)
 
 

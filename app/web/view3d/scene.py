@@ -26,6 +26,7 @@ from calib_core.arrays import Points3
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.measurements import RadarScan
+from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, PairResult
 
 if TYPE_CHECKING:
@@ -152,13 +153,15 @@ class TabScene:
         if sight.scan is None:
             self._scan.visible = False
             return
+        calibration = shown_calibration(sight.session, sight.reference)
+        errors = calibration.radar_errors if calibration else RadarErrors()
         still = still_returns(sight.scan, sight.session.options.gating)
         colours = np.where(still[:, None], np.array(self._palette.still), np.array(self._palette.moving)).astype(
             np.uint8
         )
-        _fill_cloud(self._scan, sight.scan.points_radar_m, colours)
+        _fill_cloud(self._scan, errors.corrected(sight.scan.points_radar_m), colours)
         window = np.tile(np.array([self._palette.window], dtype=np.uint8), (len(sight.window), 1))
-        _fill_cloud(self._window, sight.window, window)
+        _fill_cloud(self._window, errors.corrected(sight.window), window)
 
     def _show_pose(self, sight: Sight) -> None:
         """Move the frustum, and the ground to the lowest chosen return, whenever the answer changes."""
@@ -175,7 +178,8 @@ class TabScene:
         if camera is not None:
             self._frustum.fov = vertical_field_of_view_rad(camera)
             self._frustum.aspect = camera.width_px / camera.height_px
-        heights = [float(pair.point_radar_m[2]) for pair in calibration.pairs if pair.inlier] if calibration else []
+        inliers = tuple(pair for pair in calibration.pairs if pair.inlier) if calibration else ()
+        heights = _true_positions(calibration, inliers)[:, 2].tolist() if calibration else []
         self._grid.position = (0.0, 0.0, min([0.0, *heights]))
 
     def _show_pairs(self, sight: Sight) -> None:
@@ -184,7 +188,7 @@ class TabScene:
             for node in (self._chosen, self._rays, self._ray, self._gap, self._ellipsoids, self._ellipsoid, self._name):
                 node.visible = False
             return
-        points = np.array([pair.point_radar_m for pair in calibration.pairs]).reshape(-1, 3)
+        points = _true_positions(calibration, calibration.pairs)
         residuals = np.array([pair.distance_px for pair in calibration.pairs])
         _fill_cloud(self._chosen, points, residual_colours(residuals, sight.view.residual_limit_px or 20.0))
         chosen = tuple(pair for pair in calibration.pairs if pair.id == sight.selected)
@@ -197,12 +201,13 @@ class TabScene:
     def _show_selected(self, calibration: Calibration, chosen: tuple[PairResult, ...]) -> None:
         rays = rays_to(calibration, chosen)
         _fill_lines(self._ray, rays)
-        _fill_lines(self._gap, np.stack([rays[0, 1], chosen[0].point_radar_m])[None] if len(rays) else rays)
+        points = _true_positions(calibration, chosen)
+        _fill_lines(self._gap, np.stack([rays[0, 1], points[0]])[None] if len(rays) else rays)
         self._name.visible = bool(chosen)
         if chosen:
-            point = chosen[0].point_radar_m
-            self._name.position = tuple(point + np.array([0.0, 0.0, 0.15]))
-            self._name.text = f"{chosen[0].id}: {np.linalg.norm(point):.2f} m, {_residual(chosen[0])}"
+            self._name.position = tuple(points[0] + np.array([0.0, 0.0, 0.15]))
+            reported_m = float(np.linalg.norm(chosen[0].point_radar_m))
+            self._name.text = f"{chosen[0].id}: {reported_m:.2f} m, {_residual(chosen[0])}"
 
     def _show_advice(self, sight: Sight) -> None:
         """Draw a ring around the best next placement."""
@@ -243,9 +248,13 @@ def _ground(scene: "viser.SceneApi") -> tuple[Any, list[Any]]:
     return grid, rings
 
 
+def _true_positions(calibration: Calibration, pairs: tuple[PairResult, ...]) -> Points3:
+    """Return where the radar's positions of some pairs (n, 3) truly are: its estimated errors are taken out."""
+    return calibration.radar_errors.corrected(np.array([pair.point_radar_m for pair in pairs]).reshape(-1, 3))
+
+
 def _shells(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:
-    points = np.array([pair.point_radar_m for pair in pairs]).reshape(-1, 3)
-    return ellipsoids(points, calibration.options.noise, calibration.noise_scale)
+    return ellipsoids(_true_positions(calibration, pairs), calibration.options.noise, calibration.noise_scale)
 
 
 def _cloud(scene: "viser.SceneApi", name: str, size_m: float) -> Any:

@@ -121,7 +121,7 @@ def rays_to(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarr
     """
     radar_from_camera = calibration.camera_from_radar.inverse()
     pixels = np.array([pair.pixel_px for pair in pairs]).reshape(-1, 2)
-    points = np.array([pair.point_radar_m for pair in pairs]).reshape(-1, 3)
+    points = calibration.radar_errors.corrected(np.array([pair.point_radar_m for pair in pairs]).reshape(-1, 3))
     distance_m = np.linalg.norm(calibration.camera_from_radar @ points, axis=1)
     ends = radar_from_camera @ (calibration.camera.rays(pixels) * distance_m[:, None])
     starts = np.broadcast_to(radar_from_camera.translation_m, ends.shape)

@@ -1,11 +1,11 @@
 """Check a calibration against pairs: the radar positions must project near their pixels."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from calib_core.arrays import Points2, Points3, frozen_array
+from calib_core.arrays import Points2, Points3, Values, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
@@ -17,6 +17,8 @@ from calib_core.interchange.own.documents import CALIBRATION_SCHEMA
 from calib_core.interchange.own.pairs_json import read_pairs
 from calib_core.interchange.syntax.strict_json import json_object
 from calib_core.measurements import MIN_PAIRS
+from calib_core.radar import RadarErrors
+from calib_core.results import Calibration
 
 __all__ = ["CheckPairs", "by_pairs", "read_check_pairs", "read_check_pairs_file"]
 
@@ -33,20 +35,31 @@ class CheckPairs:
         points_radar_m: (n, 3), n at least 4.
         pixels_px: (n, 2).
         camera: the camera the pixels belong to.
+        radar_errors: what the radar gets wrong in these positions, as far as it is known.
     """
 
     points_radar_m: Points3
     pixels_px: Points2
     camera: Camera
+    radar_errors: RadarErrors = field(default_factory=RadarErrors)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points_radar_m", frozen_array(self.points_radar_m, (None, 3)))
         object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (None, 2)))
 
+    def under(self, calibration: Calibration) -> "CheckPairs":
+        """Take out of the positions what a calibration says that this radar gets wrong."""
+        return replace(self, radar_errors=calibration.radar_errors)
+
+    def misses_px(self, camera_from_radar: RigidTransform) -> Values:
+        """Return the distances (n,) between the projected points and their pixels; infinite behind the camera."""
+        points_radar_m = self.radar_errors.corrected(self.points_radar_m)
+        apart = np.linalg.norm(self.camera.project(camera_from_radar @ points_radar_m) - self.pixels_px, axis=1)
+        return np.asarray(np.where(np.isfinite(apart), apart, np.inf))
+
     def median_miss_px(self, camera_from_radar: RigidTransform) -> float:
-        """Return the median distance between the projected points and their pixels; infinite behind the camera."""
-        apart = np.linalg.norm(self.camera.project(camera_from_radar @ self.points_radar_m) - self.pixels_px, axis=1)
-        return float(np.median(np.where(np.isfinite(apart), apart, np.inf)))
+        """Return the median of these distances."""
+        return float(np.median(self.misses_px(camera_from_radar)))
 
 
 def read_check_pairs_file(path: Path) -> CheckPairs:
@@ -66,36 +79,37 @@ def read_check_pairs_file(path: Path) -> CheckPairs:
 
 
 def read_check_pairs(text: str, source: str = "pairs") -> CheckPairs:
-    """Read pairs-1, or the inliers of a calibration-1 text.
+    """Read pairs-1, or the inliers of a calibration-1 text with what that says about the radar's errors.
 
     Raises:
         InputError: it is neither, or contains fewer than four pairs.
     """
     if json_object(text, source=source).get("schema") == CALIBRATION_SCHEMA:
         calibration = read_calibration(text, source).calibration
-        camera = calibration.camera
+        camera, radar_errors = calibration.camera, calibration.radar_errors
         inliers = [pair for pair in calibration.pairs if pair.inlier]
         points, pixels = [pair.point_radar_m for pair in inliers], [pair.pixel_px for pair in inliers]
     else:
         file = read_pairs(text, source)
-        camera = file.camera
+        camera, radar_errors = file.camera, RadarErrors()
         points = [pair.candidates[0].position_radar_m for pair in file.pairs]
         pixels = [pair.pixel_px for pair in file.pairs]
     if len(points) < MIN_PAIRS:
         raise InputError(f"{source}: contains {len(points)} pairs; a check needs at least {MIN_PAIRS}")
-    return CheckPairs(np.array(points), np.array(pixels), camera)
+    return CheckPairs(np.array(points), np.array(pixels), camera, radar_errors)
 
 
 def by_pairs(pose: WrittenPose, pairs: CheckPairs) -> CheckResult:
     """Check a pose against pairs: it fits, a slip explains why not, or nothing does."""
     near_px = _NEAR * float(np.hypot(pairs.camera.width_px, pairs.camera.height_px))
-    missed_px = pairs.median_miss_px(pose.camera_from_radar())
-    count = len(pairs.points_radar_m)
+    misses_px = pairs.misses_px(pose.camera_from_radar())
+    missed_px, count = float(np.median(misses_px)), len(pairs.points_radar_m)
     where = f"{shown(missed_px)} px or more from their pixels" if np.isfinite(missed_px) else "behind the camera"
+    aed = f", AED {shown(float(misses_px.mean()))} px" if np.isfinite(misses_px).all() else ""
     mismatch = f"half of the {count} pairs project {where}"
     if missed_px <= near_px:
         return CheckResult(
-            "good", "pairs-fit", f"half of the {count} pairs project within {shown(missed_px)} px of their pixels"
+            "good", "pairs-fit", f"half of the {count} pairs project within {shown(missed_px)} px of their pixels{aed}"
         )
     undone = explain(pose, pairs.median_miss_px, min(near_px, _CLEARLY_BETTER * missed_px))
     if undone is not None:

@@ -109,7 +109,7 @@ def check(
     if against is not None:
         results.append(_by_other(imported.pose, against.camera_from_radar))
     if pairs is not None:
-        results.append(by_pairs(imported.pose, pairs))
+        results.append(by_pairs(imported.pose, pairs.under(imported.file.calibration) if imported.file else pairs))
     if imported.file is not None:
         results += _by_its_pairs(imported)
     pose_tests = [result for result in results if result.code not in ("contradiction", _CHECK_POINT_UNUSED)]

@@ -2,12 +2,14 @@
 
 import json
 import re
+from dataclasses import fields
 
 import numpy as np
 
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
 from calib_core.interchange.imported import StatedCheckPoint
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
+from calib_core.radar import RadarErrors
 
 __all__ = ["POSE_ONLY", "hash_comment", "stated_check_point", "stated_frames", "statement", "xml_comment"]
 
@@ -40,6 +42,12 @@ def statement(file: CalibrationFile, meaning: str) -> tuple[str, ...]:
         lines.append(
             f"check point: p_radar [{numbers_text(check.radar_m)}] m -> p_camera [{numbers_text(point_camera_m[0])}] m"
             f" -> pixel [{numbers_text(check.pixel_px)}] px"
+        )
+    errors = file.calibration.radar_errors
+    if errors != RadarErrors():
+        lines.append(
+            "p_radar is a true position; first take the radar's errors out of a reported one, as in docs/formats.md: "
+            + ", ".join(f"{one.name} {getattr(errors, one.name):.6g}" for one in fields(errors))
         )
     # The version in a file may be any text; the frame names are checked and kept unchanged, including spaces.
     version = " ".join((file.provenance.version or "").split())

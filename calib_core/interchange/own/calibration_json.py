@@ -23,11 +23,18 @@ from calib_core.interchange.own.clicks_json import refuse_repeated_ids
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
 from calib_core.interchange.own.pair_document import SOLVED_FROM_KEYS, solved_pair_document, solved_pair_of
 from calib_core.interchange.own.provenance_document import provenance_document, provenance_of
+from calib_core.interchange.own.radar_errors_document import (
+    radar_errors_document,
+    radar_errors_of,
+    systematic_error_document,
+    systematic_error_of,
+)
 from calib_core.interchange.own.unknown_results import unknown_results, with_unknown
 from calib_core.interchange.syntax.content import decoded
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import json_object, parse_document
 from calib_core.measurements import ReflectorClick, Unpaired
+from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
 
 __all__ = [
@@ -108,6 +115,8 @@ def write_calibration(file: CalibrationFile) -> str:
         check_point=documents.CheckPointDocument(nested(check.radar_m), nested(check.pixel_px)) if check else None,
         metrics=_metrics_document(calibration.metrics),
         noise_scale=documents.NoiseScaleDocument(*calibration.noise_scale),
+        radar_errors=radar_errors_document(calibration.radar_errors),
+        systematic_errors=[systematic_error_document(error) for error in calibration.systematic_errors],
         radar_angle_map=angle_map_document(calibration.angle_map),
         paper=documents.PaperDocument(finite_or_none(calibration.iterative_px), finite_or_none(calibration.sqpnp_px)),
         warnings=[documents.WarningDocument(c.code, c.message, c.hint) for c in calibration.warnings],
@@ -118,18 +127,23 @@ def write_calibration(file: CalibrationFile) -> str:
         provenance=provenance_document(file.provenance),
     )
     content = msgspec.to_builtins(document)
+    if content["metrics"]["picture_sigma_px"] is None:
+        del content["metrics"]["picture_sigma_px"]
     for pair in content["pairs"]:
         if not pair["candidates"]:
             for key in SOLVED_FROM_KEYS:
                 del pair[key]
-    known = {key: content[key] for key in _KEY_ORDER if key != "radar_angle_map" or calibration.angle_map is not None}
+    absent = set() if calibration.angle_map is not None else {"radar_angle_map"}
+    if not calibration.systematic_errors and calibration.radar_errors == RadarErrors():
+        absent |= {"radar_errors", "systematic_errors"}
+    known = {key: content[key] for key in _KEY_ORDER if key not in absent}
     return json_text(with_unknown(known, file.unknown))
 
 
 _KEY_ORDER = (
     *("schema", "equation", "frames", "camera_from_radar", "radar_from_camera", "check_point", "sigma", "covariance"),
-    *("covariance_convention", "covariance_quantile", "metrics", "noise_scale", "radar_angle_map", "paper", "warnings"),
-    *("unpaired", "pairs", "camera", "options", "provenance"),
+    *("covariance_convention", "covariance_quantile", "metrics", "noise_scale", "radar_errors", "systematic_errors"),
+    *("radar_angle_map", "paper", "warnings", "unpaired", "pairs", "camera", "options", "provenance"),
 )
 
 
@@ -183,6 +197,8 @@ def calibration_file_of(
         iterative_px=nan_if_none(document.paper.iterative_px),
         sqpnp_px=nan_if_none(document.paper.sqpnp_px),
         angle_map=angle_map_of(document.radar_angle_map, source=source),
+        radar_errors=radar_errors_of(document.radar_errors),
+        systematic_errors=tuple(map(systematic_error_of, document.systematic_errors)),
     )
     try:
         frames = FrameNames(document.frames.radar, document.frames.camera)
@@ -239,6 +255,7 @@ def _metrics_document(metrics: Metrics) -> documents.MetricsDocument:
         n=metrics.n,
         chi2=finite_or_none(metrics.chi2),
         degrees_of_freedom=metrics.degrees_of_freedom,
+        picture_sigma_px=finite_or_none(metrics.picture_sigma_px),
     )
 
 
@@ -252,4 +269,5 @@ def _metrics(document: documents.MetricsDocument) -> Metrics:
         acc=document.acc,
         chi2=nan_if_none(document.chi2),
         degrees_of_freedom=document.degrees_of_freedom,
+        picture_sigma_px=nan_if_none(document.picture_sigma_px),
     )

@@ -27,7 +27,9 @@ __all__ = [
     "PairsDocument",
     "PositionDocument",
     "RadarDocument",
+    "RadarErrorsDocument",
     "SolvedPairDocument",
+    "SystematicErrorDocument",
     "TimeDocument",
     "TransformDocument",
     "names_schema",
@@ -49,6 +51,8 @@ def names_schema(text: str, schema: str) -> bool:
 
 Measured = Annotated[float, Meta(ge=-1e9, le=1e9)]
 """The bound is far beyond any position, pixel or coefficient; it keeps what is computed from them finite."""
+Scale = Annotated[float, Meta(gt=-1.0, le=1e9)]
+"""A scale minus 1: -1 would be a scale of 0."""
 Pixel = tuple[Measured, Measured]
 Position = tuple[Measured, Measured, Measured]
 Vector2 = tuple[float, float]
@@ -175,6 +179,7 @@ class MetricsDocument(Struct, frozen=True):
     n: Count = 0
     chi2: float | None = None
     degrees_of_freedom: Count = 0
+    picture_sigma_px: float | None = None
 
 
 class CandidateDocument(Struct, frozen=True):
@@ -282,6 +287,30 @@ class PaperDocument(Struct, frozen=True):
     sqpnp_px: float | None = None
 
 
+class RadarErrorsDocument(Struct, frozen=True):
+    """What the radar gets wrong at every position alike, to be taken out of a reported position before the pose is applied.
+
+    range = range - range_bias_m, then sqrt(range^2 - squared_height_m2); azimuth / (1 + azimuth_scale); elevation likewise.
+    """
+
+    azimuth_scale: Scale = 0.0
+    elevation_scale: Scale = 0.0
+    range_bias_m: Measured = 0.0
+    squared_height_m2: Measured = 0.0
+
+
+class SystematicErrorDocument(Struct, frozen=True):
+    """One error that all pairs share; value and sigmas have the unit in its name, the shares are of the pose's variance."""
+
+    name: Name
+    value: float
+    sigma: float
+    prior_sigma: float
+    estimated: bool = True
+    position_share: float = 0.0
+    rotation_share: float = 0.0
+
+
 class AngleMapDocument(Struct, frozen=True):
     """The radar's own smooth angle errors: what to add to a measured azimuth and elevation before applying the pose.
 
@@ -314,6 +343,8 @@ class CalibrationDocument(Struct, frozen=True):
     check_point: CheckPointDocument | None = None
     metrics: MetricsDocument = field(default_factory=MetricsDocument)
     noise_scale: NoiseScaleDocument = field(default_factory=NoiseScaleDocument)
+    radar_errors: RadarErrorsDocument = field(default_factory=RadarErrorsDocument)
+    systematic_errors: list[SystematicErrorDocument] = []
     radar_angle_map: AngleMapDocument | None = None
     paper: PaperDocument = field(default_factory=PaperDocument)
     warnings: list[WarningDocument] = []

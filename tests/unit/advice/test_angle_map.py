@@ -47,7 +47,7 @@ def solved(simulated: SimulatedPairs, count: int, options: CalibrationOptions | 
 
 
 def unseen_aed_px(simulated: SimulatedPairs, count: int, calibration: Calibration, angle_map: AngleMap | None) -> float:
-    points = positions(simulated)[count:]
+    points = calibration.radar_errors.corrected(positions(simulated)[count:])
     if angle_map is not None:
         points = angle_map.corrected(points)
     projected = calibration.camera.project(calibration.camera_from_radar @ points)
@@ -80,7 +80,8 @@ def test_sigma_grows_where_no_placement_was() -> None:
     calibration = solved(simulated, 30)
     angle_map = learn_angle_map(calibration)
     assert angle_map is not None
-    directions = polar_from_cartesian(np.array([pair.point_radar_m for pair in calibration.pairs]))[:, 1:]
+    reported = np.array([pair.point_radar_m for pair in calibration.pairs])
+    directions = polar_from_cartesian(calibration.radar_errors.corrected(reported))[:, 1:]
     grid = np.stack([*np.meshgrid(angle_map.azimuth_rad, angle_map.elevation_rad)], axis=-1)
     away = np.linalg.norm(grid[:, :, None] - directions, axis=3).min(axis=2)
     for angle in (0, 1):

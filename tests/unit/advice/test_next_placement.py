@@ -1,5 +1,7 @@
 """Following the advice reduces the uncertainty more than random placements."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,10 @@ def solved(pairs: list[Pair], simulated: SimulatedPairs) -> Calibration:
     outcome = calibrate_pairs(pairs, simulated.camera, OPTIONS)
     assert isinstance(outcome, Calibration)
     return outcome
+
+
+def positions(simulated: SimulatedPairs) -> np.ndarray:
+    return np.array([pair.candidates[0].position_radar_m for pair in simulated.pairs])
 
 
 def rotation_sigma(calibration: Calibration) -> float:
@@ -48,6 +54,34 @@ def test_following_the_advice_beats_random_placements() -> None:
         random = solved(list(simulated.pairs), simulated)
         ratios.append(rotation_sigma(random) / rotation_sigma(solved(advised, simulated)))
     assert np.median(ratios) > 1.2
+
+
+def test_the_promised_gain_is_what_a_pair_there_brings() -> None:
+    options = replace(OPTIONS, noise=replace(OPTIONS.noise, estimate_scale=False))
+    for seed in (3, 5):
+        rng = np.random.default_rng(seed)
+        simulated = simulate_pairs(10, rng=rng)
+        before = calibrate_pairs(simulated.pairs, simulated.camera, options).unwrap()
+        advice = next_placement(before)
+        assert advice is not None
+        added = measured_at(advice.position_radar_m, "added", simulated, rng)
+        after = calibrate_pairs([*simulated.pairs, added], simulated.camera, options).unwrap()
+        points = np.array([pair.point_radar_m for pair in before.pairs])
+        scale = np.repeat([1.0 / float(np.median(np.linalg.norm(points, axis=1))), 1.0], 3)
+        spreads = [np.sqrt(np.trace(one.covariance * np.outer(scale, scale))) for one in (before, after)]
+        assert spreads[0] / spreads[1] == pytest.approx(advice.gain, rel=0.15)
+
+
+def test_no_placement_is_said_to_level_a_radar_without_elevation() -> None:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(4))
+    flat = [np.array([np.hypot(*one[[0, 2]]), one[1], 0.0]) for one in positions(simulated)]
+    pairs = [
+        replace(pair, candidates=(replace(pair.candidates[0], position_radar_m=point),))
+        for pair, point in zip(simulated.pairs, flat, strict=True)
+    ]
+    advice = next_placement(solved(pairs, simulated))
+    assert advice is not None
+    assert advice.gain < 1.5
 
 
 def test_the_advised_place_is_in_view_and_new() -> None:

@@ -86,6 +86,7 @@ def test_wrong_intrinsics_show_in_the_residuals() -> None:
     matrix = simulated.camera.matrix_px * np.array([[1.25, 1, 1], [1, 1.25, 1], [1, 1, 1]])
     wrong = replace(simulated.camera, matrix_px=matrix)
     assert codes(simulated.pairs, wrong, measured()) & {
+        "angle-scale",
         "residuals-too-large",
         "many-outliers",
         "camera-position-contradicted",

@@ -8,14 +8,16 @@ import pytest
 
 from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
-from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
+from calib_core.options import CalibrationOptions, CameraPositionPrior, RadarOptions, SolvingOptions
 from calib_core.results import Calibration, DataWarning
 from calib_core.synthetic import RigOptions, simulate_pairs
 
-FREE = CalibrationOptions()
-MEASURED = CalibrationOptions(
-    solving=SolvingOptions(camera_position=CameraPositionPrior(RigOptions().camera_offset_m, 0.01))
+EXACT_RADAR = RadarOptions(
+    azimuth_scale_sigma=0.0, elevation_scale_sigma=0.0, range_bias_sigma_m=0.0, range_scale_sigma=0.0
 )
+POSITION = SolvingOptions(camera_position=CameraPositionPrior(RigOptions().camera_offset_m, 0.01))
+FREE = CalibrationOptions(radar=EXACT_RADAR)
+MEASURED = CalibrationOptions(radar=EXACT_RADAR, solving=POSITION)
 
 
 def suspected(seed: int, noise: str, options: CalibrationOptions, *, focal: float = 1.0, count: int = 20) -> str | None:
@@ -55,10 +57,15 @@ def test_a_distortion_that_was_forgotten_is_suspected() -> None:
         assert "grow with" in text
 
 
-@pytest.mark.parametrize("options", [FREE, MEASURED])
+@pytest.mark.parametrize("options", [FREE, MEASURED, CalibrationOptions(), CalibrationOptions(solving=POSITION)])
 @pytest.mark.parametrize("noise", ["ti", "imaging"])
 def test_right_intrinsics_are_not_suspected(noise: str, options: CalibrationOptions) -> None:
     assert [suspected(seed, noise, options) for seed in range(6)] == [None] * 6
+
+
+def test_a_focal_length_that_the_radars_scale_explains_is_not_blamed_on_the_lens() -> None:
+    for seed in range(3):
+        assert suspected(seed, "imaging", CalibrationOptions(solving=POSITION), focal=1.03) is None
 
 
 def test_a_few_pairs_are_not_tested() -> None:

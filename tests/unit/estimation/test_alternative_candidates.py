@@ -80,7 +80,9 @@ def test_two_clicks_of_one_moment_do_not_take_the_same_return() -> None:
     pairs = [replace(pair, image_time=TimeNs(k * 60 * 10**9)) for k, pair in enumerate(simulated.pairs)]
     first, second = pairs[0], pairs[1]
     both = (*first.candidates, *second.candidates)
-    wrong_first = replace(second, image_time=first.image_time, candidates=both, pixel_px=first.pixel_px + np.array([1.0, 0.0]))
+    wrong_first = replace(
+        second, image_time=first.image_time, candidates=both, pixel_px=first.pixel_px + np.array([1.0, 0.0])
+    )
     measurements = pair_measurements([replace(first, candidates=both), wrong_first, *pairs[2:]], simulated.camera, FREE)
     assert (measurements.returns[:4] >= 0).all()
     rows, _ = associate(measurements, simulated.camera_from_radar)

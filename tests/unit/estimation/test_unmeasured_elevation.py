@@ -71,9 +71,9 @@ def test_the_warning_says_what_the_pairs_determine_and_what_is_assumed() -> None
     calibration, _ = solved(1, 1.2, FREE)
     (warning,) = (one for one in calibration.warnings if one.code == "flat-radar")
     determined, assumed = warning.message.split("; up ")
-    assert "up axis ± 0." in determined
-    assert "about left" in assumed
-    assert "radar's height" in warning.hint
+    assert "yaw ± 0." in determined
+    assert "pitch ± 1" in assumed
+    assert "tilt and height" in warning.hint
 
 
 def test_the_covariance_of_a_radar_with_elevation_is_not_widened() -> None:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calib_core.advice.angle_map import AngleMap
 from calib_core.interchange import (
     FORMATS,
     Content,
@@ -20,6 +19,7 @@ from calib_core.interchange import (
     write_calibration,
 )
 from calib_core.interchange.own.schemas import schema_texts
+from calib_core.radar import AngleMap, RadarErrors
 
 
 @pytest.mark.parametrize("name", ["clicks-1.schema.json", "pairs-1.schema.json", "calibration-1.schema.json"])
@@ -72,7 +72,7 @@ def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(
     project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
-    recipe, _ = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    _, recipe, _ = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     golden = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
     add = np.deg2rad(np.random.default_rng(2).uniform(-2, 2, (4, 6, 2)))
     angle_map = AngleMap(np.linspace(-0.5, 0.5, 6), np.linspace(-0.2, 0.1, 4), add, np.abs(add), 9.0, 5.0)
@@ -88,9 +88,26 @@ def test_the_recipe_for_the_angle_map_gives_what_the_library_gives(
     assert np.abs(names["corrected"] - names["points"]).max() > 0.01
 
 
+def test_the_recipe_for_radar_errors_gives_what_the_library_gives(
+    project_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
+    recipe, _, _ = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    golden = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+    monkeypatch.chdir(tmp_path)
+    for errors in (RadarErrors(), RadarErrors(0.02, -0.03, 0.12, 0.6), RadarErrors(squared_height_m2=1e3)):
+        calibration = replace(golden.calibration, radar_errors=errors)
+        (tmp_path / "calibration.json").write_text(write_calibration(replace(golden, calibration=calibration)))
+        names: dict[str, Any] = {}
+        exec(recipe, names)
+        np.testing.assert_allclose(names["true"], errors.corrected(names["reported"]), rtol=0, atol=1e-12)
+        pixels_px = calibration.camera.project(names["points_camera"])
+        np.testing.assert_allclose(pixels_px, calibration.reproject(names["reported"]), rtol=0, atol=1e-8)
+
+
 def test_the_example_of_a_format_writes_and_reads(project_root: Path):
     page = (project_root / "docs/formats.md").read_text(encoding="utf-8")
-    _, example = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    _, _, example = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
     golden = read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
     names: dict[str, Any] = {}
     exec(example, names)

@@ -2,6 +2,7 @@
 
 import dataclasses
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ from calib_core.measurements import (
     TimeNs,
     Unsolvable,
 )
+from calib_core.radar import RadarErrors
 
 FEW = Unsolvable("too-few-pairs", "1 of 4 pairs", "click more placements")
 
@@ -105,6 +107,22 @@ def test_once_solved_the_new_calibration_is_drawn_and_compared(facts, file):
     assert {"apart_5_m", "apart_20_m", "apart_60_m"} <= set(figures)
     assert float(figures["apart_60_m"].value) > 1.0
     assert "other.yaml" in figures["rotation_apart"].hint
+
+
+def test_returns_and_placements_are_drawn_where_the_calibration_reprojects_them(facts, file):
+    errors = RadarErrors(azimuth_scale=0.03, elevation_scale=-0.02, range_bias_m=0.1)
+    other = Reference("other.json", dataclasses.replace(file.calibration, radar_errors=errors))
+    points = np.array([[6.0, 1.5, -0.4], [9.0, -2.0, 0.2]])
+    scan = RadarScan(TimeNs(0), points, np.zeros(2), np.full(2, 20.0), np.full((2, 3), np.nan))
+    placements = [SimpleNamespace(position_radar_m=point) for point in points]
+    overlay = overlay_of(0, Session(), scan, placements, other)
+    expected_px = other.calibration.reproject(points)
+    assert [(one.u_px, one.v_px) for one in overlay.returns] == [
+        pytest.approx(pixel, abs=0.01) for pixel in expected_px
+    ]
+    assert [one.range_m for one in overlay.returns] == pytest.approx(np.linalg.norm(points, axis=1), abs=1e-3)
+    assert list(overlay.guesses) == [pytest.approx(pixel) for pixel in expected_px]
+    assert np.abs(expected_px - file.calibration.reproject(points)).max() > 2.0
 
 
 @pytest.mark.parametrize("name", [form.name for form in FORMATS])

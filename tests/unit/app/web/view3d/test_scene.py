@@ -28,7 +28,7 @@ from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import RadarScan, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions, NoiseOptions
-from calib_core.radar import polar_from_cartesian
+from calib_core.radar import RadarErrors, cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, Metrics, PairResult
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
@@ -54,6 +54,21 @@ def test_a_ray_of_an_exact_click_ends_at_its_return() -> None:
     assert rays[:, 1] == pytest.approx(np.array([pair.point_radar_m for pair in solved.pairs]), abs=1e-9)
     centre = solved.camera_from_radar.inverse().translation_m
     assert rays[:, 0] == pytest.approx(np.broadcast_to(centre, (4, 3)), abs=1e-12)
+
+
+def test_a_ray_ends_at_the_true_position_of_its_return() -> None:
+    solved = calibration()
+    errors = RadarErrors(azimuth_scale=0.02, elevation_scale=-0.01, range_bias_m=0.1)
+    biased = tuple(replace(pair, point_radar_m=reported(errors, pair.point_radar_m)) for pair in solved.pairs)
+    rays = rays_to(replace(solved, pairs=biased, radar_errors=errors), biased)
+    assert rays[:, 1] == pytest.approx(np.array([pair.point_radar_m for pair in solved.pairs]), abs=1e-9)
+
+
+def reported(errors: RadarErrors, point_radar_m: np.ndarray) -> np.ndarray:
+    """Return what a radar with these errors reports for a true position (3,)."""
+    scales = np.array([1.0, 1.0 + errors.azimuth_scale, 1.0 + errors.elevation_scale])
+    polar = polar_from_cartesian(point_radar_m[None]) * scales + np.array([errors.range_bias_m, 0.0, 0.0])
+    return cartesian_from_polar(polar)[0]
 
 
 def test_rings_are_at_their_ranges_and_numbers_on_the_ground_next_to_them() -> None:

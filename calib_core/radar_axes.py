@@ -1,0 +1,84 @@
+"""The uncertainty of a pose in the radar's axes: what a radar without elevation determines, and what it leaves open."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Matrix33, Matrix66, Vector3, frozen_array
+from calib_core.geometry import RigidTransform, skew
+from calib_core.options import RadarOptions
+
+__all__ = ["RadarAxesSigma", "camera_axes_text", "mounting_moves", "sigma_in_radar_axes", "without_mounting"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RadarAxesSigma:
+    """One standard deviation of the camera's place and orientation, in the radar's axes; NaN if unknown.
+
+    A radar without elevation determines forward, left and the rotation about up; the others come from assumptions.
+
+    Attributes:
+        position_m: (3,) of the camera centre: forward, left, up.
+        rotation_rad: (3,) about forward (roll), left (pitch) and up (yaw).
+    """
+
+    position_m: Vector3
+    rotation_rad: Vector3
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position_m", frozen_array(self.position_m, (3,)))
+        object.__setattr__(self, "rotation_rad", frozen_array(self.rotation_rad, (3,)))
+
+    @property
+    def firm_text(self) -> str:
+        """What a radar without elevation determines."""
+        forward, left = 100.0 * self.position_m[:2]
+        return f"forward {forward:.1f}, left {left:.1f} cm; yaw {np.rad2deg(self.rotation_rad[2]):.2f} deg"
+
+    @property
+    def open_text(self) -> str:
+        """What such a radar leaves to assumptions."""
+        roll, pitch = np.rad2deg(self.rotation_rad[:2])
+        return f"up {100.0 * self.position_m[2]:.0f} cm; pitch {pitch:.1f}, roll {roll:.1f} deg: the radar has no elevation"
+
+
+def camera_axes_text(covariance: Matrix66) -> str:
+    """Write the standard deviations of the translation and of the rotation about the camera's x, y and z axes."""
+    sigma = np.sqrt(np.diag(covariance))
+    (x, y, z), (about_x, about_y, about_z) = 100.0 * sigma[:3], np.rad2deg(sigma[3:])
+    return f"x {x:.2f}, y {y:.2f}, z {z:.2f} cm; about x {about_x:.3f}, y {about_y:.3f}, z {about_z:.3f} deg"
+
+
+def sigma_in_radar_axes(camera_from_radar: RigidTransform, covariance: Matrix66) -> RadarAxesSigma:
+    """Turn the covariance (6, 6) of (dt, dtheta) into standard deviations in the radar's axes.
+
+    The camera centre c = -R^T t moves by -R^T dt - R^T [t]x dtheta.
+    """
+    turned = camera_from_radar.rotation.T
+    centre = np.concatenate([-turned, -turned @ skew(camera_from_radar.translation_m)], axis=1)
+    position_m2 = np.diag(centre @ covariance @ centre.T)
+    rotation_rad2 = np.diag(turned @ covariance[3:, 3:] @ turned.T)
+    return RadarAxesSigma(np.sqrt(np.maximum(position_m2, 0.0)), np.sqrt(np.maximum(rotation_rad2, 0.0)))
+
+
+def mounting_moves(rotation: Matrix33, radar: RadarOptions) -> np.ndarray:
+    """Return by how much (6, 3) one sigma of the radar's roll, pitch and height move the pose, if it measures no elevation.
+
+    Args:
+        rotation: of camera_from_radar; its columns are the radar's axes in the camera frame.
+        radar: with the priors of tilt and height.
+    """
+    moves = np.zeros((6, 3))
+    moves[3:, :2] = rotation[:, :2] * np.deg2rad(radar.tilt_sigma_deg)
+    moves[:3, 2] = rotation[:, 2] * radar.height_sigma_m
+    return moves
+
+
+def without_mounting(camera_from_radar: RigidTransform, covariance: Matrix66, radar: RadarOptions) -> Matrix66:
+    """Return the covariance (6, 6) that remains if tilt and height of a radar without elevation are left out.
+
+    It is that of the map from reported positions to the picture: in the plane of the placements the pairs determine it.
+    """
+    moves = mounting_moves(camera_from_radar.rotation, radar)
+    values, vectors = np.linalg.eigh(covariance - moves @ moves.T)
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)

@@ -1,0 +1,181 @@
+"""Errors that all pairs share: what is known of each of them, and in words what to do about the largest.
+
+The estimate takes them from `estimation/systematic_errors`; a file keeps their numbers, and their names say the rest.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib_core.arrays import Matrix66
+from calib_core.error_words import error_words
+
+__all__ = [
+    "DominantError",
+    "SystematicErrorResult",
+    "dominance_text",
+    "dominant_errors",
+    "is_determined",
+    "knowledge_text",
+    "rescaled",
+]
+
+_DOMINANT_SHARE = 1.0 / 3.0
+_UNDETERMINED = 0.97  # of the prior's sigma: the pairs say nothing
+_SHARES = (
+    (0.9, "nearly all"),
+    (0.71, "about three quarters"),
+    (0.58, "about two thirds"),
+    (0.44, "about half"),
+    (0.0, "about a third"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SystematicErrorResult:
+    """One error that all pairs share: what is known of it, and its part in the uncertainty of the pose.
+
+    Attributes:
+        name: key in files, with its unit; scales and shares have none.
+        text: what it is, for users.
+        value: estimated; for an error that is not taken out of the pose, what the residuals suggest.
+        sigma: standard deviation of that value.
+        prior_sigma: the same before any pair, as the options state it.
+        estimated: whether the pose was estimated together with it; otherwise it only widens the covariance.
+        position_share: its part of the variance of the translation, 0 to 1.
+        rotation_share: the same of the rotation.
+    """
+
+    name: str
+    text: str
+    value: float
+    sigma: float
+    prior_sigma: float
+    estimated: bool
+    position_share: float
+    rotation_share: float
+
+
+@dataclass(frozen=True, slots=True)
+class DominantError:
+    """An error, or one along several axes, with a third or more of the variance of the position, the rotation or both.
+
+    Attributes:
+        position_share: its part of the variance of the translation; 0 if below a third.
+        rotation_share: the same of the rotation.
+        label: a few words: which error it is, and what is known of it.
+        sentence: its part in the uncertainty, what is known of it, and what would reduce it.
+    """
+
+    position_share: float
+    rotation_share: float
+    label: str
+    sentence: str
+
+
+def dominant_errors(
+    errors: Sequence[SystematicErrorResult], covariance: Matrix66, *, measured: bool
+) -> tuple[DominantError, ...]:
+    """Name the errors that make up most of the uncertainty, the largest share first: at most one each of position and rotation.
+
+    Args:
+        errors: all that the pairs share.
+        covariance: (6, 6) of (dt, dtheta) [m, rad].
+        measured: whether the camera position was measured, so that a tape is no remedy.
+    """
+    families: dict[str, list[SystematicErrorResult]] = {}
+    for one in errors:
+        families.setdefault("".join(error_words(one.name).family) or one.name, []).append(one)
+    shares = {
+        name: (_sum_of(rows, "position_share"), _sum_of(rows, "rotation_share")) for name, rows in families.items()
+    }
+    chosen: dict[str, list[float]] = {}
+    for part in (0, 1):
+        most = max(shares, key=lambda name: shares[name][part], default="")
+        if most and shares[most][part] >= _DOMINANT_SHARE:
+            chosen.setdefault(most, [0.0, 0.0])[part] = shares[most][part]
+    found = [
+        _dominant(families[name], position, rotation, covariance, measured)
+        for name, (position, rotation) in chosen.items()
+    ]
+    return tuple(sorted(found, key=lambda one: -max(one.position_share, one.rotation_share)))
+
+
+def rescaled(
+    errors: Sequence[SystematicErrorResult], position: float, rotation: float
+) -> tuple[SystematicErrorResult, ...]:
+    """Multiply the shares of the position's and of the rotation's variance, as when only a part of that variance is meant."""
+    return tuple(
+        replace(one, position_share=position * one.position_share, rotation_share=rotation * one.rotation_share)
+        for one in errors
+    )
+
+
+def _sum_of(rows: Sequence[SystematicErrorResult], share: str) -> float:
+    return min(float(sum(getattr(row, share) for row in rows)), 1.0)
+
+
+def _dominant(
+    rows: Sequence[SystematicErrorResult],
+    position_share: float,
+    rotation_share: float,
+    covariance: Matrix66,
+    measured: bool,
+) -> DominantError:
+    largest = max(rows, key=lambda row: row.position_share + row.rotation_share)
+    words, known = error_words(largest.name), knowledge_text(largest)
+    position_cm = 100.0 * float(np.sqrt(np.trace(covariance[:3, :3])))
+    rotation_deg = float(np.rad2deg(np.sqrt(np.trace(covariance[3:, 3:]))))
+    parts = []
+    if position_share:
+        parts.append(f"{_share_text(position_share)} of the variance of the position ({position_cm:.2g} cm)")
+    if rotation_share:
+        parts.append(f"{_share_text(rotation_share)} of that of the rotation ({rotation_deg:.2g} deg)")
+    if not position_share:
+        parts = [parts[0].replace("that of", "the variance of")]
+    label, name = words.family or (words.label, words.text)
+    come = "come" if len(parts) > 1 else "comes"
+    remedy = (words.remedy_with_tape if measured else "") or words.remedy
+    return DominantError(
+        position_share=position_share,
+        rotation_share=rotation_share,
+        label=f"{label} {_value_text(largest) if is_determined(largest) else known.partition(' assumed')[0]}",
+        sentence=f"{' and '.join(parts)} {come} from {name}: {known}; {remedy}",
+    )
+
+
+def dominance_text(dominant: Sequence[DominantError]) -> str:
+    """Name these errors with their shares, in one line."""
+    parts = [
+        f"{100 * share:.0f} % of the {what}: {one.label}"
+        for one in dominant
+        for what, share in (("position", one.position_share), ("rotation", one.rotation_share))
+        if share
+    ]
+    return "; ".join(parts) or "none with a third of the uncertainty"
+
+
+def _share_text(share: float) -> str:
+    return next(words for least, words in _SHARES if share >= least)
+
+
+def knowledge_text(error: SystematicErrorResult) -> str:
+    """Say what is known of an error: "+1.2 ± 0.9 %, ± 2 % before any pair", or that the pairs do not determine it."""
+    words = error_words(error.name)
+    prior = f"± {words.factor * error.prior_sigma:.2g} {words.unit}".rstrip()
+    if not is_determined(error):
+        return f"{prior} assumed, the pairs do not determine it"
+    return f"{_value_text(error)}, {prior} before any pair"
+
+
+def is_determined(error: SystematicErrorResult) -> bool:
+    """Return whether the pairs say anything about an error."""
+    return error.sigma <= _UNDETERMINED * error.prior_sigma
+
+
+def _value_text(error: SystematicErrorResult) -> str:
+    words = error_words(error.name)
+    sigma = words.factor * error.sigma
+    decimals = max(0, 1 - int(np.floor(np.log10(sigma)))) if sigma > 0.0 else 2
+    return f"{words.factor * error.value:+.{decimals}f} ± {sigma:.{decimals}f} {words.unit}".rstrip()

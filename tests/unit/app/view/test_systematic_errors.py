@@ -1,0 +1,107 @@
+"""The page and the command line say what the uncertainty rests on, and for a radar without elevation first what is firm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.view import summary_lines
+from app.view.figures import assumed_figures, firm_text, pose_figures
+from app.view.systematic_errors import systematic_errors
+from calib_core.calibration import calibrate_pairs
+from calib_core.interchange import calibration_text, read_calibration
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
+from calib_core.synthetic import simulate_pairs
+from calib_core.systematic_errors import SystematicErrorResult
+
+
+def solved(*, flat: bool = False, options: CalibrationOptions | None = None) -> Calibration:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(1), noise="imaging")
+    pairs = simulated.pairs
+    if flat:
+        pairs = tuple(
+            replace(pair, candidates=(replace(one, position_radar_m=np.array([*one.position_radar_m[:2], 0.5])),))
+            for pair in pairs
+            for one in pair.candidates
+        )
+    return calibrate_pairs(pairs, simulated.camera, options).unwrap()
+
+
+@pytest.fixture(scope="module")
+def calibration() -> Calibration:
+    return solved()
+
+
+@pytest.fixture(scope="module")
+def flat() -> Calibration:
+    return solved(flat=True)
+
+
+def error(name: str, position: float, rotation: float, *, sigma: float = 0.02) -> SystematicErrorResult:
+    return SystematicErrorResult(name, "", 0.011, sigma, 0.02, True, position, rotation)
+
+
+def test_the_table_shows_what_matters_or_is_determined_the_largest_first(calibration: Calibration) -> None:
+    known = (
+        error("range_scale", 0.01, 0.0),
+        error("azimuth_scale", 0.0, 0.02, sigma=0.004),
+        error("elevation_scale", 0.4, 0.1),
+    )
+    table = systematic_errors(replace(calibration, systematic_errors=known))
+    assert [row.key for row in table.rows] == ["elevation_scale", "azimuth_scale"]
+    assert [row.level for row in table.rows] == ["warning", "plain"]
+    assert [(row.position_percent, row.rotation_percent) for row in table.rows] == [(40, 10), (0, 2)]
+    assert [row.value for row in table.rows] == ["–", "1.1 ± 0.4"]
+    assert [f"{row.prior} {row.unit}" for row in table.rows] == ["± 2.0 %", "± 2.0 %"]
+    assert table.note.startswith("1 more:")
+    (words,) = table.sentences
+    assert words.startswith("About a third of the variance of the position")
+    assert words.endswith("would reduce it.")
+
+
+def test_axes_that_the_pairs_do_not_determine_share_a_row(calibration: Calibration) -> None:
+    axes = (error("reflector_right_m", 0.05, 0.0), error("reflector_down_m", 0.04, 0.01))
+    (row,) = systematic_errors(replace(calibration, systematic_errors=axes)).rows
+    assert (row.label, row.position_percent, row.rotation_percent) == ("clicks off the phase centre", 9, 1)
+    apart = (replace(axes[0], sigma=0.01), axes[1])
+    assert [row.label for row in systematic_errors(replace(calibration, systematic_errors=apart)).rows] == [
+        "clicks right of centre",
+        "clicks below centre",
+    ]
+
+
+def test_the_command_line_says_the_same_as_the_page(calibration: Calibration) -> None:
+    lines = summary_lines(calibration)
+    assert [line.removeprefix("uncertainty: ") for line in lines if line.startswith("uncertainty: ")] == list(
+        systematic_errors(calibration).sentences
+    )
+    assert any(line.startswith("in the picture") for line in lines)
+    assert assumed_figures(calibration) == ()
+
+
+def test_a_radar_without_elevation_shows_first_what_is_firm(flat: Calibration) -> None:
+    figures = {one.key: one.value for one in pose_figures(flat)}
+    assert list(figures)[:4] == ["camera_x", "camera_y", "yaw", "picture"]
+    assert [one.key for one in assumed_figures(flat)] == ["camera_z", "roll", "pitch"]
+    lines = summary_lines(flat)
+    assert [line.split("  ")[0] for line in lines[:4]] == ["camera forward", "camera left", "yaw", "in the picture"]
+    assert "assumed, because this radar measures no elevation: camera up" in next(
+        line for line in lines if "assumed" in line
+    )
+    assert firm_text(flat).startswith("camera forward ")
+    assert firm_text(flat).endswith(" px")
+
+
+def test_a_calibration_from_a_file_looks_the_same(calibration: Calibration, flat: Calibration) -> None:
+    for one in (calibration, flat):
+        read = read_calibration(calibration_text(one)).calibration
+        assert systematic_errors(read) == systematic_errors(one)
+        assert summary_lines(read) == summary_lines(one)
+        assert str(read).partition("next")[0] == str(one).partition("next")[0]
+
+
+def test_the_papers_method_has_no_table() -> None:
+    paper = solved(options=CalibrationOptions(method="paper"))
+    assert not systematic_errors(paper).rows
+    assert not systematic_errors(paper).sentences
