@@ -54,7 +54,7 @@ class AgreeingOutliers:
 
 
 def find_agreeing_outliers(
-    measurements: PairMeasurements, refined: ErrorsInVariablesFit, *, rng: np.random.Generator
+    measurements: PairMeasurements, refined: ErrorsInVariablesFit, *, rng: "np.random.Generator"
 ) -> AgreeingOutliers | None:
     """Look among the outliers of a fit for pairs that agree on another pose.
 
@@ -89,7 +89,9 @@ def find_agreeing_outliers(
     )
 
 
-def _starts(outliers: PairMeasurements, fitted: RigidTransform, rng: np.random.Generator) -> tuple[RigidTransform, ...]:
+def _starts(
+    outliers: PairMeasurements, fitted: RigidTransform, rng: "np.random.Generator"
+) -> tuple[RigidTransform, ...]:
     """Return hypotheses from few pairs, as drawn and refined, and the fit: a companion's pose is often near it."""
     drawn = initial_poses(outliers, most=_STARTS, rng=rng)
     return (fitted, *drawn, *(one.camera_from_radar for one in solve_gnc(outliers, drawn, estimate_scale=False)))

@@ -35,7 +35,7 @@ class Mixture:
     centres: np.ndarray
     spreads: np.ndarray
 
-    def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
+    def draw(self, count: int, rng: "np.random.Generator") -> np.ndarray:
         """Draw samples (count, d), from each component as many as its weight says."""
         which = np.searchsorted(np.cumsum(self.weights), (np.arange(count) + rng.random()) / count * (1.0 - 1e-12))
         which = np.minimum(which, len(self.weights) - 1)
@@ -90,7 +90,7 @@ def importance_samples(
     per_round: int,
     rounds: tuple[int, int],
     enough: float,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
 ) -> WeightedSamples:
     """Sample the density exp(-costs / 2).
 

@@ -68,7 +68,7 @@ def sample_posterior(
     covariance: Matrix66,
     others: Sequence[RigidTransform],
     *,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
 ) -> PosteriorSamples:
     """Draw weighted samples of pose and noise level.
 
@@ -90,7 +90,7 @@ def sample_posterior(
     return PosteriorSamples(posterior, samples)
 
 
-def _hypotheses(posterior: PosePosterior, rng: np.random.Generator) -> tuple[RigidTransform, ...]:
+def _hypotheses(posterior: PosePosterior, rng: "np.random.Generator") -> tuple[RigidTransform, ...]:
     """Draw poses from few pairs each, and keep the most likely."""
     drawn = initial_poses(posterior.measurements, most=_HYPOTHESES, rng=rng)
     if not drawn:

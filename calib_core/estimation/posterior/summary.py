@@ -52,7 +52,7 @@ def summarize_posterior(
     quantile: float,
     *,
     shared: Matrix66 | None = None,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
 ) -> PosteriorSummary:
     """Compare samples with a stated pose and ellipsoid, and describe them by a pose and an ellipsoid of their own.
 
@@ -86,7 +86,7 @@ def summarize_posterior(
     )
 
 
-def _draws(covariance: Matrix66, count: int, rng: np.random.Generator) -> np.ndarray:
+def _draws(covariance: Matrix66, count: int, rng: "np.random.Generator") -> np.ndarray:
     values, vectors = np.linalg.eigh(covariance)
     return np.asarray(rng.standard_normal((count, 6)) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
 
