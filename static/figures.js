@@ -44,7 +44,7 @@ export function startFigures() {
 function draw() {
   const view = state.view;
   if (!view) return;
-  figures.classList.toggle("stale", view.solving && view.has_calibration);
+  figures.classList.toggle("stale", view.solving && !view.checking && view.has_calibration);
   const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Available after the first calibration.", level: "none" }));
   figures.replaceChildren(...shown.map(cell));
   poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Available after the first calibration.")])]));

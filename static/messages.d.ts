@@ -177,6 +177,7 @@ export interface View {
   status: string;
   hint: string;
   solving: boolean;
+  checking: boolean;
   solved_revision: number;
   can_undo: boolean;
   can_redo: boolean;

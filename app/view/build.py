@@ -34,6 +34,7 @@ def view(history: History, facts: RecordingFacts, reference: Reference | None = 
         status=status,
         hint=hint,
         solving=session.needs_solving,
+        checking=session.is_checking,
         solved_revision=session.outcome_revision if outcome is not None else -1,
         can_undo=bool(history.past),
         can_redo=bool(history.future),
@@ -89,6 +90,8 @@ def _words(session: Session, stage: Stage, reference: Reference | None) -> tuple
         return reference_words(session, reference), _still_missing(session, missing)
     if _waits_for_clicks(session):
         return f"{missing} more placement{'s' if missing > 1 else ''} needed", _next_click(session)
+    if session.is_checking and isinstance(outcome, Calibration):
+        return _agreement(outcome, "Checking…"), ""
     if stage == "solving":
         return "Solving…", ""
     if isinstance(outcome, Unsolvable):
@@ -124,12 +127,12 @@ def _next_click(session: Session) -> str:
     return f"{count} no radar position: {unpaired[0].reason}. {sentence(unpaired[0].hint)}"
 
 
-def _agreement(calibration: Calibration) -> str:
+def _agreement(calibration: Calibration, word: str = "Solved:") -> str:
     used = [pair for pair in calibration.pairs if not pair.excluded]
     agreeing = sum(pair.inlier for pair in used)
     agreed = f"all {len(used)}" if agreeing == len(used) else f"{agreeing} of {len(used)}"
     firm = "" if calibration.sees_elevation else f"; {firm_text(calibration)}"
-    return f"Solved: {agreed} pairs agree{firm}"
+    return f"{word} {agreed} pairs agree{firm}"
 
 
 def _warnings(calibration: Calibration) -> tuple[DataWarning, ...]:

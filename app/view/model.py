@@ -174,7 +174,8 @@ class View:
         stage: how far the session has come.
         status: the same in a few words: "4 more placements needed", "solving…", "solved: 18 of 20 pairs agree".
         hint: the next thing to do; "" when there is none.
-        solving: this revision is being solved; what is shown belongs to an older one.
+        solving: this revision is being solved; what is shown belongs to an older one, unless it is being checked.
+        checking: what is shown is a preview of this revision's answer; warnings and advice are still the previous ones.
         solved_revision: the revision that the figures belong to; -1 without figures.
         can_undo: whether there is a change to undo.
         can_redo: whether there is a change to redo.
@@ -198,6 +199,7 @@ class View:
     status: str
     hint: str
     solving: bool
+    checking: bool
     solved_revision: int
     can_undo: bool
     can_redo: bool

@@ -2,17 +2,21 @@
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from app.session import Solved
 from app.solver_worker import SolverWorker
+from calib_core.calibration import calibrate_pairs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
+from calib_core.synthetic import simulate_pairs
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 CLICK = ReflectorClick(TimeNs(10**18), "c1", 1.0, 2.0)
@@ -120,3 +124,31 @@ def test_after_close_nothing_is_answered() -> None:
     worker.request(3, [CLICK], CalibrationOptions(), answers)
     assert len(answers.all) == count
     assert all(solved.revision == 1 for solved in answers.all)
+
+
+def test_the_preview_is_delivered_before_the_answer_and_the_next_one_starts_from_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    simulated = simulate_pairs(8, rng=np.random.default_rng(1))
+    answer = calibrate_pairs(simulated.pairs, simulated.camera)
+    assert isinstance(answer, Calibration)
+    started_from: list[Calibration | None] = []
+
+    def steps(*_: object, previous: Calibration | None) -> Iterator[Calibration]:
+        started_from.append(previous)
+        yield replace(answer, checking=True)
+        yield answer
+
+    monkeypatch.setattr("app.solver_worker.solve_in_steps", steps)
+    answers = Answers()
+    worker = SolverWorker(Radar(), CAMERA)
+    for revision in (1, 2):
+        worker.request(revision, [CLICK], CalibrationOptions(), answers)
+        answers.wait()
+        answers.wait()
+    worker.close()
+    outcomes = [
+        (solved.revision, isinstance(solved.outcome, Calibration) and solved.outcome.checking) for solved in answers.all
+    ]
+    assert outcomes == [(1, True), (1, False), (2, True), (2, False)]
+    assert started_from == [None, answer]

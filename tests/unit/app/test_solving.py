@@ -18,6 +18,7 @@ from app.solving import (
     camera_for,
     half_window_s,
     solve_clicks,
+    solve_in_steps,
     solve_pairs,
 )
 from app.workspace import open_workspace
@@ -122,6 +123,23 @@ def test_page_and_command_line_give_the_same_bytes(
     workspace.close()
     assert isinstance(by_page, Calibration)
     assert calibration_text(by_page, recording) == calibration_text(by_command, recording)
+
+
+def test_a_preview_comes_first_and_the_answer_does_not_depend_on_it(
+    recording: Recording, clicks: tuple[ReflectorClick, ...], solved: Calibration
+) -> None:
+    camera, options = recording.camera(), CalibrationOptions()
+    for previous in (None, solved):
+        preview, answer = solve_in_steps(recording, clicks, camera, options, previous=previous)
+        assert isinstance(preview, Calibration)
+        assert isinstance(answer, Calibration)
+        assert (preview.checking, answer.checking) == (True, False)
+        error = preview.camera_from_radar.error_from(answer.camera_from_radar)
+        assert error @ np.linalg.solve(answer.covariance, error) < 0.1
+        assert preview.warnings == (solved.warnings if previous else ())
+        assert calibration_text(answer, recording) == calibration_text(solved, recording)
+    *previews, _ = solve_in_steps(recording, clicks, camera, replace(options, method="paper"), previous=solved)
+    assert previews == []
 
 
 def test_the_text_says_what_went_in(sample: Path, recording: Recording, solved: Calibration) -> None:

@@ -141,6 +141,17 @@ def test_figures_stay_while_a_newer_answer_is_computed() -> None:
     assert seen.metrics
 
 
+def test_a_preview_is_shown_as_being_checked() -> None:
+    pairs = [pair(f"c{k}", inlier=k > 1) for k in range(1, 6)]
+    preview = calibration(*pairs, checking=True)
+    drawn = shown(5, preview)
+    assert (drawn.checking, drawn.solving) == (True, True)
+    assert drawn.status == "Checking… 4 of 5 pairs agree"
+    checked = shown(5, replace(preview, checking=False))
+    assert (checked.checking, checked.solving) == (False, False)
+    assert checked.status == "Solved: 4 of 5 pairs agree"
+
+
 def test_the_view_says_what_can_be_undone_and_redone() -> None:
     seen = view(clicked(2, Undo()), FACTS)
     assert (seen.can_undo, seen.can_redo) == (True, True)
