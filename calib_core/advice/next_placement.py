@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Points3, Values
+from calib_core.association.placement_groups import placement_groups
 from calib_core.estimation.linearization import MeasurementPlanes
 from calib_core.estimation.measurement_model import pair_measurements
 from calib_core.estimation.systematic_errors import SystematicErrors
@@ -43,14 +44,12 @@ def next_placement(calibration: Calibration, *, limits: PlacementLimits | None =
         calibration: of the default method, with its covariance.
         limits: where the reflector can go.
     """
-    inliers = [
-        _as_chosen(pair.measured, pair.candidate)
-        for pair in calibration.pairs
-        if pair.inlier and pair.measured is not None
+    clicks = [
+        _as_chosen(one.measured, one.candidate) for one in calibration.pairs if one.inlier and one.measured is not None
     ]
-    if not inliers or not np.isfinite(calibration.covariance).all():
+    if not clicks or not np.isfinite(calibration.covariance).all():
         return None
-    design = _design(inliers, calibration)
+    design = _design([group.pair for group in placement_groups(clicks, calibration.options)], calibration)
     limits, used = limits or PlacementLimits(), cartesian_from_polar(design.planes.polar.T)
     places = _free_places(calibration, used, limits)
     if not len(places):

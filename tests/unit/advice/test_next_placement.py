@@ -72,6 +72,20 @@ def test_the_promised_gain_is_what_a_pair_there_brings() -> None:
         assert spreads[0] / spreads[1] == pytest.approx(advice.gain, rel=0.15)
 
 
+def test_more_clicks_of_the_same_placements_leave_the_gain_unchanged() -> None:
+    simulated = simulate_pairs(10, rng=np.random.default_rng(3))
+    before = solved(list(simulated.pairs), simulated)
+    repeated = [replace(pair, id=f"{pair.id}-{copy}") for pair in before.pairs for copy in range(3)]
+    measured = [
+        replace(result, measured=replace(result.measured, id=result.id)) for result in repeated if result.measured
+    ]
+    once, thrice = next_placement(before), next_placement(replace(before, pairs=tuple(measured)))
+    assert once is not None
+    assert thrice is not None
+    assert len(measured) == 3 * len(before.pairs)
+    assert thrice.gain == pytest.approx(once.gain, rel=0.05)
+
+
 def test_no_placement_is_said_to_level_a_radar_without_elevation() -> None:
     simulated = simulate_pairs(20, rng=np.random.default_rng(4))
     flat = [np.array([np.hypot(*one[[0, 2]]), one[1], 0.0]) for one in positions(simulated)]
