@@ -4,11 +4,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Matrix66, Vector3, frozen_array
+from calib_core.arrays import Matrix66, Vector3, frozen_array
 from calib_core.geometry import RigidTransform, skew
 from calib_core.options import RadarOptions
 
-__all__ = ["RadarAxesSigma", "camera_axes_text", "mounting_moves", "sigma_in_radar_axes", "without_mounting"]
+__all__ = [
+    "RadarAxesSigma",
+    "bias_moves",
+    "camera_axes_text",
+    "mounting_moves",
+    "sigma_in_radar_axes",
+    "without_mounting",
+]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,24 +68,45 @@ def sigma_in_radar_axes(camera_from_radar: RigidTransform, covariance: Matrix66)
     return RadarAxesSigma(np.sqrt(np.maximum(position_m2, 0.0)), np.sqrt(np.maximum(rotation_rad2, 0.0)))
 
 
-def mounting_moves(rotation: Matrix33, radar: RadarOptions) -> np.ndarray:
-    """Return by how much (6, 3) one sigma of the radar's roll, pitch and height move the pose, if it measures no elevation.
+def mounting_moves(camera_from_radar: RigidTransform, height_m: float, radar: RadarOptions) -> np.ndarray:
+    """Return by how much (6, 5) one sigma of a radar's unknown mounting moves the pose, if it measures no elevation.
+
+    These are roll, pitch and height, and the lever between the places where bearings meet and where ranges start: the radar's
+    up axis and the normal of the plane of the placements reach that plane tilt times height apart, forward and left. The
+    radar is taken to be about as high as the camera.
 
     Args:
-        rotation: of camera_from_radar; its columns are the radar's axes in the camera frame.
+        camera_from_radar: the pose; the columns of its rotation are the radar's axes in the camera frame.
+        height_m: z of the plane of the placements as reported.
         radar: with the priors of tilt and height.
     """
-    moves = np.zeros((6, 3))
-    moves[3:, :2] = rotation[:, :2] * np.deg2rad(radar.tilt_sigma_deg)
+    rotation, tilt_rad = camera_from_radar.rotation, np.deg2rad(radar.tilt_sigma_deg)
+    above_m = abs(float(camera_from_radar.inverse().translation_m[2]) - height_m)
+    moves = np.zeros((6, 5))
+    moves[3:, :2] = rotation[:, :2] * tilt_rad
     moves[:3, 2] = rotation[:, 2] * radar.height_sigma_m
+    moves[:3, 3:] = rotation[:, :2] * (tilt_rad * above_m)
     return moves
 
 
-def without_mounting(camera_from_radar: RigidTransform, covariance: Matrix66, radar: RadarOptions) -> Matrix66:
-    """Return the covariance (6, 6) that remains if tilt and height of a radar without elevation are left out.
+def without_mounting(
+    camera_from_radar: RigidTransform, covariance: Matrix66, height_m: float, radar: RadarOptions
+) -> Matrix66:
+    """Return the covariance (6, 6) that remains if the mounting of a radar without elevation is left out.
 
     It is that of the map from reported positions to the picture: in the plane of the placements the pairs determine it.
     """
-    moves = mounting_moves(camera_from_radar.rotation, radar)
+    moves = mounting_moves(camera_from_radar, height_m, radar)
     values, vectors = np.linalg.eigh(covariance - moves @ moves.T)
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
+
+
+def bias_moves(camera_from_radar: RigidTransform, radar: RadarOptions) -> np.ndarray:
+    """Return by how much (6, 2) one sigma of constant azimuth and elevation errors turns the radar's housing.
+
+    Such an error is a rotation about up, or nearly one about left, so the pose of the reported axes contains it.
+    """
+    moves = np.zeros((6, 2))
+    biases_deg = np.array([radar.azimuth_bias_sigma_deg, radar.elevation_bias_sigma_deg])
+    moves[3:] = camera_from_radar.rotation[:, [2, 1]] * np.deg2rad(biases_deg)
+    return moves

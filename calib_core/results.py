@@ -12,7 +12,7 @@ from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.measurements import Pair, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 from calib_core.radar import AngleMap, RadarErrors
-from calib_core.radar_axes import camera_axes_text, sigma_in_radar_axes, without_mounting
+from calib_core.radar_axes import bias_moves, camera_axes_text, sigma_in_radar_axes, without_mounting
 from calib_core.systematic_errors import DominantError, SystematicErrorResult, dominance_text, dominant_errors, rescaled
 
 __all__ = [
@@ -250,7 +250,14 @@ class Calibration:
         """The covariance (6, 6) without what no pair can show: tilt and height of a radar that measures no elevation."""
         if self.sees_elevation or not np.isfinite(self.covariance).all():
             return self.covariance
-        return without_mounting(self.camera_from_radar, self.covariance, self.options.radar)
+        height_m = float(np.median([pair.point_radar_m[2] for pair in self.pairs if pair.inlier]))
+        return without_mounting(self.camera_from_radar, self.covariance, height_m, self.options.radar)
+
+    @property
+    def housing_covariance(self) -> Matrix66:
+        """The covariance (6, 6) of the pose of the radar's housing: constant angle errors of the radar are included."""
+        moves = bias_moves(self.camera_from_radar, self.options.radar)
+        return np.asarray(self.covariance + moves @ moves.T)
 
     @property
     def errors_of_firm(self) -> tuple[SystematicErrorResult, ...]:

@@ -70,7 +70,7 @@ def _flat_radar(fit: SolvedFit) -> list[DataWarning]:
     if not fit.measurements.flat:
         return []
     pose, stated = fit.refined.camera_from_radar, fit.uncertainty.covariance
-    firm = sigma_in_radar_axes(pose, without_mounting(pose, stated, fit.options.radar))
+    firm = sigma_in_radar_axes(pose, without_mounting(pose, stated, fit.refined.placements_z_m, fit.options.radar))
     (forward, left), yaw = 100.0 * firm.position_m[:2], np.rad2deg(firm.rotation_rad[2])
     assumed = sigma_in_radar_axes(pose, stated)
     up, (roll, pitch) = 100.0 * assumed.position_m[2], np.rad2deg(assumed.rotation_rad[:2])
@@ -144,7 +144,8 @@ def _smooth_angle_errors(fit: SolvedFit) -> list[DataWarning]:
 def _weak_geometry(fit: SolvedFit) -> list[DataWarning]:
     covariance = fit.uncertainty.covariance
     if fit.measurements.flat:  # `_flat_radar` says what its tilt and height add
-        covariance = without_mounting(fit.refined.camera_from_radar, covariance, fit.options.radar)
+        refined = fit.refined
+        covariance = without_mounting(refined.camera_from_radar, covariance, refined.placements_z_m, fit.options.radar)
     sigma = np.sqrt(np.diag(covariance))
     rotation_rad, position_m = float(np.linalg.norm(sigma[3:])), float(np.linalg.norm(sigma[:3]))
     narrow = fit.uncertainty.condition > _NARROW_CONDITION and not fit.measurements.prior.measured

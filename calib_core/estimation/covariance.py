@@ -9,8 +9,8 @@ from calib_core.estimation.correlated_angle_errors import pose_spread
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import normal_equations
 from calib_core.estimation.systematic_errors import SystematicError
-from calib_core.estimation.unmeasured_elevation import mounting_spread
 from calib_core.options import RadarOptions
+from calib_core.radar_axes import mounting_moves
 from calib_core.results import SystematicErrorResult
 
 __all__ = ["PoseCovariance", "pose_covariance"]
@@ -72,9 +72,8 @@ def pose_covariance(
     wide, found = _shared_errors(refined, plain, covariance)
     pose = covariance[:6, :6] + wide
     if refined.measurements.flat:
-        reported = refined.measurements.reported[refined.rows]
-        height_m = float(np.median(reported[:, 0] * np.sin(reported[:, 2])))
-        pose = pose + mounting_spread(refined.camera_from_radar, height_m, radar or RadarOptions())
+        moves = mounting_moves(refined.camera_from_radar, refined.placements_z_m, radar or RadarOptions())
+        pose = pose + moves @ moves.T
     noise = (independent @ (information - prior_information) @ independent)[:6, :6]
     from_pairs = float(np.trace(np.linalg.solve(pose, noise))) / 6.0
     return PoseCovariance(

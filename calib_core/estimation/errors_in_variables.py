@@ -74,6 +74,12 @@ class ErrorsInVariablesFit:
     inlier_share: float
 
     @property
+    def placements_z_m(self) -> float:
+        """The median z of the chosen radar positions, as reported."""
+        range_m, _, elevation_rad = self.measurements.reported[self.rows].T
+        return float(np.median(range_m * np.sin(elevation_rad)))
+
+    @property
     def inliers(self) -> Flags:
         """The pairs (n,) that are more likely inliers than not."""
         return np.asarray(self.weights > 0.5)

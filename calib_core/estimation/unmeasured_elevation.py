@@ -3,17 +3,16 @@
 Such a radar reports one elevation, or one height, for whatever it sees. A pitch or a roll of the radar against the plane of
 the placements is then exactly a rotation, and the height of that plane above or below the radar a shift along its up axis, but
 for the range along the plane, sqrt(r^2 - h^2). So each elevation is taken as reported, with a small noise of its own, h^2 is
-estimated with the pose (`systematic_errors`), and pitch, roll and height are added to the covariance afterwards: the pose is
-the one that maps reported positions to pixels, its covariance that of the radar's housing.
+estimated with the pose (`systematic_errors`), and pitch, roll and height are added to the covariance afterwards
+(`radar_axes.mounting_moves`): the pose is the one that maps reported positions to pixels, its covariance that of the radar's
+housing.
 """
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Points3, Values
-from calib_core.geometry import RigidTransform
-from calib_core.options import RadarOptions
+from calib_core.arrays import Points3, Values
 
-__all__ = ["OWN_SIGMA_RAD", "is_flat", "mounting_spread"]
+__all__ = ["OWN_SIGMA_RAD", "is_flat"]
 
 OWN_SIGMA_RAD = np.deg2rad(0.5)
 """Standard deviation of each placement's elevation above or below the common plane: uneven ground."""
@@ -36,23 +35,3 @@ def is_flat(points_radar_m: Points3) -> bool:
 def _apart(values: Values) -> float:
     """Return how far from their median all but a few of the values lie."""
     return float(np.quantile(np.abs(values - np.median(values)), _NEARLY_ALL))
-
-
-def mounting_spread(camera_from_radar: RigidTransform, height_m: float, radar: RadarOptions) -> Matrix66:
-    """Return the covariance (6, 6) that an unknown pitch, roll and height of the radar add to the pose (dt, dtheta).
-
-    Bearings meet where the radar's up axis passes through the plane of the placements, ranges start at the foot of its normal;
-    the two are apart by tilt times height, forward and left. The radar is taken to be about as high as the camera.
-
-    Args:
-        camera_from_radar: the pose; the columns of its rotation are the radar's axes in the camera frame.
-        height_m: z of the plane of the placements as reported.
-        radar: with the priors of tilt and height.
-    """
-    rotation, tilt_rad = camera_from_radar.rotation, np.deg2rad(radar.tilt_sigma_deg)
-    above_m = abs(float(camera_from_radar.inverse().translation_m[2]) - height_m)
-    moves = np.zeros((6, 5))
-    moves[3:, :2] = rotation[:, :2] * tilt_rad
-    moves[:3, 2] = rotation[:, 2] * radar.height_sigma_m
-    moves[:3, 3:] = rotation[:, :2] * (tilt_rad * above_m)
-    return np.asarray(moves @ moves.T)

@@ -146,3 +146,12 @@ def test_points_of_another_shape_are_refused(simulated: SimulatedPairs) -> None:
 def test_invalid_options_are_refused_by_name(simulated: SimulatedPairs, options: Any, words: str) -> None:
     with pytest.raises(OptionError, match=words):
         calibrate_pairs(simulated.pairs, simulated.camera, options)
+
+
+def test_the_housing_is_less_certain_by_the_biases_of_the_angles(simulated: SimulatedPairs) -> None:
+    calibration = calibrate_pairs(simulated.pairs, simulated.camera)
+    assert isinstance(calibration, Calibration)
+    added = calibration.housing_covariance - calibration.covariance
+    about = calibration.camera_from_radar.rotation.T @ added[3:, 3:] @ calibration.camera_from_radar.rotation
+    np.testing.assert_allclose(about, np.diag([0.0, np.deg2rad(1.0) ** 2, np.deg2rad(1.0) ** 2]), atol=1e-12)
+    assert not added[:3].any()
