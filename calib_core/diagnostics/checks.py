@@ -27,6 +27,7 @@ _WEAK_POSITION_M = 0.3
 _NOISE_EXCESS = 2.5
 _NOTABLE_GROWTH = 2.5
 _FEW_INLIERS = 8
+_MANY_PLACES = 500  # of more, neighbours come from a tree: all distances would take too long
 _FOLLOWS_FROM_PIXELS = {"mirrored-axes", "handedness-open", "handedness-assumed", "intrinsics-suspected"}
 
 
@@ -170,6 +171,11 @@ def _places(fit: SolvedFit) -> int:
     centres = (
         direction_cosines(cartesian_from_polar(fit.measurements.polar[fit.refined.rows[fit.inliers]])) / CLUSTER_SCALE
     )
+    if len(centres) > _MANY_PLACES:
+        from scipy.spatial import cKDTree
+
+        near = cKDTree(centres).query_pairs(1.0, output_type="ndarray")
+        return len(centres) - len(np.unique(near.max(axis=1)))
     apart = sum(((axis[:, None] - axis) ** 2 for axis in centres.T), start=np.zeros((len(centres), len(centres))))
     first_close = (apart <= 1.0).argmax(axis=1)  # the place itself, if no earlier one is close
     return int((first_close == np.arange(len(centres))).sum())

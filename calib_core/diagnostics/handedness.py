@@ -191,7 +191,7 @@ def _plane(fit: SolvedFit) -> _Plane:
     for _ in range(_PLANE_ROUNDS):
         origin_m = (weights @ points) / weights.sum()
         offsets = points - origin_m
-        axes = np.linalg.svd(offsets * np.sqrt(weights)[:, None])[2]
+        axes = np.linalg.svd(offsets * np.sqrt(weights)[:, None], full_matrices=False)[2]
         weights = 1.0 / np.einsum("i,nij,j->n", axes[2], covariances, axes[2])
     distances = weights * (offsets @ axes[2]) ** 2
     excess = float(distances.sum()) / max(len(points) - 3, 1)

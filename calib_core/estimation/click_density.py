@@ -13,7 +13,7 @@ __all__ = ["click_density"]
 
 _ANYWHERE = 0.3  # share of the outliers whose click is anywhere on the image
 _LEAST_WIDTH = 5.0  # standard deviations of a click
-_MOST_OTHERS = 300  # more do not change a density, and all would make the work grow with the square
+_ALL_OTHERS, _SOME_OTHERS = 300, 100  # of more clicks than the first, so many give the density: work grows linearly
 
 
 def click_density(pixels_px: Points2, sigma_px: Values, camera: Camera) -> Values:
@@ -28,7 +28,7 @@ def click_density(pixels_px: Points2, sigma_px: Values, camera: Camera) -> Value
     even = np.full(count, 1.0 / (camera.width_px * camera.height_px))
     if count < 2:
         return even
-    chosen = np.linspace(0, count - 1, min(count, _MOST_OTHERS)).round().astype(np.int64)
+    chosen = np.linspace(0, count - 1, count if count <= _ALL_OTHERS else _SOME_OTHERS).round().astype(np.int64)
     squared = ((pixels_px[:, None] - pixels_px[chosen]) ** 2).sum(axis=2)
     nth = min(max(round(len(chosen) ** 0.5), 1), len(chosen) - 1)
     width2 = np.maximum(np.partition(squared, nth, axis=1)[:, nth], (_LEAST_WIDTH * sigma_px) ** 2)[:, None]
