@@ -10,7 +10,7 @@ pose, as one more unknown with its prior, where it bends the whole pose (a scale
 the covariance, by B Sigma B^T with B = -H^-1 J^T W A.
 
 The derivative belongs at the estimated true position mu: at the measured one it is correlated with the noise, and a scale
-comes out too large. A new error is one more entry of `_errors`.
+comes out too large. A new error is one more entry of `systematic_errors`.
 """
 
 from collections.abc import Callable
