@@ -14,7 +14,7 @@ from calib_core.synthetic.options import (
     SimulationOptions,
     Surroundings,
 )
-from calib_core.synthetic.pairs import (
+from calib_core.synthetic.pairs.simulated import (
     AISLE,
     FIELD,
     NOISE_PROFILES,
@@ -24,13 +24,13 @@ from calib_core.synthetic.pairs import (
     SimulatedPairs,
     simulate_pairs,
 )
-from calib_core.synthetic.placements import SimulatedPlacement
+from calib_core.synthetic.pairs.systematic_errors import SystematicErrors, draw_systematic_errors
 from calib_core.synthetic.presets import PRESETS, PresetName
-from calib_core.synthetic.radar_profiles import RADAR_PROFILES, RadarProfile
+from calib_core.synthetic.radar.profiles import RADAR_PROFILES, RadarProfile
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording, simulate
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
 from calib_core.synthetic.scans import SimulatedScans, simulate_scans
-from calib_core.synthetic.systematic_errors import SystematicErrors, draw_systematic_errors
+from calib_core.synthetic.scene.placements import SimulatedPlacement
 
 __all__ = [
     "AISLE",

@@ -7,8 +7,8 @@ import numpy as np
 
 from calib_core.arrays import Vector2
 from calib_core.measurements import ReflectorClick, TimeNs
-from calib_core.synthetic.placements import SimulatedPlacement, clear_frames
-from calib_core.synthetic.stage import Stage, child_rng
+from calib_core.synthetic.scene.placements import SimulatedPlacement, clear_frames
+from calib_core.synthetic.scene.stage import Stage, child_rng
 
 __all__ = ["ClickFault", "SimulatedClick", "clicks_of"]
 

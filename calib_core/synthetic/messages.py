@@ -17,8 +17,8 @@ from calib_core.recordings.containers.writing import (
     RadarReturnMessage,
     RecordedMessage,
 )
-from calib_core.synthetic.antennas import Antenna
-from calib_core.synthetic.radar_defects import second_azimuths
+from calib_core.synthetic.radar.antennas import Antenna
+from calib_core.synthetic.radar.defects import second_azimuths
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
 
 __all__ = [

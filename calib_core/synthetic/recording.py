@@ -8,13 +8,13 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import RadarScan, ReflectorClick, TimeNs
-from calib_core.synthetic.antennas import Antenna
 from calib_core.synthetic.clicking import SimulatedClick, clicks_of
 from calib_core.synthetic.options import SimulationOptions
-from calib_core.synthetic.placements import SimulatedPlacement, placements_of
+from calib_core.synthetic.radar.antennas import Antenna
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.scans import antenna_scans, radar_scans
-from calib_core.synthetic.stage import Stage, child_rng, set_stage
+from calib_core.synthetic.scene.placements import SimulatedPlacement, placements_of
+from calib_core.synthetic.scene.stage import Stage, child_rng, set_stage
 
 __all__ = ["SimulatedFrame", "SimulatedRecording", "simulate"]
 

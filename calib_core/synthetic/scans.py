@@ -10,16 +10,16 @@ from calib_core.arrays import Flags, Points2, Points3
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import RadarScan, RadarScans, ReflectorClick, TimeNs
-from calib_core.synthetic.antennas import Antenna
 from calib_core.synthetic.clicking import SimulatedClick, clicks_of
 from calib_core.synthetic.options import SimulationOptions
-from calib_core.synthetic.person import PersonState, capsules
-from calib_core.synthetic.placements import SimulatedPlacement, placements_of
-from calib_core.synthetic.radar_defects import second_azimuths, second_is_true
-from calib_core.synthetic.returns import Targets, measure
-from calib_core.synthetic.stage import Stage, child_rng, set_stage
-from calib_core.synthetic.story import Moment, Resting
-from calib_core.synthetic.surroundings import cart_position
+from calib_core.synthetic.radar.antennas import Antenna
+from calib_core.synthetic.radar.defects import second_azimuths, second_is_true
+from calib_core.synthetic.radar.returns import Targets, measure
+from calib_core.synthetic.scene.person import PersonState, capsules
+from calib_core.synthetic.scene.placements import SimulatedPlacement, placements_of
+from calib_core.synthetic.scene.stage import Stage, child_rng, set_stage
+from calib_core.synthetic.scene.story import Moment, Resting
+from calib_core.synthetic.scene.surroundings import cart_position
 
 __all__ = ["SimulatedScans", "antenna_scans", "radar_scans", "simulate_scans", "targets_at"]
 

@@ -13,9 +13,9 @@ from benchmarks.accuracy.rows import Claim, Figures, Kept, Part, Row, Section
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.synthetic import simulate_pairs
-from calib_core.synthetic.pairs import NoiseName, study_camera
+from calib_core.synthetic.pairs.simulated import NoiseName, study_camera
+from calib_core.synthetic.pairs.systematic_errors import draw_systematic_errors
 from calib_core.synthetic.rig import random_rig_apart
-from calib_core.synthetic.systematic_errors import draw_systematic_errors
 
 __all__ = ["HANDEDNESS_CODES", "ROWS", "measure_apart", "measure_clean_draw", "section"]
 

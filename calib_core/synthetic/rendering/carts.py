@@ -5,7 +5,7 @@ import numpy as np
 from calib_core.arrays import Vector3
 from calib_core.synthetic.rendering.light import lit
 from calib_core.synthetic.rendering.reflector import Facet
-from calib_core.synthetic.scenes import Scene
+from calib_core.synthetic.scene.scenes import Scene
 
 __all__ = ["cart_facets"]
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from calib_core.arrays import Vector3
 from calib_core.synthetic.options import Surroundings
-from calib_core.synthetic.person import Capsule, PersonState, capsules
 from calib_core.synthetic.rendering.carts import cart_facets
 from calib_core.synthetic.rendering.light import display, sun_direction
 from calib_core.synthetic.rendering.people import Window, draw_limbs, shade_ground
@@ -20,9 +19,10 @@ from calib_core.synthetic.rendering.reflector import (
 )
 from calib_core.synthetic.rendering.still import Still, trace_still
 from calib_core.synthetic.rig import Rig
-from calib_core.synthetic.scenes import Scene
-from calib_core.synthetic.story import Moment
-from calib_core.synthetic.surroundings import cart_position
+from calib_core.synthetic.scene.person import Capsule, PersonState, capsules
+from calib_core.synthetic.scene.scenes import Scene
+from calib_core.synthetic.scene.story import Moment
+from calib_core.synthetic.scene.surroundings import cart_position
 
 __all__ = ["FrameRenderer"]
 

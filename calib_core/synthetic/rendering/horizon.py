@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from calib_core.synthetic.rendering.noise import fractal_noise, hash_random, value_noise
-from calib_core.synthetic.scenes import Backdrop
+from calib_core.synthetic.scene.scenes import Backdrop
 
 __all__ = ["HAZE", "backdrop_colour"]
 

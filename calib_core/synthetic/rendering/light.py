@@ -3,7 +3,7 @@
 import numpy as np
 
 from calib_core.arrays import Vector3
-from calib_core.synthetic.scenes import Scene
+from calib_core.synthetic.scene.scenes import Scene
 
 __all__ = ["SKY", "SUN", "display", "lit", "sun_direction"]
 

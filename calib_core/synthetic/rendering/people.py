@@ -5,10 +5,10 @@ import numpy as np
 from calib_core.arrays import Vector3
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
-from calib_core.synthetic.person import Capsule, Surface
 from calib_core.synthetic.rendering.light import display, lit
 from calib_core.synthetic.rendering.still import Still
-from calib_core.synthetic.scenes import Scene
+from calib_core.synthetic.scene.person import Capsule, Surface
+from calib_core.synthetic.scene.scenes import Scene
 
 __all__ = ["Window", "draw_limbs", "shade_ground"]
 

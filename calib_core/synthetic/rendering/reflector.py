@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Points3, Vector3
-from calib_core.synthetic.person import Capsule
 from calib_core.synthetic.rendering.light import lit
-from calib_core.synthetic.scenes import Scene
+from calib_core.synthetic.scene.person import Capsule
+from calib_core.synthetic.scene.scenes import Scene
 
 __all__ = ["EDGE_M", "Facet", "apex_edges", "on_block", "reflector_facets", "shadow_limbs", "stand_limbs"]
 

@@ -7,7 +7,7 @@ import numpy as np
 from calib_core.arrays import Vector3
 from calib_core.synthetic.rendering.surfaces import Patch, material_colour
 from calib_core.synthetic.rig import Rig
-from calib_core.synthetic.scenes import Box, Cylinder, Material, Scene
+from calib_core.synthetic.scene.scenes import Box, Cylinder, Material, Scene
 
 __all__ = ["Hits", "Solid", "block", "shadowed", "trace"]
 

@@ -10,7 +10,7 @@ from calib_core.synthetic.rendering.light import display, lit, sun_direction
 from calib_core.synthetic.rendering.solids import Hits, Solid, block, shadowed, trace
 from calib_core.synthetic.rendering.surfaces import Patch, ground_colour
 from calib_core.synthetic.rig import Rig
-from calib_core.synthetic.scenes import Scene
+from calib_core.synthetic.scene.scenes import Scene
 
 __all__ = ["Still", "pixel_rays", "trace_still"]
 

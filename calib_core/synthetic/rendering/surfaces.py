@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.synthetic.rendering.noise import cell_random, fractal_noise, line_coverage
-from calib_core.synthetic.scenes import Ground, Material
+from calib_core.synthetic.scene.scenes import Ground, Material
 
 __all__ = ["Patch", "ground_colour", "material_colour"]
 

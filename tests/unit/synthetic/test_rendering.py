@@ -10,15 +10,15 @@ import pytest
 from calib_core.camera import CameraModel
 from calib_core.synthetic import Rig, SimulationOptions, random_rig, simulate, typical_camera
 from calib_core.synthetic.options import SceneName
-from calib_core.synthetic.person import PersonState
 from calib_core.synthetic.rendering.frames import FrameRenderer
 from calib_core.synthetic.rendering.light import sun_direction
 from calib_core.synthetic.rendering.noise import fractal_noise, line_coverage
 from calib_core.synthetic.rendering.reflector import apex_edges
 from calib_core.synthetic.rendering.still import Still, pixel_rays, trace_still
-from calib_core.synthetic.scenes import scene_named
-from calib_core.synthetic.stage import Stage, set_stage
-from calib_core.synthetic.story import Moment, Resting
+from calib_core.synthetic.scene.person import PersonState
+from calib_core.synthetic.scene.scenes import scene_named
+from calib_core.synthetic.scene.stage import Stage, set_stage
+from calib_core.synthetic.scene.story import Moment, Resting
 
 OPTIONS = SimulationOptions(placements=6, dwell_s=5.0, width_px=480, height_px=300, seed=3, radar_rate_hz=1.0)
 

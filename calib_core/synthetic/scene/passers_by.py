@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Vector2, frozen_array
-from calib_core.synthetic.person import PersonState
+from calib_core.synthetic.scene.person import PersonState
 
 __all__ = ["PasserBy", "draw_passers_by"]
 

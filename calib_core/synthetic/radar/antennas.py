@@ -6,7 +6,7 @@ import numpy as np
 
 from calib_core.measurements import NS_PER_S
 from calib_core.synthetic.options import SimulationOptions
-from calib_core.synthetic.radar_profiles import RadarProfile
+from calib_core.synthetic.radar.profiles import RadarProfile
 from calib_core.synthetic.timeline import Islands, SensorTimes, draw_times
 
 __all__ = ["Antenna", "antennas_of"]

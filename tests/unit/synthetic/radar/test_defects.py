@@ -21,8 +21,8 @@ from calib_core.synthetic import (
 )
 from calib_core.synthetic.messages import CLOUD_TOPIC, SECOND_COLUMN, SECOND_SUFFIX, camera_messages, radar_messages
 from calib_core.synthetic.options import SecondAzimuth
-from calib_core.synthetic.radar_defects import radar_from_reported
-from calib_core.synthetic.returns import Targets, measure
+from calib_core.synthetic.radar.defects import radar_from_reported
+from calib_core.synthetic.radar.returns import Targets, measure
 from calib_core.synthetic.rig import RigOptions, radar_stand
 from calib_core.synthetic.truth import truth_text
 

@@ -10,8 +10,8 @@ from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Candidate, Pair
 from calib_core.radar import cartesian_from_polar, covariance_from_sigma_polar
+from calib_core.synthetic.pairs.systematic_errors import SystematicErrors
 from calib_core.synthetic.rig import Rig, RigOptions, random_rig, typical_camera
-from calib_core.synthetic.systematic_errors import SystematicErrors
 
 __all__ = [
     "AISLE",

@@ -6,7 +6,7 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points3, Vector3
 from calib_core.synthetic.options import Surroundings
-from calib_core.synthetic.scenes import Box, Cylinder, Scatterer, Scene
+from calib_core.synthetic.scene.scenes import Box, Cylinder, Scatterer, Scene
 
 __all__ = ["Flicker", "cart_position", "draw_flickers", "furnished", "in_sight"]
 

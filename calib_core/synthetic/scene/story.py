@@ -11,8 +11,8 @@ from typing import Literal
 import numpy as np
 
 from calib_core.arrays import Values, Vector2, Vector3
-from calib_core.synthetic.passers_by import PasserBy
-from calib_core.synthetic.person import PersonState, hand_position
+from calib_core.synthetic.scene.passers_by import PasserBy
+from calib_core.synthetic.scene.person import PersonState, hand_position
 
 __all__ = ["Moment", "Resting", "Story", "tell_story"]
 

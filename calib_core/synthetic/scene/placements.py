@@ -7,9 +7,9 @@ import numpy as np
 
 from calib_core.arrays import Vector2, Vector3, frozen_array
 from calib_core.measurements import TimeNs
-from calib_core.synthetic.person import PersonState, capsules
-from calib_core.synthetic.stage import Stage
-from calib_core.synthetic.story import Resting
+from calib_core.synthetic.scene.person import PersonState, capsules
+from calib_core.synthetic.scene.stage import Stage
+from calib_core.synthetic.scene.story import Resting
 
 __all__ = ["SimulatedPlacement", "clear_frames", "placements_of"]
 

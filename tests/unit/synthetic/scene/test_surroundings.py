@@ -9,11 +9,11 @@ from calib_core.errors import OptionError
 from calib_core.measurements import NS_PER_S, RadarScans
 from calib_core.radar import direction_cosines
 from calib_core.synthetic import SimulatedScans, SimulationOptions, Surroundings, simulate, simulate_scans
-from calib_core.synthetic.placements import SimulatedPlacement
 from calib_core.synthetic.rendering.frames import FrameRenderer
-from calib_core.synthetic.scenes import Box, scene_named
-from calib_core.synthetic.stage import set_stage
-from calib_core.synthetic.surroundings import cart_position, in_sight
+from calib_core.synthetic.scene.placements import SimulatedPlacement
+from calib_core.synthetic.scene.scenes import Box, scene_named
+from calib_core.synthetic.scene.stage import set_stage
+from calib_core.synthetic.scene.surroundings import cart_position, in_sight
 
 QUIET = SimulationOptions(
     scene="field",

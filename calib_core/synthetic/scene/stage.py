@@ -8,16 +8,16 @@ from calib_core.arrays import Points3, Vector3
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, TimeNs
-from calib_core.synthetic.antennas import Antenna, antennas_of
 from calib_core.synthetic.options import IntrinsicsErrors, SimulationOptions
-from calib_core.synthetic.pairs import draw_positions
-from calib_core.synthetic.passers_by import draw_passers_by
-from calib_core.synthetic.radar_defects import radar_from_reported
-from calib_core.synthetic.radar_profiles import RadarProfile, profile_with
+from calib_core.synthetic.pairs.simulated import draw_positions
+from calib_core.synthetic.radar.antennas import Antenna, antennas_of
+from calib_core.synthetic.radar.defects import radar_from_reported
+from calib_core.synthetic.radar.profiles import RadarProfile, profile_with
 from calib_core.synthetic.rig import Rig, random_rig, typical_camera
-from calib_core.synthetic.scenes import Scatterer, Scene, scene_named
-from calib_core.synthetic.story import Story, tell_story
-from calib_core.synthetic.surroundings import Flicker, draw_flickers, furnished, in_sight
+from calib_core.synthetic.scene.passers_by import draw_passers_by
+from calib_core.synthetic.scene.scenes import Scatterer, Scene, scene_named
+from calib_core.synthetic.scene.story import Story, tell_story
+from calib_core.synthetic.scene.surroundings import Flicker, draw_flickers, furnished, in_sight
 from calib_core.synthetic.timeline import Islands, SensorTimes, draw_islands, draw_times
 
 __all__ = ["Stage", "child_rng", "set_stage"]

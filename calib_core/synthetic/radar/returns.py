@@ -8,8 +8,8 @@ from calib_core.arrays import Flags, Points3, Values, frozen_array
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import direction_cosines
 from calib_core.synthetic.options import RadarDefects
-from calib_core.synthetic.radar_defects import distorted, reported_points
-from calib_core.synthetic.radar_profiles import RadarProfile
+from calib_core.synthetic.radar.defects import distorted, reported_points
+from calib_core.synthetic.radar.profiles import RadarProfile
 
 __all__ = ["Targets", "measure"]
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from calib_core.synthetic.options import SceneName
-from calib_core.synthetic.pairs import PairsLayout
+from calib_core.synthetic.pairs.simulated import PairsLayout
 
 __all__ = ["Backdrop", "Box", "Cylinder", "Ground", "Material", "Scatterer", "Scene", "scene_named"]
 
