@@ -100,6 +100,11 @@ class SystematicErrors:
         return np.array([one.sigma for one in self.estimated])
 
     @property
+    def prior_information(self) -> np.ndarray:
+        """Inverse covariance of the priors of the estimated errors: (k, k)."""
+        return np.diag(self.sigma**-2.0) if len(self) else np.zeros((0, 0))
+
+    @property
     def offset_m(self) -> Vector3:
         """The reflector's offset from the clicked point, in the camera frame: (3,)."""
         offset_m = np.zeros(3)

@@ -66,14 +66,14 @@ def find_agreeing_outliers(
     outliers = np.flatnonzero(~refined.inliers)
     if not _LEAST_PAIRS <= len(outliers) <= _MOST_OUTLIERS:
         return None
-    free = replace(measurements, prior=measurements.prior.weakened())  # a companion's camera may be anywhere
-    starts = _starts(free.some(outliers), refined.camera_from_radar, rng)
-    used = np.zeros((len(starts), len(free)), dtype=bool)
-    used[:, outliers] = True
+    # a companion's camera may be anywhere
+    free = replace(measurements, prior=measurements.prior.weakened()).some(outliers)
+    starts = _starts(free, refined.camera_from_radar, rng)
+    used = np.ones((len(starts), len(free)), dtype=bool)
     posterior = pose_posterior(free, refined.camera_from_radar, np.zeros(3))
     as_assumed = np.zeros((len(starts), 4))
     modes = refine_poses(posterior, batch_of(starts), as_assumed, share=_SHARE, used=used, rounds=_ROUNDS)
-    agree = modes.inlier[:, outliers] > 0.5
+    agree = modes.inlier > 0.5
     ratios = np.where(agree.sum(axis=1) >= _LEAST_PAIRS, _log_ratios(modes, free.prior.sigma_m), -np.inf)
     best = int(np.argmax(ratios))
     if not ratios[best] > _LEAST_LOG_RATIO:
