@@ -84,9 +84,9 @@ def _told(draw: Draw) -> str:
     return f"{draw.noise}, {draw.pairs}, {'free' if draw.tape_m is None else 'tape'}{apart}"
 
 
-_MODES = ("doubtful-pair", "one-pair-decides", "two-poses")
+_MODES = ("agreeing-outliers", "doubtful-pair", "one-pair-decides", "two-poses")
 _HAND = ("mirrored-axes", "handedness-open")
-_LENS = ("intrinsics-suspected",)
+_LENS = ("angle-scale", "intrinsics-suspected")
 _UNITS = ("units-suspected", "camera-position-contradicted")
 
 _SHARED = (
@@ -185,7 +185,7 @@ _CLICKING = (
     ),
     *_rows(
         "half of the pairs from before the camera was turned by 4 deg",
-        ("two-poses", "many-outliers"),
+        ("agreeing-outliers", "two-poses", "many-outliers"),
         Draw("group-imaging-tape", tape_m=_TAPE_M, change=_moved(0.5, 4.0)),
         Draw("group-ti-free", "ti", 40, change=_moved(0.5, 4.0)),
     ),
@@ -197,13 +197,13 @@ _CLICKING = (
     ),
     *_rows(
         "stronger object 1 m behind each reflector",
-        ("uncertain-association", "two-poses"),
+        ("agreeing-outliers", "uncertain-association", "two-poses"),
         Draw("companion-imaging-free", change=_companion(1.0, seen=True)),
         Draw("companion-ti-tape", "ti", tape_m=_TAPE_M, change=_companion(1.0, seen=True)),
     ),
     *_rows(
         "object 1 m behind half of the reflectors hides them",
-        ("two-poses", "many-outliers"),
+        ("agreeing-outliers", "two-poses", "many-outliers"),
         Draw("hidden-imaging-free", change=_companion(0.5, seen=False)),
     ),
 )
