@@ -34,7 +34,7 @@ from calib_core.plausibility import implausible_input
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Calibration
 
-__all__ = ["calibrate", "calibrate_pairs", "calibration_steps", "solve_again"]
+__all__ = ["calibrate", "calibrate_pairs", "calibration_steps", "preview_pairs", "solve_again"]
 
 _UNDETERMINED_ROTATION_RAD = 0.5  # a larger standard deviation means that the pairs do not determine the rotation
 _AGREEING_SHARE = 0.9
@@ -125,10 +125,38 @@ def calibrate_pairs(
         from calib_core.paper.algorithm_1 import solve_pairs_as_printed
 
         return solve_pairs_as_printed(checked_pairs(pairs, with_noise=False), camera, options, excluded)
+    *_, outcome = _steps(_task_of_pairs(pairs, camera, options, excluded), previous=None, preview=False)
+    return outcome
+
+
+def preview_pairs(
+    pairs: Sequence[Pair],
+    camera: Camera,
+    options: CalibrationOptions | None = None,
+    *,
+    previous: Calibration | None = None,
+) -> Calibration | Unsolvable:
+    """Solve existing pairs for pose and local covariance only; what `calibrate_pairs` checks is left out.
+
+    Args:
+        pairs: in any order.
+        camera: the intrinsics.
+        options: of the default method; None takes the defaults.
+        previous: the answer to nearly the same pairs, to start from.
+
+    Raises:
+        InputError: a pair contains a number that is impossible, or an id occurs twice.
+    """
+    task = _task_of_pairs(pairs, camera, checked_options(options or CalibrationOptions()), frozenset())
+    return next(_steps(task, previous=previous, preview=True))
+
+
+def _task_of_pairs(
+    pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, excluded: frozenset[str]
+) -> "_Task":
     checked_pairs(pairs, with_noise=True)
     shown = sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))
-    *_, outcome = _steps(_Task.of(tuple(shown), (), excluded, camera, options), previous=None, preview=False)
-    return outcome
+    return _Task.of(tuple(shown), (), excluded, camera, options)
 
 
 def solve_again(calibration: Calibration, options: CalibrationOptions | None = None) -> Calibration | Unsolvable:
