@@ -77,7 +77,7 @@ def _rows(what: str, medians_ms: Mapping[str, float], aim_ms: float | None) -> l
             f"{checked_ms:.1f} ms",
             f"{checked_ms / ours_ms:.2g} x {_OURS}",
             soon,
-            checked_ms < _CHECKED_MS,
+            checked_in_time,
         ),
         *(Row(f"{what}, {name}", f"{value:.1f} ms") for name, value in peers.items()),
     ]
