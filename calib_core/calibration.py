@@ -243,10 +243,8 @@ def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Itera
     if preview:
         quick = quick_fit(measurements, task.options, previous)
         if quick is not None:
-            yield replace(
-                _described(task, groups, measurements, _Solution.local(quick, task.options, smooth=False)),
-                checking=True,
-            )
+            solution = _Solution.local(quick, task.options, smooth=False)
+            yield _preview(_described(task, groups, measurements, solution), previous)
     yield _answer(task, groups, measurements)
 
 

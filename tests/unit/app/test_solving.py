@@ -28,7 +28,7 @@ from calib_core.interchange import camera_info_text, read_calibration, read_clic
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, LocatingOptions
 from calib_core.recordings import Recording, RecordingOptions, open_recording
-from calib_core.results import Calibration
+from calib_core.results import Calibration, DataWarning
 
 CAMERA = Camera("pinhole", 640, 480, np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]))
 CLICK = ReflectorClick(TimeNs(10**18), "c1", 1.0, 2.0)
@@ -129,14 +129,16 @@ def test_a_preview_comes_first_and_the_answer_does_not_depend_on_it(
     recording: Recording, clicks: tuple[ReflectorClick, ...], solved: Calibration
 ) -> None:
     camera, options = recording.camera(), CalibrationOptions()
-    for previous in (None, solved):
+    warned = replace(solved, warnings=(DataWarning("weak-geometry", "the pose is uncertain", "add placements"),))
+    for previous in (None, warned):
         preview, answer = solve_in_steps(recording, clicks, camera, options, previous=previous)
         assert isinstance(preview, Calibration)
         assert isinstance(answer, Calibration)
         assert (preview.checking, answer.checking) == (True, False)
         error = preview.camera_from_radar.error_from(answer.camera_from_radar)
         assert error @ np.linalg.solve(answer.covariance, error) < 0.1
-        assert preview.warnings == (solved.warnings if previous else ())
+        assert preview.warnings == (warned.warnings if previous else ())
+        assert preview.next_placement is (warned.next_placement if previous else None)
         assert calibration_text(answer, recording) == calibration_text(solved, recording)
     *previews, _ = solve_in_steps(recording, clicks, camera, replace(options, method="paper"), previous=solved)
     assert previews == []
