@@ -24,6 +24,10 @@ class TopicFlags(RecordingOptions):
     image_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "image_topic")
     camera_info_topic: Annotated[str | None, called("TOPIC")] = same(RecordingOptions, "camera_info_topic")
     radar_axes: Annotated[str | None, called("AXES")] = same(RecordingOptions, "radar_axes")
+    map: Annotated[tuple[str, ...], called("QUANTITY=COLUMN:UNIT"), tyro.conf.UseAppendAction] = same(
+        RecordingOptions, "map"
+    )
+    confirm_assumptions: Annotated[bool, called()] = same(RecordingOptions, "confirm_assumptions")
     video_start: Annotated[str | None, called("TIME")] = same(RecordingOptions, "video_start")
 
 

@@ -86,6 +86,7 @@ class Solve:
 
         clicks = read_clicks(read_text(clicks_path), source=str(clicks_path))
         with open_recording(self.recording, self.topics) as recording:
+            _require_confirmed(recording)
             camera = required_camera(recording, self.camera)
             _require_inside(clicks, recording, camera, source=clicks_path)
             outcome = solve_clicks(recording, clicks, camera, self.measured.over(self.options))
@@ -109,6 +110,20 @@ class Solve:
         write_whole(self.out, text)
         print("\n".join([*summary_lines(calibration), f"written to {self.out}"]))
         return 0
+
+
+def _require_confirmed(recording: "Recording") -> None:
+    """Refuse a recording whose units, signs or meanings are assumed.
+
+    Raises:
+        InputError: there is an unconfirmed assumption; all are named.
+    """
+    if recording.assumptions:
+        named = "; ".join(f"{one.topic}: {one.text} (confirm: {one.confirm})" for one in recording.assumptions)
+        raise InputError(
+            f"{recording.name}: the recording does not state everything that is needed: {named}; "
+            "state what is right, or confirm all of it with --confirm-assumptions"
+        )
 
 
 def _require_inside(clicks: Sequence[ReflectorClick], recording: "Recording", camera: Camera, *, source: Path) -> None:

@@ -11,6 +11,7 @@ from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import Stamp, TimeNs
+from calib_core.recordings.assumptions import Assumption, about_assumptions
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.camera.images import ImageLayout
 from calib_core.recordings.camera.recorded_intrinsics import recorded_camera
@@ -48,6 +49,7 @@ class Assembly:
     images: ImageStream | None
     camera: Camera | None
     warnings: tuple[DataWarning, ...]
+    assumptions: tuple[Assumption, ...]
 
 
 def assemble(
@@ -87,6 +89,8 @@ def assemble(
     warnings.extend(
         [*about_camera, *about_radar(radar), *about_claims(radar), *about_images(images), *about_video(images)]
     )
+    assumptions = _unconfirmed(sources, selection, options)
+    warnings.extend(about_assumptions(assumptions))
     return Assembly(
         topics=tuple(_summary(topic, inventory, selection, stamps, diagnoses.get(topic.name)) for topic in topics),
         radar_topic=selection.radar.name if selection.radar else None,
@@ -98,7 +102,16 @@ def assemble(
         images=images,
         camera=camera,
         warnings=tuple(warnings),
+        assumptions=assumptions,
     )
+
+
+def _unconfirmed(sources: Sequence[Source], selection: Selection, options: RecordingOptions) -> tuple[Assumption, ...]:
+    """Return what the files of the topics in use do not state and the user has not confirmed."""
+    if options.confirm_assumptions:
+        return ()
+    used = {topic.name for topic in (selection.radar, selection.image) if topic is not None}
+    return tuple(one for source in sources for one in source.assumptions if one.topic in used)
 
 
 def _stamped(

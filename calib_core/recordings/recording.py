@@ -14,6 +14,7 @@ from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
+from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.containers.sources import Source
@@ -110,6 +111,11 @@ class Recording:
 
     def _clock_of(self, name: str | None) -> str | None:
         return next((topic.clock for topic in self.topics if topic.name == name), None)
+
+    @property
+    def assumptions(self) -> tuple[Assumption, ...]:
+        """What the files do not state, reading takes for granted, and the user has not confirmed."""
+        return self._assembly.assumptions
 
     @property
     def warnings(self) -> tuple[DataWarning, ...]:

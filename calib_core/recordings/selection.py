@@ -33,6 +33,14 @@ class RecordingOptions:
         None,
         "Directions of the radar message's x, y and z, such as forward,right,up; add degrees or radians for its angles.",
     )
+    map: tuple[str, ...] = option(
+        (),
+        "Which column of the radar holds which quantity, as QUANTITY=COLUMN:UNIT, such as x=posX:m; may be repeated. "
+        "A minus before the column turns its sign.",
+    )
+    confirm_assumptions: bool = option(
+        False, "Confirm the units, signs and meanings that the recording does not state and that `cocalib info` lists."
+    )
     video_start: str | None = option(
         None,
         "Time of a video's first frame: seconds since 1970, or a date such as 2024-05-01T12:00:00.25+02:00.",

@@ -16,6 +16,7 @@ import numpy as np
 
 from calib_core.arrays import Indices
 from calib_core.errors import RecordingError
+from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.cached_indexes import KeptIndex, heads_from, index_from, keep_heads, keep_index
 from calib_core.recordings.containers.compression import refuse_bomb, unpack, unpack_what_is_there
 from calib_core.recordings.containers.index_cache import cache_of
@@ -156,6 +157,11 @@ class ChunkedSource:
         with self._lock:
             self._cache.clear()
             self._cache_bytes = 0
+
+    @property
+    def assumptions(self) -> tuple[Assumption, ...]:
+        """None: a ROS recording declares its fields."""
+        return ()
 
     @property
     def later_warnings(self) -> tuple[DataWarning, ...]:

@@ -8,6 +8,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from calib_core.arrays import Indices, TimesNs
+from calib_core.recordings.assumptions import Assumption
 from calib_core.results import DataWarning
 
 __all__ = ["Channel", "Encoding", "Heads", "MessageIndex", "Source"]
@@ -115,6 +116,11 @@ class Source(Protocol):
     @property
     def later_warnings(self) -> tuple[DataWarning, ...]:
         """Warnings found since, while reading it."""
+        ...
+
+    @property
+    def assumptions(self) -> tuple[Assumption, ...]:
+        """What the file does not state and reading it takes for granted."""
         ...
 
     def index(self, channel_id: int) -> MessageIndex:

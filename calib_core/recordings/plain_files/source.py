@@ -9,6 +9,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
 from calib_core.recordings.plain_files.messages import header_bytes
 from calib_core.results import DataWarning
@@ -31,6 +32,7 @@ class PlainSource:
         message: builds the message of a row.
         warnings: problems found on opening it.
         closed: called on closing.
+        assumptions: what it does not state and reading it takes for granted.
     """
 
     path: Path
@@ -41,6 +43,7 @@ class PlainSource:
     message: Callable[[int], bytes]
     warnings: tuple[DataWarning, ...] = ()
     closed: Callable[[], None] | None = None
+    assumptions: tuple[Assumption, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse times that a message cannot represent.

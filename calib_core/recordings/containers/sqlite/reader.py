@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calib_core.errors import RecordingError
+from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.cached_indexes import heads_from, keep_heads
 from calib_core.recordings.containers.compression import unpack_message
 from calib_core.recordings.containers.index_cache import cache_of
@@ -67,6 +68,11 @@ class SqliteSource:
     def counts(self) -> Mapping[int, int]:
         """Empty: a database does not store its number of rows."""
         return {}
+
+    @property
+    def assumptions(self) -> tuple[Assumption, ...]:
+        """None: a ROS recording declares its fields."""
+        return ()
 
     @property
     def later_warnings(self) -> tuple[DataWarning, ...]:
