@@ -15,6 +15,7 @@ from calib_core.association.placement_groups import PlacementGroup, click_result
 from calib_core.camera import Camera
 from calib_core.diagnostics.checks import warnings_of
 from calib_core.diagnostics.clocks import CLOCK_CODES, clocks
+from calib_core.diagnostics.elevation import flat_radar
 from calib_core.diagnostics.picture import picture_sigma_px
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.errors import InputError
@@ -244,14 +245,14 @@ def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Itera
         quick = quick_fit(measurements, task.options, previous)
         if quick is not None:
             solution = _Solution.local(quick, task.options, smooth=False)
-            yield _preview(_described(task, groups, measurements, solution), previous)
+            described = _described(task, groups, measurements, solution)
+            first = flat_radar(quick, solution.uncertainty, task.options.radar)
+            yield _preview(described, previous or replace(described, warnings=tuple(first)))
     yield _answer(task, groups, measurements)
 
 
-def _preview(calibration: Calibration, previous: Calibration | None) -> Calibration:
+def _preview(calibration: Calibration, previous: Calibration) -> Calibration:
     """Mark a calibration as being checked; warnings and advice are still those of the previous answer."""
-    if previous is None:
-        return replace(calibration, checking=True)
     return replace(
         calibration,
         checking=True,
@@ -311,7 +312,8 @@ class _Solution:
     @classmethod
     def local(cls, refined: ErrorsInVariablesFit, options: CalibrationOptions, *, smooth: bool = True) -> "_Solution":
         uncertainty = pose_covariance(refined, options.radar, smooth=smooth)
-        return cls(refined, uncertainty, leave_one_out(refined, uncertainty.information))
+        left_out = leave_one_out(refined, uncertainty.information, uncertainty.pose_information)
+        return cls(refined, uncertainty, left_out)
 
 
 def _described(

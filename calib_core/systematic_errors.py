@@ -38,7 +38,6 @@ class SystematicErrorResult:
 
     Attributes:
         name: key in files, with its unit; scales and shares have none.
-        text: what it is, for users.
         value: estimated; for an error that is not taken out of the pose, what the residuals suggest.
         sigma: standard deviation of that value.
         prior_sigma: the same before any pair, as the options state it.
@@ -48,13 +47,17 @@ class SystematicErrorResult:
     """
 
     name: str
-    text: str
     value: float
     sigma: float
     prior_sigma: float
     estimated: bool
     position_share: float
     rotation_share: float
+
+    @property
+    def text(self) -> str:
+        """What it is, within a sentence."""
+        return error_words(self.name).text
 
 
 @dataclass(frozen=True, slots=True)

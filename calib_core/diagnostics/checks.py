@@ -6,17 +6,17 @@ A check returns an empty list if all is well. The texts are for people; the code
 import numpy as np
 
 from calib_core.association.clustering import CLUSTER_SCALE
+from calib_core.diagnostics.elevation import flat_radar
 from calib_core.diagnostics.handedness import assumed_axes, mirrored_axes
 from calib_core.diagnostics.intrinsics import intrinsics
 from calib_core.diagnostics.pairs import ambiguous_candidates, contradicted_pairs, decisive_pair, listed
-from calib_core.diagnostics.picture import picture_sigma_px
 from calib_core.diagnostics.pose import camera_position, two_poses
 from calib_core.diagnostics.posterior import agreeing_outliers, pivotal_pair, possible_poses
 from calib_core.diagnostics.solved_fit import SolvedFit
 from calib_core.diagnostics.systematic import angle_scale, clicks_off_centre
 from calib_core.plausibility import PIXELS_SUSPECTED, implausible_input
 from calib_core.radar import cartesian_from_polar, direction_cosines
-from calib_core.radar_axes import sigma_in_radar_axes, without_mounting
+from calib_core.radar_axes import without_mounting
 from calib_core.results import DataWarning
 
 __all__ = ["warnings_of"]
@@ -67,25 +67,7 @@ def _other_poses(fit: SolvedFit) -> list[DataWarning]:
 
 
 def _flat_radar(fit: SolvedFit) -> list[DataWarning]:
-    """Warn of a radar without elevation: say what the pairs determine and what depends on how it is mounted."""
-    if not fit.measurements.flat:
-        return []
-    pose, stated = fit.refined.camera_from_radar, fit.uncertainty.covariance
-    firm = sigma_in_radar_axes(pose, without_mounting(pose, stated, fit.refined.placements_z_m, fit.options.radar))
-    (forward, left), yaw = 100.0 * firm.position_m[:2], np.rad2deg(firm.rotation_rad[2])
-    assumed = sigma_in_radar_axes(pose, stated)
-    up, (roll, pitch) = 100.0 * assumed.position_m[2], np.rad2deg(assumed.rotation_rad[:2])
-    return [
-        DataWarning(
-            "flat-radar",
-            f"this radar measures no elevation. One sigma: the pairs determine forward ± {forward:.0f} cm, left ± {left:.0f} cm "
-            f"and yaw ± {yaw:.1f} deg in the plane of the placements, and where its returns appear in the picture, "
-            f"± {picture_sigma_px(fit.refined, fit.uncertainty):.0f} px; up ± {up:.0f} cm, pitch ± {pitch:.1f} and roll "
-            f"± {roll:.1f} deg are assumptions about how it is mounted",
-            "state among the options how well the radar's tilt and height are known, or measure the camera position; if the "
-            "radar does measure elevation, find out why it is missing",
-        )
-    ]
+    return flat_radar(fit.refined, fit.uncertainty, fit.options.radar)
 
 
 def _many_outliers(fit: SolvedFit) -> list[DataWarning]:

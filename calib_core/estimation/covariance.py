@@ -8,6 +8,7 @@ from calib_core.arrays import Matrix66, Values
 from calib_core.estimation.correlated_angle_errors import pose_spread
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.estimation.gnc import normal_equations
+from calib_core.estimation.prior_rows import prior_rows
 from calib_core.estimation.systematic_errors import SystematicError
 from calib_core.options import RadarOptions
 from calib_core.radar_axes import mounting_moves
@@ -64,7 +65,8 @@ def pose_covariance(
     weight_variance = refined.weights * (1.0 - refined.weights)
     lost = (gradients * weight_variance[:, None]).T @ gradients
     information = _floored(plain, lost)
-    prior_information = _prior_information(refined)
+    priors = prior_rows(refined.measurements, refined.camera_from_radar)[1]
+    prior_information = priors.T @ priors
     independent = _symmetric_inverse(information)
     spread = pose_spread(refined, plain) if smooth else None
     covariance = independent if spread is None else _widened(independent, plain, spread)
@@ -84,16 +86,6 @@ def pose_covariance(
         growth=growth,
         systematic_errors=tuple(_result(one, pose) for one in found),
     )
-
-
-def _prior_information(refined: ErrorsInVariablesFit) -> np.ndarray:
-    """Return the part (6 + k, 6 + k) of the information that comes from the priors."""
-    errors = refined.measurements.errors
-    jacobian = refined.measurements.prior.rows(refined.camera_from_radar)[1]
-    information = np.zeros((6 + len(errors), 6 + len(errors)))
-    information[:6, :6] = jacobian.T @ jacobian
-    information[6:, 6:] = np.diag(errors.sigma**-2.0) if len(errors) else 0.0
-    return information
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,7 +148,6 @@ def _result(found: _Found, pose: Matrix66) -> SystematicErrorResult:
     position, rotation = float(np.trace(pose[:3, :3])), float(np.trace(pose[3:, 3:]))
     return SystematicErrorResult(
         name=found.error.name,
-        text=found.error.text,
         value=found.value,
         sigma=found.sigma,
         prior_sigma=found.error.sigma,

@@ -174,9 +174,9 @@ def _normal_equations(
     hessian[..., :6, :6] += prior_hessian
     gradient[..., :6] += prior_gradient
     if len(measurements.errors):
-        precision = measurements.errors.sigma**-2.0
-        hessian[..., 6:, 6:] += np.diag(precision)
-        gradient[..., 6:] -= precision * measurements.errors.values
+        information = measurements.errors.prior_information
+        hessian[..., 6:, 6:] += information
+        gradient[..., 6:] -= information @ measurements.errors.values
     return hessian, gradient
 
 

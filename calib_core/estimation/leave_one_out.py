@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Points2, Points3, Values
+from calib_core.arrays import Matrix66, Points2, Points3, Values
 from calib_core.estimation.errors_in_variables import ErrorsInVariablesFit
 from calib_core.radar import cartesian_from_polar
 
@@ -24,12 +24,13 @@ class LeaveOneOut:
     influence: Values
 
 
-def leave_one_out(refined: ErrorsInVariablesFit, information: np.ndarray) -> LeaveOneOut:
+def leave_one_out(refined: ErrorsInVariablesFit, information: np.ndarray, pose_information: Matrix66) -> LeaveOneOut:
     """Leave out each pair by one Newton step: delta_i = -(H - w J_i^T J_i)^-1 w J_i^T e_i.
 
     Args:
         refined: the fit.
         information: (6 + k, 6 + k) of all pairs.
+        pose_information: (6, 6) of them about the pose alone.
     """
     jacobian, residual, weights = refined.model.jacobian, refined.model.residual, refined.weights
     own = weights[:, None, None] * (np.swapaxes(jacobian, 1, 2) @ jacobian)
@@ -37,7 +38,7 @@ def leave_one_out(refined: ErrorsInVariablesFit, information: np.ndarray) -> Lea
     scale = 1.0 / np.sqrt(np.diag(information))
     rest = (information - 0.999 * own) * np.outer(scale, scale)
     moves = -np.linalg.solve(rest, (pull * scale)[:, :, None])[:, :, 0] * scale
-    turned = moves[:, :6] @ np.linalg.inv(np.linalg.inv(information)[:6, :6])
+    turned = moves[:, :6] @ pose_information
     influence = np.sqrt(np.maximum((turned * moves[:, :6]).sum(axis=1), 0.0))
     polar = refined.measurements.measured(refined.rows).polar
     polar = polar + refined.measurements.errors.polar_change(polar, moves[:, 6:])

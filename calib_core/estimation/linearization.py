@@ -57,10 +57,8 @@ class MeasurementPlanes:
             at_polar: (3, n) the true positions mu to linearize at; None takes the measured ones.
         """
         true_polar = self.polar if at_polar is None else at_polar
-        position_m, turning = position_planes(true_polar)
-        turned_m = rotations @ position_m
+        turned_m, d_polar = _turned(rotations, true_polar)
         projected_px, d_point = camera.project_planes(turned_m + (translations_m + self.errors.offset_m)[..., None])
-        d_polar = (rotations @ turning.reshape(3, -1)).reshape(*rotations.shape[:-2], *turning.shape)
         # residual, d pixel / d (dt, dtheta), d pixel / d errors, d pixel / d polar, stacked
         rows = np.empty((*rotations.shape[:-2], 10 + len(self.errors), *self.pixels_px.shape))
         np.subtract(self.pixels_px, projected_px, out=rows[..., 0, :, :])
@@ -85,10 +83,8 @@ class MeasurementPlanes:
     ) -> np.ndarray:
         """Return d pixel / d error (k, 2, n), not whitened, of errors that are no unknowns of the fit."""
         true_polar = self.polar if at_polar is None else at_polar
-        position_m, turning = position_planes(true_polar)
-        translation_m = pose.translation_m + self.errors.offset_m
-        projected_px, d_point = camera.project_planes(pose.rotation @ position_m + translation_m[:, None])
-        d_polar = (pose.rotation @ turning.reshape(3, -1)).reshape(turning.shape)
+        turned_m, d_polar = _turned(pose.rotation, true_polar)
+        projected_px, d_point = camera.project_planes(turned_m + (pose.translation_m + self.errors.offset_m)[:, None])
         to_polar = np.einsum("irn,ikn->krn", d_point, d_polar)
         at = _sensitivity(camera, true_polar, projected_px, d_point, to_polar)
         return np.array([error.column(at) for error in errors]).reshape(len(errors), *self.pixels_px.shape)
@@ -186,6 +182,13 @@ def linearize(
     measured = MeasurementPlanes(pixels_px.T, sigma_px, polar.T, sigma_polar.T)
     at = None if at_polar is None else at_polar.T
     return measured.linearize(camera, camera_from_radar.rotation, camera_from_radar.translation_m, at)
+
+
+def _turned(rotations: np.ndarray, polar: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return polar positions (3, n) under each rotation as points (..., 3, n), and their derivatives (..., 3, 3, n)."""
+    position_m, d_position = position_planes(polar)
+    d_polar = (rotations @ d_position.reshape(3, -1)).reshape(*rotations.shape[:-2], *d_position.shape)
+    return rotations @ position_m, d_polar
 
 
 def _sensitivity(

@@ -51,18 +51,16 @@ class Sensitivity:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SystematicError:
-    """One error that all pairs share.
+    """One error that all pairs share; `error_words` says what it is called.
 
     Attributes:
         name: key in files, with its unit; a scale without one.
-        text: what it is, for users.
         sigma: standard deviation of its prior.
         column: d pixel / d error (..., 2, n).
         axis: of the camera along which it shifts the reflector; None for other errors.
     """
 
     name: str
-    text: str
     sigma: float
     column: Callable[[Sensitivity], np.ndarray]
     axis: int | None = None
@@ -166,19 +164,15 @@ def systematic_errors(options: CalibrationOptions, camera: Camera, *, flat: bool
         flat: whether the radar does not measure elevation.
     """
     taped = options.solving.camera_position is not None
-    estimated = [
-        _scale("azimuth_scale", "the radar's azimuth scale", _azimuth_scale_sigma(options.radar, flat=flat), 1)
-    ]
+    estimated = [_scale("azimuth_scale", _azimuth_scale_sigma(options.radar, flat=flat), 1)]
     if flat:
         estimated.append(_squared_height(options.radar.height_sigma_m))
     else:
-        estimated.append(
-            _scale("elevation_scale", "the radar's elevation scale", options.radar.elevation_scale_sigma, 2)
-        )
+        estimated.append(_scale("elevation_scale", options.radar.elevation_scale_sigma, 2))
     estimated.append(_range_bias(options.radar.range_bias_sigma_m))
     reflector = [_reflector(axis, name, options.reflector.offset_sigma_m) for axis, name in enumerate(_AXES)]
     widening = [
-        _scale("range_scale", "the radar's range scale", options.radar.range_scale_sigma, 0),
+        _scale("range_scale", options.radar.range_scale_sigma, 0),
         *(_click(row, name, _click_sigma_px(options, camera)) for row, name in enumerate(_AXES[:2])),
         _focal(options.lens.focal_length_sigma),
         _radial(options.lens.distortion_sigma),
@@ -207,18 +201,18 @@ def _click_sigma_px(options: CalibrationOptions, camera: Camera) -> float:
     return float(np.hypot(options.reflector.click_offset_sigma_px, principal_point_px))
 
 
-def _scale(name: str, text: str, sigma: float, coordinate: int) -> SystematicError:
+def _scale(name: str, sigma: float, coordinate: int) -> SystematicError:
     def column(at: Sensitivity) -> np.ndarray:
         return np.asarray(at.d_polar[..., coordinate, :, :] * -at.polar[coordinate])
 
-    return SystematicError(name, text, sigma, column)
+    return SystematicError(name, sigma, column)
 
 
 def _range_bias(sigma_m: float) -> SystematicError:
     def column(at: Sensitivity) -> np.ndarray:
         return -at.d_polar[..., 0, :, :]
 
-    return SystematicError("range_bias_m", "a constant range error", sigma_m, column)
+    return SystematicError("range_bias_m", sigma_m, column)
 
 
 def _squared_height(sigma_m: float) -> SystematicError:
@@ -227,15 +221,14 @@ def _squared_height(sigma_m: float) -> SystematicError:
     def column(at: Sensitivity) -> np.ndarray:
         return np.asarray(at.d_polar[..., 0, :, :] / (-2.0 * at.polar[0]))
 
-    return SystematicError("squared_height_m2", "the height of the placements", sigma_m**2, column)
+    return SystematicError("squared_height_m2", sigma_m**2, column)
 
 
 def _reflector(axis: int, name: str, sigma_m: float) -> SystematicError:
     def column(at: Sensitivity) -> np.ndarray:
         return np.asarray(at.d_point[..., axis, :, :])
 
-    text = f"the clicked point being {name} of the phase centre"
-    return SystematicError(f"reflector_{name}_m", text, sigma_m, column, axis=axis)
+    return SystematicError(f"reflector_{name}_m", sigma_m, column, axis=axis)
 
 
 def _click(row: int, name: str, sigma_px: float) -> SystematicError:
@@ -244,13 +237,11 @@ def _click(row: int, name: str, sigma_px: float) -> SystematicError:
         shift[..., row, :] = 1.0
         return shift
 
-    return SystematicError(
-        f"click_{name}_px", f"clicks or the principal point being off to the {name}", sigma_px, column
-    )
+    return SystematicError(f"click_{name}_px", sigma_px, column)
 
 
 def _focal(sigma: float) -> SystematicError:
-    return SystematicError("focal_length", "the focal length", sigma, lambda at: at.offset_px)
+    return SystematicError("focal_length", sigma, lambda at: at.offset_px)
 
 
 def _radial(sigma: float) -> SystematicError:
@@ -258,4 +249,4 @@ def _radial(sigma: float) -> SystematicError:
         squared = (at.offset_px**2).sum(axis=-2, keepdims=True) / at.focal_px**2
         return np.asarray(at.offset_px * squared)
 
-    return SystematicError("distortion", "the lens distortion", sigma, column)
+    return SystematicError("distortion", sigma, column)

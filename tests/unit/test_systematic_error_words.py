@@ -13,8 +13,8 @@ from calib_core.systematic_errors import SystematicErrorResult, dominant_errors,
 
 CAMERA = Camera("pinhole", 1920, 1080, np.array([[1000.0, 0, 960], [0, 1000, 540], [0, 0, 1]]))
 COVARIANCE = np.diag([0.03, 0.06, 0.06, 0.004, 0.004, 0.002]) ** 2
-AZIMUTH = SystematicErrorResult("azimuth_scale", "", 0.012, 0.009, 0.02, True, 0.51, 0.05)
-DOWN = SystematicErrorResult("click_down_px", "", 0.5, 5.38, 5.385, False, 0.0, 0.25)
+AZIMUTH = SystematicErrorResult("azimuth_scale", 0.012, 0.009, 0.02, True, 0.51, 0.05)
+DOWN = SystematicErrorResult("click_down_px", 0.5, 5.38, 5.385, False, 0.0, 0.25)
 RIGHT = replace(DOWN, name="click_right_px", rotation_share=0.20)
 
 

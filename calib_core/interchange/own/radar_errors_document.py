@@ -1,6 +1,5 @@
 """The errors that all pairs share in a calibration-1 file: those of the radar, and the part of each in the uncertainty."""
 
-from calib_core.error_words import error_words
 from calib_core.interchange.own.documents import RadarErrorsDocument, SystematicErrorDocument
 from calib_core.interchange.own.numbers import finite_or_none
 from calib_core.radar import RadarErrors
@@ -40,7 +39,6 @@ def systematic_error_of(document: SystematicErrorDocument) -> SystematicErrorRes
     """Return the error in a document."""
     return SystematicErrorResult(
         name=document.name,
-        text=error_words(document.name).text,
         value=document.value,
         sigma=document.sigma,
         prior_sigma=document.prior_sigma,

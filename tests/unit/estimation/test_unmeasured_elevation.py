@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib_core.calibration import calibrate_pairs
+from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import Pair
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
@@ -81,3 +81,12 @@ def test_the_covariance_of_a_radar_with_elevation_is_not_widened() -> None:
     outcome = calibrate_pairs(simulated.pairs, simulated.camera, MEASURED)
     assert isinstance(outcome, Calibration)
     assert np.sqrt(outcome.covariance[3:, 3:].trace()) < np.deg2rad(1.5)
+
+
+def test_the_first_preview_of_a_radar_without_elevation_says_so() -> None:
+    simulated = simulate_pairs(20, rng=np.random.default_rng(3), rig_options=LEVEL)
+    preview = preview_pairs([flattened(pair) for pair in simulated.pairs], simulated.camera)
+    assert isinstance(preview, Calibration)
+    assert preview.checking
+    assert not preview.sees_elevation
+    assert np.trace(preview.firm_covariance) < np.trace(preview.covariance)

@@ -39,7 +39,7 @@ def flat() -> Calibration:
 
 
 def error(name: str, position: float, rotation: float, *, sigma: float = 0.02) -> SystematicErrorResult:
-    return SystematicErrorResult(name, "", 0.011, sigma, 0.02, True, position, rotation)
+    return SystematicErrorResult(name, 0.011, sigma, 0.02, True, position, rotation)
 
 
 def test_the_table_shows_what_matters_or_is_determined_the_largest_first(calibration: Calibration) -> None:
