@@ -7,7 +7,7 @@ PARALLEL := -n logical --maxprocesses 4 --dist loadfile
 FAST := tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
   $(addprefix tests/unit/,advice association diagnostics estimation interchange)
 
-.PHONY: help env dev demo test test-fast test-lowest test-newest check lock bench bench-accuracy sample picture clean
+.PHONY: help env dev demo test fuzz test-fast test-lowest test-newest check lock bench bench-accuracy sample picture clean
 
 help:  ## List the targets.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -50,6 +50,9 @@ test: dev  ## Run all tests, including those in the browser.
 
 test-fast: dev  ## Run the core's tests, in under a minute of processor time.
 	$(BIN)/pytest -q -m "not slow and not real" $(FAST)
+
+fuzz: dev  ## Fuzz every reader, guided by coverage; the corpus grows in .fuzz/. FUZZ="--seconds 3600 --target mcap".
+	$(BIN)/python -m tests.fuzz $(FUZZ)
 
 test-lowest:  ## Run part of the tests with the lowest versions that pyproject.toml allows (needs python3.11 and the package index).
 	@$(LOWEST_PYTHON) .ci/test_bounds lowest

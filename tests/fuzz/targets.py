@@ -1,0 +1,284 @@
+"""What is fuzzed: everything that reads what a stranger may have written."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from app.session import ClickExcluded, ClickPlaced, ClicksImported, History, RecordingFacts, Undo, advance, settled
+from app.session.file import SessionFileError, open_session_file
+from app.view import view
+from app.web.messages.incoming import CursorMoved, FrameWanted, Hello, ImportWanted, ViewpointWanted, parse
+from app.web.port import guard
+from calib_core.errors import CalibrationError
+from calib_core.interchange import (
+    FORMATS,
+    camera_info_text,
+    export,
+    read_any,
+    read_calibration,
+    read_camera,
+    read_clicks,
+    read_pairs,
+)
+from calib_core.measurements import TimeNs
+from calib_core.recordings import describe, first_picture, inspect_recording
+from calib_core.recordings.column_map import parse_column_map
+from calib_core.recordings.messages.decoding import decode
+from calib_core.recordings.messages.definitions import parse_definition
+from calib_core.recordings.radar.axes import parse_radar_axes
+from calib_core.recordings.radar.layouts import recognise
+from calib_core.recordings.time.written_times import read_time, time_from_name
+from tests.fuzz.fuzzing import Target
+from tests.unit.recordings.conftest import START_NS, Ros, plain_rows, write_rows
+from tests.unit.recordings.containers.malformed import CASES, Kit
+
+__all__ = ["TARGETS"]
+
+GOLDEN = Path(__file__).resolve().parents[1] / "golden"
+FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(20), width_px=640, height_px=480)
+_LONGEST_SEED = 1 << 17
+
+
+def _jpeg(width_px: int = 24, height_px: int = 16) -> bytes:
+    picture = np.arange(height_px * width_px * 3, dtype=np.uint8).reshape(height_px, width_px, 3)
+    return bytes(cv2.imencode(".jpg", picture)[1])
+
+
+def _read_everything(path: Path) -> None:
+    first_picture([path])
+    with inspect_recording(path) as recording:
+        recording.radar_scans()
+        for index in range(len(recording.image_times)):
+            _swallow(lambda index=index: recording.image_bytes(index))
+        describe(recording)
+
+
+def _swallow(call: Callable[[], object]) -> None:
+    """Call; an error of ours is the right answer."""
+    try:
+        call()
+    except CalibrationError as error:
+        _require_words(error)
+
+
+def _require_words(error: CalibrationError) -> None:
+    assert str(error).strip(), "an error without a message"
+
+
+def _file_target(name: str, suffix: str, seeds: Callable[[Path], Sequence[bytes]], *tokens: bytes) -> Target:
+    """Open the input as a file with this suffix."""
+
+    def run(data: bytes, folder: Path) -> None:
+        path = folder / f"input{suffix}"
+        path.write_bytes(data)
+        _read_everything(path)
+
+    return Target(name, run, seeds, tokens)
+
+
+def _folder_target(name: str, suffix: str, seeds: Callable[[Path], Sequence[bytes]], *tokens: bytes) -> Target:
+    """Open a folder with two files of the same content, stamped by their names."""
+
+    def run(data: bytes, folder: Path) -> None:
+        inside = folder / f"{name}-inputs"
+        inside.mkdir(exist_ok=True)
+        for second in (0, 1):
+            (inside / f"170000000{second}.5{suffix}").write_bytes(data)
+        _read_everything(inside)
+
+    return Target(name, run, seeds, tokens)
+
+
+def _containers(*kinds: str, cases: str) -> Callable[[Path], list[bytes]]:
+    """Return small recordings of these containers, and every malformed one whose name begins with `cases`."""
+
+    def seeds(folder: Path) -> list[bytes]:
+        found = []
+        for kind in kinds:
+            ros = Ros(1 if kind.startswith("bag") else 2)
+            path = write_rows(folder / f"seed-{kind}", ros, plain_rows(ros, _jpeg(), n=4), kind)
+            files = [path] if path.is_file() else sorted(path.iterdir())
+            found += [file.read_bytes() for file in files if file.suffix != ".yaml"]
+        for number, (name, build) in enumerate(CASES.items()):
+            if name.startswith(cases) and "bomb" not in name:
+                inside = folder / f"case{number}"
+                inside.mkdir()
+                path = build(Kit(inside, _jpeg()))
+                if path.is_file() and path.stat().st_size <= _LONGEST_SEED:
+                    found.append(path.read_bytes())
+        return found
+
+    return seeds
+
+
+def _fixed(*inputs: bytes) -> Callable[[Path], Sequence[bytes]]:
+    return lambda _: inputs
+
+
+def _pcd(_folder: Path) -> list[bytes]:
+    head = (
+        b"VERSION .7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\n"
+    )
+    points = np.arange(8, dtype="<f4").tobytes()
+    return [head + b"DATA ascii\n1 2 3 4\n5 6 7 8\n", head + b"DATA binary\n" + points]
+
+
+def _definition(data: bytes, _folder: Path) -> None:
+    """Read a message definition, a zero byte, and a message."""
+    text, _, payload = data.partition(b"\0")
+    for encoding in ("ros1", "cdr"):
+        definition = parse_definition("made_msgs/Up", text.decode("utf-8", "replace"), encoding)
+        _swallow(lambda definition=definition: decode(definition, payload))
+        _swallow(lambda definition=definition: recognise(definition, payload))
+
+
+_DEFINITION = b"""std_msgs/Header header
+made_msgs/Target[] targets
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+================================================================================
+MSG: made_msgs/Target
+float32 range  # [m]
+float32 azimuth  # deg
+int16 rcs
+"""
+
+
+def _exported(_folder: Path) -> list[bytes]:
+    file = read_calibration((GOLDEN / "calibration-1.json").read_text(encoding="utf-8"))
+    made = [(GOLDEN / "calibration-1.json").read_bytes()]
+    for known in FORMATS:
+        try:
+            made.append(export(file, known.name, rectified=known.is_for_rectified).data)
+        except CalibrationError:  # formats that are only read
+            continue
+    return [one if isinstance(one, bytes) else one.encode() for one in made]
+
+
+def _own(data: bytes, _folder: Path) -> None:
+    text = data.decode("utf-8", "surrogateescape")
+    for read in (read_clicks, read_pairs, read_calibration, read_camera):
+        _swallow(lambda read=read: read(text, "input"))
+
+
+def _own_files(_folder: Path) -> list[bytes]:
+    text = (GOLDEN / "calibration-1.json").read_text(encoding="utf-8")
+    camera = read_calibration(text).calibration.camera
+    yaml = camera_info_text(camera, "camera")
+    return [text.encode(), yaml.encode(), _PAIRS, _CLICKS, b"%YAML:1.0\nM1: !!opencv-matrix\n   rows: 3\n   cols: 3\n"]
+
+
+def _session(data: bytes, folder: Path) -> None:
+    """Open a session whose journal is the input, and its snapshot the rest after a zero byte."""
+    inside = folder / "input.cocalib-session"
+    inside.mkdir(exist_ok=True)
+    for old in inside.iterdir():
+        old.unlink()
+    journal, zero, snapshot = data.partition(b"\0")
+    (inside / "journal.jsonl").write_bytes(journal)
+    if zero:
+        (inside / "session.json").write_bytes(snapshot)
+    try:
+        open_session_file(inside, FACTS).close()
+    except SessionFileError:
+        assert (inside / "journal.jsonl").read_bytes() == journal, "a refused session was changed"
+
+
+def _sessions(folder: Path) -> list[bytes]:
+    session = open_session_file(folder / "seed.cocalib-session", FACTS)
+    history = session.restored.history
+    times = [TimeNs(int(time)) for time in FACTS.image_times[:4]]
+    for step in (*(ClickPlaced(time, 10.5, 20.25) for time in times), ClickExcluded("c2", True), Undo()):
+        history = advance(history, step, FACTS)
+        session.append(step, history)
+    session.close()
+    files = [(folder / "seed.cocalib-session" / name).read_bytes() for name in ("journal.jsonl", "session.json")]
+    return [files[0], b"\0".join(files)]
+
+
+def _request(data: bytes, _folder: Path) -> None:
+    """Ask the guard: the path in the first line, headers in the others."""
+    path, *lines = data.decode("latin-1").split("\n")
+    headers: dict[str, list[str]] = {}
+    for line in lines:
+        name, _, value = line.partition(": ")
+        headers.setdefault(name.lower(), []).append(value)
+    doorkeeper = guard.Guard(host="127.0.0.1", key=b"k" * 32, token="t" * 32)
+    verdict = doorkeeper.check(guard.Request(path, headers))
+    assert not isinstance(verdict, guard.Allowed), "a request without the cookie was allowed"
+
+
+def _words(data: bytes, _folder: Path) -> None:
+    """Read what a user types or a file is called: options, dates, names."""
+    text = data.decode("utf-8", "replace")
+    for read in (lambda: parse_column_map([text]), lambda: parse_radar_axes(text), lambda: read_time(text)):
+        _swallow(read)
+    time_from_name(text)
+
+
+def _messages(data: bytes, _folder: Path) -> None:
+    """Take the lines as what a page sends, one message after the other, and look at the result."""
+    history = History()
+    for line in data.split(b"\n")[:20]:
+        try:
+            command = parse(line).command
+            if not isinstance(command, Hello | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted):
+                history = advance(history, settled(command, history.present), FACTS)
+            elif isinstance(command, ImportWanted):
+                history = advance(history, ClicksImported(read_clicks(command.text, command.name)), FACTS)
+        except CalibrationError as error:
+            _require_words(error)
+    view(history, FACTS, None)
+
+
+_PAIRS = (
+    b'{"schema":"cocalib/pairs-1","camera":{"model":"pinhole","width_px":640,"height_px":480,'
+    b'"matrix_px":[[500,0,320],[0,500,240],[0,0,1]]},'
+    b'"pairs":[{"id":"p1","radar_m":[5,1,-0.5],"pixel_px":[212.9,239.4],"alternatives_radar_m":[[5,2,0]],"sigma_px":2}]}'
+)
+_CLICKS = b'{"schema":"cocalib/clicks-1","clicks":[{"id":"c1","image_time":{"sec":1700000000,"nanosec":5},"pixel_px":[1.5,2]}]}'
+_REQUESTS = (b"/?token=x\nHost: 127.0.0.1:8080", b"/ws/a\nHost: localhost\nUpgrade: websocket\nOrigin: http://x")
+_TYPED = (b"x=posX:m", b"forward,right,up,degrees", b"2024-05-01T12:00:00.25+02:00", b"img_1715938951.208764")
+_CSV = (
+    b"time_ns,x_m,y_m,z_m,doppler_mps,snr_db\n1700000000000000000,1,2,3,0.1,20\n1700000000100000000,1,2,3,,20\n",
+    b"timestamp [s];range [m];azimuth [deg]\n1700000000,5;3,2;10\n",
+    b"2024/05/17/09:42:31.20,x\n",
+)
+_CLICK = b'{"type":"click_placed","image_time":{"sec":1700000000,"nanosec":%d},"pixel_px":[1.5,2.5],"request":3}'
+_MESSAGES = (
+    b"\n".join(
+        (
+            *(_CLICK % (100_000_000 * number) for number in range(5)),
+            b'{"type":"click_moved","id":"c1","pixel_px":[1.5,2.5]}',
+            b'{"type":"click_excluded","id":"c2","excluded":true}',
+            b'{"type":"undo"}\n{"type":"redo"}',
+            b'{"type":"click_removed","id":"c1"}',
+        )
+    ),
+    b'{"type":"options_changed","options":{"noise":{"sigma_px":3},"method":"paper"}}\n{"type":"cleared"}',
+    b'{"type":"hello"}\n{"type":"cursor","index":7}\n{"type":"viewpoint","viewpoint":"above"}',
+    b'{"type":"import_clicks","text":"{\\"schema\\":\\"cocalib/clicks-1\\",\\"clicks\\":[]}","name":"a.json"}',
+)
+
+TARGETS: tuple[Target, ...] = (
+    _file_target("bag", ".bag", _containers("bag", "bag-lz4", cases="bag_"), b"#ROSBAG V2.0\n", b"conn=", b"chunk_pos="),
+    _file_target("mcap", ".mcap", _containers("mcap", "mcap-zstd", cases="mcap_"), b"\x89MCAP0\r\n", b"zstd", b"lz4"),
+    _file_target("db3", ".db3", _containers("db3", cases="db3_"), b"SQLite format 3\0", b"messages", b"topics"),
+    _file_target("csv", ".csv", _fixed(*_CSV), b"time_ns", b"x_m", b"y_m", b"range_m", b"azimuth_deg", b",", b";", b"\t"),
+    _folder_target("pcd", ".pcd", _pcd, b"FIELDS", b"DATA ascii\n", b"WIDTH", b"COUNT", b"rgb"),
+    _folder_target("bin", ".bin", _fixed(np.arange(14, dtype="<f4").tobytes(), bytes(28))),
+    _folder_target("jpeg", ".jpg", _fixed(_jpeg(), _jpeg(8, 8)), b"\xff\xd8", b"\xff\xe1", b"\xff\xd9", b"\xff\xc0"),
+    Target("definition", _definition, _fixed(_DEFINITION + b"\0" + bytes(64), b"float64 x\nfloat64 y\n\0")),
+    Target("calibration", lambda data, _: _swallow(lambda: read_any(data, "input")), _exported, (b"NaN", b"xyzw", b"1e308")),
+    Target("own-files", _own, _own_files, (b'"pairs"', b'"clicks"', b'"cocalib/pairs-1"', b'"cocalib/clicks-1"')),
+    Target("session", _session, _sessions, (b'"n"', b'"step"', b'"undo"', b"\n")),
+    Target("messages", _messages, _fixed(*_MESSAGES), (b'"type"', b'"request"', b'"click_moved"', b'"import"')),
+    Target("request", _request, _fixed(*_REQUESTS), (b"%2e", b"//", b"token=", b"Cookie: ", b"cocalib=", b"Origin: ")),
+    Target("words", _words, _fixed(*_TYPED), (b"deg", b":", b"=", b"-", b"T", b"Z", b"+02:00")),
+)  # fmt: skip
+"""By name; a new reader of foreign bytes gets one here."""
