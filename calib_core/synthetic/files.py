@@ -8,6 +8,7 @@ from calib_core.lens_models.naming import written_lens
 from calib_core.recordings.containers.writing import write_ros1_bag, write_ros2
 from calib_core.synthetic.messages import all_messages, camera_messages, radar_messages
 from calib_core.synthetic.options import Container
+from calib_core.synthetic.plain_files import write_plain_files
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
 from calib_core.synthetic.truth import clicks_text, truth_text
 
@@ -30,7 +31,8 @@ def write_recording(
         recording: what to write.
         folder: created if it does not exist; existing files are not overwritten.
         containers: "ros1" writes radar.bag and camera.bag; "mcap" and "db3" write a ROS 2 bag each: a folder with
-            metadata.yaml, whose data file can also be opened alone.
+            metadata.yaml, whose data file can also be opened alone. "csv" and "jsonl" write a folder without ROS: pictures
+            named by date, the radar as a table or as one JSON object per scan, and camera.yaml.
         progress: called after each frame with the number written and the total over all containers.
 
     Raises:
@@ -44,7 +46,9 @@ def write_recording(
     frame_count = len(recording.stage.frame_times.header_ns)
     for number, container in enumerate(containers):
         frames = _counted(recording, progress, before=number * frame_count, total=len(containers) * frame_count)
-        if container == "ros1":
+        if container in ("csv", "jsonl"):
+            written.extend(write_plain_files(recording, folder / f"recording_{container}", container, frames))
+        elif container == "ros1":
             written.append(write_ros1_bag(folder / "radar.bag", radar_messages(recording, 1)))
             written.append(write_ros1_bag(folder / "camera.bag", camera_messages(recording, frames)))
         else:

@@ -9,13 +9,14 @@ import numpy as np
 
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import polar_from_cartesian
-from calib_core.recordings.containers.writing import (
+from calib_core.recordings.containers.recorded_messages import (
     CameraInfoMessage,
     CloudMessage,
     CompressedImageMessage,
     ImageMessage,
     RadarReturnMessage,
     RecordedMessage,
+    VendorScanMessage,
 )
 from calib_core.synthetic.radar.antennas import Antenna
 from calib_core.synthetic.radar.defects import second_azimuths
@@ -31,6 +32,7 @@ __all__ = [
     "RAW_IMAGE_TOPIC",
     "SECOND_COLUMN",
     "SECOND_SUFFIX",
+    "VENDOR_TOPIC",
     "all_messages",
     "camera_messages",
     "radar_messages",
@@ -38,6 +40,7 @@ __all__ = [
 
 RADAR_SCAN_TOPIC = "/ti_mmwave/radar_scan"
 CLOUD_TOPIC = "/ti_mmwave/radar_scan_pcl"
+VENDOR_TOPIC = "/acme/packets"
 RAW_IMAGE_TOPIC = "/camera/image_raw"
 IMAGE_TOPIC = "/camera/image_raw/compressed"
 CAMERA_INFO_TOPIC = "/camera/camera_info"
@@ -80,7 +83,7 @@ def radar_messages(recording: SimulatedRecording, generation: Literal[1, 2]) -> 
 
     Args:
         recording: the recording.
-        generation: of ROS; 1 writes the messages of options.radar_message, 2 writes clouds.
+        generation: of ROS; 1 writes the messages of options.radar_message, 2 writes clouds or a vendor's scans.
     """
     streams = [_antenna_messages(recording, antenna, generation) for antenna in recording.stage.antennas]
     return heapq.merge(*streams, key=lambda message: message.receive_time)
@@ -90,10 +93,15 @@ def _antenna_messages(
     recording: SimulatedRecording, antenna: Antenna, generation: Literal[1, 2]
 ) -> Iterator[RecordedMessage]:
     options, second = recording.options, recording.options.defects.second_azimuth
+    vendor = options.radar_message == "vendor"
     cloud = generation == 2 or options.radar_message == "cloud" or options.radar == "imaging"
     cloud = cloud or second != "none" or bool(antenna.name)
-    topic = f"{CLOUD_TOPIC}_{antenna.name}" if antenna.name else CLOUD_TOPIC
+    base = VENDOR_TOPIC if vendor else CLOUD_TOPIC
+    topic = f"{base}_{antenna.name}" if antenna.name else base
     for scan, receive in zip(recording.scans_of(antenna), antenna.times.receive_ns, strict=True):
+        if vendor:
+            yield _vendor_scan(topic, scan, TimeNs(int(receive)))
+            continue
         if not cloud:
             yield from _returns(recording, scan, int(receive))
             continue
@@ -127,6 +135,13 @@ def _cloud(topic: str, scan: RadarScan, receive: TimeNs, *, second_column: bool 
         names = (*names, SECOND_COLUMN)
         columns.append(polar_from_cartesian(second_azimuths(scan.points_radar_m))[:, 1])
     return RecordedMessage(topic, receive, CloudMessage(scan.time, RADAR_FRAME, names, np.column_stack(columns)))
+
+
+def _vendor_scan(topic: str, scan: RadarScan, receive: TimeNs) -> RecordedMessage:
+    polar = polar_from_cartesian(scan.points_radar_m)
+    return RecordedMessage(
+        topic, receive, VendorScanMessage(scan.time, RADAR_FRAME, polar, scan.doppler_mps, scan.snr_db)
+    )
 
 
 def _returns(recording: SimulatedRecording, scan: RadarScan, receive: int) -> Iterator[RecordedMessage]:

@@ -27,9 +27,9 @@ __all__ = [
 
 SceneName = Literal["rooftop", "field", "aisle", "checkerboard"]
 RadarName = Literal["awr1843", "imaging"]
-RadarMessage = Literal["filled", "stock", "cloud"]
+RadarMessage = Literal["filled", "stock", "cloud", "vendor"]
 Clutter = Literal["none", "scene", "heavy"]
-Container = Literal["ros1", "mcap", "db3"]
+Container = Literal["ros1", "mcap", "db3", "csv", "jsonl"]
 ReportedElevation = Literal["measured", "zero", "rounding"]
 SecondAzimuth = Literal["none", "column", "topic"]
 
@@ -158,7 +158,8 @@ class SimulationOptions:
     radar_message: RadarMessage = option(
         "filled",
         'In ROS 1 bags: one RadarScan message per return with all fields filled ("filled"), or with range, bearing, Doppler '
-        'bin and intensity zero as in the stock driver ("stock"), or one PointCloud2 per scan ("cloud").',
+        'bin and intensity zero as in the stock driver ("stock"), or one PointCloud2 per scan ("cloud"). In any bag: one '
+        'message per scan in the manner of a vendor, with an array of structs ("vendor").',
     )
     raw_images: bool = option(False, "Write sensor_msgs/Image instead of JPEG.")
     jpeg_quality: int = option(85, "JPEG quality, 1 to 100.")

@@ -13,13 +13,13 @@ from app.cli import run
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.measurements import NS_PER_S, TimeNs, time_parts
-from calib_core.recordings.containers.writing import (
+from calib_core.recordings.containers.recorded_messages import (
     CameraInfoMessage,
     CloudMessage,
     CompressedImageMessage,
     RecordedMessage,
-    write_ros2,
 )
+from calib_core.recordings.containers.writing import write_ros2
 
 START = TimeNs(1_700_000_000 * NS_PER_S)
 DWELL_S = 4

@@ -1,144 +1,17 @@
 """Write recordings: ROS 1 bags, and ROS 2 bags as MCAP or SQLite. For simulated recordings and for tests."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
-import numpy as np
-
-from calib_core.arrays import frozen_array
-from calib_core.camera import Camera
 from calib_core.errors import RecordingError
-from calib_core.lens_models.naming import written_lens
-from calib_core.measurements import TimeNs, time_parts
+from calib_core.recordings.containers.message_building import MESSAGE_TYPES, MessageBuilder
+from calib_core.recordings.containers.recorded_messages import RecordedMessage
 
-__all__ = [
-    "CameraInfoMessage",
-    "CloudMessage",
-    "CompressedImageMessage",
-    "ImageMessage",
-    "MessageBody",
-    "RadarReturnMessage",
-    "RecordedMessage",
-    "Ros1Compression",
-    "Ros2Container",
-    "write_ros1_bag",
-    "write_ros2",
-]
+__all__ = ["Ros1Compression", "Ros2Container", "write_ros1_bag", "write_ros2"]
 
 Ros1Compression = Literal["none", "bz2", "lz4"]
 Ros2Container = Literal["mcap", "sqlite3"]
-
-RADAR_SCAN_TYPE = "ti_mmwave_rospkg/msg/RadarScan"
-RADAR_SCAN_DEFINITION = """\
-Header header
-uint16 point_id
-float32 x
-float32 y
-float32 z
-float32 range
-float32 velocity
-uint16 doppler_bin
-float32 bearing
-float32 intensity
-"""
-
-
-@dataclass(frozen=True, slots=True)
-class CompressedImageMessage:
-    """A sensor_msgs/CompressedImage: the bytes of a JPEG or PNG file."""
-
-    stamp: TimeNs
-    frame_id: str
-    data: bytes
-    format: str = "jpeg"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ImageMessage:
-    """A sensor_msgs/Image of encoding bgr8: pixels are (h, w, 3) uint8, blue first."""
-
-    stamp: TimeNs
-    frame_id: str
-    pixels: np.ndarray
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "pixels", frozen_array(self.pixels, (None, None, 3), dtype=np.uint8))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CameraInfoMessage:
-    """A sensor_msgs/CameraInfo."""
-
-    stamp: TimeNs
-    frame_id: str
-    camera: Camera
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CloudMessage:
-    """A sensor_msgs/PointCloud2 of little-endian float32 fields without padding: values are (n, k) for k names."""
-
-    stamp: TimeNs
-    frame_id: str
-    names: tuple[str, ...]
-    values: np.ndarray
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen_array(self.values, (None, len(self.names)), dtype=np.float32))
-
-
-@dataclass(frozen=True, slots=True)
-class RadarReturnMessage:
-    """A ti_mmwave_rospkg/RadarScan: one return; point_id 0 begins a scan.
-
-    Attributes:
-        stamp: when the driver parsed the return.
-        frame_id: of the radar.
-        point_id: index in its scan.
-        x_m: forward.
-        y_m: left.
-        z_m: up.
-        range_m: 0 in the stock driver, which never sets it; likewise doppler_bin, bearing and intensity.
-        velocity_mps: positive moving away.
-        doppler_bin: 0 to the number of bins minus 1; zero speed is at half the number of bins.
-        bearing_deg: positive to the left.
-        intensity_db: SNR.
-    """
-
-    stamp: TimeNs
-    frame_id: str
-    point_id: int
-    x_m: float
-    y_m: float
-    z_m: float
-    range_m: float
-    velocity_mps: float
-    doppler_bin: int
-    bearing_deg: float
-    intensity_db: float
-
-
-MessageBody: TypeAlias = CompressedImageMessage | ImageMessage | CameraInfoMessage | CloudMessage | RadarReturnMessage
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RecordedMessage:
-    """A message as received by the recorder."""
-
-    topic: str
-    receive_time: TimeNs
-    body: MessageBody
-
-
-_TYPES: dict[type, str] = {
-    CompressedImageMessage: "sensor_msgs/msg/CompressedImage",
-    ImageMessage: "sensor_msgs/msg/Image",
-    CameraInfoMessage: "sensor_msgs/msg/CameraInfo",
-    CloudMessage: "sensor_msgs/msg/PointCloud2",
-    RadarReturnMessage: RADAR_SCAN_TYPE,
-}
 
 
 def write_ros1_bag(path: Path, messages: Iterable[RecordedMessage], *, compression: Ros1Compression = "none") -> Path:
@@ -155,7 +28,7 @@ def write_ros1_bag(path: Path, messages: Iterable[RecordedMessage], *, compressi
     from rosbags.rosbag1 import Writer
 
     _refuse_existing(path)
-    build = _Builder(1)
+    build = MessageBuilder(1)
     writer = Writer(path)
     if compression != "none":
         writer.set_compression(Writer.CompressionFormat[compression.upper()])
@@ -182,7 +55,7 @@ def write_ros2(path: Path, messages: Iterable[RecordedMessage], *, container: Ro
     from rosbags.rosbag2 import StoragePlugin, Writer
 
     _refuse_existing(path)
-    build = _Builder(2)
+    build = MessageBuilder(2)
     writer = Writer(path, version=9, storage_plugin=StoragePlugin[container.upper()])
     with writer:
         _write_all(
@@ -209,122 +82,5 @@ def _write_all(
     connections: dict[str, Any] = {}
     for message in messages:
         if message.topic not in connections:
-            connections[message.topic] = connect(message.topic, _TYPES[type(message.body)])
+            connections[message.topic] = connect(message.topic, MESSAGE_TYPES[type(message.body)])
         write(connections[message.topic], message)
-
-
-class _Builder:
-    """Convert message values to serialised messages of one ROS generation."""
-
-    def __init__(self, generation: Literal[1, 2]) -> None:
-        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-        self.generation = generation
-        self.typestore: Any = get_typestore(Stores.ROS1_NOETIC if generation == 1 else Stores.ROS2_JAZZY)
-        definition = (
-            RADAR_SCAN_DEFINITION if generation == 1 else RADAR_SCAN_DEFINITION.replace("Header", "std_msgs/Header", 1)
-        )
-        self.typestore.register(get_types_from_msg(definition, RADAR_SCAN_TYPE))
-        self.sequence: dict[type, int] = {}
-
-    def ros1(self, body: MessageBody) -> bytes:
-        """Serialise for ROS 1."""
-        return bytes(self.typestore.serialize_ros1(self.message(body), _TYPES[type(body)]))
-
-    def cdr(self, body: MessageBody) -> bytes:
-        """Serialise for ROS 2."""
-        return bytes(self.typestore.serialize_cdr(self.message(body), _TYPES[type(body)]))
-
-    def message(self, body: MessageBody) -> Any:
-        """Build the ROS message for a value."""
-        if isinstance(body, RadarReturnMessage):
-            return self._radar_return(body)
-        if isinstance(body, CloudMessage):
-            return self._cloud(body)
-        if isinstance(body, CameraInfoMessage):
-            return self._camera_info(body)
-        if isinstance(body, ImageMessage):
-            return self._image(body)
-        data = np.frombuffer(body.data, dtype=np.uint8)
-        return self._new(body, header=self._header(body), format=body.format, data=data)
-
-    def _new(self, body: MessageBody, **fields: Any) -> Any:
-        return self.typestore.types[_TYPES[type(body)]](**fields)
-
-    def _header(self, body: MessageBody) -> Any:
-        sec, nanosec = time_parts(body.stamp)
-        stamp = self.typestore.types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec)
-        header = self.typestore.types["std_msgs/msg/Header"]
-        if self.generation == 2:
-            return header(stamp=stamp, frame_id=body.frame_id)
-        sequence = self.sequence.get(type(body), 0)
-        self.sequence[type(body)] = sequence + 1
-        return header(seq=sequence, stamp=stamp, frame_id=body.frame_id)
-
-    def _radar_return(self, body: RadarReturnMessage) -> Any:
-        return self._new(
-            body,
-            header=self._header(body),
-            point_id=body.point_id,
-            x=body.x_m,
-            y=body.y_m,
-            z=body.z_m,
-            range=body.range_m,
-            velocity=body.velocity_mps,
-            doppler_bin=body.doppler_bin,
-            bearing=body.bearing_deg,
-            intensity=body.intensity_db,
-        )
-
-    def _cloud(self, body: CloudMessage) -> Any:
-        field = self.typestore.types["sensor_msgs/msg/PointField"]
-        count, width = body.values.shape
-        return self._new(
-            body,
-            header=self._header(body),
-            height=1,
-            width=count,
-            fields=[field(name=name, offset=4 * i, datatype=7, count=1) for i, name in enumerate(body.names)],
-            is_bigendian=False,
-            point_step=4 * width,
-            row_step=4 * width * count,
-            data=np.frombuffer(body.values.astype("<f4").tobytes(), dtype=np.uint8),
-            is_dense=True,
-        )
-
-    def _image(self, body: ImageMessage) -> Any:
-        height, width = body.pixels.shape[:2]
-        return self._new(
-            body,
-            header=self._header(body),
-            height=height,
-            width=width,
-            encoding="bgr8",
-            is_bigendian=0,
-            step=3 * width,
-            data=body.pixels.reshape(-1),
-        )
-
-    def _camera_info(self, body: CameraInfoMessage) -> Any:
-        camera = body.camera
-        projection = np.zeros((3, 4))
-        projection[:, :3] = camera.matrix_px
-        lens = written_lens(camera.lens, camera.distortion, "camera_info")
-        arrays = {
-            "D": np.array(lens.coefficients),
-            "K": camera.matrix_px.reshape(-1),
-            "R": np.eye(3).reshape(-1),
-            "P": projection.reshape(-1),
-        }
-        region = self.typestore.types["sensor_msgs/msg/RegionOfInterest"]
-        return self._new(
-            body,
-            header=self._header(body),
-            height=camera.height_px,
-            width=camera.width_px,
-            distortion_model=lens.name,
-            **{(name if self.generation == 1 else name.lower()): values for name, values in arrays.items()},
-            binning_x=0,
-            binning_y=0,
-            roi=region(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
-        )

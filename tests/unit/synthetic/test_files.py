@@ -1,8 +1,10 @@
 """Written recordings: another reader finds in them exactly what was simulated."""
 
+import csv
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,9 @@ from rosbags.typesys import Stores, get_typestore
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import RadarScan, TimeNs
-from calib_core.recordings.containers.writing import RadarReturnMessage, RecordedMessage, write_ros1_bag
+from calib_core.radar import polar_from_cartesian
+from calib_core.recordings.containers.recorded_messages import RadarReturnMessage, RecordedMessage
+from calib_core.recordings.containers.writing import write_ros1_bag
 from calib_core.synthetic import SimulatedFrame, SimulatedRecording, SimulationOptions, simulate, write_recording
 
 OPTIONS = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0, seed=5)
@@ -159,3 +163,29 @@ def test_a_bag_reads_back_whatever_its_compression(tmp_path: Path, compression: 
     [(time, message)] = _messages([path], "/radar")
     assert time == 9
     assert (message.x, message.y, message.z, message.velocity, message.doppler_bin) == (1.0, -2.0, 0.5, -0.5, 12)
+
+
+def test_a_folder_without_ros_has_dated_pictures_and_every_return(recording, scans, frames, tmp_path) -> None:
+    write_recording(recording, tmp_path, ("csv", "jsonl"))
+    pictures = sorted((tmp_path / "recording_csv" / "camera").iterdir())
+    for path, frame in zip(pictures, frames, strict=True):
+        when = datetime.strptime(path.stem, "img_%Y-%m-%d_%H-%M-%S-%f").replace(tzinfo=UTC)
+        assert abs(when.timestamp() - frame.time / 1e9) < 2e-6
+    rows = list(csv.reader((tmp_path / "recording_csv" / "radar.csv").read_text().splitlines(), delimiter=";"))[1:]
+    azimuths_deg = np.concatenate([np.rad2deg(polar_from_cartesian(scan.points_radar_m)[:, 1]) for scan in scans])
+    np.testing.assert_allclose([float(row[3]) for row in rows], azimuths_deg, atol=1e-6)
+    for line, scan in zip((tmp_path / "recording_jsonl" / "radar.jsonl").read_text().splitlines(), scans, strict=True):
+        read = json.loads(line)
+        assert read["time_ns"] == scan.time
+        np.testing.assert_allclose([target["y_m"] for target in read["targets"]], scan.points_radar_m[:, 1], atol=1e-6)
+
+
+@pytest.mark.parametrize("container", ["ros1", "mcap"])
+def test_a_vendors_packets_hold_the_same_returns(scans, container, tmp_path) -> None:
+    write_recording(simulate(replace(OPTIONS, radar_message="vendor")), tmp_path, (container,))
+    path = tmp_path / ("radar.bag" if container == "ros1" else "recording_mcap")
+    messages = [message for _, message in _messages([path], "/acme/packets")]
+    for message, scan in zip(messages, scans, strict=True):
+        assert _stamp(message) == scan.time
+        found = [(one.f_pos_x, one.f_pos_y, one.f_pos_z) for one in message.s_detections]
+        np.testing.assert_allclose(np.array(found).reshape(-1, 3), scan.points_radar_m, rtol=1e-5, atol=1e-6)

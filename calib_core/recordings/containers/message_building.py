@@ -1,0 +1,203 @@
+"""Build and serialise ROS messages from values, with rosbags. For simulated recordings and for tests."""
+
+import dataclasses
+from typing import Any, Literal
+
+import numpy as np
+
+from calib_core.lens_models.naming import written_lens
+from calib_core.measurements import time_parts
+from calib_core.radar import cartesian_from_polar
+from calib_core.recordings.containers.recorded_messages import (
+    CameraInfoMessage,
+    CloudMessage,
+    CompressedImageMessage,
+    ImageMessage,
+    MessageBody,
+    RadarReturnMessage,
+    VendorScanMessage,
+)
+
+__all__ = ["MESSAGE_TYPES", "RADAR_SCAN_DEFINITION", "RADAR_SCAN_TYPE", "MessageBuilder"]
+
+RADAR_SCAN_TYPE = "ti_mmwave_rospkg/msg/RadarScan"
+RADAR_SCAN_DEFINITION = """\
+Header header
+uint16 point_id
+float32 x
+float32 y
+float32 z
+float32 range
+float32 velocity
+uint16 doppler_bin
+float32 bearing
+float32 intensity
+"""
+VENDOR_SCAN_TYPE = "acme_radar_msgs/msg/AcmeDataPacket"
+VENDOR_SCAN_DEFINITION = """\
+Header header
+uint32 u_packet_counter
+uint16 u_num_detections
+AcmeDetection[] s_detections
+"""
+VENDOR_DETECTION_TYPE = "acme_radar_msgs/msg/AcmeDetection"
+VENDOR_DETECTION_DEFINITION = """\
+uint16 u_index
+float32 f_range            # [m]
+float32 f_range_rate       # [m/s] positive moving away
+float32 f_azimuth_angle    # [deg] positive to the left
+float32 f_elevation_angle  # [deg] positive upwards
+float32 f_rcs              # [dBsm]
+float32 f_range_var        # [m^2]
+float32 f_pos_x            # [m] forward
+float32 f_pos_y            # [m] left
+float32 f_pos_z            # [m] up
+"""
+
+
+_DEFINITIONS = {
+    RADAR_SCAN_TYPE: RADAR_SCAN_DEFINITION,
+    VENDOR_DETECTION_TYPE: VENDOR_DETECTION_DEFINITION,
+    VENDOR_SCAN_TYPE: VENDOR_SCAN_DEFINITION,
+}
+MESSAGE_TYPES: dict[type, str] = {
+    CompressedImageMessage: "sensor_msgs/msg/CompressedImage",
+    ImageMessage: "sensor_msgs/msg/Image",
+    CameraInfoMessage: "sensor_msgs/msg/CameraInfo",
+    CloudMessage: "sensor_msgs/msg/PointCloud2",
+    RadarReturnMessage: RADAR_SCAN_TYPE,
+    VendorScanMessage: VENDOR_SCAN_TYPE,
+}
+
+
+class MessageBuilder:
+    """Convert message values to serialised messages of one ROS generation."""
+
+    def __init__(self, generation: Literal[1, 2]) -> None:
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+        self.generation = generation
+        self.typestore: Any = get_typestore(Stores.ROS1_NOETIC if generation == 1 else Stores.ROS2_JAZZY)
+        for kind, definition in _DEFINITIONS.items():
+            spelt = definition if generation == 1 else definition.replace("Header header", "std_msgs/Header header", 1)
+            self.typestore.register(get_types_from_msg(spelt, kind))
+        self.sequence: dict[type, int] = {}
+
+    def ros1(self, body: MessageBody) -> bytes:
+        """Serialise for ROS 1."""
+        return bytes(self.typestore.serialize_ros1(self.message(body), MESSAGE_TYPES[type(body)]))
+
+    def cdr(self, body: MessageBody) -> bytes:
+        """Serialise for ROS 2."""
+        return bytes(self.typestore.serialize_cdr(self.message(body), MESSAGE_TYPES[type(body)]))
+
+    def message(self, body: MessageBody) -> Any:
+        """Build the ROS message for a value."""
+        if isinstance(body, RadarReturnMessage):
+            return self._radar_return(body)
+        if isinstance(body, VendorScanMessage):
+            return self._vendor_scan(body)
+        if isinstance(body, CloudMessage):
+            return self._cloud(body)
+        if isinstance(body, CameraInfoMessage):
+            return self._camera_info(body)
+        if isinstance(body, ImageMessage):
+            return self._image(body)
+        data = np.frombuffer(body.data, dtype=np.uint8)
+        return self._new(body, header=self._header(body), format=body.format, data=data)
+
+    def _new(self, body: MessageBody, **fields: Any) -> Any:
+        return self.typestore.types[MESSAGE_TYPES[type(body)]](**fields)
+
+    def _header(self, body: MessageBody) -> Any:
+        sec, nanosec = time_parts(body.stamp)
+        stamp = self.typestore.types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec)
+        header = self.typestore.types["std_msgs/msg/Header"]
+        if self.generation == 2:
+            return header(stamp=stamp, frame_id=body.frame_id)
+        sequence = self.sequence.get(type(body), 0)
+        self.sequence[type(body)] = sequence + 1
+        return header(seq=sequence, stamp=stamp, frame_id=body.frame_id)
+
+    def _radar_return(self, body: RadarReturnMessage) -> Any:
+        return self._new(
+            body,
+            header=self._header(body),
+            point_id=body.point_id,
+            x=body.x_m,
+            y=body.y_m,
+            z=body.z_m,
+            range=body.range_m,
+            velocity=body.velocity_mps,
+            doppler_bin=body.doppler_bin,
+            bearing=body.bearing_deg,
+            intensity=body.intensity_db,
+        )
+
+    def _vendor_scan(self, body: VendorScanMessage) -> Any:
+        detection = self.typestore.types[VENDOR_DETECTION_TYPE]
+        names = [field.name for field in dataclasses.fields(detection) if not field.name.startswith("__")]
+        degrees = np.rad2deg(body.polar[:, 1:])
+        rest = (np.full(len(body.polar), 1e-3), *cartesian_from_polar(body.polar).T)
+        columns = (body.polar[:, 0], body.doppler_mps, *degrees.T, body.rcs_dbsm, *rest)
+        rows = [
+            detection(**dict(zip(names, (number, *row), strict=True)))
+            for number, row in enumerate(np.column_stack(columns).tolist())
+        ]
+        count = self.sequence.get(type(body), 0)
+        return self._new(
+            body, header=self._header(body), u_packet_counter=count, u_num_detections=len(rows), s_detections=rows
+        )
+
+    def _cloud(self, body: CloudMessage) -> Any:
+        field = self.typestore.types["sensor_msgs/msg/PointField"]
+        count, width = body.values.shape
+        return self._new(
+            body,
+            header=self._header(body),
+            height=1,
+            width=count,
+            fields=[field(name=name, offset=4 * i, datatype=7, count=1) for i, name in enumerate(body.names)],
+            is_bigendian=False,
+            point_step=4 * width,
+            row_step=4 * width * count,
+            data=np.frombuffer(body.values.astype("<f4").tobytes(), dtype=np.uint8),
+            is_dense=True,
+        )
+
+    def _image(self, body: ImageMessage) -> Any:
+        height, width = body.pixels.shape[:2]
+        return self._new(
+            body,
+            header=self._header(body),
+            height=height,
+            width=width,
+            encoding="bgr8",
+            is_bigendian=0,
+            step=3 * width,
+            data=body.pixels.reshape(-1),
+        )
+
+    def _camera_info(self, body: CameraInfoMessage) -> Any:
+        camera = body.camera
+        projection = np.zeros((3, 4))
+        projection[:, :3] = camera.matrix_px
+        lens = written_lens(camera.lens, camera.distortion, "camera_info")
+        arrays = {
+            "D": np.array(lens.coefficients),
+            "K": camera.matrix_px.reshape(-1),
+            "R": np.eye(3).reshape(-1),
+            "P": projection.reshape(-1),
+        }
+        region = self.typestore.types["sensor_msgs/msg/RegionOfInterest"]
+        return self._new(
+            body,
+            header=self._header(body),
+            height=camera.height_px,
+            width=camera.width_px,
+            distortion_model=lens.name,
+            **{(name if self.generation == 1 else name.lower()): values for name, values in arrays.items()},
+            binning_x=0,
+            binning_y=0,
+            roi=region(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
+        )
