@@ -15,8 +15,6 @@ from calib_core.results import Calibration
 
 __all__ = ["click_rows"]
 
-_DECIMALS_PX = 2
-
 
 def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
     """Return one row per click, in order of image time; a row that is as before is the same object."""
@@ -59,7 +57,8 @@ def _residual_px(click: ReflectorClick, pair: Reprojection) -> float | None:
     if pair.projected_px is None:
         return None
     u_px, v_px = pair.projected_px
-    return round(math.hypot(u_px - click.u_px, v_px - click.v_px), _DECIMALS_PX)
+    distance_px = math.hypot(u_px - click.u_px, v_px - click.v_px)
+    return round(distance_px / pair.step_px) * pair.step_px
 
 
 def _state(click: ReflectorClick, pair: Reprojection) -> ClickState:

@@ -31,8 +31,8 @@ class Ellipse(msgspec.Struct, frozen=True, array_like=True):
     """The region around a reprojection that contains 95 % of the residuals of a good pair; written as an array.
 
     Attributes:
-        semi_major_px: semi-major axis, to 0.01 px.
-        semi_minor_px: semi-minor axis, to 0.01 px.
+        semi_major_px: semi-major axis.
+        semi_minor_px: semi-minor axis.
         angle_rad: from the image's x axis (right) towards its y axis (down) to the longer axis.
     """
 
@@ -52,8 +52,8 @@ class ClickRow:
         u_px: column of the click.
         v_px: row of the click.
         state: according to the latest outcome; "pending" if that does not cover it.
-        projected_px: reprojection of its radar position (u, v), to 0.01 px; None if it has none.
-        residual_px: length of projected_px minus the current click, to 0.01 px; None without projected_px.
+        projected_px: reprojection of its radar position (u, v), rounded to 1 % of the ellipse or finer; None if it has none.
+        residual_px: length of projected_px minus the current click, rounded likewise; None without projected_px.
         ellipse: None if the method has no noise model.
         range_m: of its radar position; None without one.
         azimuth_deg: of its radar position, positive to the left.
