@@ -18,12 +18,15 @@ import { startPairs } from "./pairs.js";
 import { startPicture } from "./picture.js";
 import { frameFailed, goTo, pause, play, receiveFrame, requestAgain, step, tellCursor } from "./player.js";
 import { startScatter } from "./scatter.js";
-import { connect, unconfirmed } from "./socket.js";
+import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace } from "./space.js";
-import { clickIn, clicks, emit, on, state } from "./state.js";
+import { clickIn, clicks, emit, on, select, selectedClick, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
 import { startTimeline } from "./timeline.js";
+import { Follower } from "./view_changes.js";
+
+const follower = new Follower();
 
 /** @type {Record<string, (message: any) => void>} */
 const readers = {
@@ -34,14 +37,12 @@ const readers = {
   },
   recording: takeRecording,
   view(message) {
-    state.view = message;
-    if (state.selected && !message.clicks.some((/** @type {{id: string}} */ click) => click.id === state.selected)) state.selected = null;
-    emit("view");
-    const here = clickIn(state.shown?.index ?? -1);
-    if (here?.id && !state.selected) {
-      state.selected = here.id;
-      emit("selected");
-    }
+    follower.take(message);
+    takeView();
+  },
+  view_change(message) {
+    if (follower.follow(message)) takeView();
+    else tell({ type: "view" });
   },
   placements(message) {
     state.placements = message.placements;
@@ -62,6 +63,14 @@ const readers = {
     frameFailed(message.request);
   },
 };
+
+function takeView() {
+  state.view = follower.view;
+  emit("view");
+  if (state.selected && !selectedClick()) select(null);
+  const here = clickIn(state.shown?.index ?? -1);
+  if (here?.id && !state.selected) select(here.id);
+}
 
 /** @param {import("./messages.js").RecordingNote} message */
 function takeRecording(message) {
@@ -142,5 +151,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, goTo, unconfirmed },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, goTo, unconfirmed, follower },
 });

@@ -124,7 +124,7 @@ function drawReprojection(pen, click, x, y, closeUp) {
   const [px, py] = toDevice(ring[0], ring[1]);
   const colour = residualColour(click.residual_px, limit);
   if (state.layers.ellipses && click.ellipse) {
-    const { semi_major_px: major, semi_minor_px: minor, angle_rad: angle } = click.ellipse;
+    const [major, minor, angle] = click.ellipse;
     const ellipse = () => pen.ellipse(px, py, major * viewport.scale, minor * viewport.scale, angle, 0, 2 * Math.PI);
     pen.beginPath();
     ellipse();

@@ -7,12 +7,8 @@ export interface Stamp {
   nanosec: number;
 }
 
-/** The region around a reprojection that contains 95 % of the residuals of a good pair. */
-export interface Ellipse {
-  semi_major_px: number;
-  semi_minor_px: number;
-  angle_rad: number;
-}
+/** The region around a reprojection that contains 95 % of the residuals of a good pair; written as an array. */
+export type Ellipse = [semi_major_px: number, semi_minor_px: number, angle_rad: number];
 
 /** One click: its mark on the picture and its row in the table. */
 export interface ClickRow {
@@ -194,6 +190,27 @@ export interface View {
   comparison: Figure[];
   pose_assumed: Figure[];
   systematic_errors: SystematicErrorTable;
+}
+
+/** New values of some fields in some rows. */
+export interface RowValues {
+  rows: number[] | null;
+  fields: Record<string, unknown[]>;
+}
+
+/** How the list of clicks changes: rows are removed, then added, then given values. */
+export interface ClickChange {
+  removed: number[];
+  added: number[];
+  values: RowValues[];
+}
+
+/** What a page changes in the View it has. */
+export interface ViewChange {
+  type: "view_change";
+  number: number;
+  fields: Record<string, unknown>;
+  clicks: ClickChange | null;
 }
 
 /** The recording is being opened: there is at most a preview, and nothing can be clicked yet. */
@@ -406,6 +423,12 @@ export interface HelloForm {
   request?: number;
 }
 
+/** A change of the View was missed. */
+export interface ViewForm {
+  type: "view";
+  request?: number;
+}
+
 /** The picture of a frame is requested; exactly one binary message answers, unless a newer request comes first. */
 export interface FrameForm {
   type: "frame";
@@ -442,6 +465,7 @@ export interface ImportForm {
 
 export type FromServer =
   | View
+  | ViewChange
   | Opening
   | RecordingNote
   | Placements
@@ -461,6 +485,7 @@ export type FromPage =
   | UndoForm
   | RedoForm
   | HelloForm
+  | ViewForm
   | FrameForm
   | CursorForm
   | ViewpointForm

@@ -6,7 +6,7 @@ import { residualColour } from "./colours.js";
 import { toggleExcluded } from "./clicking.js";
 import { make } from "./notices.js";
 import { drawSteps } from "./steps.js";
-import { clicks, on, rangeApart, select, state } from "./state.js";
+import { clicks, on, rangeApart, select, stampKey, state } from "./state.js";
 
 /** @typedef {import("./messages.js").ClickRow} Click */
 const page = /** @type {HTMLElement} */ (document.getElementById("page-pairs"));
@@ -21,6 +21,11 @@ const COLUMNS = [
   { key: "residual_px", label: "Residual", hint: "Distance between the click and the reprojection of its radar position. Click to sort." },
   { key: null, label: "Use", hint: "" },
 ];
+const body = make("tbody", "", []);
+const table = make("table", "pairs", []);
+/** The table's row of each click, and what it was drawn from: a row is made again only when that changes. @type {Map<string, {from: unknown[], row: HTMLElement}>} */
+const made = new Map();
+/** What else was drawn: the head of the table and the steps. */
 let drawn = "";
 
 export function startPairs() {
@@ -53,19 +58,60 @@ export function nextWorst() {
 function draw() {
   const rows = sorted();
   count.textContent = rows.length ? String(rows.length) : "";
-  const text = JSON.stringify([rows, state.selected, sorting, state.view?.residual_limit_px, state.placements.length, state.placementsKnown, state.recording === null]);
-  if (text === drawn) return;
-  drawn = text;
-  if (!rows.length) return page.replaceChildren(drawSteps());
-  const head = make("thead", "", [make("tr", "", COLUMNS.map(heading))]);
-  const table = make("table", "pairs", [head, make("tbody", "", rows.map(line))]);
-  const top = page.scrollTop;
+  const steps = !rows.length || !state.view?.has_calibration;
+  const used = rows.filter((click) => click.state !== "excluded").length;
+  const text = JSON.stringify([sorting, rows.length > 0, steps, steps && used, state.placements.length, state.placementsKnown, state.recording === null]);
   const held = document.activeElement?.matches("[data-act]") ? idOf(document.activeElement) : undefined;
-  page.replaceChildren(...(state.view?.has_calibration ? [table] : [table, drawSteps()]));
-  page.scrollTop = top;
-  if (held) /** @type {HTMLElement|null} */ (page.querySelector(`[data-id="${held}"] [data-act]`))?.focus({ preventScroll: true });
-  page.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" });
+  const changed = drawRows(rows);
+  if (text !== drawn) drawAround(rows.length > 0, steps);
+  else if (!changed) return;
+  drawn = text;
+  if (held) /** @type {HTMLElement|null|undefined} */ (made.get(held)?.row.querySelector("[data-act]"))?.focus({ preventScroll: true });
+  body.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" });
 }
+
+/** The head of the table, and the steps below it as long as there is no calibration. @param {boolean} some @param {boolean} steps */
+function drawAround(some, steps) {
+  const top = page.scrollTop;
+  table.replaceChildren(make("thead", "", [make("tr", "", COLUMNS.map(heading))]), body);
+  page.replaceChildren(...(some ? [table] : []), ...(steps ? [drawSteps()] : []));
+  page.scrollTop = top;
+}
+
+/** Bring the rows up to date, one by one. @param {Click[]} rows @returns {boolean} whether any changed */
+function drawRows(rows) {
+  const keys = new Set(rows.map(keyOf));
+  let changed = false;
+  for (const [key, { row }] of made) {
+    if (keys.has(key)) continue;
+    row.remove();
+    made.delete(key);
+    changed = true;
+  }
+  /** @type {Element|null} */
+  let next = body.firstElementChild;
+  for (const click of rows) {
+    const before = made.get(keyOf(click));
+    const from = [click, click.id === state.selected, state.view?.residual_limit_px, state.placements, state.seconds];
+    let row = before?.row;
+    if (!row || from.some((value, index) => value !== before?.from[index])) {
+      row = line(click);
+      if (next === before?.row) next = row;
+      before?.row.replaceWith(row);
+      made.set(keyOf(click), { from, row });
+      changed = true;
+    }
+    if (row === next) next = row.nextElementSibling;
+    else {
+      body.insertBefore(row, next);
+      changed = true;
+    }
+  }
+  return changed;
+}
+
+/** A name for a row; a click that is not confirmed has no id yet. @param {Click} click */
+const keyOf = (click) => click.id || stampKey(click.image_time);
 
 /** @param {(typeof COLUMNS)[number]} column */
 function heading(column) {

@@ -39,20 +39,35 @@ export function on(topics, listener) {
 
 /** Notify the listeners of a topic. @param {Topic} topic */
 export function emit(topic) {
+  if (topic === "view" || topic === "recording") derived = null;
   for (const listener of listeners.get(topic) ?? []) listener();
 }
 
-/** The clicks as they should be drawn now. @returns {Click[]} */
-export function clicks() {
+/**
+ * What is derived from the view and the marks as the user left them; made again once either changed.
+ * @type {{rows: Click[], byFrame: Map<number, Click>, byId: Map<string, Click>, frames: number[]}|null}
+ */
+let derived = null;
+
+function drawn() {
+  if (derived) return derived;
   const known = state.view?.clicks ?? [];
-  const drawn = known.map((click) => {
-    const local = state.local.get(stampKey(click.image_time));
-    return local ? { ...click, u_px: local.u, v_px: local.v } : click;
-  });
-  const stamps = new Set(known.map((click) => stampKey(click.image_time)));
-  for (const [key, place] of state.local) if (!stamps.has(key)) drawn.push(placedHere(key, place));
-  return drawn;
+  let rows = known;
+  if (state.local.size) {
+    rows = known.map((click) => {
+      const local = state.local.get(stampKey(click.image_time));
+      return local ? { ...click, u_px: local.u, v_px: local.v } : click;
+    });
+    const stamps = new Set(known.map((click) => stampKey(click.image_time)));
+    for (const [key, place] of state.local) if (!stamps.has(key)) rows.push(placedHere(key, place));
+  }
+  const frames = rows.map((click) => click.frame).filter((frame) => frame >= 0).sort((a, b) => a - b);
+  derived = { rows, byFrame: new Map(rows.map((click) => [click.frame, click])), byId: new Map(rows.map((click) => [click.id, click])), frames };
+  return derived;
 }
+
+/** The clicks as they should be drawn now; a row that did not change is the same object as before. @returns {Click[]} */
+export const clicks = () => drawn().rows;
 
 /** A click that the server has not confirmed yet. @param {string} key @param {{u: number, v: number}} place @returns {Click} */
 function placedHere(key, place) {
@@ -80,10 +95,10 @@ function frameOf(stamp) {
 }
 
 /** The click in a frame. @param {number} index @returns {Click|undefined} */
-export const clickIn = (index) => clicks().find((click) => click.frame === index);
+export const clickIn = (index) => drawn().byFrame.get(index);
 
 /** The selected click. @returns {Click|undefined} */
-export const selectedClick = () => clicks().find((click) => click.id !== "" && click.id === state.selected);
+export const selectedClick = () => (state.selected ? drawn().byId.get(state.selected) : undefined);
 
 /** The placement that includes a frame. @param {number} index @returns {import("./messages.js").PlacementRow|undefined} */
 export function placementAt(index) {
@@ -93,10 +108,14 @@ export function placementAt(index) {
 
 /** Whether a placement has a click. @param {import("./messages.js").PlacementRow} placement */
 export function isClicked(placement) {
-  return clicks().some((click) => {
-    const time = state.seconds[click.frame];
-    return placement.start_s <= time && time <= placement.end_s;
-  });
+  const { frames } = drawn();
+  let [low, high] = [0, frames.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (state.seconds[frames[middle]] < placement.start_s) low = middle + 1;
+    else high = middle;
+  }
+  return low < frames.length && state.seconds[frames[low]] <= placement.end_s;
 }
 
 /** A range that differs this much from the placement's is another target [m]; the reflector's own returns scatter by a few decimetres. */

@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import TimesNs, frozen_array
+from calib_core.arrays import Indices, TimesNs, frozen_array
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, PairResult
@@ -40,6 +40,12 @@ class RecordingFacts:
         """Return the index of the frame with exactly this stamp; None when no frame has it."""
         index = int(np.searchsorted(self.image_times, time))
         return index if index < len(self.image_times) and int(self.image_times[index]) == time else None
+
+    def frames_at(self, times_ns: TimesNs) -> Indices:
+        """Return the index of the frame with each stamp (n,) [ns]; -1 when no frame has it."""
+        places = np.searchsorted(self.image_times, times_ns)
+        found = np.append(self.image_times, np.iinfo(np.int64).min)[places] == times_ns
+        return np.where(found, places, -1)
 
     def has_pixel(self, u_px: float, v_px: float) -> bool:
         """Return whether a pixel is on the frame, whose edge is half a pixel outside the outermost pixel centres."""

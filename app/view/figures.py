@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from app.view.click_rows import ellipse_of
 from app.view.model import Figure
 from app.view.mounting import mounting_of
 from app.view.number_format import plain, with_sigma
+from app.view.reprojections import reprojections
 from app.view.wording import sentence
 from calib_core.radar_axes import sigma_in_radar_axes
 from calib_core.results import Calibration
@@ -140,7 +140,7 @@ def residual_limit_px(calibration: Calibration) -> float | None:
     """
     if calibration.options.method == "paper":
         return calibration.options.paper.ransac_threshold_px
-    ellipses = (ellipse_of(pair.expected_covariance_px2) for pair in calibration.pairs)
+    ellipses = (pair.ellipse for pair in reprojections(calibration.pairs).values())
     lengths = [ellipse.semi_major_px for ellipse in ellipses if ellipse is not None]
     return float(np.median(lengths)) if lengths else None
 

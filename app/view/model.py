@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
+import msgspec
+
 from calib_core.measurements import Stamp
 from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning
@@ -25,9 +27,8 @@ Level: TypeAlias = Literal["plain", "good", "warning"]
 Stage: TypeAlias = Literal["collecting", "solving", "solved", "unsolvable"]
 
 
-@dataclass(frozen=True, slots=True)
-class Ellipse:
-    """The region around a reprojection that contains 95 % of the residuals of a good pair.
+class Ellipse(msgspec.Struct, frozen=True, array_like=True):
+    """The region around a reprojection that contains 95 % of the residuals of a good pair; written as an array.
 
     Attributes:
         semi_major_px: semi-major axis.
@@ -51,8 +52,8 @@ class ClickRow:
         u_px: column of the click.
         v_px: row of the click.
         state: according to the latest outcome; "pending" if that does not cover it.
-        projected_px: reprojection of its radar position (u, v); None if it has none.
-        residual_px: length of projected_px minus the current click; None without projected_px.
+        projected_px: reprojection of its radar position (u, v), rounded to 1 % of the ellipse or finer; None if it has none.
+        residual_px: length of projected_px minus the current click, rounded likewise; None without projected_px.
         ellipse: None if the method has no noise model.
         range_m: of its radar position; None without one.
         azimuth_deg: of its radar position, positive to the left.

@@ -5,6 +5,7 @@ import tempfile
 from pathlib import Path
 
 from app.resources import sample_folder
+from benchmarks.speed.channel import measure_channel
 from benchmarks.speed.paging import measure_page
 from benchmarks.speed.recordings import measure_recordings
 from benchmarks.speed.rows import page
@@ -20,6 +21,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as scratch:
         tables = [
             *measure_page(Path(scratch)),
+            measure_channel(),
             measure_solving(),
             measure_starting(sample_folder() / "rooftop"),
             measure_recordings(Path(scratch), large=large),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["Row", "Table", "page", "spread"]
+__all__ = ["Row", "Table", "page", "section", "spread"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +53,14 @@ def page(tables: Sequence[Table], *, command: str) -> str:
         f"Written by `{command}`. Machine: {_machine()}. Read times as ratios within this one run.",
     ]
     for table in tables:
-        lines += ["", f"## {table.title}", "", table.how, "", "| what | measured | ratio | aim |", "|---|---|---|---|"]
-        lines += [f"| {row.what} | {row.figure} | {row.ratio} | {_aim(row)} |" for row in table.rows]
+        lines += ["", *section(table)]
     return "\n".join(lines) + "\n"
+
+
+def section(table: Table) -> list[str]:
+    """Return the lines of one table in Markdown, under its heading."""
+    head = [f"## {table.title}", "", table.how, "", "| what | measured | ratio | aim |", "|---|---|---|---|"]
+    return [*head, *(f"| {row.what} | {row.figure} | {row.ratio} | {_aim(row)} |" for row in table.rows)]
 
 
 def _aim(row: Row) -> str:

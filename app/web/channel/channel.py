@@ -13,6 +13,7 @@ from app.web.channel.hub import Hub
 from app.web.channel.newest import NewestWins
 from app.web.channel.outbox import Outbox
 from app.web.channel.radar_survey import placements_at
+from app.web.channel.view_feed import Shown
 from app.web.frames import Frame
 from app.web.messages import (
     CursorMoved,
@@ -24,6 +25,7 @@ from app.web.messages import (
     Incoming,
     Problem,
     ViewpointWanted,
+    ViewWanted,
     encode,
     encode_frame,
     parse,
@@ -73,6 +75,7 @@ class Channel:
         self.scene: TabScene | None = None
         self._hub = hub
         self._cursor = Cursor()
+        self._shown: Shown | None = None
         self._frames = NewestWins(self._send_frame)
         self._overlay = NewestWins(self._send_overlay)
         self._space = NewestWins(self._draw_space)
@@ -94,6 +97,10 @@ class Channel:
             for task in (sending, reading):
                 task.cancel()
             await asyncio.gather(sending, reading, return_exceptions=True)
+
+    def show(self) -> None:
+        """Send the newest View, or what differs from the one that the page has."""
+        self.outbox.put(self._view_text, kind="view")
 
     def refresh(self) -> None:
         """Draw again, after a change of the session or once the 3D view is connected."""
@@ -121,7 +128,11 @@ class Channel:
         elif isinstance(command, CursorMoved):
             self._move(command)
         elif isinstance(command, Hello):
-            self._hub.greet(self.outbox)
+            self._shown = None
+            self._hub.greet(self)
+        elif isinstance(command, ViewWanted):
+            self._shown = None
+            self.show()
         elif isinstance(command, ViewpointWanted):
             if self.scene is not None:
                 self.scene.look_from(command.viewpoint)
@@ -135,6 +146,11 @@ class Channel:
             await asyncio.get_running_loop().run_in_executor(self._hub.steps, change)
         if incoming.request is not None:
             self.outbox.put(encode(Done(incoming.request)))
+
+    def _view_text(self) -> str:
+        """Write the message that makes the page show the newest View; called when the page can take it."""
+        text, self._shown = self._hub.feed.message(self._shown)
+        return text
 
     def _move(self, command: CursorMoved) -> None:
         if not 0 <= command.index < len(self._hub.frames):

@@ -11,6 +11,7 @@ from app.resources import version
 from app.view import View, warning_in_sentences
 from app.web.channel.outbox import Outbox
 from app.web.channel.radar_survey import Survey, survey_of
+from app.web.channel.view_feed import ViewFeed
 from app.web.frames import FrameStore
 from app.web.messages import (
     Outgoing,
@@ -39,6 +40,9 @@ class Tab(Protocol):
 
     outbox: Outbox
 
+    def show(self) -> None:
+        """Send the newest View, or what differs from the one that the page has."""
+
     def refresh(self) -> None:
         """Draw the overlay and the 3D view again, after a change of the session."""
 
@@ -56,7 +60,7 @@ class Hub:
         self.survey: Survey | None = None
         self.tabs: set[Tab] = set()
         self.steps = ThreadPoolExecutor(max_workers=1, thread_name_prefix="steps")
-        self._view = workspace.view
+        self.feed = ViewFeed(workspace.view)
         self._searching: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
@@ -77,12 +81,13 @@ class Hub:
     @property
     def view(self) -> View:
         """The latest View of the workspace."""
-        return self._view
+        return self.feed.newest
 
-    def greet(self, outbox: Outbox) -> None:
+    def greet(self, tab: Tab) -> None:
         """Send the current state to a page that has just opened."""
+        outbox = tab.outbox
         outbox.put(encode(self._recording_note()), kind="recording")
-        outbox.put(encode(self._view), kind="view")
+        tab.show()
         if self.survey is not None:
             outbox.put(encode(Placements(self.survey.rows)), kind="placements")
         else:
@@ -95,8 +100,9 @@ class Hub:
             tab.outbox.put(text, kind=kind)
 
     def _take(self, view: View) -> None:
-        self._view = view
-        self.broadcast(view, "view")
+        self.feed.take(view)
+        for tab in self.tabs:
+            tab.show()
         if view.solving:
             return  # overlay and 3D view show the last answer until the next one; redrawing would only slow the solver
         for tab in self.tabs:

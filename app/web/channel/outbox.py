@@ -3,8 +3,12 @@
 import asyncio
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Hashable
+from typing import TypeAlias
 
-__all__ = ["Outbox"]
+__all__ = ["Message", "Outbox"]
+
+Message: TypeAlias = str | bytes | Callable[[], str]
+"""What is sent, or a function that writes it when it is sent."""
 
 _MOST = 2000
 """A page that leaves more messages than this unread is considered gone."""
@@ -14,11 +18,11 @@ class Outbox:
     """Messages to one page, in order. Runs on one event loop."""
 
     def __init__(self) -> None:
-        self._waiting: OrderedDict[Hashable, str | bytes] = OrderedDict()
+        self._waiting: OrderedDict[Hashable, Message] = OrderedDict()
         self._something = asyncio.Event()
         self._number = 0
 
-    def put(self, message: str | bytes, *, kind: str | None = None) -> None:
+    def put(self, message: Message, *, kind: str | None = None) -> None:
         """Queue a message. One with a kind replaces a waiting one of the same kind; all others are sent."""
         self._number += 1
         key: Hashable = kind if kind is not None else self._number
@@ -41,5 +45,5 @@ class Outbox:
                 if len(self._waiting) > _MOST:
                     raise BufferError(f"the page has left {len(self._waiting)} messages unread")
                 _, message = self._waiting.popitem(last=False)
-                await send(message)
+                await send(message() if callable(message) else message)
             self._something.clear()

@@ -14,6 +14,7 @@ from app.web.messages.incoming import (
     Incoming,
     Viewpoint,
     ViewpointWanted,
+    ViewWanted,
     parse,
     request_of,
 )
@@ -35,9 +36,11 @@ from app.web.messages.outgoing import (
     encode,
     encode_frame,
 )
+from app.web.messages.view_changes import ClickChange, RowValues, ViewChange, change_between
 
 __all__ = [
     "MAX_TEXT_BYTES",
+    "ClickChange",
     "Command",
     "CursorMoved",
     "Done",
@@ -55,11 +58,15 @@ __all__ = [
     "Problem",
     "Progress",
     "RecordingNote",
+    "RowValues",
     "SensorNote",
     "SessionNote",
     "StampColumns",
+    "ViewChange",
+    "ViewWanted",
     "Viewpoint",
     "ViewpointWanted",
+    "change_between",
     "encode",
     "encode_frame",
     "parse",

@@ -22,6 +22,7 @@ __all__ = [
     "ImportWanted",
     "Incoming",
     "MessageForm",
+    "ViewWanted",
     "Viewpoint",
     "ViewpointWanted",
     "parse",
@@ -38,6 +39,11 @@ FrameIndex: TypeAlias = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 @dataclass(frozen=True, slots=True)
 class Hello:
     """A page has opened: send it the recording and the view."""
+
+
+@dataclass(frozen=True, slots=True)
+class ViewWanted:
+    """A page missed a change of the View: send it a whole one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +107,7 @@ class ImportWanted:
     name: str
 
 
-Command: TypeAlias = Step | Hello | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted
+Command: TypeAlias = Step | Hello | ViewWanted | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +129,10 @@ class _Form(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
 class HelloForm(_Form, frozen=True, tag="hello"):
     """A page has opened."""
+
+
+class ViewForm(_Form, frozen=True, tag="view"):
+    """A change of the View was missed."""
 
 
 class FrameForm(_Form, frozen=True, tag="frame"):
@@ -156,7 +166,7 @@ class ImportForm(_Form, frozen=True, tag="import_clicks"):
     name: Annotated[str, Meta(max_length=300)] = "the file"
 
 
-MessageForm: TypeAlias = forms.StepForm | HelloForm | FrameForm | CursorForm | ViewpointForm | ImportForm
+MessageForm: TypeAlias = forms.StepForm | HelloForm | ViewForm | FrameForm | CursorForm | ViewpointForm | ImportForm
 
 
 _TYPES = {str(form.__struct_config__.tag): form for form in get_args(MessageForm)}
@@ -220,6 +230,11 @@ def _options(form: forms.OptionsChangedForm) -> Command:
 @_command.register
 def _hello(form: HelloForm) -> Command:
     return Hello()
+
+
+@_command.register
+def _view(form: ViewForm) -> Command:
+    return ViewWanted()
 
 
 @_command.register

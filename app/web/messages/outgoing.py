@@ -9,6 +9,7 @@ import msgspec
 
 from app.option_changes import OptionGroup, option_groups
 from app.view import View
+from app.web.messages.view_changes import ViewChange
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, Stamp
 from calib_core.results import DataWarning
@@ -249,10 +250,11 @@ class FrameHeader:
     format: Literal["jpeg", "png"]
 
 
-Outgoing: TypeAlias = View | Opening | RecordingNote | Placements | Overlay | Progress | Problem | Done
+Outgoing: TypeAlias = View | ViewChange | Opening | RecordingNote | Placements | Overlay | Progress | Problem | Done
 
 TYPES: Mapping[type, str] = {
     View: "view",
+    ViewChange: "view_change",
     Opening: "opening",
     RecordingNote: "recording",
     Placements: "placements",
@@ -265,10 +267,28 @@ TYPES: Mapping[type, str] = {
 
 
 def encode(message: Outgoing) -> str:
-    """Encode a message to a page as JSON text, with its "type"; a number that is not finite becomes null."""
-    body = msgspec.json.encode(message).decode()
+    """Encode a message to a page as JSON text, with its "type".
+
+    A number that is not finite becomes null. A character that is not Unicode, such as an undecodable byte of a file name, is
+    written as an escape (backslash, x or u, digits).
+    """
+    try:
+        body = msgspec.json.encode(message).decode()
+    except UnicodeEncodeError:
+        body = msgspec.json.encode(_unicode(msgspec.to_builtins(message))).decode()
     separator = "," if len(body) > 2 else ""
     return f'{{"type":"{TYPES[type(message)]}"{separator}{body[1:]}'
+
+
+def _unicode(tree: object) -> object:
+    """Return plain values with every character that UTF-8 cannot encode written as an escape."""
+    if isinstance(tree, str):
+        return tree.encode("utf-8", "backslashreplace").decode()
+    if isinstance(tree, dict):
+        return {_unicode(name): _unicode(value) for name, value in tree.items()}
+    if isinstance(tree, list | tuple):
+        return [_unicode(value) for value in tree]
+    return tree
 
 
 def encode_frame(header: FrameHeader, data: bytes) -> bytes:

@@ -20,7 +20,7 @@ def test_every_import_names_a_file_and_what_that_file_exports(static: Path) -> N
         for names, target in re.findall(r'^import (.+?) from "\./(.+?)";', script.read_text(), re.M | re.S):
             exporter = (static / target).read_text()
             for name in re.findall(r"(\w+)(?: as \w+)?", names.strip("{} ")) if names.startswith("{") else []:
-                assert re.search(rf"export (async function|function|const|let) {name}\b", exporter), (
+                assert re.search(rf"export (async function|function|class|const|let) {name}\b", exporter), (
                     f"{script.name}: {name}"
                 )
 

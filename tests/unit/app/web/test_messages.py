@@ -4,6 +4,7 @@ import json
 import struct
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -41,9 +42,11 @@ from app.web.messages import (
     Problem,
     Progress,
     RecordingNote,
+    SensorNote,
     SessionNote,
     StampColumns,
     ViewpointWanted,
+    change_between,
     encode,
     encode_frame,
     parse,
@@ -203,6 +206,30 @@ def test_a_view_is_written_as_plain_json_with_its_type() -> None:
     assert msgspec.convert(written, View) == shown
     assert written["clicks"][0]["image_time"] == {"sec": 1700000000, "nanosec": 223456789}
     assert written["options"]["solving"]["camera_position"] is None
+
+
+@pytest.mark.parametrize(
+    ("name", "written"), [("drive\udcff.bag", "drive\\udcff.bag"), ("\ud800", "\\ud800"), ("é ✓", "é ✓")]
+)
+def test_a_name_that_is_not_unicode_is_written_as_an_escape(name: str, written: str) -> None:
+    stamps = StampColumns.of(FACTS.image_times)
+    sensors = (SensorNote("radar", name, about=(name,)),)
+    note = RecordingNote(
+        name, name, "/i", 640, 480, stamps, Stamp(1, 2), stamps, (), sensors, SessionNote(name, 0), "0.1"
+    )
+    sent = json.loads(encode(note).encode("utf-8"))
+    assert (sent["name"], sent["sensors"][0]["topic"], sent["session"]["folder"]) == (written,) * 3
+    assert sent["frame_times"]["nanosec"] == [123456789, 223456789, 323456789]
+    assert json.loads(encode(Problem(name, name)).encode("utf-8"))["message"] == written
+
+
+@given(st.text(st.characters()), st.text(st.characters(categories=["Cs"]), min_size=1))
+def test_no_text_keeps_a_message_from_being_sent(text: str, surrogates: str) -> None:
+    history = advance(History(), ClickPlaced(TimeNs(int(FACTS.image_times[1])), 1.5, 2.5), FACTS)
+    before = view(history, FACTS)
+    after = replace(before, status=text, clicks=(replace(before.clicks[0], note=text + surrogates),))
+    json.loads(encode(change_between(before, after, number=1)).encode("utf-8"))
+    json.loads(encode(after).encode("utf-8"))
 
 
 def test_numbers_that_are_not_finite_become_null() -> None:

@@ -14,6 +14,7 @@ from websockets.sync.client import connect
 
 from app.web.port.server import RunningServer, ServerOptions, start
 from app.workspace import open_workspace
+from tests.page_view import PageView
 from tests.picture_recording import START, PictureRecording, grey_pictures
 from tests.port_client import channel, come_in, get, wanted
 
@@ -159,18 +160,30 @@ def test_a_page_is_greeted_with_recording_and_view(server: RunningServer, cookie
 
 def test_a_click_reaches_the_other_tab_and_undo_takes_it_from_both(server: RunningServer, cookie: str) -> None:
     with channel(server, cookie, "/ws/tab1") as one, channel(server, cookie, "/ws/tab2") as two:
-        for socket in (one, two):
+        pages = PageView(one), PageView(two)
+        for socket, page in zip((one, two), pages, strict=True):
             socket.send('{"type":"hello"}')
-            wanted(socket, "view")
+            page.next()
         one.send(json.dumps({"type": "click_placed", "image_time": stamp(1), "pixel_px": [12.25, 34.5], "request": 7}))
-        seen = wanted(one, "view")
+        seen = pages[0].next()
         assert [(row["frame"], row["u_px"], row["v_px"]) for row in seen["clicks"]] == [(1, 12.25, 34.5)]
-        assert wanted(one, "done")["request"] == 7
-        assert wanted(two, "view")["clicks"] == seen["clicks"]
+        assert pages[1].next()["clicks"] == seen["clicks"]
         two.send('{"type":"undo","request":1}')
-        while wanted(one, "view")["clicks"]:
+        while pages[0].next()["clicks"]:
             pass
         assert wanted(two, "done")["request"] == 1
+
+
+def test_a_page_that_missed_a_change_gets_a_whole_view(server: RunningServer, cookie: str) -> None:
+    with channel(server, cookie) as socket:
+        socket.send('{"type":"hello"}')
+        wanted(socket, "view")
+        socket.send(json.dumps({"type": "click_placed", "image_time": stamp(2), "pixel_px": [20, 30]}))
+        assert wanted(socket, "view_change")["number"] == 1
+        socket.send('{"type":"view"}')
+        assert [row["frame"] for row in wanted(socket, "view")["clicks"]] == [2]
+        socket.send('{"type":"undo"}')
+        assert wanted(socket, "view_change")["number"] == 1, "changes are counted from the last whole View"
 
 
 @pytest.mark.parametrize(
