@@ -13,7 +13,7 @@ import tyro
 
 from app.cli.flags import File, Folder, Switch, called
 from app.cli.import_file import camera_in, reference_from
-from app.cli.output import read_text, required_camera
+from app.cli.output import read_text, required_camera, told_clicks_at_frames
 from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from calib_core.camera import Camera
 from calib_core.errors import InputError
@@ -140,10 +140,11 @@ def _serve(
         CalibrationError: the recording, the intrinsics, the clicks or the session cannot be used.
     """
     from app.resources import check_installation
-    from app.session import OptionsChanged
+    from app.session import ClicksImported, OptionsChanged
     from app.view import sentence
     from app.web.port.address import require_address, require_token
     from app.workspace import open_workspace
+    from calib_core.interchange import read_clicks
     from calib_core.recordings import open_recording
 
     check_installation()
@@ -165,7 +166,8 @@ def _serve(
         if options is not None and options != CalibrationOptions():
             workspace.dispatch(OptionsChanged(options))
         if clicks_file is not None and workspace.restored.steps == 0:
-            workspace.import_clicks(read_text(clicks_file), source=str(clicks_file))
+            clicks = read_clicks(read_text(clicks_file), source=str(clicks_file))
+            workspace.dispatch(ClicksImported(told_clicks_at_frames(clicks, recording, source=str(clicks_file))))
         elif clicks_file is not None:
             print(f"Continuing the existing session; {clicks_file} was not imported (start over with --fresh)")
         service.serve(workspace, recording)

@@ -2,6 +2,7 @@
 
 import logging
 import os
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -144,18 +145,19 @@ def open_session_file(folder: Path, facts: RecordingFacts, warnings: tuple[DataW
         SessionFileError: it cannot be written, is open in another process, is damaged, is of another recording, or holds a link
             or another user's file. What is on the disk is unchanged.
     """
-    guarded = GuardedFolder(folder, create=True)
-    lock: FolderLock | None = None
-    try:
-        lock = FolderLock(guarded)
-        return _opened(guarded, lock, facts, warnings)
-    except (OSError, SessionFileError) as error:
-        if lock is not None:
-            lock.close()
-        guarded.close()
-        if isinstance(error, SessionFileError):
-            raise
-        raise SessionFileError(f"{folder}: cannot be used: {error.strerror}; give another --session folder") from error
+    with ExitStack() as stack:
+        try:
+            guarded = GuardedFolder(folder, create=True)
+            stack.callback(guarded.close)
+            lock = FolderLock(guarded)
+            stack.callback(lock.close)
+            opened = _opened(guarded, lock, facts, warnings)
+        except OSError as error:
+            raise SessionFileError(
+                f"{folder}: cannot be used: {error.strerror}; give another --session folder"
+            ) from error
+        stack.pop_all()
+        return opened
 
 
 def set_aside(folder: Path) -> Path | None:
