@@ -43,9 +43,9 @@ class Closed:
         if not self.clicks:
             return f"there were no clicks to save, but {self.fault}"
         if self.kept_in is None:
-            return f"{self.clicks} clicks could not be saved: {self.fault}"
+            return f"the clicks ({self.clicks}) could not be saved: {self.fault}"
         return (
-            f"{self.fault}. All {self.clicks} clicks are saved in {self.kept_in}; "
+            f"{self.fault}. All clicks ({self.clicks}) are saved in {self.kept_in}; "
             "they are used when the recording is opened again"
         )
 

@@ -242,7 +242,7 @@ def test_a_step_is_refused_when_another_program_changed_the_journal(tmp_path: Pa
         session_file.append(step, advance(history, step, FACTS))
     assert journal.read_bytes() == before
     left = session_file.close()
-    assert "3 clicks are saved in" in left.note
+    assert "All clicks (3) are saved in" in left.note
     assert left.kept_in == folder / SNAPSHOT
     assert clicks_in(folder) == [1.0, 2.0, 3.0]
 
@@ -299,7 +299,7 @@ def test_without_any_place_to_write_the_end_says_that_the_clicks_are_lost(
     monkeypatch.setattr(os, "write", full)
     left = session_file.close()
     assert left.kept_in is None
-    assert left.note.startswith("2 clicks could not be saved: ")
+    assert left.note.startswith("the clicks (2) could not be saved: ")
     assert "no space left on device" in left.note
 
 
