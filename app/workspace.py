@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol, TypeAlias
 
 from app.session import ClicksImported, History, RecordingFacts, Redo, Session, Solved, Step, Undo, advance, settled
-from app.session.file import Restored, open_session_file
+from app.session.file import Closed, Restored, open_session_file
 from app.solver_worker import SolverWorker
 from app.view import Reference, View, view
 from calib_core.camera import Camera
@@ -16,6 +16,7 @@ from calib_core.interchange import read_clicks, write_clicks
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording
+from calib_core.results import DataWarning
 
 __all__ = ["Journal", "Solver", "Subscriber", "Workspace", "open_workspace", "recording_facts"]
 
@@ -28,8 +29,8 @@ class Journal(Protocol):
     def append(self, step: Step, history: History) -> None:
         """Store a step permanently before returning; `history` is the state after it."""
 
-    def close(self) -> None:
-        """Close the file."""
+    def close(self) -> Closed:
+        """Close the file; return whether everything is in it, also when called again."""
 
 
 class Solver(Protocol):
@@ -157,11 +158,14 @@ class Workspace:
         """
         self.dispatch(ClicksImported(read_clicks(text, source)))
 
-    def close(self) -> None:
-        """Stop the solver and close the session file."""
+    def close(self) -> Closed:
+        """Stop the solver, write the snapshot and close the session file; return whether all clicks are on the disk.
+
+        Safe to call again.
+        """
         self._solver.close()
         with self._lock:
-            self._journal.close()
+            return self._journal.close()
 
     def _ask_for_answer(self, session: Session) -> None:
         """Request a solve without holding the lock: the answer may come at once; older requests never replace newer ones."""
@@ -199,7 +203,9 @@ def recording_facts(recording: Recording, name: str) -> RecordingFacts:
             f"{name}: has no frames to click in; give the camera's recording as well, or another --image-topic"
         )
     picture = recording.image_bytes(0)
-    return RecordingFacts(name, recording.image_times, picture.width_px, picture.height_px, recording.radar_axes)
+    return RecordingFacts(
+        name, recording.image_times, picture.width_px, picture.height_px, recording.radar_axes, recording.radar_times
+    )
 
 
 def open_workspace(
@@ -209,6 +215,7 @@ def open_workspace(
     session_folder: Path,
     name: str,
     reference: Reference | None = None,
+    warnings: tuple[DataWarning, ...] = (),
 ) -> Workspace:
     """Open or start the session of a recording, with its solver.
 
@@ -218,12 +225,13 @@ def open_workspace(
         session_folder: where the session is stored.
         name: what to call the recording.
         reference: a calibration to review and to compare with; None if there is none.
+        warnings: what is known about the choice of the session folder.
 
     Raises:
         InputError: the recording has no frames.
         SessionFileError: the session cannot be opened.
     """
     facts = recording_facts(recording, name)
-    session_file = open_session_file(session_folder, facts)
+    session_file = open_session_file(session_folder, facts, warnings)
     solver = SolverWorker(recording, camera, reference.calibration if reference else None)
     return Workspace(facts, session_file.restored, session_file, solver, reference)

@@ -89,6 +89,11 @@ COMMANDS: Mapping[str, Command] = {
             "Write the camera's frames to a video, each at its recorded time; recorded JPEG is not re-encoded.",
         ),
         Command(
+            "session",
+            "app.cli.session:Session",
+            "List the sessions of recordings, repair a damaged one, or export its clicks.",
+        ),
+        Command(
             "simulate",
             "app.cli.simulate:Simulate",
             "Simulate a recording: radar, camera, and the ground truth (truth.json).",

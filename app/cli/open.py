@@ -13,7 +13,7 @@ import tyro
 
 from app.cli.flags import File, Folder, Switch, called
 from app.cli.import_file import camera_in, reference_from
-from app.cli.output import read_text, required_camera
+from app.cli.output import read_text, required_camera, told_clicks_at_frames
 from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from calib_core.camera import Camera
 from calib_core.errors import InputError
@@ -21,6 +21,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, RecordingOptions
 
 if TYPE_CHECKING:
+    from app.session.file import FoundFolder
     from app.web.port.serving import Service
 
 __all__ = ["Demo", "Open"]
@@ -93,7 +94,7 @@ class Open:
     clicks: File = None
     """Clicks to start a new session with (cocalib/clicks-1 JSON)."""
     session: Folder = None
-    """Session folder; by default, next to the recording if that is writable, else in your user folder."""
+    """Session folder; by default the one with this recording's frames, next to it or in your user folder, else a new one."""
     fresh: Switch = False
     """Start without the previous clicks (a backup is kept)."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
@@ -103,13 +104,12 @@ class Open:
 
     def run(self) -> int:
         """Serve until Ctrl+C or SIGTERM; return the exit code."""
-        from app.session.file import recording_session_folder
         from calib_core.recordings import require_files
 
         paths = require_files(self.recording)
         return _serve(
             paths,
-            session=self.session or recording_session_folder(paths),
+            session=self.session,
             fresh=self.fresh,
             serving=self.serving,
             name=paths[0].name,
@@ -124,7 +124,7 @@ class Open:
 def _serve(
     paths: Sequence[Path],
     *,
-    session: Path,
+    session: Path | None,
     fresh: Switch,
     serving: ServingFlags,
     name: str,
@@ -140,11 +140,11 @@ def _serve(
         CalibrationError: the recording, the intrinsics, the clicks or the session cannot be used.
     """
     from app.resources import check_installation
-    from app.session import OptionsChanged
-    from app.session.file import set_aside
+    from app.session import ClicksImported, OptionsChanged
     from app.view import sentence
     from app.web.port.address import require_address, require_token
     from app.workspace import open_workspace
+    from calib_core.interchange import read_clicks
     from calib_core.recordings import open_recording
 
     check_installation()
@@ -156,20 +156,37 @@ def _serve(
         recording = stack.enter_context(open_recording(paths, topics))
         camera = _camera(recording, camera_file, calibration_file)
         reference = reference_from(calibration_file, camera) if calibration_file else None
-        if fresh and (kept := set_aside(session)) is not None:
-            print(f"The previous session is kept in {kept}")
-        workspace = open_workspace(recording, camera=camera, session_folder=session, name=name, reference=reference)
+        found = _session_folder(session, paths, recording, name, fresh=fresh)
+        workspace = open_workspace(
+            recording, camera=camera, session_folder=found.path, name=name, reference=reference, warnings=found.warnings
+        )
         stack.callback(workspace.close)
         for warning in workspace.restored.warnings:
             print(f"{sentence(warning.message)} {sentence(warning.hint)}")
         if options is not None and options != CalibrationOptions():
             workspace.dispatch(OptionsChanged(options))
         if clicks_file is not None and workspace.restored.steps == 0:
-            workspace.import_clicks(read_text(clicks_file), source=str(clicks_file))
+            clicks = read_clicks(read_text(clicks_file), source=str(clicks_file))
+            workspace.dispatch(ClicksImported(told_clicks_at_frames(clicks, recording, source=str(clicks_file))))
         elif clicks_file is not None:
             print(f"Continuing the existing session; {clicks_file} was not imported (start over with --fresh)")
         service.serve(workspace, recording)
     return 0
+
+
+def _session_folder(
+    session: Path | None, paths: Sequence[Path], recording: Recording, name: str, *, fresh: bool
+) -> "FoundFolder":
+    """Return the given session folder, or the one of this recording; with `fresh`, an existing one is renamed first."""
+    from app.session.file import FoundFolder, find_session_folder, recording_session_folder, set_aside
+    from app.workspace import recording_facts
+
+    if not fresh:
+        return FoundFolder(session) if session else find_session_folder(paths, recording_facts(recording, name))
+    folder = session or recording_session_folder(paths)
+    if (kept := set_aside(folder)) is not None:
+        print(f"The previous session is kept in {kept}")
+    return FoundFolder(folder)
 
 
 def _service(paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str) -> "Service":

@@ -1,7 +1,7 @@
 """Shared by the commands: reading and writing files, required intrinsics, progress."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +11,7 @@ from calib_core.errors import InputError
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
-    from calib_core.measurements import TimeNs, Unsolvable
+    from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
     from calib_core.recordings import Recording
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "read_text",
     "required_camera",
     "seconds_text",
+    "told_clicks_at_frames",
     "write_whole",
 ]
 
@@ -107,6 +108,22 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(label, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def told_clicks_at_frames(
+    clicks: "Sequence[ReflectorClick]", recording: "Recording", *, source: str
+) -> "tuple[ReflectorClick, ...]":
+    """Move the clicks of a file to the nearest frames, and print to stderr which ones had the stamp of no frame.
+
+    Raises:
+        InputError: a click is far from every frame.
+    """
+    from app.session.click_stamps import clicks_at_frames
+
+    found = clicks_at_frames(clicks, recording.image_times, source=source)
+    for line in found.moved:
+        print(f"note: {line}", file=sys.stderr)
+    return found.clicks
 
 
 def seconds_text(time: "TimeNs") -> str:

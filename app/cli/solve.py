@@ -10,7 +10,14 @@ import numpy as np
 import tyro
 
 from app.cli.flags import File
-from app.cli.output import explain_unsolvable, read_text, required_camera, seconds_text, write_whole
+from app.cli.output import (
+    explain_unsolvable,
+    read_text,
+    required_camera,
+    seconds_text,
+    told_clicks_at_frames,
+    write_whole,
+)
 from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from app.view import summary_lines
 from calib_core.camera import Camera
@@ -89,6 +96,7 @@ class Solve:
             _require_confirmed(recording)
             camera = required_camera(recording, self.camera)
             _require_inside(clicks, recording, camera, source=clicks_path)
+            clicks = told_clicks_at_frames(clicks, recording, source=str(clicks_path))
             outcome = solve_clicks(recording, clicks, camera, self.measured.over(self.options))
             if isinstance(outcome, Unsolvable):
                 return explain_unsolvable(outcome)
@@ -132,9 +140,12 @@ def _require_inside(clicks: Sequence[ReflectorClick], recording: "Recording", ca
     Raises:
         InputError: a click is outside the recording or the image; the first one is named.
     """
+    from app.session.click_stamps import half_interval_ns
+
     first, last = int(recording.image_times[0]), int(recording.image_times[-1])
+    half_ns = half_interval_ns(recording.image_times)
     for click in clicks:
-        if not first <= click.image_time <= last:
+        if not first - half_ns <= click.image_time <= last + half_ns:
             raise InputError(
                 f"{source}: click {click.id} at {seconds_text(click.image_time)} is outside the recording, "
                 f"whose frames run from {seconds_text(TimeNs(first))} to {seconds_text(TimeNs(last))}; "

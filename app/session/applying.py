@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import singledispatch
 
 from app.option_changes import changed_options
+from app.session.click_stamps import nearest_frame
 from app.session.events import (
     Cleared,
     ClickExcluded,
@@ -129,10 +130,15 @@ def _click(session: Session, click_id: str) -> ReflectorClick:
 
 
 def _require_frame(time: TimeNs, facts: RecordingFacts) -> None:
-    if facts.frame_at(time) is None:
-        raise EventError(
-            f"no frame of {facts.name} has the stamp {_seconds(time)}; a click needs the exact stamp of its frame"
-        )
+    if facts.frame_at(time) is not None:
+        return
+    nearest = ""
+    if len(facts.image_times):
+        index = nearest_frame(facts.image_times, time)
+        nearest = f", the nearest is frame {index + 1} at {_seconds(TimeNs(int(facts.image_times[index])))}"
+    raise EventError(
+        f"no frame of {facts.name} has the stamp {_seconds(time)}{nearest}; a click needs the exact stamp of its frame"
+    )
 
 
 def _require_pixel(u_px: float, v_px: float, facts: RecordingFacts) -> None:

@@ -37,6 +37,25 @@ def test_solve_finds_the_pose_the_recording_was_made_with(calibration: Path) -> 
     assert document["camera_from_radar"]["translation_m"] == pytest.approx(truth.translation_m, abs=0.01)
 
 
+def test_clicks_with_rounded_stamps_are_solved_at_their_frames_and_told(
+    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path
+) -> None:
+    recording = made()
+    exact = cocalib("solve", recording, "--clicks", clicks_file)
+    document = json.loads(clicks_file.read_text())
+    for click in document["clicks"][:3]:
+        click["image_time"]["nanosec"] += 1_000_000
+    (tmp_path / "rounded.json").write_text(json.dumps(document))
+    rounded = cocalib("solve", recording, "--clicks", tmp_path / "rounded.json")
+    assert (rounded.code, exact.err) == (0, "")
+    assert rounded.out == exact.out
+    notes = rounded.err.splitlines()
+    assert len(notes) == 3
+    assert notes[0].startswith(
+        "note: click c0 at 1700000002.001000000 s has the stamp of no frame; the nearest is frame 5"
+    )
+
+
 def test_solve_gives_the_same_bytes_twice_and_for_shuffled_clicks(
     cocalib: Cocalib, clicks_file: Path, calibration: Path, tmp_path: Path
 ) -> None:

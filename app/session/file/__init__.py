@@ -1,19 +1,32 @@
 """The session on disk: a journal of every step, written before the step is announced, and a snapshot to restart from.
 
 A session is a folder, `NAME.cocalib-session/`, with `journal.jsonl` (one line per step, only ever appended to), `session.json`
-(the clicks and options, replaced as a whole from time to time) and `lock` (held while a process has the session open).
+(the clicks and options, replaced as a whole from time to time) and `lock` (held while a process has the session open). All of
+them are opened without following links, carry checksums, and are compared with each other before anything is overwritten.
 """
 
+from app.session.file.closing import Closed
 from app.session.file.errors import SessionFileError
+from app.session.file.finding import FoundFolder, find_session_folder
 from app.session.file.folders import recording_session_folder, user_session_folder
+from app.session.file.listing import SessionSummary, session_summaries
+from app.session.file.repairing import Repair, inspect_session, repair_session
 from app.session.file.session_file import Restored, SessionFile, open_session_file, set_aside
 
 __all__ = [
+    "Closed",
+    "FoundFolder",
+    "Repair",
     "Restored",
     "SessionFile",
     "SessionFileError",
+    "SessionSummary",
+    "find_session_folder",
+    "inspect_session",
     "open_session_file",
     "recording_session_folder",
+    "repair_session",
+    "session_summaries",
     "set_aside",
     "user_session_folder",
 ]

@@ -1,15 +1,17 @@
 """Where a session is stored: next to its recording if that folder is writable, else in the user's state folder."""
 
 import hashlib
+import re
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from app.resources import state_folder
 
-__all__ = ["recording_session_folder", "user_session_folder"]
+__all__ = ["is_writable", "recording_session_folder", "session_folders_in", "user_session_folder"]
 
 _SUFFIX = ".cocalib-session"
+_SET_ASIDE = re.compile(re.escape(_SUFFIX) + r"\.[0-9]+$")
 
 
 def recording_session_folder(paths: Sequence[Path]) -> Path:
@@ -22,9 +24,9 @@ def recording_session_folder(paths: Sequence[Path]) -> Path:
     adjacent = first.with_name(first.name + _SUFFIX)
     in_state_folder = user_session_folder(first.name, key=str(first))
     for folder in (adjacent, in_state_folder):
-        if folder.is_dir() and _is_writable(folder):
+        if folder.is_dir() and is_writable(folder):
             return folder
-    return adjacent if _is_writable(adjacent.parent) else in_state_folder
+    return adjacent if is_writable(adjacent.parent) else in_state_folder
 
 
 def user_session_folder(name: str, *, key: str = "") -> Path:
@@ -38,7 +40,23 @@ def user_session_folder(name: str, *, key: str = "") -> Path:
     return state_folder() / "sessions" / f"{name}{distinct}{_SUFFIX}"
 
 
-def _is_writable(folder: Path) -> bool:
+def session_folders_in(folder: Path, *, set_aside: bool = False) -> tuple[Path, ...]:
+    """Return the session folders directly in a folder, by name; none if it cannot be read.
+
+    Args:
+        folder: where to look.
+        set_aside: also those that --fresh has renamed.
+    """
+    try:
+        names = sorted(path.name for path in folder.iterdir())
+    except OSError:
+        return ()
+    return tuple(
+        folder / name for name in names if name.endswith(_SUFFIX) or (set_aside and _SET_ASIDE.search(name) is not None)
+    )
+
+
+def is_writable(folder: Path) -> bool:
     """Try to write: permission bits do not cover read-only media, quotas and network folders."""
     try:
         with tempfile.TemporaryFile(dir=folder):

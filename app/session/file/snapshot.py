@@ -1,18 +1,30 @@
-"""The snapshot: clicks and options at some step, replaced as a whole, to restart from if the journal is lost."""
+"""The snapshot: clicks and options at some step, replaced as a whole, to restart from if the journal is lost or cut.
 
-from pathlib import Path
+It ends with a checksum of its own, and names the journal's lines that it contains by the first digits of their checksums.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
 
 from app.option_changes import options_from_tree
-from app.session import ClicksImported, OptionsChanged, RecordingFacts, Session, Step
+from app.session import ClicksImported, OptionsChanged, Session, Step
+from app.session.file.checksums import line_bytes, sealed, taken_apart
 from app.session.file.errors import SessionFileError
-from app.session.file.identity import SCHEMA, RecordingForm, recording_form, require_same_recording
+from app.session.file.guarded_folder import GuardedFolder
+from app.session.file.identity import RecordingForm
+from app.session.file.journal import SCHEMA, SCHEMA_1
 from app.session.file.step_json import ClickForm, click_from_form, form_of_click
-from app.whole_file import write_whole
+from calib_core.errors import CalibrationError
+from calib_core.measurements import ReflectorClick
+from calib_core.options import CalibrationOptions
 
-__all__ = ["read_snapshot", "snapshot_axes", "write_snapshot"]
+__all__ = ["SNAPSHOT", "FoundSnapshot", "read_snapshot", "write_snapshot"]
+
+SNAPSHOT = "session.json"
+_DIGITS = 8
 
 
 class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -22,54 +34,109 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     steps: int
     options: dict[str, Any]
     clicks: tuple[ClickForm, ...]
+    last: str = ""
+    lines: str = ""
 
 
-def write_snapshot(path: Path, session: Session, *, facts: RecordingFacts, steps: int, cocalib: str) -> None:
+@dataclass(frozen=True, slots=True)
+class FoundSnapshot:
+    """A snapshot as found on the disk; its checksum is right.
+
+    Attributes:
+        recording: the recording it belongs to.
+        count: how many steps of the journal it contains.
+        clicks: sorted by time.
+        options: of that step.
+        last: checksum of the journal's line that holds the last of these steps; "" in session-1.
+        lines: the first digits of the checksums of all lines up to that one, one after another.
+        sum: its own checksum.
+    """
+
+    recording: RecordingForm
+    count: int
+    clicks: tuple[ReflectorClick, ...]
+    options: CalibrationOptions
+    last: str
+    lines: str
+    sum: str
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The steps that lead from an empty session to the snapshot."""
+        return (OptionsChanged(self.options), ClicksImported(self.clicks))
+
+    def agrees_with(self, sums: Sequence[str]) -> bool:
+        """Return whether the journal's lines are those of the snapshot, as far as both have them."""
+        shared = _marks(sums[: self.count + 1])
+        return self.lines[: len(shared)] == shared
+
+
+def write_snapshot(
+    folder: GuardedFolder, session: Session, *, recording: RecordingForm, sums: Sequence[str], cocalib: str
+) -> None:
     """Replace the snapshot atomically: a reader sees the old one or the new one, never a part.
 
+    Args:
+        folder: where it goes.
+        session: what it holds.
+        recording: the recording it belongs to.
+        sums: checksums of the journal's lines, up to this state.
+        cocalib: version of the program.
+
     Raises:
+        SessionFileError: what is there is no snapshot of this user.
         OSError: it cannot be written; the old one stays.
     """
     snapshot = _Snapshot(
         schema=SCHEMA,
         cocalib=cocalib,
-        recording=recording_form(facts),
-        steps=steps,
+        recording=recording,
+        steps=len(sums) - 1,
         options=msgspec.to_builtins(session.options),
         clicks=tuple(form_of_click(click) for click in session.clicks),
+        last=sums[-1],
+        lines=_marks(sums),
     )
-    write_whole(path, msgspec.json.format(msgspec.json.encode(snapshot), indent=1) + b"\n")
+    folder.replace(SNAPSHOT, line_bytes(sealed(msgspec.json.encode(snapshot))) + b"\n")
 
 
-def snapshot_axes(path: Path, otherwise: str | None) -> str | None:
-    """Return what was specified about the radar's axes when the snapshot was written.
+def read_snapshot(data: bytes, place: str) -> FoundSnapshot:
+    """Read a snapshot.
 
     Args:
-        path: of the snapshot.
-        otherwise: returned if the snapshot is missing or damaged, since the journal does not need it.
-    """
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=_Snapshot).recording.radar_axes
-    except (OSError, msgspec.DecodeError, UnicodeDecodeError):
-        return otherwise
-
-
-def read_snapshot(path: Path, facts: RecordingFacts) -> tuple[Step, ...]:
-    """Return the steps that lead from an empty session to the snapshot.
+        data: its bytes.
+        place: its path, for messages.
 
     Raises:
-        SessionFileError: it is damaged, of another version, or of another recording.
+        SessionFileError: it is damaged or of another version.
     """
+    found = taken_apart(data.removesuffix(b"\n"))
+    if found.sum and (not found.follows("") or not data.endswith(b"\n")):
+        raise _damaged(place, "its checksum is wrong")
     try:
-        snapshot = msgspec.json.decode(path.read_bytes(), type=_Snapshot)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise SessionFileError(
-            f"{path}: the snapshot is damaged ({error}); move it away to start over, or give another --session folder"
-        ) from error
-    if snapshot.schema != SCHEMA:
-        raise SessionFileError(
-            f"{path}: written as '{snapshot.schema}', but this version reads '{SCHEMA}'; move it away"
+        snapshot = msgspec.json.decode(found.content, type=_Snapshot)
+        if snapshot.schema not in (SCHEMA, SCHEMA_1):
+            raise SessionFileError(f"{place}: written as '{snapshot.schema}', but this version reads '{SCHEMA}'")
+        if snapshot.schema != (SCHEMA if found.sum else SCHEMA_1):
+            raise _damaged(place, "its checksum is missing")
+        return FoundSnapshot(
+            recording=snapshot.recording,
+            count=snapshot.steps,
+            clicks=tuple(sorted(click_from_form(click) for click in snapshot.clicks)),
+            options=options_from_tree(snapshot.options),
+            last=snapshot.last,
+            lines=snapshot.lines,
+            sum=found.sum or sealed(data).sum,
         )
-    require_same_recording(snapshot.recording, facts, path.parent)
-    clicks = ClicksImported(tuple(click_from_form(click) for click in snapshot.clicks))
-    return (OptionsChanged(options_from_tree(snapshot.options)), clicks)
+    except SessionFileError:
+        raise
+    except (msgspec.DecodeError, UnicodeDecodeError, CalibrationError) as error:
+        raise _damaged(place, str(error)) from error
+
+
+def _marks(sums: Sequence[str]) -> str:
+    return "".join(sum_[:_DIGITS] for sum_ in sums)
+
+
+def _damaged(place: str, reason: str) -> SessionFileError:
+    return SessionFileError(f"{place}: the snapshot is damaged ({reason})")

@@ -83,7 +83,8 @@ class Service:
             server.admit(workspace, recording)
             threading.Event().wait()
         except KeyboardInterrupt:
-            print("\nStopped; all clicks are saved.")
+            server.close()
+            print(f"\nStopped; {workspace.close().note}.")
         finally:
             server.close()
 

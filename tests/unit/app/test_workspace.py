@@ -20,7 +20,7 @@ from app.session import (
     Step,
     Undo,
 )
-from app.session.file import Restored, SessionFileError
+from app.session.file import Closed, Restored, SessionFileError
 from app.view import View, view
 from app.workspace import Workspace, open_workspace, recording_facts
 from calib_core.errors import InputError
@@ -43,8 +43,9 @@ class ListJournal:
             raise SessionFileError("the disk is full")
         self.steps.append(step)
 
-    def close(self) -> None:
+    def close(self) -> Closed:
         self.closed = True
+        return Closed(Path("nowhere"), 0)
 
 
 class HeldSolver:
@@ -246,7 +247,7 @@ class BareRecording:
     radar_axes: str | None = None
     video_start = None
     radar_frame, camera_frame = "radar", "camera"
-    image_times = FACTS.image_times
+    image_times = radar_times = FACTS.image_times
 
     def camera(self) -> None:
         return None

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -37,6 +38,7 @@ from app.session.file import (
     set_aside,
     user_session_folder,
 )
+from app.session.file.checksums import line_bytes, sealed, taken_apart
 from app.session.file.step_json import StepForm, form_of_step, step_from_form
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
@@ -165,40 +167,176 @@ def damaged(line: int, text: bytes, whole: bytes) -> bytes:
     return b"\n".join(lines)
 
 
-@pytest.mark.parametrize(
-    ("line", "text", "words"),
-    [
-        (2, b'{"n":2,"step":{"type":"click_placed","image', "line 3 is damaged"),
-        (2, b"\x00\x00\xff\xfe", "line 3 is damaged"),
-        (2, b"", "line 3 is damaged"),
-        (2, b'{"n":7,"step":{"type":"cleared"}}', "found step 7, expected step 2"),
-        (2, b'{"n":2,"step":{"type":"click_removed","id":"c9"}}', "there is no click 'c9'"),
-        (2, b'{"n":2,"step":{"type":"options_changed","options":{"nois":{}}}}', "unknown option 'nois'"),
-        (2, b'{"n":2,"step":{"type":"juggled"}}', "Invalid value 'juggled'"),
-        (0, b"{}", "line 1 is damaged"),
-        (0, b'{"schema":"cocalib/session-1"', "line 1 is damaged"),
-    ],
-)
-def test_a_damaged_journal_is_refused_with_a_clear_error_and_left_alone(
+def files(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "lock"}
+
+
+def reseal(line: int, content: bytes, whole: bytes) -> bytes:
+    """Exchange the content of a line, with a right checksum as another version of the program would write it."""
+    lines = [taken_apart(each) for each in whole.split(b"\n")[:-1]]
+    lines[line] = sealed(content, lines[line - 1].sum if line else "")
+    return b"".join(line_bytes(each) + b"\n" for each in lines)
+
+
+DAMAGE = [
+    (2, b'{"n":2,"step":{"type":"click_placed","image', "line 3 is damaged"),
+    (2, b"\x00\x00\xff\xfe", "line 3 is damaged"),
+    (2, b"", "line 3 is damaged"),
+    (2, b'{"n":2,"step":{"type":"cleared"}}', "line 3 is damaged (it has no checksum)"),
+    (0, b"{}", "line 1 is damaged"),
+    (0, b'{"schema":"cocalib/session-2"', "line 1 is damaged"),
+    (0, b"", "line 1 is damaged"),
+]
+
+
+@pytest.mark.parametrize(("line", "text", "words"), DAMAGE)
+def test_a_damaged_journal_without_a_snapshot_is_refused_and_left_alone(
     tmp_path: Path, line: int, text: bytes, words: str
 ) -> None:
     kept(tmp_path, *STEPS[:4])
+    (tmp_path / "session.json").unlink()
     journal = tmp_path / "journal.jsonl"
     journal.write_bytes(damaged(line, text, journal.read_bytes()))
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.name != "lock"}
+    before = files(tmp_path)
     with pytest.raises(SessionFileError) as refused:
         open_session_file(tmp_path, FACTS)
     assert words in str(refused.value)
-    assert "rename journal.jsonl" in str(refused.value)
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.name != "lock"} == before
+    assert "cocalib session repair" in str(refused.value) or "nothing of the session can be proven" in str(
+        refused.value
+    )
+    assert files(tmp_path) == before
+
+
+@pytest.mark.parametrize(("line", "text", "words"), DAMAGE[:4])
+def test_a_damaged_journal_whose_snapshot_holds_its_steps_continues_with_both_kept(
+    tmp_path: Path, line: int, text: bytes, words: str
+) -> None:
+    history = kept(tmp_path, *STEPS[:4])
+    journal, snapshot = tmp_path / "journal.jsonl", tmp_path / "session.json"
+    journal.write_bytes(damaged(line, text, journal.read_bytes()))
+    before = files(tmp_path)
+    session_file = open_session_file(tmp_path, FACTS)
+    (warning,) = session_file.restored.warnings
+    assert warning.code == "session-damaged"
+    assert words in warning.message
+    assert session_file.restored.history.present.clicks == history.present.clicks
+    assert session_file.restored.history.present.options == history.present.options
+    assert "cannot be undone" in session_file.restored.note
+    assert (tmp_path / "journal.jsonl.backup-1").read_bytes() == before["journal.jsonl"]
+    assert (tmp_path / "session.json.backup-1").read_bytes() == before["session.json"]
+    session_file.close()
+    again = open_session_file(tmp_path, FACTS)
+    assert again.restored.warnings == ()
+    assert again.restored.history.present.clicks == history.present.clicks
+    again.close()
+    assert snapshot.exists()
+
+
+def test_steps_after_the_snapshot_are_kept_when_a_line_before_it_is_damaged(tmp_path: Path) -> None:
+    kept(tmp_path, *STEPS[:3])
+    snapshot = (tmp_path / "session.json").read_bytes()
+    history = kept(tmp_path, *STEPS[3:5])
+    (tmp_path / "session.json").write_bytes(snapshot)  # as a kill after the fifth step leaves it
+    journal = tmp_path / "journal.jsonl"
+    journal.write_bytes(damaged(2, b"", journal.read_bytes()))
+    session_file = open_session_file(tmp_path, FACTS)
+    assert session_file.restored.history.present.clicks == history.present.clicks
+    assert session_file.restored.history.present.options == history.present.options
+    session_file.close()
+
+
+def test_a_damaged_line_after_the_snapshot_is_refused(tmp_path: Path) -> None:
+    kept(tmp_path, *STEPS[:2])
+    snapshot = (tmp_path / "session.json").read_bytes()
+    kept(tmp_path, *STEPS[2:5])
+    (tmp_path / "session.json").write_bytes(snapshot)
+    journal = tmp_path / "journal.jsonl"
+    journal.write_bytes(damaged(4, b"", journal.read_bytes()))
+    before = files(tmp_path)
+    with pytest.raises(SessionFileError, match=r"line 5 is damaged .*cocalib session repair"):
+        open_session_file(tmp_path, FACTS)
+    assert files(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b'{"n":2,"step":{"type":"click_removed","id":"c9"}}', "there is no click 'c9'"),
+        (b'{"n":2,"step":{"type":"options_changed","options":{"nois":{}}}}', "unknown option 'nois'"),
+        (b'{"n":2,"step":{"type":"juggled"}}', "Invalid value 'juggled'"),
+    ],
+)
+def test_a_step_that_this_version_does_not_understand_is_refused(tmp_path: Path, content: bytes, words: str) -> None:
+    kept(tmp_path, *STEPS[:2])
+    (tmp_path / "session.json").unlink()
+    journal = tmp_path / "journal.jsonl"
+    journal.write_bytes(reseal(2, content, journal.read_bytes()))
+    with pytest.raises(SessionFileError) as refused:
+        open_session_file(tmp_path, FACTS)
+    assert words in str(refused.value)
 
 
 def test_a_journal_of_another_version_is_refused_with_that_version_named(tmp_path: Path) -> None:
     kept(tmp_path)
     journal = tmp_path / "journal.jsonl"
-    journal.write_bytes(journal.read_bytes().replace(b"cocalib/session-1", b"cocalib/session-9"))
+    head = taken_apart(journal.read_bytes().removesuffix(b"\n")).content
+    journal.write_bytes(reseal(0, head.replace(b"cocalib/session-2", b"cocalib/session-9"), journal.read_bytes()))
     with pytest.raises(SessionFileError, match=r"cocalib/session-9.*with that version"):
         open_session_file(tmp_path, FACTS)
+
+
+def test_a_journal_cut_to_its_first_line_gives_the_clicks_of_the_snapshot(tmp_path: Path) -> None:
+    history = kept(tmp_path, *(ClickPlaced(time, 1.0, 1.0) for time in TIMES[:20]))
+    journal = tmp_path / "journal.jsonl"
+    cut = journal.read_bytes().partition(b"\n")[0] + b"\n"
+    journal.write_bytes(cut)
+    session_file = open_session_file(tmp_path, FACTS)
+    assert session_file.restored.history.present.clicks == history.present.clicks
+    assert "the journal holds 0 steps, its snapshot 20" in session_file.restored.warnings[0].message
+    session_file.close()
+    assert (tmp_path / "journal.jsonl.backup-1").read_bytes() == cut
+
+
+def test_a_snapshot_of_another_journal_is_refused_until_a_person_decides(tmp_path: Path) -> None:
+    kept(tmp_path / "a", *STEPS[:4])
+    kept(tmp_path / "b", *reversed(STEPS[:2]))
+    shutil.copy(tmp_path / "b" / "session.json", tmp_path / "a" / "session.json")
+    before = files(tmp_path / "a")
+    with pytest.raises(SessionFileError, match=r"do not belong together.*cocalib session repair"):
+        open_session_file(tmp_path / "a", FACTS)
+    assert files(tmp_path / "a") == before
+
+
+def test_a_session_of_the_earlier_version_is_opened_and_written_again_with_checksums(
+    tmp_path: Path, project_root: Path
+) -> None:
+    shutil.copytree(project_root / "tests" / "golden" / "session-1", tmp_path, dirs_exist_ok=True)
+    before = files(tmp_path)
+    history = History()
+    for step in STEPS:
+        history = advance(history, step, FACTS)
+    session_file = open_session_file(tmp_path, FACTS)
+    assert session_file.restored.history == history
+    assert session_file.restored.warnings == ()
+    session_file.close()
+    assert (tmp_path / "journal.jsonl.backup-1").read_bytes() == before["journal.jsonl"]
+    assert (tmp_path / "session.json.backup-1").read_bytes() == before["session.json"]
+    assert b"cocalib/session-2" in (tmp_path / "journal.jsonl").read_bytes()
+    again = open_session_file(tmp_path, FACTS)
+    assert again.restored.history == history
+    again.close()
+
+
+def test_a_session_of_the_earlier_version_cut_to_its_first_line_gives_the_clicks_of_the_snapshot(
+    tmp_path: Path, project_root: Path
+) -> None:
+    shutil.copytree(project_root / "tests" / "golden" / "session-1", tmp_path, dirs_exist_ok=True)
+    journal = tmp_path / "journal.jsonl"
+    journal.write_bytes(journal.read_bytes().partition(b"\n")[0] + b"\n")
+    session_file = open_session_file(tmp_path, FACTS)
+    assert [click.id for click in session_file.restored.history.present.clicks] == ["c2", "p1"]
+    assert session_file.restored.warnings[0].code == "session-damaged"
+    session_file.close()
 
 
 def test_after_damage_the_snapshot_brings_the_clicks_back(tmp_path: Path) -> None:
@@ -218,7 +356,10 @@ def test_after_damage_the_snapshot_brings_the_clicks_back(tmp_path: Path) -> Non
 def test_a_damaged_snapshot_is_refused_only_when_it_is_needed(tmp_path: Path) -> None:
     kept(tmp_path, *STEPS[:2])
     (tmp_path / "session.json").write_text("{")
-    open_session_file(tmp_path, FACTS).close()
+    session_file = open_session_file(tmp_path, FACTS)
+    assert "the snapshot is damaged" in session_file.restored.warnings[0].message
+    assert (tmp_path / "session.json.backup-1").read_text() == "{"
+    session_file.close()
     (tmp_path / "session.json").write_text("{")
     (tmp_path / "journal.jsonl").unlink()
     with pytest.raises(SessionFileError, match="the snapshot is damaged"):
@@ -297,6 +438,7 @@ def test_a_refused_session_is_not_left_locked(tmp_path: Path) -> None:
     journal = tmp_path / "journal.jsonl"
     good = journal.read_bytes()
     journal.write_bytes(b"no\n")
+    (tmp_path / "session.json").unlink()
     with pytest.raises(SessionFileError):
         open_session_file(tmp_path, FACTS)
     journal.write_bytes(good)
@@ -359,7 +501,7 @@ def test_a_closed_session_writes_into_no_other_file(tmp_path: Path) -> None:
 def test_a_folder_deleted_under_an_open_session_is_noticed(tmp_path: Path) -> None:
     session_file = open_session_file(tmp_path, FACTS)
     (tmp_path / "journal.jsonl").unlink()
-    with pytest.raises(SessionFileError, match="deleted while the session was open"):
+    with pytest.raises(SessionFileError, match="was deleted, moved or replaced while the session was open"):
         keep(session_file, STEPS[0])
     session_file.close()
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,12 +17,14 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
 from app.cli import run
+from app.session import ClickPlaced
 from app.web.messages import Opening
 from app.web.port import serving
 from app.web.port.server import RunningServer, ServerOptions
 from app.web.port.serving import Service
 from app.workspace import Workspace, open_workspace
 from calib_core.errors import RecordingError
+from calib_core.measurements import TimeNs
 from tests.picture_recording import START, PictureRecording, grey_pictures
 from tests.port_client import channel, come_in, get, wanted
 
@@ -202,6 +205,25 @@ def test_a_recording_that_opens_at_once_is_served_without_an_opening_message(
     assert "all clicks are saved" in printed
     with pytest.raises(ConnectionRefusedError):
         get(server, "/")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows does not delete open files")
+def test_the_end_says_where_the_clicks_are_if_the_session_folder_was_deleted(
+    workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def click_delete_and_stop(*_: Any) -> None:
+        workspace.dispatch(ClickPlaced(TimeNs(int(RECORDING.image_times[1])), 1.0, 1.0))
+        shutil.rmtree(tmp_path / "session")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(RunningServer, "admit", click_delete_and_stop)
+    with service(let_in_after_s=LONG_S) as opening:
+        opening.serve(workspace, RECORDING)
+    printed = capsys.readouterr().out
+    rescued = tmp_path / "state" / "cocalib" / "sessions" / "three_greys-rescued-1.cocalib-session"
+    assert "all clicks are saved" not in printed
+    assert f"All clicks (1) are saved in {rescued}" in printed
+    assert (rescued / "session.json").is_file()
 
 
 def test_an_immediate_error_starts_no_server(monkeypatch: pytest.MonkeyPatch) -> None:

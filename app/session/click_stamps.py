@@ -1,0 +1,85 @@
+"""Clicks from a file, moved to the frames they were made in: another program may have rounded their stamps."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.errors import InputError
+from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs, time_parts
+
+__all__ = ["ClicksAtFrames", "clicks_at_frames", "half_interval_ns", "nearest_frame"]
+
+
+@dataclass(frozen=True, slots=True)
+class ClicksAtFrames:
+    """Clicks with the stamps of frames.
+
+    Attributes:
+        clicks: sorted by time.
+        moved: one sentence per click whose stamp was no frame's.
+    """
+
+    clicks: tuple[ReflectorClick, ...]
+    moved: tuple[str, ...]
+
+
+def clicks_at_frames(clicks: Sequence[ReflectorClick], image_times: TimesNs, *, source: str) -> ClicksAtFrames:
+    """Move each click to the nearest frame if that is at most half a frame interval away.
+
+    Args:
+        clicks: as read from a file.
+        image_times: (m,) stamps of the frames [ns], ascending; at least one.
+        source: name of the file, for messages.
+
+    Raises:
+        InputError: a click is farther from every frame; the first one is named.
+    """
+    half_ns = half_interval_ns(image_times)
+    at_frames, moved = [], []
+    for click in clicks:
+        index = nearest_frame(image_times, click.image_time)
+        frame = TimeNs(int(image_times[index]))
+        if frame == click.image_time:
+            at_frames.append(click)
+            continue
+        what = f"click {click.id} at {_seconds(click.image_time)} has the stamp of no frame; the nearest is frame {index + 1}"
+        where = f"at {_seconds(frame)}, {_milliseconds(frame - click.image_time)}"
+        if abs(frame - click.image_time) > half_ns:
+            raise InputError(
+                f"{source}: {what} {where}, which is more than half a frame interval "
+                f"({half_ns / 1e6:.1f} ms); give the clicks of this recording, with the stamps of its frames"
+            )
+        at_frames.append(replace(click, image_time=frame))
+        moved.append(f"{what} {where}, and is used")
+    return ClicksAtFrames(tuple(sorted(at_frames)), tuple(moved))
+
+
+def half_interval_ns(image_times: TimesNs) -> int:
+    """Return half the usual time between two frames [ns]; 0 if there is only one."""
+    return int(np.median(np.diff(image_times))) // 2 if len(image_times) > 1 else 0
+
+
+def nearest_frame(image_times: TimesNs, time: TimeNs) -> int:
+    """Return the index of the nearest frame; of two equally near, the earlier one.
+
+    Args:
+        image_times: (m,) stamps of the frames [ns], ascending; at least one.
+        time: any stamp.
+    """
+    after = min(int(np.searchsorted(image_times, time)), len(image_times) - 1)
+    before = max(after - 1, 0)
+    return before if abs(time - int(image_times[before])) <= abs(int(image_times[after]) - time) else after
+
+
+def _seconds(time: TimeNs) -> str:
+    sec, nanosec = time_parts(time)
+    return f"{sec}.{nanosec:09d} s"
+
+
+def _milliseconds(later_ns: int) -> str:
+    """Return a difference in time in words."""
+    amount = abs(later_ns) * 1e3 / NS_PER_S
+    text = f"{amount:.3f} ms" if amount < 1000 else f"{amount / 1e3:.3f} s"
+    return f"{text} {'later' if later_ns > 0 else 'earlier'}"

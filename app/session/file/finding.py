@@ -1,0 +1,117 @@
+"""Find the session of a recording that was renamed or moved: by its content, next to it and in the user's folder."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.resources import state_folder
+from app.session import RecordingFacts
+from app.session.file.errors import SessionFileError
+from app.session.file.folders import is_writable, recording_session_folder, session_folders_in
+from app.session.file.guarded_folder import GuardedFolder
+from app.session.file.identity import RecordingForm, has_dates, is_same_recording
+from app.session.file.journal import JOURNAL, read_journal
+from app.session.file.snapshot import SNAPSHOT, read_snapshot
+from calib_core.results import DataWarning
+
+__all__ = ["FoundFolder", "find_session_folder"]
+
+_HEAD_BYTES = 1 << 16
+
+
+@dataclass(frozen=True, slots=True)
+class FoundFolder:
+    """Where the session of a recording is, or starts.
+
+    Attributes:
+        path: of the folder.
+        warnings: what the user must know about this choice.
+    """
+
+    path: Path
+    warnings: tuple[DataWarning, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Candidate:
+    path: Path
+    recording: RecordingForm
+    changed_at_s: float
+
+
+def find_session_folder(paths: Sequence[Path], facts: RecordingFacts) -> FoundFolder:
+    """Return the folder named after a recording if it has the session, else one whose session has the same stamps.
+
+    Args:
+        paths: the files or folders of the recording, at least one; the first names the session.
+        facts: the open recording.
+    """
+    named = recording_session_folder(paths)
+    own = _candidate(named)
+    if named.is_symlink() or (own is None and _has_files(named)):
+        return FoundFolder(named)  # opening it says what is wrong
+    if own is not None and is_same_recording(own.recording, facts):
+        return FoundFolder(named)
+    places = dict.fromkeys([*(path.resolve().parent for path in paths), state_folder() / "sessions"])
+    folders = [folder for place in places for folder in session_folders_in(place) if folder != named]
+    same = [
+        candidate
+        for folder in folders
+        if (candidate := _candidate(folder)) is not None and is_same_recording(candidate.recording, facts)
+    ]
+    return _chosen(named, sorted(same, key=lambda candidate: -candidate.changed_at_s), facts)
+
+
+def _chosen(named: Path, same: Sequence[_Candidate], facts: RecordingFacts) -> FoundFolder:
+    """Choose the newest session that can be continued, and tell about all others."""
+    usable = [candidate for candidate in same if has_dates(candidate.recording) and is_writable(candidate.path)]
+    chosen = usable[0] if usable else None
+    warnings = [_about(candidate, facts) for candidate in same if candidate is not chosen]
+    if chosen is None:
+        return FoundFolder(named, tuple(warnings))
+    message = f"continuing the session of '{chosen.recording.name}' in {chosen.path}, which has the same frames as {facts.name}"
+    hint = f"to start a new session instead, give another folder: --session {named}"
+    return FoundFolder(chosen.path, (DataWarning("session-of-other-name", message, hint), *warnings))
+
+
+def _about(candidate: _Candidate, facts: RecordingFacts) -> DataWarning:
+    """Tell about a session of the same stamps that is not continued."""
+    of = f"the session of '{candidate.recording.name}' in {candidate.path}"
+    message = f"{of} has the same frames as {facts.name} and is not used"
+    if not has_dates(candidate.recording):
+        message += ", since the stamps are no dates and another recording may have the same"
+    if not is_writable(candidate.path):
+        export = f"cocalib session export {candidate.path} --out clicks.json"
+        hint = f"it cannot be written; take its clicks over: {export}, then start again with --clicks clicks.json"
+    else:
+        hint = f"to continue it, start again with --session {candidate.path}"
+    return DataWarning("session-not-used", message, hint)
+
+
+def _candidate(path: Path) -> _Candidate | None:
+    """Return what a folder's session says about its recording; None if there is none or it cannot be read."""
+    try:
+        folder = GuardedFolder(path)
+    except SessionFileError:
+        return None
+    try:
+        recording = _recording(folder)
+        changed = max((folder.changed_at_s(name) or 0.0 for name in (JOURNAL, SNAPSHOT)), default=0.0)
+        return None if recording is None else _Candidate(path, recording, changed)
+    except (SessionFileError, OSError):
+        return None
+    finally:
+        folder.close()
+
+
+def _recording(folder: GuardedFolder) -> RecordingForm | None:
+    head = (folder.read(JOURNAL, at_most=_HEAD_BYTES) or b"").partition(b"\n")[0]
+    recording = read_journal(head + b"\n", str(folder.path / JOURNAL)).recording if head else None
+    if recording is not None:
+        return recording
+    data = folder.read(SNAPSHOT)
+    return None if data is None else read_snapshot(data, SNAPSHOT).recording
+
+
+def _has_files(folder: Path) -> bool:
+    return any((folder / name).exists() or (folder / name).is_symlink() for name in (JOURNAL, SNAPSHOT))

@@ -1,0 +1,224 @@
+"""`cocalib session`: list, repair and export."""
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.session import ClickPlaced, RecordingFacts, advance
+from app.session.file import open_session_file
+from calib_core.interchange import read_clicks
+from calib_core.measurements import TimeNs
+
+Cocalib = Callable[..., Any]
+FACTS = RecordingFacts("drive.bag", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), 640, 480)
+
+
+@pytest.fixture(autouse=True)
+def state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path / "state" / "cocalib" / "sessions"
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    (folder / "drive.bag").write_bytes(b"")
+    return folder
+
+
+def clicked(folder: Path, clicks: int = 12, facts: RecordingFacts = FACTS) -> Path:
+    session_file = open_session_file(folder, facts)
+    history = session_file.restored.history
+    for frame in range(clicks):
+        step = ClickPlaced(TimeNs(int(facts.image_times[frame])), float(frame), 2.0)
+        history = advance(history, step, facts)
+        session_file.append(step, history)
+    session_file.close()
+    return folder
+
+
+def damaged(folder: Path, line: int, *, with_snapshot: bool = False) -> Path:
+    """Damage a line of the journal, and remove the snapshot unless it is to stay."""
+    journal = folder / "journal.jsonl"
+    lines = journal.read_bytes().split(b"\n")
+    lines[line - 1] = lines[line - 1].replace(b"2.0", b"3.0")
+    journal.write_bytes(b"\n".join(lines))
+    if not with_snapshot:
+        (folder / "session.json").unlink()
+    return folder
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != "lock"}
+
+
+def test_the_list_names_every_session_here_and_in_the_users_folder(
+    cocalib: Cocalib, home: Path, state_folder: Path
+) -> None:
+    clicked(home / "drive.bag.cocalib-session", 3)
+    shutil.copytree(clicked(home / "a.bag.cocalib-session", 4), home / "a.bag.cocalib-session.1")
+    damaged(clicked(home / "b.bag.cocalib-session", 5), 4)
+    clicked(state_folder / "c.bag-1.cocalib-session", 6)
+    answer = cocalib("session", "list", home, "--json")
+    assert answer.code == 0
+    found = {Path(each["folder"]).name: each for each in json.loads(answer.out)}
+    assert {name: (each["state"], each["clicks"], each["steps"]) for name, each in found.items()} == {
+        "a.bag.cocalib-session": ("sound", 4, 4),
+        "a.bag.cocalib-session.1": ("sound", 4, 4),
+        "b.bag.cocalib-session": ("damaged", 2, 2),
+        "c.bag-1.cocalib-session": ("sound", 6, 6),
+        "drive.bag.cocalib-session": ("sound", 3, 3),
+    }
+    assert found["drive.bag.cocalib-session"]["recording"] == "drive.bag"
+    assert "line 4 is damaged" in found["b.bag.cocalib-session"]["about"]
+    lines = cocalib("session", "list", home).out.splitlines()
+    assert lines[0].split() == ["state", "clicks", "steps", "last", "change", "recording", "folder"]
+    assert len(lines) == 1 + 5 + 1
+
+
+def test_the_list_takes_recordings_and_shows_which_process_has_a_session_open(cocalib: Cocalib, home: Path) -> None:
+    folder = clicked(home / "drive.bag.cocalib-session", 3)
+    session_file = open_session_file(folder, FACTS)
+    (found,) = json.loads(cocalib("session", "list", home / "drive.bag", "--json").out)
+    assert (found["state"], found["clicks"]) == ("open", 3)
+    assert f"process {os.getpid()}" in found["about"]
+    assert cocalib("session", "repair", folder, "--yes").code == 2
+    session_file.close()
+
+
+def test_the_list_of_nothing_says_so(cocalib: Cocalib, tmp_path: Path) -> None:
+    answer = cocalib("session", "list", tmp_path)
+    assert (answer.code, answer.out) == (0, "no sessions here or in your user folder\n")
+    assert cocalib("session", "list", tmp_path / "absent").code == 2
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows needs a right to make links")
+def test_the_list_follows_no_link_and_prints_no_control_characters(
+    cocalib: Cocalib, home: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / "target"
+    target.write_bytes(b"precious")
+    folder = home / "drive.bag.cocalib-session"
+    folder.mkdir()
+    (folder / "journal.jsonl").symlink_to(target)
+    hostile = RecordingFacts("\x1b]0;owned\x07", FACTS.image_times, 640, 480)
+    clicked(home / "x.cocalib-session", 2, hostile)
+    answer = cocalib("session", "list", home)
+    assert answer.code == 0
+    assert "unreadable" in answer.out
+    assert "is a symbolic link" in answer.out
+    assert "\x1b" not in answer.out
+    assert target.read_bytes() == b"precious"
+
+
+def test_a_sound_session_needs_no_repair(cocalib: Cocalib, home: Path) -> None:
+    folder = clicked(home / "drive.bag.cocalib-session")
+    before = files(folder)
+    for arguments in ([folder], [home / "drive.bag"], [folder, "--yes"]):
+        answer = cocalib("session", "repair", *arguments)
+        assert (answer.code, answer.err) == (0, "")
+        assert "Sound; nothing to repair." in answer.out
+    assert files(folder) == before
+
+
+def test_a_repair_shows_what_it_would_keep_and_changes_nothing(cocalib: Cocalib, home: Path) -> None:
+    folder = damaged(clicked(home / "drive.bag.cocalib-session"), 9)
+    before = files(folder)
+    answer = cocalib("session", "repair", folder)
+    assert answer.code == 1
+    assert "line 9 is damaged" in answer.out
+    assert "proven: 7 clicks, from 7 steps of the journal" in answer.out
+    assert "not proven, and left out: 5 lines of the journal" in answer.out
+    assert f"cocalib session repair {folder} --yes" in answer.out
+    assert files(folder) == before
+
+
+def test_a_repair_with_yes_keeps_what_is_proven_and_the_old_files(cocalib: Cocalib, home: Path) -> None:
+    folder = damaged(clicked(home / "drive.bag.cocalib-session"), 9)
+    before = files(folder)
+    answer = cocalib("session", "repair", folder, "--yes")
+    assert answer.code == 0
+    assert "The old files are kept as journal.jsonl.backup-1." in answer.out
+    assert (folder / "journal.jsonl.backup-1").read_bytes() == before["journal.jsonl"]
+    session_file = open_session_file(folder, FACTS)
+    assert len(session_file.restored.history.present.clicks) == 7
+    assert session_file.restored.warnings == ()
+    session_file.close()
+    assert cocalib("session", "repair", folder).code == 0
+
+
+def test_two_files_that_do_not_belong_together_are_told_apart_by_hand(cocalib: Cocalib, home: Path) -> None:
+    folder, other = clicked(home / "drive.bag.cocalib-session", 3), clicked(home / "other.cocalib-session", 9)
+    shutil.copy(damaged(other, 5, with_snapshot=True) / "session.json", folder)
+    lines = (folder / "journal.jsonl").read_bytes().split(b"\n")
+    (folder / "journal.jsonl").write_bytes(b"\n".join([lines[0], lines[2], *lines[1:2], b""]))
+    before = files(folder)
+    shown = cocalib("session", "repair", folder)
+    assert shown.code == 1
+    assert files(folder) == before
+    assert cocalib("session", "repair", folder, "--yes").code == 0
+    assert {name: files(folder)[f"{name}.backup-1"] for name in before} == before
+
+
+def test_an_export_writes_the_clicks_of_a_sound_session(cocalib: Cocalib, home: Path, tmp_path: Path) -> None:
+    clicked(home / "drive.bag.cocalib-session")
+    answer = cocalib("session", "export", home / "drive.bag", "--out", tmp_path / "clicks.json")
+    assert (answer.code, answer.err) == (0, "")
+    assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 12
+
+
+def test_an_export_of_a_damaged_session_writes_what_is_proven_and_says_what_is_not(
+    cocalib: Cocalib, home: Path, tmp_path: Path
+) -> None:
+    folder = damaged(clicked(home / "drive.bag.cocalib-session"), 9)
+    before = files(folder)
+    answer = cocalib("session", "export", folder, "--out", tmp_path / "clicks.json")
+    assert answer.code == 3
+    assert len(read_clicks((tmp_path / "clicks.json").read_text())) == 7
+    assert "line 9 is damaged" in answer.err
+    assert "not proven, and left out: 5 lines" in answer.err
+    assert files(folder) == before
+
+
+def test_what_proves_nothing_is_not_exported(cocalib: Cocalib, home: Path, tmp_path: Path) -> None:
+    folder = clicked(home / "drive.bag.cocalib-session")
+    (folder / "session.json").unlink()
+    (folder / "journal.jsonl").write_bytes(b"no\n")
+    for arguments in (["export", folder, "--out", tmp_path / "clicks.json"], ["repair", folder, "--yes"]):
+        answer = cocalib("session", *arguments)
+        assert answer.code == 2
+        assert "nothing of the session can be proven" in answer.err
+    assert not (tmp_path / "clicks.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["export", "a"], "needs the name of the new file: --out clicks.json"),
+        (["export", "--out", "b"], "takes one session folder, or its recording; 0 given"),
+        (["repair", "a", "b"], "takes one session folder, or its recording; 2 given"),
+        (["list", "--yes"], "--yes applies to session repair only"),
+        (["repair", "a", "--json"], "--json applies to session list only"),
+        (["list", "--out", "b"], "--out applies to session export only"),
+        (["repair", "absent"], "absent: no such folder"),
+        (["mend"], "takes list, repair or export, not 'mend'"),
+    ],
+)
+def test_wrong_usage_is_one_line(cocalib: Cocalib, arguments: list[str], words: str) -> None:
+    answer = cocalib("session", *arguments)
+    assert answer.code == 2
+    assert words in answer.err
+    assert len(answer.err.splitlines()) == 1
+
+
+def test_a_folder_without_a_session_is_refused(cocalib: Cocalib, home: Path) -> None:
+    assert "has no session next to it" in cocalib("session", "repair", home / "drive.bag").err
+    (home / "empty.cocalib-session").mkdir()
+    assert "holds no session" in cocalib("session", "repair", home / "empty.cocalib-session").err

@@ -1,0 +1,50 @@
+"""Clicks of a file whose stamps are no frame's: moved to the nearest frame and told, or refused."""
+
+import numpy as np
+import pytest
+
+from app.session.click_stamps import clicks_at_frames
+from calib_core.errors import InputError
+from calib_core.measurements import ReflectorClick, TimeNs
+
+START_NS = 1_700_000_000_123_456_789
+IMAGE_TIMES = START_NS + 100_000_000 * np.array([0, 1, 2, 3, 50, 51, 52, 53])
+
+
+def click(time_ns: int, name: str = "c1") -> ReflectorClick:
+    return ReflectorClick(TimeNs(time_ns), name, 1.0, 2.0)
+
+
+def test_clicks_with_the_stamps_of_frames_stay_as_they_are() -> None:
+    clicks = tuple(click(int(time), f"c{index}") for index, time in enumerate(IMAGE_TIMES))
+    found = clicks_at_frames(clicks, IMAGE_TIMES, source="clicks.json")
+    assert found.clicks == clicks
+    assert found.moved == ()
+
+
+@pytest.mark.parametrize("off_ns", [-789, 211, 50_000_000, -50_000_000])
+def test_a_click_within_half_a_frame_interval_is_moved_to_its_frame_and_told(off_ns: int) -> None:
+    found = clicks_at_frames([click(int(IMAGE_TIMES[4]) + off_ns)], IMAGE_TIMES, source="clicks.json")
+    assert found.clicks == (click(int(IMAGE_TIMES[4])),)
+    (line,) = found.moved
+    assert line.startswith("click c1 at 1700000005.")
+    assert "has the stamp of no frame; the nearest is frame 5 at 1700000005.123456789 s" in line
+
+
+def test_clicks_rounded_to_microseconds_before_the_first_frame_are_moved_too() -> None:
+    found = clicks_at_frames([click(START_NS - 789)], IMAGE_TIMES, source="clicks.json")
+    assert found.clicks == (click(START_NS),)
+
+
+@pytest.mark.parametrize("time_ns", [START_NS + 2_000_000_000, int(IMAGE_TIMES[-1]) + 51_000_000])
+def test_a_click_where_frames_are_missing_is_refused_with_the_nearest_one_named(time_ns: int) -> None:
+    with pytest.raises(
+        InputError, match=r"clicks.json: click c1 .* the nearest is frame \d at .* more than half a frame"
+    ):
+        clicks_at_frames([click(time_ns)], IMAGE_TIMES, source="clicks.json")
+
+
+def test_with_one_frame_only_its_own_stamp_fits() -> None:
+    assert clicks_at_frames([click(START_NS)], IMAGE_TIMES[:1], source="clicks.json").moved == ()
+    with pytest.raises(InputError, match="the nearest is frame 1"):
+        clicks_at_frames([click(START_NS + 1)], IMAGE_TIMES[:1], source="clicks.json")

@@ -1,0 +1,176 @@
+"""A session is found by its recording's content: renamed, moved, grown, or without pictures."""
+
+import os
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.session import ClickPlaced, RecordingFacts, advance
+from app.session.file import SessionFileError, find_session_folder, open_session_file
+from calib_core.measurements import TimeNs
+
+START_NS = 1_700_000_000_123_456_789
+IMAGE_TIMES = START_NS + 100_000_000 * np.arange(50)
+RADAR_TIMES = START_NS + 50_000_000 * np.arange(90)
+NO_TIMES = np.zeros(0, dtype=np.int64)
+FACTS = RecordingFacts("drive.bag", IMAGE_TIMES, 640, 480, radar_times=RADAR_TIMES)
+
+
+@pytest.fixture(autouse=True)
+def state_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    folder = tmp_path / "state" / "cocalib" / "sessions"
+    folder.mkdir(parents=True)
+    return folder
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    return folder
+
+
+def clicked(folder: Path, facts: RecordingFacts = FACTS, *, changed_at_s: float | None = None) -> Path:
+    """Make a session with one click."""
+    session_file = open_session_file(folder, facts)
+    step = ClickPlaced(TimeNs(int(facts.image_times[3])), 1.0, 2.0)
+    session_file.append(step, advance(session_file.restored.history, step, facts))
+    session_file.close()
+    if changed_at_s is not None:
+        for name in ("journal.jsonl", "session.json"):
+            os.utime(folder / name, (changed_at_s, changed_at_s))
+    return folder
+
+
+def test_a_recording_without_a_session_starts_one_next_to_it(home: Path) -> None:
+    found = find_session_folder([home / "drive.bag"], FACTS)
+    assert found.path == home / "drive.bag.cocalib-session"
+    assert found.warnings == ()
+
+
+def test_the_session_of_the_same_name_is_continued_without_a_word(home: Path) -> None:
+    clicked(home / "other.bag.cocalib-session")
+    folder = clicked(home / "drive.bag.cocalib-session")
+    found = find_session_folder([home / "drive.bag"], FACTS)
+    assert (found.path, found.warnings) == (folder, ())
+
+
+def test_a_renamed_recording_continues_its_session_and_says_so(home: Path) -> None:
+    folder = clicked(home / "drive.bag.cocalib-session")
+    found = find_session_folder([home / "renamed.bag"], replace(FACTS, name="renamed.bag"))
+    assert found.path == folder
+    (warning,) = found.warnings
+    assert warning.code == "session-of-other-name"
+    assert f"continuing the session of 'drive.bag' in {folder}" in warning.message
+    session_file = open_session_file(found.path, replace(FACTS, name="renamed.bag"), found.warnings)
+    assert session_file.restored.warnings == found.warnings
+    assert len(session_file.restored.history.present.clicks) == 1
+    session_file.close()
+
+
+def test_a_moved_recording_continues_the_session_in_the_users_folder(
+    home: Path, tmp_path: Path, state_folder: Path
+) -> None:
+    folder = clicked(state_folder / "drive.bag-12345678.cocalib-session")
+    found = find_session_folder([home / "drive.bag"], FACTS)
+    assert found.path == folder
+    assert "continuing the session" in found.warnings[0].message
+
+
+def test_of_two_sessions_the_newest_is_continued_and_the_other_named(home: Path, state_folder: Path) -> None:
+    old = clicked(home / "old.bag.cocalib-session", changed_at_s=1e9)
+    new = clicked(state_folder / "new.bag.cocalib-session", changed_at_s=1.1e9)
+    found = find_session_folder([home / "drive.bag"], FACTS)
+    assert found.path == new
+    assert [warning.code for warning in found.warnings] == ["session-of-other-name", "session-not-used"]
+    assert str(old) in found.warnings[1].message
+    assert f"--session {old}" in found.warnings[1].hint
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        replace(FACTS, image_times=IMAGE_TIMES + 1),
+        replace(FACTS, width_px=320),
+        replace(FACTS, image_times=IMAGE_TIMES[:40]),
+    ],
+    ids=["other stamps", "other size", "shorter"],
+)
+def test_a_session_of_another_recording_is_not_taken(home: Path, other: RecordingFacts) -> None:
+    clicked(home / "drive.bag.cocalib-session")
+    found = find_session_folder([home / "other.bag"], other)
+    assert (found.path, found.warnings) == (home / "other.bag.cocalib-session", ())
+
+
+def test_a_new_recording_of_an_old_name_finds_its_own_session_elsewhere(home: Path, state_folder: Path) -> None:
+    other = replace(FACTS, image_times=IMAGE_TIMES + 10**12)
+    clicked(home / "drive.bag.cocalib-session", other)
+    mine = clicked(state_folder / "drive.bag.cocalib-session")
+    assert find_session_folder([home / "drive.bag"], FACTS).path == mine
+
+
+def test_a_recording_that_has_grown_keeps_its_session(home: Path) -> None:
+    clicked(home / "drive.bag.cocalib-session", replace(FACTS, image_times=IMAGE_TIMES[:10]))
+    assert find_session_folder([home / "renamed.bag"], FACTS).warnings
+    session_file = open_session_file(home / "drive.bag.cocalib-session", FACTS)
+    step = ClickPlaced(TimeNs(int(IMAGE_TIMES[40])), 1.0, 2.0)
+    session_file.append(step, advance(session_file.restored.history, step, FACTS))
+    session_file.close()
+    again = open_session_file(home / "drive.bag.cocalib-session", FACTS)
+    assert len(again.restored.history.present.clicks) == 2
+    again.close()
+
+
+def test_a_recording_without_pictures_is_known_by_its_scans(home: Path) -> None:
+    facts = RecordingFacts("radar.bag", NO_TIMES, 0, 0, radar_times=RADAR_TIMES[:30])
+    open_session_file(home / "radar.bag.cocalib-session", facts).close()
+    grown = replace(facts, radar_times=RADAR_TIMES)
+    open_session_file(home / "radar.bag.cocalib-session", grown).close()
+    assert find_session_folder([home / "renamed.bag"], grown).path == home / "radar.bag.cocalib-session"
+    for other in (replace(facts, radar_times=RADAR_TIMES + 1), replace(facts, radar_times=NO_TIMES)):
+        with pytest.raises(SessionFileError, match=r"'radar.bag' \(30 radar scans, no frames from"):
+            open_session_file(home / "radar.bag.cocalib-session", other)
+
+
+def test_stamps_that_count_from_zero_prove_nothing_and_the_session_is_only_named(home: Path) -> None:
+    video = replace(FACTS, image_times=33_333_333 * np.arange(50))
+    folder = clicked(home / "drive.bag.cocalib-session", video)
+    found = find_session_folder([home / "renamed.bag"], video)
+    assert found.path == home / "renamed.bag.cocalib-session"
+    (warning,) = found.warnings
+    assert "the stamps are no dates" in warning.message
+    assert f"--session {folder}" in warning.hint
+
+
+def test_a_session_that_cannot_be_written_is_named_with_the_way_to_its_clicks(
+    home: Path, state_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = clicked(home / "drive.bag.cocalib-session")
+    monkeypatch.setattr("app.session.file.folders.is_writable", lambda place: state_folder in (place, place.parent))
+    monkeypatch.setattr("app.session.file.finding.is_writable", lambda place: False)
+    found = find_session_folder([home / "drive.bag"], FACTS)
+    assert found.path.parent == state_folder
+    (warning,) = found.warnings
+    assert f"cocalib session export {folder} --out clicks.json" in warning.hint
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows needs a right to make links")
+def test_a_link_is_not_followed_while_searching(home: Path, tmp_path: Path) -> None:
+    real = clicked(tmp_path / "elsewhere")
+    (home / "drive.bag.cocalib-session").symlink_to(real)
+    assert find_session_folder([home / "renamed.bag"], FACTS).path == home / "renamed.bag.cocalib-session"
+    found = find_session_folder([home / "drive.bag"], FACTS)
+    with pytest.raises(SessionFileError, match="is a symbolic link"):
+        open_session_file(found.path, FACTS)
+
+
+def test_a_session_whose_journal_lost_its_first_line_is_found_by_its_snapshot(home: Path) -> None:
+    folder = clicked(home / "drive.bag.cocalib-session")
+    (folder / "journal.jsonl").write_bytes(b"no\n")
+    assert find_session_folder([home / "renamed.bag"], FACTS).path == folder
+    shutil.rmtree(folder)
+    assert find_session_folder([home / "renamed.bag"], FACTS).path == home / "renamed.bag.cocalib-session"
