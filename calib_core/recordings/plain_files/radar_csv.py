@@ -1,178 +1,171 @@
-"""Read radar returns from a CSV file whose header names columns and units: time_ns,x_m,y_m,z_m,doppler_mps,snr_db."""
+"""Read radar returns from CSV and other text tables, whatever their column names, separators and units."""
 
-import csv
 import math
 import re
 from array import array
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
+from operator import itemgetter
 
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.measurements import TimeNs
-from calib_core.recordings.plain_files.messages import cloud_channel, cloud_message
-from calib_core.recordings.plain_files.source import PlainSource, topic_of
-from calib_core.recordings.time.written_times import TimeUnit, read_time
+from calib_core.recordings.field_words import FIELD_SPELLINGS
+from calib_core.recordings.plain_files.reading_options import PlainOptions
+from calib_core.recordings.plain_files.table_columns import TableColumns, units_of
+from calib_core.recordings.plain_files.table_times import TimeReader
+from calib_core.recordings.plain_files.text_tables import TABLE_EXAMPLE, TextTable
 
-__all__ = ["CSV_EXAMPLE", "csv_columns", "open_radar_csv"]
+__all__ = ["CSV_EXAMPLE", "csv_columns", "first_rows", "read_rows", "require_header"]
 
-CSV_EXAMPLE = "time_ns,x_m,y_m,z_m,doppler_mps,snr_db"
-_FRAME = "radar"
-_DELIMITERS = ",;\t"
-_MAX_HEADER = 1 << 16
-_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
-_ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "mrad": 0.001}
-_SPEEDS = {"mps": 1.0, "kmh": 1 / 3.6, "kph": 1 / 3.6, "cmps": 0.01}
-_DECIBELS = {"db": 1.0, "dbsm": 1.0, "dbm": 1.0}
-_TIMES: dict[str, TimeUnit] = {"ns": "ns", "us": "us", "ms": "ms", "s": "s"}
-_TIME_NAMES = ("time", "timestamp", "stamp", "t")
-_QUANTITIES = {
-    "x": ("x", _LENGTHS), "y": ("y", _LENGTHS), "z": ("z", _LENGTHS),
-    "range": ("range", _LENGTHS), "r": ("range", _LENGTHS), "distance": ("range", _LENGTHS),
-    "azimuth": ("azimuth", _ANGLES), "elevation": ("elevation", _ANGLES),
-    "doppler": ("doppler", _SPEEDS), "range_rate": ("doppler", _SPEEDS), "velocity": ("doppler", _SPEEDS),
-    "radial_speed": ("doppler", _SPEEDS),
-    "snr": ("snr", _DECIBELS), "rcs": ("rcs", _DECIBELS), "power": ("power", _DECIBELS), "amplitude": ("amplitude", _DECIBELS),
-    "sigma_range": ("sigma_range", _LENGTHS), "sigma_azimuth": ("sigma_azimuth", _ANGLES),
-    "sigma_elevation": ("sigma_elevation", _ANGLES),
-}  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class _Column:
-    """One used column: its index, the quantity it holds, and the factor to apply."""
-
-    place: int
-    name: str
-    scale: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Header:
-    """A parsed header."""
-
-    time_place: int
-    time_unit: TimeUnit
-    columns: tuple[_Column, ...]
-    unused: tuple[str, ...]
+CSV_EXAMPLE = TABLE_EXAMPLE
+_SAMPLED_ROWS = 2000
+_COMMENTS = ("#", "%")
+_SUSPECT = frozenset({"", " ", "\t", *_COMMENTS})
+_WRITTEN_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf", re.IGNORECASE)
 
 
 def csv_columns() -> tuple[str, ...]:
     """Return the table rows of columns and units for the documentation."""
-    rows = [f"| {', '.join(f'`{name}`' for name in _TIME_NAMES)} | {', '.join(_TIMES)} |"]
-    for becomes, units in dict(_QUANTITIES.values()).items():
-        names = ", ".join(f"`{name}`" for name, (quantity, _) in _QUANTITIES.items() if quantity == becomes)
-        rows.append(f"| {names} | {', '.join(units)} |")
+    rows = []
+    for quantity, spellings in FIELD_SPELLINGS.items():
+        units = {"time": "ns, us, ms, s, or dates"}.get(quantity, "")
+        if not units and quantity not in ("sec", "nanosec", "date", "frame"):
+            units = ", ".join(units_of(quantity))
+        names = ", ".join(f"`{spelling}`" for spelling in spellings[:12])
+        rows.append(f"| {quantity} | {names} | {units} |")
     return tuple(rows)
 
 
-def open_radar_csv(path: Path) -> PlainSource:
-    """Read a CSV file of radar returns; rows with the same time form one scan.
+def require_header(table: TextTable, options: PlainOptions) -> None:
+    """Refuse a table without a header unless --map says which columns are which.
 
     Raises:
-        RecordingError: a column has no unit or an unknown one, a position or the time is missing, or a row is damaged.
+        RecordingError: there is neither.
     """
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            delimiter = max(_DELIMITERS, key=file.readline(_MAX_HEADER).count)
-            file.seek(0)
-            rows = csv.reader(file, delimiter=delimiter)
-            header = _read_header(path, next(rows, []))
-            times, values = _read_rows(path, header, rows)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise RecordingError(f"{path}: cannot be read as CSV: {error}") from error
-    order = np.argsort(times, kind="stable")
-    stamps, first = np.unique(times[order], return_index=True)
-    edges = np.append(first, len(times))
-    dtype = np.dtype([(column.name, "<f8") for column in header.columns])
-    points = np.ascontiguousarray(values[order]).view(dtype)[:, 0]
-    unused = f", without {', '.join(header.unused)}" if header.unused else ""
-    return PlainSource(
-        path, path.stat().st_size, f"radar CSV{unused}", cloud_channel(topic_of(path, "radar")), stamps,
-        _message(stamps, edges, points),
-    )  # fmt: skip
-
-
-def _message(stamps: np.ndarray, edges: np.ndarray, points: np.ndarray) -> Callable[[int], bytes]:
-    def message(row: int) -> bytes:
-        return cloud_message(TimeNs(int(stamps[row])), _FRAME, points[int(edges[row]) : int(edges[row + 1])])
-
-    return message
-
-
-def _read_header(path: Path, names: Sequence[str]) -> _Header:
-    time: tuple[int, TimeUnit] | None = None
-    columns: list[_Column] = []
-    unused = []
-    for place, written in enumerate(names):
-        name, unit = _split(written)
-        if name in _TIME_NAMES:
-            time = place, _TIMES[_unit(path, written, unit, _TIMES)]
-        elif name in _QUANTITIES:
-            becomes, units = _QUANTITIES[name]
-            columns.append(_Column(place, becomes, units[_unit(path, written, unit, units)]))
-        else:
-            unused.append(written.strip())
-    if time is None:
+    if table.headless and not any(one.column.isdigit() for one in options.mapped):
         raise RecordingError(
-            f"{path}: no time column; the first line must name columns and units, such as {CSV_EXAMPLE}"
+            f"{table.path}: no header; the first line is '{table.first_line[:80].strip()}'; write one above it that names "
+            f"columns and units, such as {CSV_EXAMPLE}, or count the columns: --map time=1:s --map x=2:m --map y=3:m"
         )
-    have = {column.name for column in columns}
-    if len(have) < len(columns):
-        raise RecordingError(f"{path}: two columns hold the same quantity: {', '.join(names)}; keep one of them")
-    if not ({"x", "y"} <= have or {"range", "azimuth"} <= have):
-        raise RecordingError(
-            f"{path}: no position columns; x_m and y_m, or range_m and azimuth_deg, are required, such as {CSV_EXAMPLE}"
-        )
-    return _Header(*time, tuple(columns), tuple(unused))
 
 
-def _split(written: str) -> tuple[str, str]:
-    """Split "x_m", "x [m]" or "#timestamp (ns)" into name and unit."""
-    text = written.strip().lower().lstrip("# ")
-    match = re.fullmatch(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]", text)
-    if match:
-        return match[1].replace(" ", "_"), match[2].replace("m/s", "mps").replace("km/h", "kmh")
-    if text in _QUANTITIES or text in _TIME_NAMES:
-        return text, ""
-    name, _, unit = text.replace(" ", "_").removeprefix("position_").rpartition("_")
-    if not name or unit in ("x", "y", "z", "id"):
-        return (f"{name}_{unit}" if name else unit), ""
-    return name, unit
+def first_rows(table: TextTable) -> list[list[str]]:
+    """Return the first rows."""
+    with table.rows() as rows:
+        return [row for row in islice(rows, _SAMPLED_ROWS) if _is_data(row)]
 
 
-def _unit(path: Path, written: str, unit: str, known: Mapping[str, object]) -> str:
-    if unit in known:
-        return unit
-    units = ", ".join(known)
-    example = f"{_split(written)[0]}_{next(iter(known))}"
-    if not unit:
-        raise RecordingError(f"{path}: column '{written.strip()}' has no unit; write {example}; known units: {units}")
-    raise RecordingError(f"{path}: column '{written.strip()}' has the unknown unit '{unit}'; known units: {units}")
+def _is_data(row: Sequence[str]) -> bool:
+    return bool(row) and any(map(str.strip, row)) and not row[0].lstrip().startswith(_COMMENTS)
 
 
-def _read_rows(path: Path, header: _Header, rows: Iterable[list[str]]) -> tuple[np.ndarray, np.ndarray]:
-    times, values = array("q"), array("d")  # eight bytes per number; a Python list would take forty
-    places = [column.place for column in header.columns]
-    known, time = "", 0  # rows of a scan have the same time
-    for number, row in enumerate(rows, start=2):
-        if not row or not any(map(str.strip, row)):
+def read_rows(table: TextTable, columns: TableColumns, times: TimeReader | None) -> tuple[np.ndarray, np.ndarray]:
+    """Read times (n,) [ns], zero without a time reader, and values (n, k) as written.
+
+    Raises:
+        RecordingError: a row is damaged; the message names its line.
+    """
+    listed = any(_is_list(table.first_row[c.place]) for c in columns.values if c.place < len(table.first_row))
+    with table.rows() as rows:
+        return _read_lists(table, columns, times, rows) if listed else _read_numbers(table, columns, times, rows)
+
+
+def _read_numbers(
+    table: TextTable, columns: TableColumns, times: TimeReader | None, rows: Iterator[list[str]]
+) -> tuple[np.ndarray, np.ndarray]:
+    stamps, values = array("q"), array("d")  # eight bytes per number; a Python list would take forty
+    cells, comma = _cells_of(columns), table.decimal_comma
+    key = times.key if times else _no_time
+    known, time = None, 0
+    for number, row in enumerate(rows, start=table.skipped_lines + 1):
+        if not row or (row[0][:1] in _SUSPECT and not _is_data(row)):
             continue
         try:
-            if (text := row[header.time_place]) != known:
-                known, time = text, read_time(text, header.time_unit)
-            times.append(time)
-            values.extend([_number(row[place]) for place in places])
+            if (text := key(row)) != known:
+                known, time = text, times.read(text) if times else 0
+            written = cells(row)
+            try:
+                numbers = list(map(float, written))
+            except ValueError:
+                numbers = [_number(cell.replace(",", ".") if comma else cell) for cell in written]
         except (ValueError, IndexError, OverflowError, RecordingError) as error:
-            why = "too few columns" if isinstance(error, IndexError) else str(error)
-            raise RecordingError(f"{path}: line {number}: {why}; fix or remove the line") from error
-    if not times:
-        raise RecordingError(f"{path}: the file has a header but no rows")
-    scale = np.array([column.scale for column in header.columns])
-    return np.array(times, dtype=np.int64), np.array(values, dtype=np.float64).reshape(-1, len(scale)) * scale
+            raise _damaged(table, number, error) from error
+        stamps.append(time)
+        values.extend(numbers)
+    return np.array(stamps, dtype=np.int64), np.array(values, dtype=np.float64).reshape(-1, len(columns.values))
+
+
+def _no_time(_: Sequence[str]) -> object:
+    return None
+
+
+def _cells_of(columns: TableColumns) -> Callable[[Sequence[str]], Sequence[str]]:
+    places = [column.place for column in columns.values]
+    return itemgetter(*places)
+
+
+def _damaged(table: TextTable, number: int, error: Exception) -> RecordingError:
+    why = "too few columns" if isinstance(error, IndexError) else str(error)
+    return RecordingError(f"{table.path}: line {number}: {why}; fix or remove the line")
 
 
 def _number(text: str) -> float:
-    return math.nan if not text or text.isspace() else float(text)
+    return (
+        math.nan
+        if not text or text.isspace() or text.strip().lower() in ("-", "na", "n/a", "null", "none")
+        else float(text)
+    )
+
+
+def _is_list(cell: str) -> bool:
+    """Return whether a cell holds several numbers, such as [1.0, 2.0] or 1;2;3."""
+    text = cell.strip()
+    return text[:1] in ("[", "(", "{") or (
+        len(_WRITTEN_NUMBER.findall(text)) > 1 and bool(re.search(r"[;|\s]", text)) and not re.search(r"[:/]", text)
+    )
+
+
+def _read_lists(
+    table: TextTable, columns: TableColumns, times: TimeReader | None, rows: Iterator[list[str]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Read rows that hold a scan each: every column is a list of as many numbers, or one number for all returns."""
+    stamps, values = array("q"), array("d")
+    cells = _cells_of(columns)
+    for number, split in enumerate(rows, start=table.skipped_lines + 1):
+        if not _is_data(split):
+            continue
+        row = _joined(split, table.separator) if len(split) > len(table.names) else split
+        try:
+            lists = [_list(text) for text in cells(row)]
+            count = max(map(len, lists))
+            if any(len(one) not in (1, count) for one in lists):
+                raise ValueError(f"lists of {' and '.join(str(len(one)) for one in lists)} numbers in one row")
+            time = times.read(times.key(row)) if times else 0
+        except (ValueError, IndexError, OverflowError, RecordingError) as error:
+            raise _damaged(table, number, error) from error
+        full = [one * count if len(one) == 1 else one for one in lists]
+        stamps.extend([time] * count)
+        values.extend(value for one in zip(*full, strict=True) for value in one)
+    return np.array(stamps, dtype=np.int64), np.array(values, dtype=np.float64).reshape(-1, len(columns.values))
+
+
+def _joined(row: Sequence[str], separator: str) -> list[str]:
+    """Join the cells of lists that are separated like the columns and not quoted."""
+    joined: list[str] = []
+    depth = 0
+    for cell in row:
+        if depth > 0:
+            joined[-1] += separator + cell
+        else:
+            joined.append(cell)
+        depth += cell.count("[") + cell.count("(") - cell.count("]") - cell.count(")")
+    return joined
+
+
+def _list(cell: str) -> list[float]:
+    text = cell.strip().strip("[](){} ")
+    if not text:
+        return []
+    words = [word for word in re.split(r"[,;|\s]+", text) if word]
+    return [float(word) for word in words]
