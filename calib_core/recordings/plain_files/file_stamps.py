@@ -25,6 +25,7 @@ _TIME_NAME = re.compile(r"(?:time|timestamp|stamp|t)(?:[_ ]*[\[(]?\s*(ns|us|ms|s
 _STEP_NS = NS_PER_S // 10
 _MAX_TABLE_BYTES = 1 << 28
 _ENOUGH = 0.8
+_HEADER_ROWS = 10
 
 
 def _no_numbers() -> dict[int, TimeNs]:
@@ -184,22 +185,32 @@ def _from_table(table: Path, files: Sequence[Path], zone_s: int | None) -> tuple
     text = table.read_text(encoding="utf-8-sig", errors="replace")
     by_name = {name: file for file in files for name in (file.name, file.stem)}
     rows = [row for row in map(_cells, text.splitlines()) if any(cell.strip() for cell in row)]
-    if not rows:
-        return {}, False
-    head = [cell.strip().lower().lstrip("# ") for cell in rows[0]]
-    time_place = next((n for n, cell in enumerate(head) if _TIME_NAME.fullmatch(cell)), None)
-    file_place = next((n for n, cell in enumerate(head) if cell in _FILE_NAMES), None)
-    if time_place is None or file_place is None:
+    first, time_place, file_place, unit = _places(rows, by_name)
+    if time_place < 0:
         return _one_per_line(table, rows, files, zone_s)
-    unit = _TIME_NAME.fullmatch(head[time_place])
     times: dict[Path, TimeNs] = {}
     zoneless = False
-    for number, row in enumerate(rows[1:], start=2):
+    for number, row in enumerate(rows[first:], start=first + 1):
         file = by_name.get(Path(row[file_place].strip()).name) if len(row) > max(file_place, time_place) else None
         if file is not None:
-            times[file] = _time(table, number, row[time_place], unit[1] if unit else None, zone_s)
+            times[file] = _time(table, number, row[time_place], unit, zone_s)
             zoneless = zoneless or _zoneless(row[time_place])
     return times, zoneless and zone_s is None
+
+
+def _places(rows: Sequence[Sequence[str]], by_name: Mapping[str, Path]) -> tuple[int, int, int, str | None]:
+    """Return the first row, the column of times, that of files, and the unit of times; -1 for columns that are not there."""
+    for number, row in enumerate(rows[:_HEADER_ROWS]):
+        head = [cell.strip().lower().lstrip("# ") for cell in row]
+        times = [(n, match[1]) for n, cell in enumerate(head) if (match := _TIME_NAME.fullmatch(cell))]
+        names = [n for n, cell in enumerate(head) if cell in _FILE_NAMES]
+        if times and names:
+            return number + 1, times[0][0], names[0], times[0][1]
+    for number, row in enumerate(rows[:_HEADER_ROWS]):
+        places = [n for n, cell in enumerate(row) if Path(cell.strip()).name in by_name]
+        if len(row) == 2 and len(places) == 1:
+            return number, 1 - places[0], places[0], None
+    return 0, -1, -1, None
 
 
 def _cells(line: str) -> list[str]:

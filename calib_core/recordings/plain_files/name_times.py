@@ -57,7 +57,7 @@ def times_in_names(stems: Sequence[str], zone_s: int | None = None) -> NamedTime
 def _named(stems: Sequence[str], found: Sequence[tuple[int, WrittenMoment]], zone_s: int | None) -> NamedTimes | None:
     """Return the times of one way to choose moments; None if they do not tell the files apart."""
     times = _times([moment for _, moment in found])
-    if times is None or (len(found) > 1 and len(np.unique(times[0])) == 1):
+    if times is None or (len(found) > 1 and len(np.unique(times[0])) == 1) or _is_numbered_day(stems, found):
         return None
     zoned = np.array([moment.zoned for _, moment in found])
     shift = np.where(zoned, 0, (zone_s or 0) * NS_PER_S)
@@ -69,6 +69,18 @@ def _named(stems: Sequence[str], found: Sequence[tuple[int, WrittenMoment]], zon
         times[1],
         _disorder(times[0], numbers),
     )
+
+
+def _is_numbered_day(stems: Sequence[str], found: Sequence[tuple[int, WrittenMoment]]) -> bool:
+    """Return whether what looks like a time of day counts files: 2024-05-17_000060 is none, and 000001, 000002 may be none."""
+    if any(moment.tail or moment.zoned for _, moment in found):
+        return False
+    shapes = {re.sub(r"\d", "0", stems[place]) for place, _ in found}
+    dated = {place for place, _ in found}
+    if any(place not in dated and re.sub(r"\d", "0", stem) in shapes for place, stem in enumerate(stems)):
+        return True
+    seconds = np.sort([moment.second for _, moment in found])
+    return len(seconds) > 1 and int(seconds[0]) % 86_400 <= 1 and bool((np.diff(seconds) == 1).all())
 
 
 def _candidates(stems: Sequence[str]) -> list[list[WrittenMoment | None]]:
@@ -122,11 +134,14 @@ def _spread(seconds: np.ndarray, tails: np.ndarray) -> tuple[TimesNs, str] | Non
     _, counts = np.unique(seconds, return_counts=True)
     if len(counts) < 2 or counts.max() > _MOST_PER_SECOND:
         return None
+    usual = int(np.median(counts[1:-1])) if len(counts) > 2 else int(counts.max())
     times = np.zeros(len(seconds), dtype=np.int64)
     for second in np.unique(seconds):
         mine = np.flatnonzero(seconds == second)
         mine = mine[np.argsort(tails[mine], kind="stable")]
-        times[mine] = second * NS_PER_S + (2 * np.arange(len(mine)) + 1) * NS_PER_S // (2 * len(mine))
+        whole = max(len(mine), usual if second in (seconds.min(), seconds.max()) else 0)
+        first = whole - len(mine) if second == seconds.min() else 0  # the recording begins within the first second
+        times[mine] = second * NS_PER_S + (2 * (first + np.arange(len(mine))) + 1) * NS_PER_S // (2 * whole)
     return times, "the names give whole seconds and a number; the files of a second are spread evenly over it"
 
 

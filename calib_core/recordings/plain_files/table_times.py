@@ -67,7 +67,7 @@ def time_reader(
         return str(text).replace(",", ".") if decimal_comma else str(text)
 
     numbers = [number for cell in cells if (number := _float(plain(cell))) is not None]
-    if len(numbers) < len(cells) or not cells:
+    if len(numbers) < len(cells) or not cells or (not column.unit and date_text(cells[0]) is not None):
         return TimeReader(
             itemgetter(column.place),
             lambda text: read_time(str(text), None, zone_s or 0),

@@ -27,9 +27,10 @@ _CLOCK = (
     r"(?:[T _/.:@-]{0,3}| at )(?P<hour>[01]\d|2[0-3])(?:(?P<b>[-_.: ]?)(?P<minute>[0-5]\d)(?P=b)(?P<second>[0-5]\d)"
     r"|h(?P<minute_m>[0-5]\d)m(?P<second_s>[0-5]\d)s?)"
 )
+_NO_DATE = r"(?![-_: ]?(?:19|20)\d\d(?P<c>[-_/.: ]?)(?:0[1-9]|1[0-2])(?P=c)(?:0[1-9]|[12]\d|3[01])(?!\d))"
 _TAIL = (  # -07:00, and -0700 after a clock with colons, is a zone
     r"(?:(?P<point>[.,])(?P<fraction>\d{1,12})"
-    r"|(?!-\d\d:\d\d|(?<=:\d\d)-\d{4}(?!\d))[-_: ]?(?P<digits>\d{1,9})(?P<unit>ms|us|ns)?)?(?!\d)"
+    r"|" + _NO_DATE + r"(?!-\d\d:\d\d|(?<=:\d\d)-\d{4}(?!\d))[-_: ]?(?P<digits>\d{1,9})(?P<unit>ms|us|ns)?)?(?!\d)"
 )
 _ZONE = r"(?P<zone> ?(?:Z|UTC)(?![A-Za-z+-])| ?(?:UTC)?[+-]\d\d:?\d\d(?!\d))?"
 _MOMENT = re.compile(_DATE + _CLOCK + _TAIL + _ZONE, re.ASCII)

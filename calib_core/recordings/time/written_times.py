@@ -71,6 +71,8 @@ def read_time(text: str, unit: TimeUnit | None = None, zone_s: int = 0) -> TimeN
         return _read_date(text, zone_s)
     sign, whole, fraction = match.groups()
     unit = unit or _UNIT_OF_DIGITS.get(len(whole))
+    if unit is None and date_text(text) is not None:
+        return _read_date(text, zone_s)
     if unit is None:
         raise RecordingError(
             f"'{text}' has {len(whole)} digits, which does not determine its unit; 10 digits mean s, 13 ms, 16 us, 19 ns"
