@@ -11,11 +11,13 @@ import numpy as np
 
 from calib_core.arrays import Matrix33, Values
 from calib_core.camera import Camera
+from calib_core.recordings.camera.picture_files import picture_size_px
 
-__all__ = ["FolderCamera", "camera_beside"]
+__all__ = ["FolderCamera", "camera_beside", "size_of_pictures_beside"]
 
 _MAX_BYTES = 1 << 29
 _LEVELS = 4
+_SUFFIXES = (".jpg", ".jpeg", ".png")
 _CAMERA_NUMBER = re.compile(r"image_?0?(\d)")
 _RAW_KITTI = "calib_cam_to_cam.txt"
 
@@ -65,6 +67,21 @@ def camera_beside(folder: Path, files: Sequence[Path], picture_size_px: tuple[in
         return _of_kitti_frames(folder, files) or _of_raw_kitti(folder, picture_size_px) or _of_nuscenes(folder, files)
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None  # a file of that name but of another form is not a data set's calibration
+
+
+def size_of_pictures_beside(calibration: Path) -> tuple[int, int] | None:
+    """Return the size of the pictures that a KITTI or View-of-Delft calibration belongs to; None if there are none.
+
+    Args:
+        calibration: such as calib/00000.txt beside image_2, or calib.txt beside or in it.
+    """
+    around = calibration.absolute().parent
+    for folder in (around.parent / "image_2", around / "image_2", around):
+        named = folder / calibration.stem
+        for picture in (*(named.with_suffix(suffix) for suffix in _SUFFIXES), *sorted(folder.glob("*"))[:1]):
+            if picture.suffix.lower() in _SUFFIXES and (size := picture_size_px(picture)):
+                return size
+    return None
 
 
 def _above(folder: Path) -> Iterator[Path]:

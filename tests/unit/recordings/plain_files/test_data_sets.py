@@ -137,7 +137,8 @@ def nuscenes(root: Path) -> Path:
     calibrated = [
         {
             "token": f"c{n}-{car}", "sensor_token": f"s{n}", "translation": [0, 0, 0], "rotation": [1, 0, 0, 0],
-            "camera_intrinsic": ((np.diag([1 + 0.1 * car, 1 + 0.1 * car, 1.0]) @ matrices[channel])).tolist() if channel in matrices else [],
+            "camera_intrinsic": (np.diag([1 + car / 10, 1 + car / 10, 1]) @ matrix).tolist()
+            if (matrix := matrices.get(channel)) is not None else [],
         }
         for car in (0, 1) for n, channel in enumerate(channels)
     ]  # fmt: skip

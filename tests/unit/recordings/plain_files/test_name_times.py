@@ -46,7 +46,7 @@ def test_the_spellings_in_the_documentation_are_one_moment(text) -> None:
 
 
 @given(
-    moment=st.datetimes(datetime(1971, 1, 1), datetime(2099, 12, 31), timezones=st.just(UTC)),  # noqa: DTZ001
+    moment=st.datetimes(datetime(1971, 1, 1), datetime(2099, 12, 31), timezones=st.just(UTC)),
     pattern=st.sampled_from(sorted(PATTERNS)),
 )
 def test_any_date_in_any_pattern_reads_back_to_the_microsecond(moment, pattern) -> None:
@@ -58,7 +58,7 @@ def test_any_date_in_any_pattern_reads_back_to_the_microsecond(moment, pattern) 
 
 
 @given(
-    start=st.datetimes(datetime(2002, 1, 1), datetime(2090, 12, 31), timezones=st.just(UTC)),  # noqa: DTZ001
+    start=st.datetimes(datetime(2002, 1, 1), datetime(2090, 12, 31), timezones=st.just(UTC)),
     pattern=st.sampled_from(sorted(PATTERNS)),
     step_us=st.integers(10_000, 3_000_000),
 )
