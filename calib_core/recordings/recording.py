@@ -22,6 +22,7 @@ from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.plain_files.opening import files_behind, open_plain_sources
 from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
+from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.time.written_dates import parse_zone
 from calib_core.recordings.topics import TopicSummary
@@ -272,11 +273,15 @@ def open_recording(
 
 
 def _plain_options(options: RecordingOptions) -> PlainOptions:
+    axes = None if options.radar_axes is None else parse_radar_axes(options.radar_axes)
+    unit = "" if axes is None or axes.degrees is None else "deg" if axes.degrees else "rad"
+    only_unit = options.radar_axes is not None and options.radar_axes.strip().lower() in ("degrees", "radians")
     return PlainOptions(
-        options.video_start,
-        parse_column_map(options.map),
-        options.radar_axes is not None,
-        parse_zone(options.time_zone),
+        video_start=options.video_start,
+        mapped=parse_column_map(options.map),
+        axes_given=axes is not None and not only_unit,
+        angle_unit=unit,
+        zone_s=parse_zone(options.time_zone),
     )
 
 

@@ -56,7 +56,7 @@ def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
         raise RecordingError(f"{path}: the file has a header but no rows")
     what = "radar JSON" if isinstance(table, JsonTable) else "radar CSV"
     read = ReturnTable(columns, stamps, values, times.zoneless, times.counted, times.assumptions, times.remarks)
-    return source_of(path, what, read, axes_given=options.axes_given)
+    return source_of(path, what, read, options)
 
 
 def table_fault(path: Path, options: PlainOptions) -> str:
@@ -104,7 +104,7 @@ def open_table_folder(
         raise RecordingError(f"{folder}: {len(files)} tables without a row in the {len(sample)} that were looked at")
     columns = _columns(tables[0], options)
     values = [_read(table, _same_columns(table, columns, options), None)[1] for table in tables]
-    units = settle_units(columns, np.concatenate(values), topic, axes_given=options.axes_given)
+    units = settle_units(columns, np.concatenate(values), topic, options)
     times = _times(tables[0], columns, topic, options)
     inside = times is not None and not times.counted
     stamped = (

@@ -14,11 +14,13 @@ class PlainOptions:
     Attributes:
         video_start: the time of a video's first frame.
         mapped: --map, parsed.
-        axes_given: whether the user gave --radar-axes.
+        axes_given: whether the user gave the directions of --radar-axes.
+        angle_unit: the angle unit of --radar-axes, "deg" or "rad"; "" if not given.
         zone_s: offset from UTC of dates without a zone [s]; None if not given.
     """
 
     video_start: str | None = None
     mapped: tuple[MappedColumn, ...] = ()
     axes_given: bool = False
+    angle_unit: str = ""
     zone_s: int | None = None

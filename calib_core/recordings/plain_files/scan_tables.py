@@ -1,6 +1,6 @@
 """Make scans of a table of returns: rows with the same time form one scan."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,8 +8,10 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.measurements import TimeNs
+from calib_core.radar import cartesian_from_polar
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.plain_files.messages import cloud_channel, cloud_message
+from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.source import PlainSource, topic_of
 from calib_core.recordings.plain_files.table_columns import TableColumns
 from calib_core.recordings.plain_files.table_units import TableUnits, settle_units
@@ -44,10 +46,10 @@ class ReturnTable:
     remarks: tuple[str, ...] = ()
 
 
-def source_of(path: Path, what: str, table: ReturnTable, *, axes_given: bool) -> PlainSource:
+def source_of(path: Path, what: str, table: ReturnTable, options: PlainOptions) -> PlainSource:
     """Return the scans of a table as a recording's topic."""
     topic = topic_of(path, "radar")
-    units = settle_units(table.columns, table.values, topic, axes_given=axes_given)
+    units = settle_units(table.columns, table.values, topic, options)
     order = np.argsort(table.times_ns, kind="stable")
     stamps, first = np.unique(table.times_ns[order], return_index=True)
     edges = np.append(first, len(order))
@@ -85,7 +87,20 @@ def points_of(columns: TableColumns, values: np.ndarray, units: TableUnits) -> n
         if "vx" in names and "vy" in names:
             x, y = names.index("vx"), names.index("vy")
             scaled[:, [x, y]] = scaled[:, [y, x]] * (1.0, -1.0)
+    if "x" not in names or "y" not in names:
+        names, scaled = _with_positions(names, scaled)
     return scaled.view(np.dtype([(name, "<f8") for name in names]))[:, 0]
+
+
+def _with_positions(names: Sequence[str], values: np.ndarray) -> tuple[list[str], np.ndarray]:
+    """Put x, y, z before range and angles, so that what was settled about these is not asked again of the message."""
+    polar = np.zeros((len(values), 3))
+    for place, name in enumerate(("range", "azimuth", "elevation")):
+        if name in names:
+            polar[:, place] = values[:, names.index(name)]
+    kept = [place for place, name in enumerate(names) if name not in ("x", "y", "z")]
+    positions = np.column_stack([cartesian_from_polar(polar), values[:, kept]])
+    return ["x", "y", "z", *(names[place] for place in kept)], np.ascontiguousarray(positions)
 
 
 def table_words(columns: TableColumns, remarks: tuple[str, ...]) -> str:

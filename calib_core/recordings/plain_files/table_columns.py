@@ -50,6 +50,11 @@ class TableColumn:
     mapped: bool = False
     sign: int = 1
 
+    @property
+    def is_documented(self) -> bool:
+        """Whether it is spelled exactly as in the documentation, which then states its sign: azimuth_deg."""
+        return self.written == f"{self.quantity}_{self.unit}"
+
 
 @dataclass(frozen=True, slots=True)
 class TableColumns:

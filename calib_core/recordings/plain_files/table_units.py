@@ -8,6 +8,7 @@ import numpy as np
 
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.column_map import MappedColumn
+from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.table_columns import TableColumn, TableColumns, units_of
 
 __all__ = ["TableUnits", "settle_units"]
@@ -39,23 +40,26 @@ class TableUnits:
     remarks: tuple[str, ...]
 
 
-def settle_units(columns: TableColumns, values: np.ndarray, topic: str, *, axes_given: bool) -> TableUnits:
+def settle_units(columns: TableColumns, values: np.ndarray, topic: str, options: PlainOptions) -> TableUnits:
     """Settle the units of all columns.
 
     Args:
         columns: the columns in use.
         values: (n, k) as written.
         topic: for the assumptions.
-        axes_given: whether the user gave --radar-axes.
+        options: the user's.
     """
     step = max(1, len(values) // _SAMPLED_ROWS)
     sample = {column.quantity: values[::step, number] for number, column in enumerate(columns.values)}
     found = _Settling(columns, sample, topic)
+    for column in columns.values:
+        if column.quantity in ("azimuth", "elevation") and not column.unit:
+            found.units[column.quantity] = options.angle_unit
     found.lengths()
     found.angles()
     found.speeds()
     found.rivals()
-    x_is_right = False if axes_given else found.axes()
+    x_is_right = False if options.axes_given else found.axes()
     scales = [
         column.sign
         * units_of(column.quantity)[found.units.get(column.quantity) or next(iter(units_of(column.quantity)))]
@@ -212,7 +216,7 @@ class _Settling:
 
     def _azimuth_sign(self) -> None:
         column = self.columns.of("azimuth")
-        if column is not None and column.rank > 0 and not column.mapped:
+        if column is not None and not column.is_documented and not column.mapped:
             text = f"{column.written} is read as the azimuth, positive to the left; the file does not state its sign"
             self.assumptions.append(
                 Assumption("azimuth-sign", self.topic, text, _map_words([column], self.units[column.quantity]))

@@ -154,8 +154,9 @@ DIALECTS: dict[str, tuple[str, str, set[str]]] = {
     "polar, degrees by their size": (
         "a.csv",
         polar_table("timestamp_ns,range_m,azimuth,elevation_deg,doppler_mps", commas),
-        set(),
+        {"azimuth-sign"},
     ),
+    "polar, our words": ("a.csv", polar_table("time_ns,range_m,azimuth_deg,elevation_deg,doppler_mps", commas), set()),
     "polar, other words": (
         "a.csv",
         polar_table("ts_ns,Range [m],Az [deg],El [deg],Vr [m/s]", commas),
@@ -177,7 +178,7 @@ DIALECTS: dict[str, tuple[str, str, set[str]]] = {
                        lambda t, x, y, z, v, s: f"0,{t / 1e9!r},{x:.12e},{y:.12e},{z:.12e},{v:.12e},{s:.12e}"), set(),
     ),
     "UTF-16": ("a.csv", table("time_ns,x_m,y_m,z_m,doppler_mps,snr_db", commas), set()),
-    "Latin-1": ("a.csv", polar_table("time_ns,range_m,azimuth [°],elevation [°],doppler_mps", commas), set()),
+    "Latin-1": ("a.csv", polar_table("time_ns,range_m,azimuth [°],elevation [°],doppler_mps", commas), {"azimuth-sign"}),
     "lists in cells": (
         "a.csv",
         "time_ns,x_m,y_m,z_m,doppler_mps,snr_db\n" + "".join(
@@ -278,6 +279,17 @@ def test_a_mapped_column_that_does_not_exist_is_refused_with_the_nearest(tmp_pat
     path = written(tmp_path, "vendor words")
     with pytest.raises(RecordingError, match=r"--map x=f_PosXX:m: no column 'f_PosXX'; did you mean 'f_PosX \[m\]'\?"):
         open_recording(path, RecordingOptions(map=("x=f_PosXX:m",)), require=("radar",))
+
+
+def test_the_angle_unit_of_the_axes_option_is_followed(tmp_path) -> None:
+    rows = "".join(f"{t},{r},{a / 50},{e / 50}\n" for t, r, a, e, _ in T.polar)
+    (tmp_path / "a.csv").write_text(f"time_ns,range_m,azimuth,elevation\n{rows}")
+    angles = {}
+    for unit in ("degrees", "radians"):
+        with open_recording(tmp_path / "a.csv", RecordingOptions(radar_axes=unit), require=("radar",)) as recording:
+            assert {one.key for one in recording.assumptions} == {"azimuth-sign"}
+            angles[unit] = polar_from_cartesian(recording.radar_scans().points_radar_m)[:, 1]
+    np.testing.assert_allclose(angles["degrees"], np.radians(angles["radians"]))
 
 
 def test_what_was_taken_for_what_and_what_was_left_out_is_shown(tmp_path) -> None:
