@@ -41,6 +41,7 @@ class StampedFiles:
         times_ns: (n,) ascending.
         warnings: what the user must know about the times.
         zoneless: whether the times are dates without a zone.
+        counted: whether they come from the numbers of the files.
         assumed: what the digits in the names were taken for, if they do not say it.
         numbers: times by the numbers in the file names; empty if the times themselves come from those numbers.
     """
@@ -49,6 +50,7 @@ class StampedFiles:
     times_ns: TimesNs
     warnings: tuple[DataWarning, ...] = ()
     zoneless: bool = False
+    counted: bool = False
     assumed: str = ""
     numbers: Mapping[int, TimeNs] = field(default_factory=_no_numbers)
 
@@ -163,7 +165,7 @@ def _stamped(
         )
     times_ns = np.array([times[file] for file in ordered], dtype=np.int64)
     numbers = {} if counted else _numbers(times)
-    return StampedFiles(tuple(ordered), times_ns, tuple(warnings), zoneless, assumed, numbers)
+    return StampedFiles(tuple(ordered), times_ns, tuple(warnings), zoneless, counted, assumed, numbers)
 
 
 def _numbers(times: Mapping[Path, TimeNs]) -> dict[int, TimeNs]:

@@ -167,7 +167,10 @@ def _add_files(
     for file in tables if not is_nuscenes else []:
         alike.setdefault(re.sub(r"\d+", "#", file.name), []).append(file)
     for group in alike.values():
-        if len(group) > 1 and is_one_scan_each(group, options):
+        fault = table_fault(group[0], options) if len(group) > 1 else ""
+        if fault:
+            contents.refused.append((group[0], f"and {len(group) - 1} like it: {fault}"))
+        elif len(group) > 1 and is_one_scan_each(group, options):
             contents.sources.append((folder, tuple(group)))
         else:
             _add_tables(group, contents, options)

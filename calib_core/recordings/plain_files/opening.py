@@ -112,7 +112,7 @@ class _Opening:
         named: list[PlainSource] = []
         for place in sorted(opened):
             named.append(_with_own_topic(opened[place], [other.channel.topic for other in named]))
-        return self._with_refusals(_about_zones(named, ros=bool(self.left))), tuple(self.left)
+        return self._with_refusals(_with_open_times(named, ros=bool(self.left))), tuple(self.left)
 
     def _open(
         self, path: Path, files: Sequence[Path], numbered: Mapping[int, TimeNs], *, inside: bool
@@ -178,18 +178,19 @@ def _reasons(refused: Sequence[tuple[Path, str]]) -> str:
     return f"{shown}; and {more} more" if more > 0 else shown
 
 
-def _about_zones(sources: Sequence[PlainSource], *, ros: bool) -> list[PlainSource]:
-    """Assume UTC for dates without a zone where it matters: where other files have times that count from 1970."""
-    others = ros or any(not source.zoneless for source in sources)
-    if not others:
-        return list(sources)
+def _with_open_times(sources: Sequence[PlainSource], *, ros: bool) -> list[PlainSource]:
+    """Assume what the times leave open where it matters: where other files have times that do not."""
     found = []
     for source in sources:
-        if source.zoneless:
+        others = [other for other in sources if other is not source]
+        added = []
+        if source.zoneless and (ros or not all(other.zoneless for other in others)):
             text = "its dates have no time zone; read as UTC"
-            assumption = Assumption("time-zone", source.channel.topic, text, "--time-zone UTC")
-            source = replace(source, assumptions=(*source.assumptions, assumption))
-        found.append(source)
+            added.append(Assumption("time-zone", source.channel.topic, text, "--time-zone UTC"))
+        if source.counted and (ros or not all(other.counted for other in others)):
+            text = "its files or scans are numbered and have no times; read as 0.1 s apart, number 0 at 1 s"
+            added.append(Assumption("frame-interval", source.channel.topic, text, "--confirm-assumptions"))
+        found.append(replace(source, assumptions=(*source.assumptions, *added)))
     return found
 
 

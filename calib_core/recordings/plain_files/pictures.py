@@ -59,6 +59,7 @@ def open_picture_folder(
         (*_about_faults(folder, faults, len(files)), *stamped.warnings),
         assumptions=stamped.assumptions(topic),
         zoneless=stamped.zoneless,
+        counted=stamped.counted,
         numbers=stamped.numbers,
         camera=camera,
     )

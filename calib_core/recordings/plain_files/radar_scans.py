@@ -60,6 +60,7 @@ def _open(folder: Path, stamped: StampedFiles, what: str, points: Callable[[Path
         stamped.warnings,
         assumptions=stamped.assumptions(topic),
         zoneless=stamped.zoneless,
+        counted=stamped.counted,
     )
 
 

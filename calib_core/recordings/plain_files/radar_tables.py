@@ -127,6 +127,7 @@ def open_table_folder(
         stamped.warnings,
         assumptions=(*stamped.assumptions(topic), *(times.assumptions if times and inside else ()), *units.assumptions),
         zoneless=stamped.zoneless,
+        counted=stamped.counted,
         mapped=any(column.mapped for column in (*columns.values, *columns.time)),
     )
 

@@ -65,6 +65,7 @@ def source_of(path: Path, what: str, table: ReturnTable, options: PlainOptions) 
         warnings,
         assumptions=(*table.assumptions, *units.assumptions),
         zoneless=table.zoneless,
+        counted=table.counted,
         mapped=any(column.mapped for column in (*table.columns.values, *table.columns.time)),
     )
 

@@ -39,6 +39,7 @@ class PlainSource:
         closed: called on closing.
         assumptions: what it does not state and reading it takes for granted.
         zoneless: whether its times come from dates without a time zone.
+        counted: whether its times come from the numbers of files or scans.
         mapped: whether --map was applied to it.
         numbers: times of its files by their numbers, for files of other folders that are only numbered.
         camera: the intrinsics that its data set publishes; None if there are none.
@@ -54,6 +55,7 @@ class PlainSource:
     closed: Callable[[], None] | None = None
     assumptions: tuple[Assumption, ...] = ()
     zoneless: bool = False
+    counted: bool = False
     mapped: bool = False
     numbers: Mapping[int, TimeNs] = field(default_factory=_no_numbers)
     camera: FolderCamera | None = None

@@ -179,6 +179,25 @@ def test_a_damaged_calibration_is_no_camera_and_no_crash(tmp_path) -> None:
 # -- nothing vanishes
 
 
+def test_many_files_of_one_kind_that_nobody_reads_are_one_entry(tmp_path) -> None:
+    picture(tmp_path / "camera" / f"{START_NS}.png", (8, 8))
+    (tmp_path / "label_2").mkdir()
+    for number in range(30):
+        (tmp_path / "label_2" / f"{number:06}.txt").write_text("Car 0.00 0 1.85 387.63 181.54 423.81 203.12 1.67\n")
+    with inspect_recording(tmp_path) as recording:
+        (warning,) = recording.warnings
+    assert "1 file or folder was looked at and not used: 000000.txt (and 29 like it: no header" in warning.message
+
+
+def test_numbers_beside_real_times_are_an_assumption(tmp_path) -> None:
+    for number in range(3):
+        picture(tmp_path / "camera" / f"{number}.png", (8, 8))
+    (tmp_path / "radar.csv").write_text("time_s,x_m,y_m\n1.0,3,1\n1.2,3,1\n")
+    with open_recording(tmp_path) as recording:
+        (assumption,) = recording.assumptions
+    assert (assumption.key, assumption.topic) == ("frame-interval", "/camera/image")
+
+
 def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path) -> None:
     for number in range(3):
         picture(tmp_path / "camera" / f"{START_NS + number}.png", (8, 8))
