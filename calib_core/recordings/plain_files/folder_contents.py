@@ -8,8 +8,8 @@ from pathlib import Path
 from calib_core.errors import RecordingError
 from calib_core.recordings.plain_files.pictures import PICTURE_SUFFIXES
 from calib_core.recordings.plain_files.radar_scans import is_lidar_bin
-from calib_core.recordings.plain_files.radar_tables import TABLE_SUFFIXES, is_one_scan_each, table_fault
 from calib_core.recordings.plain_files.reading_options import PlainOptions
+from calib_core.recordings.plain_files.tables.opening import TABLE_SUFFIXES, is_one_scan_each, table_fault
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 
 __all__ = ["Contents", "contents_of", "is_ros"]

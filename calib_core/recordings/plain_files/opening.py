@@ -10,14 +10,14 @@ from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.plain_files.folder_contents import Contents, contents_of
 from calib_core.recordings.plain_files.pictures import PICTURE_SUFFIXES, open_picture_folder
 from calib_core.recordings.plain_files.radar_scans import open_bin_folder, open_pcd_folder
-from calib_core.recordings.plain_files.radar_tables import (
+from calib_core.recordings.plain_files.reading_options import PlainOptions
+from calib_core.recordings.plain_files.source import PlainSource
+from calib_core.recordings.plain_files.tables.opening import (
     JSON_SUFFIXES,
     TABLE_SUFFIXES,
     open_radar_table,
     open_table_folder,
 )
-from calib_core.recordings.plain_files.reading_options import PlainOptions
-from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES, open_video
 from calib_core.results import DataWarning
 

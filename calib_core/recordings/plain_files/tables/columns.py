@@ -9,7 +9,7 @@ from pathlib import Path
 from calib_core.errors import RecordingError
 from calib_core.recordings.column_map import UNITS, MappedColumn
 from calib_core.recordings.field_words import FIELD_SPELLINGS, FieldWords, read_field
-from calib_core.recordings.plain_files.text_tables import TABLE_EXAMPLE
+from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE
 
 __all__ = ["QUANTITIES", "TableColumn", "TableColumns", "choose_columns", "units_of"]
 

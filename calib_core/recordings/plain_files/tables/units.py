@@ -9,7 +9,7 @@ import numpy as np
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.column_map import MappedColumn
 from calib_core.recordings.plain_files.reading_options import PlainOptions
-from calib_core.recordings.plain_files.table_columns import TableColumn, TableColumns, units_of
+from calib_core.recordings.plain_files.tables.columns import TableColumn, TableColumns, units_of
 
 __all__ = ["TableUnits", "settle_units"]
 

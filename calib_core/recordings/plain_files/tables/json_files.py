@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.plain_files.table_columns import TableColumns
-from calib_core.recordings.plain_files.table_times import TimeReader
+from calib_core.recordings.plain_files.tables.columns import TableColumns
+from calib_core.recordings.plain_files.tables.times import TimeReader
 
 __all__ = ["JsonTable", "open_json_table", "read_json_rows"]
 

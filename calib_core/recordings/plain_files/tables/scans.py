@@ -13,8 +13,8 @@ from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.plain_files.messages import cloud_channel, cloud_message
 from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.source import PlainSource, topic_of
-from calib_core.recordings.plain_files.table_columns import TableColumns
-from calib_core.recordings.plain_files.table_units import TableUnits, settle_units
+from calib_core.recordings.plain_files.tables.columns import TableColumns
+from calib_core.recordings.plain_files.tables.units import TableUnits, settle_units
 from calib_core.results import DataWarning
 
 __all__ = ["ReturnTable", "points_of", "source_of", "table_words"]

@@ -12,9 +12,9 @@ import numpy as np
 from calib_core.errors import RecordingError
 from calib_core.recordings.field_words import FIELD_SPELLINGS
 from calib_core.recordings.plain_files.reading_options import PlainOptions
-from calib_core.recordings.plain_files.table_columns import TableColumns, units_of
-from calib_core.recordings.plain_files.table_times import TimeReader
-from calib_core.recordings.plain_files.text_tables import TABLE_EXAMPLE, TextTable
+from calib_core.recordings.plain_files.tables.columns import TableColumns, units_of
+from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE, TextTable
+from calib_core.recordings.plain_files.tables.times import TimeReader
 
 __all__ = ["CSV_EXAMPLE", "csv_columns", "first_rows", "read_rows", "require_header"]
 

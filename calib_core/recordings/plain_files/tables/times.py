@@ -9,7 +9,7 @@ from operator import itemgetter
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.assumptions import Assumption
-from calib_core.recordings.plain_files.table_columns import TableColumn, TableColumns
+from calib_core.recordings.plain_files.tables.columns import TableColumn, TableColumns
 from calib_core.recordings.time.written_dates import date_text
 from calib_core.recordings.time.written_times import TimeUnit, read_time, unit_of_epoch
 

@@ -10,15 +10,15 @@ from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import TimeNs
 from calib_core.recordings.plain_files.file_stamps import StampedFiles, stamp_files
 from calib_core.recordings.plain_files.messages import cloud_channel, cloud_message
-from calib_core.recordings.plain_files.radar_csv import first_rows, read_rows, require_header
-from calib_core.recordings.plain_files.radar_json import JsonTable, open_json_table, read_json_rows
 from calib_core.recordings.plain_files.reading_options import PlainOptions
-from calib_core.recordings.plain_files.scan_tables import RADAR_FRAME, ReturnTable, points_of, source_of, table_words
 from calib_core.recordings.plain_files.source import PlainSource, topic_of
-from calib_core.recordings.plain_files.table_columns import TableColumns, choose_columns
-from calib_core.recordings.plain_files.table_times import TimeReader, time_reader
-from calib_core.recordings.plain_files.table_units import TableUnits, settle_units
-from calib_core.recordings.plain_files.text_tables import TABLE_EXAMPLE, TextTable, open_text_table
+from calib_core.recordings.plain_files.tables.columns import TableColumns, choose_columns
+from calib_core.recordings.plain_files.tables.csv_files import first_rows, read_rows, require_header
+from calib_core.recordings.plain_files.tables.json_files import JsonTable, open_json_table, read_json_rows
+from calib_core.recordings.plain_files.tables.scans import RADAR_FRAME, ReturnTable, points_of, source_of, table_words
+from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE, TextTable, open_text_table
+from calib_core.recordings.plain_files.tables.times import TimeReader, time_reader
+from calib_core.recordings.plain_files.tables.units import TableUnits, settle_units
 
 __all__ = [
     "JSON_SUFFIXES",
