@@ -15,6 +15,7 @@ from calib_core.errors import InputError
 if TYPE_CHECKING:
     from app.view import Reference
     from calib_core.camera import Camera
+    from calib_core.interchange import ImportedCalibration
 
 __all__ = ["Import", "camera_in", "reference_from"]
 
@@ -29,6 +30,8 @@ class Import:
     """Output file (calibration-1 JSON)."""
     camera: File = None
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
+    image_size: Annotated[tuple[int, int] | None, tyro.conf.arg(metavar="WIDTH HEIGHT")] = None
+    """Size of the pictures [px], if the file has a camera matrix but no size; by default that of the pictures beside it."""
 
     def run(self) -> int:
         """Write the calibration; return the exit code."""
@@ -38,7 +41,9 @@ class Import:
 
         data = calibration_bytes(self.calibration)
         found = read_any(data, str(self.calibration))
-        camera = read_camera_file(self.camera) if self.camera else None
+        camera = (
+            read_camera_file(self.camera) if self.camera else _sized_camera(found, self.calibration, self.image_size)
+        )
         origin = InputFile(self.calibration.name, len(data), hashlib.sha256(data).hexdigest())
         file = adopt(found, str(self.calibration), camera=camera, provenance=Provenance(inputs=(origin,)))
         for note in found.notes:
@@ -46,6 +51,33 @@ class Import:
         write_whole(self.out, write(file))
         print(f"{self.calibration.name} read as {found.format}; written to {self.out}")
         return 0
+
+
+def _sized_camera(found: "ImportedCalibration", path: Path, image_size_px: tuple[int, int] | None) -> "Camera | None":
+    """Return the camera of a file that states its matrix but no size, if the size is given or pictures are beside it.
+
+    Raises:
+        InputError: the matrix is not a camera's.
+    """
+    from calib_core.recordings import size_of_pictures_beside
+
+    if found.matrix_px is None:
+        if image_size_px is not None:
+            raise InputError(f"{path}: --image-size is for files with a camera matrix and no size; remove it")
+        return None
+    size_px = image_size_px or size_of_pictures_beside(path)
+    if size_px is None:
+        return None
+    if image_size_px is None:
+        print(f"note: image size {size_px[0]} x {size_px[1]} px from the pictures beside the file", file=sys.stderr)
+    return _camera_for(found, path, size_px)
+
+
+def _camera_for(found: "ImportedCalibration", path: Path, size_px: tuple[int, int]) -> "Camera | None":
+    try:
+        return found.camera_for(size_px)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}; give the intrinsics with --camera FILE") from None
 
 
 def camera_in(path: Path, width_px: int, height_px: int) -> "Camera | None":
@@ -56,7 +88,7 @@ def camera_in(path: Path, width_px: int, height_px: int) -> "Camera | None":
     """
     from calib_core.interchange import read_any_file
 
-    camera = read_any_file(path).camera
+    camera = _camera_for(read_any_file(path), path, (width_px, height_px))
     fits = camera is not None and (camera.width_px, camera.height_px) == (width_px, height_px)
     return camera if fits else None
 

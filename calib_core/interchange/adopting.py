@@ -38,6 +38,11 @@ def adopt(
     if found.file is not None:
         return found.file
     known = found.camera or camera
+    if known is None and found.matrix_px is not None:
+        raise InputError(
+            f"{source}: {found.format} states the camera matrix but not the image size; give it with --image-size WIDTH HEIGHT, "
+            "or give the intrinsics with --camera FILE"
+        )
     if known is None:
         raise InputError(f"{source}: {found.format} contains no camera; give its intrinsics with --camera FILE")
     calibration = adopted_calibration(found, source, camera=known)

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.arrays import Vector2, Vector3, frozen_array
+from calib_core.arrays import Matrix33, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
@@ -140,6 +140,7 @@ class ImportedCalibration:
         notes: the assumptions that were made, one sentence each.
         faults: the contradictions in the file, one sentence each.
         file: everything else, if it is a calibration-1 file.
+        matrix_px: (3, 3) K of undistorted pictures whose size the file does not state; None if it has none.
     """
 
     format: str
@@ -150,6 +151,17 @@ class ImportedCalibration:
     notes: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
     file: CalibrationFile | None = None
+    matrix_px: Matrix33 | None = None
+
+    def camera_for(self, image_size_px: tuple[int, int]) -> Camera | None:
+        """Return the camera; one whose size the file does not state gets that of the pictures. None if there is none.
+
+        Raises:
+            ValueError: the matrix is not a camera's.
+        """
+        if self.camera is not None or self.matrix_px is None:
+            return self.camera
+        return Camera("pinhole", *image_size_px, self.matrix_px)
 
     @property
     def camera_from_radar(self) -> RigidTransform:

@@ -3,6 +3,7 @@
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.description import clock_lines, describe
 from calib_core.recordings.first_picture import first_picture
+from calib_core.recordings.plain_files.folder_cameras import size_of_pictures_beside
 from calib_core.recordings.recording import Recording, inspect_recording, open_recording, require_files
 from calib_core.recordings.selection import RecordingOptions
 from calib_core.recordings.summary import RecordingSummary, recording_summary
@@ -25,5 +26,6 @@ __all__ = [
     "open_recording",
     "recording_summary",
     "require_files",
+    "size_of_pictures_beside",
     "write_video",
 ]

@@ -14,11 +14,13 @@ from calib_core.measurements import Stamp, TimeNs
 from calib_core.recordings.assumptions import Assumption, about_assumptions
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.camera.images import ImageLayout
-from calib_core.recordings.camera.recorded_intrinsics import recorded_camera
+from calib_core.recordings.camera.recorded_intrinsics import published_camera, recorded_camera
 from calib_core.recordings.camera.video_stream import about_video, image_stream
 from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.messages.decoding import Message
+from calib_core.recordings.plain_files.folder_cameras import FolderCamera
+from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.radar.checks import about_claims
 from calib_core.recordings.radar.layouts import layouts_of_parts
@@ -82,10 +84,14 @@ def assemble(
     heads = {name: both.heads for name, both in stamped.items()}
     radar = _radar_stream(selection.radar, inventory, stamps, heads)
     images = _image_stream(selection.image, inventory, stamps)
-    warnings.extend(check_overlap(name, radar, images, required=len(require) == 2))
+    zoneless = {s.channel.topic for s in sources if isinstance(s, PlainSource) and s.zoneless}
+    warnings.extend(check_overlap(name, radar, images, required=len(require) == 2, zoneless=zoneless))
     diagnoses = _diagnoses(stamped, (radar, images), clocks, options)
     warnings.extend(about_clocks(list(diagnoses.values())))
     camera, about_camera = recorded_camera(selection.camera_info, images)
+    beside = _camera_beside(sources, selection)
+    if beside is not None and images is not None:
+        camera, about_camera = published_camera(beside, images)
     warnings.extend(
         [*about_camera, *about_radar(radar), *about_claims(radar), *about_images(images), *about_video(images)]
     )
@@ -95,7 +101,7 @@ def assemble(
         topics=tuple(_summary(topic, inventory, selection, stamps, diagnoses.get(topic.name)) for topic in topics),
         radar_topic=selection.radar.name if selection.radar else None,
         image_topic=selection.image.name if selection.image else None,
-        camera_info_topic=selection.camera_info.name if selection.camera_info else None,
+        camera_info_topic=selection.camera_info.name if selection.camera_info else str(beside.file) if beside else None,
         radar_frame=_frame(selection.radar),
         camera_frame=_frame(selection.image) or _frame(selection.camera_info),
         radar=radar,
@@ -104,6 +110,15 @@ def assemble(
         warnings=tuple(warnings),
         assumptions=assumptions,
     )
+
+
+def _camera_beside(sources: Sequence[Source], selection: Selection) -> FolderCamera | None:
+    """Return the intrinsics that a data set publishes for the pictures in use; a camera-info topic takes precedence."""
+    image = selection.image
+    if image is None or selection.camera_info is not None:
+        return None
+    mine = (s for s in sources if isinstance(s, PlainSource) and s.channel.topic == image.name)
+    return next((source.camera for source in mine), None)
 
 
 def _unconfirmed(sources: Sequence[Source], selection: Selection, options: RecordingOptions) -> tuple[Assumption, ...]:

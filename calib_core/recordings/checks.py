@@ -1,5 +1,7 @@
 """Warnings about a recording: no overlap, lost messages, lidars, radars without elevation, repeated stamps."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from calib_core.arrays import TimesNs
@@ -14,6 +16,7 @@ from calib_core.results import DataWarning
 __all__ = ["about_images", "about_lost", "about_radar", "check_overlap"]
 
 _SAMPLED_SCANS = 12
+_ZONES_S = range(-12 * 3600, 14 * 3600 + 1, 15 * 60)
 
 
 def about_lost(name: str, count: int, stamped: StampedTopic) -> list[DataWarning]:
@@ -36,7 +39,12 @@ def about_lost(name: str, count: int, stamped: StampedTopic) -> list[DataWarning
 
 
 def check_overlap(
-    name: str, radar: RadarStream | None, images: ImageStream | None, *, required: bool
+    name: str,
+    radar: RadarStream | None,
+    images: ImageStream | None,
+    *,
+    required: bool,
+    zoneless: Collection[str] = (),
 ) -> list[DataWarning]:
     """Check that the time intervals of both sensors overlap.
 
@@ -45,6 +53,7 @@ def check_overlap(
         radar: the radar stream, if any.
         images: the image stream, if any.
         required: raise an error if they do not overlap, instead of returning a warning.
+        zoneless: topics whose times come from dates without a time zone.
 
     Raises:
         RecordingError: they do not overlap, but are required to.
@@ -60,9 +69,25 @@ def check_overlap(
         f"{gap_s:.1f} s apart"
     )
     hint = "open recordings made at the same time; if only the clocks differ, try --clock receive or --clock header"
+    local = [stream.topic.name for stream in (radar, images) if stream.topic.name in zoneless]
+    offset_s = _zone_between(*((a, b) if local == [radar.topic.name] else (b, a))) if len(local) == 1 else None
+    if offset_s is not None:
+        hours, minutes = divmod(abs(offset_s) // 60, 60)
+        zone = f"{'-' if offset_s < 0 else '+'}{hours:02d}:{minutes:02d}"
+        hint = f"the dates of {local[0]} have no time zone; with --time-zone {zone} they overlap"
     if required:
         raise RecordingError(f"{name}: {what}; {hint}")
     return [DataWarning("no-overlap", what, hint)]
+
+
+def _zone_between(local_ns: TimesNs, others_ns: TimesNs) -> int | None:
+    """Return the offset from UTC [s] with which local times overlap the others most; None if none does."""
+    overlaps = {}
+    for offset_s in _ZONES_S:
+        low, high = (int(end) - offset_s * NS_PER_S for end in (local_ns[0], local_ns[-1]))
+        overlaps[offset_s] = min(high, int(others_ns[-1])) - max(low, int(others_ns[0]))
+    best = max(overlaps, key=lambda offset_s: (overlaps[offset_s], offset_s % 3600 == 0))
+    return best if overlaps[best] >= 0 else None
 
 
 def _interval(times_ns: TimesNs) -> str:

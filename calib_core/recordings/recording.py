@@ -16,11 +16,15 @@ from calib_core.measurements import RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.camera.images import EncodedImage
+from calib_core.recordings.column_map import parse_column_map
 from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.plain_files.opening import files_behind, open_plain_sources
+from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
+from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.selection import Need, RecordingOptions
+from calib_core.recordings.time.written_dates import parse_zone
 from calib_core.recordings.topics import TopicSummary
 from calib_core.results import DataWarning, InputFile
 
@@ -247,8 +251,8 @@ def open_recording(
     chunks; compressed chunks that contain such messages are read once in full.
 
     Args:
-        paths: ROS 1 .bag, ROS 2 .mcap and .db3 files, and folders of them; folders of pictures or of radar .pcd and .bin
-            files; radar CSV; videos.
+        paths: ROS 1 .bag, ROS 2 .mcap and .db3 files, and folders of them; folders of pictures or of radar .pcd, .bin, CSV
+            and JSON files; radar CSV and JSON lines; videos; folders of data sets.
         options: topics and clock.
         require: what it must contain; to read intrinsics, "image" is enough.
 
@@ -257,15 +261,41 @@ def open_recording(
     """
     chosen = (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
     options = options or RecordingOptions()
-    plain, others = open_plain_sources(require_files(chosen), options.video_start)
+    plain, others = open_plain_sources(require_files(chosen), _plain_options(options))
     sources: tuple[Source, ...] = plain
     try:
         sources = (*(open_sources(others) if others else ()), *plain)
-        return Recording(chosen, sources, assemble(chosen, sources, options, require), options.video_start)
+        return Recording(chosen, sources, _assembled(chosen, sources, options, require), options.video_start)
     except BaseException:
         for source in sources:
             source.close()
         raise
+
+
+def _plain_options(options: RecordingOptions) -> PlainOptions:
+    axes = None if options.radar_axes is None else parse_radar_axes(options.radar_axes)
+    unit = "" if axes is None or axes.degrees is None else "deg" if axes.degrees else "rad"
+    only_unit = options.radar_axes is not None and options.radar_axes.strip().lower() in ("degrees", "radians")
+    return PlainOptions(
+        video_start=options.video_start,
+        mapped=parse_column_map(options.map),
+        axes_given=axes is not None and not only_unit,
+        angle_unit=unit,
+        zone_s=parse_zone(options.time_zone),
+    )
+
+
+def _assembled(
+    paths: tuple[Path, ...], sources: tuple[Source, ...], options: RecordingOptions, require: Sequence[Need]
+) -> Assembly:
+    """Assemble; if something is missing, say what was found in a folder and not used."""
+    try:
+        return assemble(paths, sources, options, require)
+    except RecordingError as error:
+        unused = next((w for source in sources for w in source.warnings if w.code == "unused-files"), None)
+        if unused is None:
+            raise
+        raise type(error)(f"{error}; {unused.message}") from error
 
 
 def inspect_recording(paths: "str | Path | Sequence[str | Path]", options: RecordingOptions | None = None) -> Recording:

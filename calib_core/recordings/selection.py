@@ -45,6 +45,9 @@ class RecordingOptions:
         None,
         "Time of a video's first frame: seconds since 1970, or a date such as 2024-05-01T12:00:00.25+02:00.",
     )
+    time_zone: str | None = option(
+        None, "Time zone of dates in file names and columns that state none, such as +02:00; UTC if not given."
+    )
     clock: Clock = option(
         "auto",
         "Times to use: stamps in the message headers, receive times, or auto: stamps unless they cannot be right.",
@@ -179,6 +182,7 @@ def _radar_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
         named,
         not objects,
         isinstance(layout, PointLayout),
+        "front" in name,
         len(topic),
     )
 
@@ -188,7 +192,8 @@ def _image_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
     layout = inventory.usages[topic.name].image
     assert layout is not None
     picture = not any(word in topic.name.lower() for word in _NOT_PICTURES)
-    return picture, _nearest_info(topic, inventory) is not None, inventory.count(topic), layout.compressed
+    front = "front" in topic.name.lower()
+    return picture, _nearest_info(topic, inventory) is not None, front, inventory.count(topic), layout.compressed
 
 
 def _nearest_info(image: Topic | None, inventory: Inventory) -> Topic | None:

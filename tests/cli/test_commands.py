@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -213,6 +214,28 @@ def test_import_converts_another_tools_file_to_a_calibration(
     checked = cocalib("check", back, "--against", calibration)
     assert checked.code == 0
     assert "0 deg apart" in checked.out
+
+
+def test_import_takes_the_camera_matrix_of_a_kitti_calibration(
+    cocalib: Cocalib, calibration: Path, tmp_path: Path
+) -> None:
+    kitti, back = tmp_path / "calib" / "00000.txt", tmp_path / "back.json"
+    kitti.parent.mkdir()
+    assert cocalib("export", calibration, "--to", "kitti", "--rectified", "--out", kitti).code == 0
+    refused = cocalib("import", kitti, "--out", back)
+    assert refused.code == 2
+    assert "states the camera matrix but not the image size; give it with --image-size WIDTH HEIGHT" in refused.err
+    assert cocalib("import", kitti, "--out", back, "--image-size", "640", "480").code == 0
+    (tmp_path / "image_2").mkdir()
+    cv2.imwrite(str(tmp_path / "image_2" / "00000.png"), np.zeros((480, 640, 3), np.uint8))
+    beside = tmp_path / "beside.json"
+    answer = cocalib("import", kitti, "--out", beside)
+    assert "image size 640 x 480 px from the pictures beside the file" in answer.err
+    cameras = [json.loads(path.read_text())["camera"] for path in (back, beside)]
+    assert cameras[0] == cameras[1]
+    assert (cameras[0]["model"], cameras[0]["width_px"], cameras[0]["height_px"]) == ("pinhole", 640, 480)
+    written = next(line for line in kitti.read_text().splitlines() if line.startswith("P2")).split()[1:]
+    np.testing.assert_allclose(np.ravel(cameras[0]["matrix_px"])[[0, 2]], [float(written[0]), float(written[2])])
 
 
 def test_a_format_without_a_place_for_distortion_requires_rectified_pictures(

@@ -186,6 +186,26 @@ def test_view_of_delft_s_own_calibration_is_read():
 
     np.testing.assert_allclose(pose.translation_m, [0.05283124, 0.98100483, 1.44445002], rtol=1e-12)
     np.testing.assert_allclose(pose.rotation[0], [-0.013857, -0.9997468, 0.01772762], atol=1e-6)
+    camera = read_any(text).camera_for((1936, 1216))
+    assert camera is not None
+    assert (camera.model, camera.width_px, camera.matrix_px[0, 2]) == ("pinhole", 1936, 961.272442)
+
+
+def test_the_second_camera_of_kitti_is_posed_with_its_offset():
+    p2 = np.array([[721.5, 0, 609.6, 44.9], [0, 721.5, 172.9, 0.2], [0, 0, 1, 0.003]])
+    rotation = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
+    pose = np.hstack([rotation, [[0.1], [0.2], [-0.3]]])
+    text = f"P2: {' '.join(map(str, p2.ravel()))}\nTr_velo_to_cam: {' '.join(map(str, pose.ravel()))}\n"
+    point_m = np.array([12.0, 1.5, -0.4, 1.0])
+
+    found = read_any(text)
+
+    camera = found.camera_for((1242, 375))
+    assert camera is not None
+    column, row, scale = p2 @ [*(pose @ point_m), 1.0]
+    np.testing.assert_allclose(
+        camera.project(found.camera_from_radar @ point_m[None, :3])[0], [column / scale, row / scale], atol=1e-9
+    )
 
 
 def test_nuscenes_gets_w_first_and_the_camera_in_ego(published):

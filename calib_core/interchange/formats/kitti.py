@@ -54,13 +54,28 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         if np.abs(rotation - np.eye(3)).max() > 0:
             pose = rotation @ pose
             notes.append("R0_rect was applied; the camera is the rectified one")
+    matrix_px = None
     if "P2" in lines:
-        offset = np.reshape(floats(lines["P2"].split(), source=source, place="P2", length=12), (3, 4))[:, 3]
-        if offset.any():
-            notes.append("P2 contains an offset between cameras, which was ignored; the camera is the reference one")
-    return ImportedCalibration(
-        "kitti", WrittenPose("matrix", pose[:, :3], pose[:, 3], "camera_from_radar"), notes=tuple(notes)
-    ).checked(source)
+        projection = np.reshape(floats(lines["P2"].split(), source=source, place="P2", length=12), (3, 4))
+        matrix_px = projection[:, :3]
+        if projection[:, 3].any():
+            pose = pose + np.column_stack([np.zeros((3, 3)), _offset_m(projection, source=source)])
+            notes.append("the offset in P2 was applied; the camera is the one of image_2")
+    written = WrittenPose("matrix", pose[:, :3], pose[:, 3], "camera_from_radar")
+    return ImportedCalibration("kitti", written, notes=tuple(notes), matrix_px=matrix_px).checked(source)
+
+
+def _offset_m(projection: np.ndarray, *, source: str) -> np.ndarray:
+    """Return where the reference camera stands in the frame of camera 2 [m]: P2 = K [I | t].
+
+    Raises:
+        InputError: the left part of P2 is not a camera matrix.
+    """
+    try:
+        offset_m: np.ndarray = np.linalg.solve(projection[:, :3], projection[:, 3])
+    except np.linalg.LinAlgError:
+        raise InputError(f"{source}: P2 is not a projection of a camera; correct it") from None
+    return offset_m
 
 
 KITTI = Format(

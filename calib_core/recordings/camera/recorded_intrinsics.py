@@ -1,5 +1,8 @@
 """Read the recorded intrinsics and check them against the images."""
 
+from pathlib import Path
+from typing import Protocol
+
 import numpy as np
 
 from calib_core.camera import Camera
@@ -9,7 +12,41 @@ from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.topics import Topic
 from calib_core.results import DataWarning
 
-__all__ = ["recorded_camera"]
+__all__ = ["PublishedCamera", "published_camera", "recorded_camera"]
+
+
+class PublishedCamera(Protocol):
+    """Intrinsics that stand in a file beside the pictures."""
+
+    @property
+    def file(self) -> Path:
+        """The file."""
+        ...
+
+    @property
+    def doubt(self) -> str:
+        """What is not certain about them; "" if nothing."""
+        ...
+
+    def camera(self, picture_size_px: tuple[int, int]) -> Camera:
+        """Return the camera; raises ValueError if the numbers are not a camera's."""
+        ...
+
+
+def published_camera(published: PublishedCamera, images: ImageStream) -> tuple[Camera | None, list[DataWarning]]:
+    """Read the intrinsics of a data set and check them against the images.
+
+    Args:
+        published: what the data set states.
+        images: the image stream.
+    """
+    hint = "give the intrinsics with --camera FILE"
+    try:
+        camera = published.camera(images.size_px(0))
+    except (ValueError, RecordingError) as error:
+        return None, [DataWarning("camera-unreadable", f"{published.file}: {error}", hint)]
+    warnings = [DataWarning("camera-changes", f"{published.file}: {published.doubt}", hint)] if published.doubt else []
+    return _fitted(camera, images, str(published.file), warnings)
 
 
 def recorded_camera(topic: Topic | None, images: ImageStream | None) -> tuple[Camera | None, list[DataWarning]]:

@@ -1,116 +1,197 @@
-"""Open folders of pictures and radar files, CSV and video files, with or without ROS recordings."""
+"""Open folders of pictures and radar files, tables and video files, with or without ROS recordings."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from calib_core.errors import RecordingError
+from calib_core.measurements import TimeNs
+from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.plain_files.folder_contents import Contents, contents_of
 from calib_core.recordings.plain_files.pictures import PICTURE_SUFFIXES, open_picture_folder
-from calib_core.recordings.plain_files.radar_csv import open_radar_csv
 from calib_core.recordings.plain_files.radar_scans import open_bin_folder, open_pcd_folder
+from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.source import PlainSource
+from calib_core.recordings.plain_files.tables.opening import (
+    JSON_SUFFIXES,
+    TABLE_SUFFIXES,
+    open_radar_table,
+    open_table_folder,
+)
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES, open_video
+from calib_core.results import DataWarning
 
 __all__ = ["files_behind", "open_plain_sources"]
 
-_FOLDERS: Mapping[str, Callable[[Path, Sequence[Path]], PlainSource]] = {
+_Opener = Callable[[Path, Sequence[Path], PlainOptions, Mapping[int, TimeNs]], PlainSource]
+_FOLDERS: Mapping[str, _Opener] = {
     **dict.fromkeys(PICTURE_SUFFIXES, open_picture_folder),
     ".pcd": open_pcd_folder,
     ".bin": open_bin_folder,
 }
+_MOST_NAMED = 6
 
 
 def open_plain_sources(
-    paths: Sequence[Path], video_start: str | None = None
+    paths: Sequence[Path], options: PlainOptions
 ) -> tuple[tuple[PlainSource, ...], tuple[Path, ...]]:
     """Open the paths that are not ROS recordings; return their sources and the remaining paths.
 
     Args:
         paths: as the user gave them.
-        video_start: the time of a video's first frame.
+        options: the user's.
 
     Raises:
         RecordingError: such a file or folder cannot be used.
     """
-    opened: list[PlainSource] = []
-    left: list[Path] = []
+    opening = _Opening(options)
     try:
-        for path in (inner for given in paths for inner in _expanded(given)):
-            source = _open(path, video_start)
-            if source is None:
-                left.append(path)
-            else:
-                opened.append(_with_own_topic(source, [other.channel.topic for other in opened]))
-        if video_start is not None and not any(source.path.suffix.lower() in VIDEO_SUFFIXES for source in opened):
-            raise RecordingError(
-                f"--video-start {video_start}: no video among {', '.join(path.name for path in paths)}; "
-                "remove the option, or add the video"
-            )
+        for path in paths:
+            opening.add(path)
+        sources, left = opening.finish()
+        _require_use(paths, sources, left, options)
     except RecordingError:
-        for source in opened:
-            source.close()
+        opening.close()
         raise
-    return tuple(opened), tuple(left)
+    return sources, left
 
 
-def _expanded(path: Path) -> list[Path]:
-    """Return the contents of a data-set folder: folders of pictures or radar files, CSV files and videos one level down.
-
-    Any other path is returned as it is, and so is a folder that contains a ROS recording, pictures or radar files.
-    """
-    if not path.is_dir():
-        return [path]
-    inside = sorted(inner for inner in path.iterdir() if not inner.name.startswith("."))
-    if any(_is_ros(inner) or (inner.is_file() and inner.suffix.lower() in _FOLDERS) for inner in inside):
-        return [path]
-    if any(_is_ros(below) for inner in inside if inner.is_dir() for below in inner.iterdir()):
-        return [path]
-    files = [inner for inner in inside if inner.is_file() and inner.suffix.lower() in (".csv", *VIDEO_SUFFIXES)]
-    folders = [
-        inner
-        for inner in inside
-        if inner.is_dir() and any(below.suffix.lower() in _FOLDERS for below in inner.iterdir())
-    ]
-    time_tables = {folder.with_suffix(".csv") for folder in folders}  # file times, not radar returns
-    return [*folders, *(file for file in files if file not in time_tables)] or [path]
-
-
-def _is_ros(path: Path) -> bool:
-    return path.name == "metadata.yaml" or any(suffix in (".bag", ".mcap", ".db3") for suffix in path.suffixes)
-
-
-def _open(path: Path, video_start: str | None) -> PlainSource | None:
-    suffix = path.suffix.lower()
-    if path.is_dir():
-        return _open_folder(path)
-    if suffix == ".csv":
-        return open_radar_csv(path)
-    if suffix in VIDEO_SUFFIXES:
-        return open_video(path, video_start)
-    if suffix in _FOLDERS:
+def _require_use(
+    paths: Sequence[Path], sources: Sequence[PlainSource], left: Sequence[Path], options: PlainOptions
+) -> None:
+    """Refuse options that apply to none of the files rather than ignore them."""
+    videos = any(source.path.suffix.lower() in VIDEO_SUFFIXES for source in sources)
+    if options.video_start is not None and not videos:
         raise RecordingError(
-            f"{path}: a single {suffix} file is not a recording; open the folder with all such files: {path.parent}"
+            f"--video-start {options.video_start}: no video among {', '.join(path.name for path in paths)}; "
+            "remove the option, or add the video"
         )
-    return None
 
 
-def _open_folder(folder: Path) -> PlainSource | None:
-    """Open a folder of pictures or radar files; None if it contains neither, or contains a ROS recording."""
-    kinds: dict[Callable[[Path, Sequence[Path]], PlainSource], list[Path]] = {}
-    for file in sorted(folder.iterdir()):
-        if _is_ros(file):
+class _Opening:
+    """The sources opened so far, and what was looked at and not used."""
+
+    def __init__(self, options: PlainOptions) -> None:
+        self.options = options
+        self.left: list[Path] = []
+        self.found: list[tuple[Path, tuple[Path, ...], bool]] = []
+        self.refused: list[tuple[Path, str]] = []
+        self.sources: list[PlainSource] = []
+
+    def add(self, path: Path) -> None:
+        """Add a path as the user gave it; a data-set folder becomes its contents.
+
+        Raises:
+            RecordingError: nothing in a folder can be used.
+        """
+        contents = contents_of(path, self.options) if path.is_dir() else Contents([(path, ())], inside=False)
+        self.found.extend((inner, files, contents.inside) for inner, files in contents.sources)
+        self.refused.extend(contents.refused)
+        if not contents.sources and contents.refused:
+            raise RecordingError(f"{path}: nothing in it can be used: {_reasons(contents.refused)}")
+        if not contents.sources:
+            self.left.append(path)
+
+    def finish(self) -> tuple[tuple[PlainSource, ...], tuple[Path, ...]]:
+        """Open everything, pictures first, since numbered files have the times of the pictures with their numbers.
+
+        Raises:
+            RecordingError: what the user named, or all that was found, cannot be used.
+        """
+        numbered: dict[int, TimeNs] = {}
+        opened: dict[int, PlainSource] = {}
+        for place in sorted(range(len(self.found)), key=lambda place: not _has_pictures(self.found[place][1])):
+            path, files, inside = self.found[place]
+            source = self._open(path, files, numbered, inside=inside)
+            if source is not None:
+                opened[place] = source
+                self.sources.append(source)
+                numbered = numbered or (dict(source.numbers) if _has_pictures(files) else {})
+        if not opened and not self.left:
+            raise RecordingError(f"{self.found[0][0].parent}: nothing in it can be used: {_reasons(self.refused)}")
+        named: list[PlainSource] = []
+        for place in sorted(opened):
+            named.append(_with_own_topic(opened[place], [other.channel.topic for other in named]))
+        return self._with_refusals(_with_open_times(named, ros=bool(self.left))), tuple(self.left)
+
+    def _open(
+        self, path: Path, files: Sequence[Path], numbered: Mapping[int, TimeNs], *, inside: bool
+    ) -> PlainSource | None:
+        """Open one file or folder; what was found inside a folder and cannot be used is only remembered.
+
+        Raises:
+            RecordingError: the user named it, and it cannot be used.
+        """
+        try:
+            source = self._opened(path, files, numbered)
+        except RecordingError as error:
+            if not inside:
+                raise
+            self.refused.append((path, str(error).removeprefix(f"{path}: ")))
             return None
-        opener = _FOLDERS.get(file.suffix.lower())
-        if opener is not None and file.is_file() and not file.name.startswith("."):
-            kinds.setdefault(opener, []).append(file)
-    if len(kinds) > 1:
-        what = " and ".join(f"{len(files)} {files[0].suffix}" for files in kinds.values())
-        raise RecordingError(
-            f"{folder}: the folder contains {what} files; put pictures and radar files into separate folders"
+        if source is None:
+            self.left.append(path)
+        return source
+
+    def _opened(self, path: Path, files: Sequence[Path], numbered: Mapping[int, TimeNs]) -> PlainSource | None:
+        suffix = path.suffix.lower()
+        if files:
+            if files[0].suffix.lower() in TABLE_SUFFIXES:
+                return open_table_folder(path, files, self.options, numbered)
+            return _FOLDERS[files[0].suffix.lower()](path, files, self.options, numbered)
+        if suffix == ".csv" or suffix in JSON_SUFFIXES or suffix == ".txt":
+            return open_radar_table(path, self.options)
+        if suffix in VIDEO_SUFFIXES:
+            return open_video(path, self.options.video_start)
+        if suffix in _FOLDERS:
+            raise RecordingError(
+                f"{path}: a single {suffix} file is not a recording; open the folder with all such files: {path.parent}"
+            )
+        return None
+
+    def _with_refusals(self, sources: Sequence[PlainSource]) -> tuple[PlainSource, ...]:
+        if not self.refused or not sources:
+            return tuple(sources)
+        count = len(self.refused)
+        warning = DataWarning(
+            "unused-files",
+            f"{count} {'file or folder was' if count == 1 else 'files and folders were'} looked at and not used: "
+            f"{_reasons(self.refused)}",
+            "no action needed if none of them holds the radar or the camera; otherwise open the one that does by its own path",
         )
-    for opener, files in kinds.items():
-        return opener(folder, files)
-    return None
+        first = replace(sources[0], warnings=(*sources[0].warnings, warning))
+        return (first, *sources[1:])
+
+    def close(self) -> None:
+        """Close what was opened."""
+        for source in self.sources:
+            source.close()
+
+
+def _has_pictures(files: Sequence[Path]) -> bool:
+    return bool(files) and files[0].suffix.lower() in PICTURE_SUFFIXES
+
+
+def _reasons(refused: Sequence[tuple[Path, str]]) -> str:
+    shown = "; ".join(f"{path.name} ({reason})" for path, reason in refused[:_MOST_NAMED])
+    more = len(refused) - _MOST_NAMED
+    return f"{shown}; and {more} more" if more > 0 else shown
+
+
+def _with_open_times(sources: Sequence[PlainSource], *, ros: bool) -> list[PlainSource]:
+    """Assume what the times leave open where it matters: where other files have times that do not."""
+    found = []
+    for source in sources:
+        others = [other for other in sources if other is not source]
+        added = []
+        if source.zoneless and (ros or not all(other.zoneless for other in others)):
+            text = "its dates have no time zone; read as UTC"
+            added.append(Assumption("time-zone", source.channel.topic, text, "--time-zone UTC"))
+        if source.counted and (ros or not all(other.counted for other in others)):
+            text = "its files or scans are numbered and have no times; read as 0.1 s apart, number 0 at 1 s"
+            added.append(Assumption("frame-interval", source.channel.topic, text, "--confirm-assumptions"))
+        found.append(replace(source, assumptions=(*source.assumptions, *added)))
+    return found
 
 
 def _with_own_topic(source: PlainSource, taken: Sequence[str]) -> PlainSource:
@@ -119,7 +200,9 @@ def _with_own_topic(source: PlainSource, taken: Sequence[str]) -> PlainSource:
     if topic not in taken:
         return source
     above = "".join(letter if letter.isalnum() else "_" for letter in source.path.parent.name)
-    return replace(source, channel=replace(source.channel, topic=f"/{above}{topic}"))
+    own = f"/{above}{topic}"
+    assumptions = tuple(replace(one, topic=own) for one in source.assumptions)
+    return replace(source, channel=replace(source.channel, topic=own), assumptions=assumptions)
 
 
 def files_behind(path: Path) -> tuple[Path, ...]:

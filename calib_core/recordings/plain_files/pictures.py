@@ -1,6 +1,6 @@
 """Read camera frames from a folder of pictures."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +8,13 @@ import numpy as np
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import TimeNs
 from calib_core.recordings.camera.jpeg import JPEG_MAGIC, PNG_MAGIC
+from calib_core.recordings.camera.picture_files import picture_fault, picture_size_px
 from calib_core.recordings.plain_files.file_stamps import stamp_files
+from calib_core.recordings.plain_files.folder_cameras import FolderCamera, camera_beside
 from calib_core.recordings.plain_files.messages import picture_channel, picture_message
+from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.source import PlainSource, topic_of
+from calib_core.results import DataWarning
 
 __all__ = ["PICTURE_SUFFIXES", "open_picture_folder"]
 
@@ -19,13 +23,28 @@ _FRAME = "camera"
 _MAX_BYTES = 1 << 30
 
 
-def open_picture_folder(folder: Path, files: Sequence[Path]) -> PlainSource:
-    """Open a folder of pictures.
+def open_picture_folder(
+    folder: Path, files: Sequence[Path], options: PlainOptions, numbered: Mapping[int, TimeNs]
+) -> PlainSource:
+    """Open a folder of pictures; files that cannot be pictures are left out, with a warning.
+
+    Args:
+        folder: of the pictures.
+        files: the pictures.
+        options: the user's.
+        numbered: times of other pictures by their number.
 
     Raises:
-        RecordingError: the files have no times.
+        RecordingError: the files have no times, or none can be read.
     """
-    stamped = stamp_files(folder, files)
+    faults = {file: fault for file in files if (fault := picture_fault(file))}
+    sound = [file for file in files if file not in faults]
+    if not sound:
+        file, fault = next(iter(faults.items()))
+        raise RecordingError(f"{folder}: none of its {len(files)} pictures can be read: {file.name} {fault}")
+    stamped = stamp_files(folder, sound, options, numbered)
+    topic = topic_of(folder, "image")
+    camera = camera_beside(folder, stamped.files, picture_size_px(stamped.files[0]))
 
     def message(row: int) -> bytes:
         return picture_message(TimeNs(int(stamped.times_ns[row])), _FRAME, _picture(stamped.files[row]))
@@ -33,12 +52,31 @@ def open_picture_folder(folder: Path, files: Sequence[Path]) -> PlainSource:
     return PlainSource(
         folder,
         sum(file.stat().st_size for file in stamped.files),
-        f"folder of images, {len(stamped.files)} files",
-        picture_channel(topic_of(folder, "image")),
+        f"folder of images, {len(stamped.files)} files{_calibration_words(camera)}",
+        picture_channel(topic),
         stamped.times_ns,
         message,
-        stamped.warnings,
+        (*_about_faults(folder, faults, len(files)), *stamped.warnings),
+        assumptions=stamped.assumptions(topic),
+        zoneless=stamped.zoneless,
+        counted=stamped.counted,
+        numbers=stamped.numbers,
+        camera=camera,
     )
+
+
+def _about_faults(folder: Path, faults: Mapping[Path, str], count: int) -> tuple[DataWarning, ...]:
+    if not faults:
+        return ()
+    file, fault = next(iter(faults.items()))
+    what = f"{len(faults)} of {count} pictures in {folder.name} cannot be read and are skipped; the first: {file.name} {fault}"
+    return (DataWarning("unreadable-pictures", what, "copy them again from their source if they matter"),)
+
+
+def _calibration_words(camera: FolderCamera | None) -> str:
+    if camera is None:
+        return ""
+    return f"; intrinsics from {camera.file}" + (f"; {camera.pose}" if camera.pose else "")
 
 
 def _picture(path: Path) -> bytes:

@@ -1,17 +1,18 @@
 """Read radar returns from one file per scan: nuScenes .pcd and View-of-Delft .bin."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import TimeNs
-from calib_core.recordings.plain_files.file_stamps import stamp_files
+from calib_core.recordings.plain_files.file_stamps import StampedFiles, stamp_files
 from calib_core.recordings.plain_files.messages import cloud_channel, cloud_message
+from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.source import PlainSource, topic_of
 
-__all__ = ["open_bin_folder", "open_pcd_folder", "points_of_bin", "points_of_pcd"]
+__all__ = ["is_lidar_bin", "open_bin_folder", "open_pcd_folder", "points_of_bin", "points_of_pcd"]
 
 _FRAME = "radar"
 _MAX_BYTES = 1 << 28
@@ -21,26 +22,30 @@ _DELFT = np.dtype([(name, "<f4") for name in ("x", "y", "z", "rcs", "v_r", "v_r_
 _KINDS = {"F": "f", "I": "i", "U": "u"}
 
 
-def open_pcd_folder(folder: Path, files: Sequence[Path]) -> PlainSource:
+def open_pcd_folder(
+    folder: Path, files: Sequence[Path], options: PlainOptions, numbered: Mapping[int, TimeNs]
+) -> PlainSource:
     """Open a folder of .pcd files, one scan each.
 
     Raises:
         RecordingError: the files have no times.
     """
-    return _open(folder, files, "folder of .pcd", points_of_pcd)
+    return _open(folder, stamp_files(folder, files, options, numbered), "folder of .pcd", points_of_pcd)
 
 
-def open_bin_folder(folder: Path, files: Sequence[Path]) -> PlainSource:
+def open_bin_folder(
+    folder: Path, files: Sequence[Path], options: PlainOptions, numbered: Mapping[int, TimeNs]
+) -> PlainSource:
     """Open a folder of View-of-Delft .bin files, one scan each.
 
     Raises:
         RecordingError: the files have no times.
     """
-    return _open(folder, files, "folder of View-of-Delft .bin", points_of_bin)
+    return _open(folder, stamp_files(folder, files, options, numbered), "folder of View-of-Delft .bin", points_of_bin)
 
 
-def _open(folder: Path, files: Sequence[Path], what: str, points: Callable[[Path], np.ndarray]) -> PlainSource:
-    stamped = stamp_files(folder, files)
+def _open(folder: Path, stamped: StampedFiles, what: str, points: Callable[[Path], np.ndarray]) -> PlainSource:
+    topic = topic_of(folder, "radar")
 
     def message(row: int) -> bytes:
         return cloud_message(TimeNs(int(stamped.times_ns[row])), _FRAME, points(stamped.files[row]))
@@ -49,11 +54,20 @@ def _open(folder: Path, files: Sequence[Path], what: str, points: Callable[[Path
         folder,
         sum(file.stat().st_size for file in stamped.files),
         f"{what}, {len(stamped.files)} files",
-        cloud_channel(topic_of(folder, "radar")),
+        cloud_channel(topic),
         stamped.times_ns,
         message,
         stamped.warnings,
+        assumptions=stamped.assumptions(topic),
+        zoneless=stamped.zoneless,
+        counted=stamped.counted,
     )
+
+
+def is_lidar_bin(files: Sequence[Path]) -> bool:
+    """Return whether .bin files are a lidar's: four floats a point as KITTI has them, not seven as View-of-Delft's radar."""
+    sizes = [file.stat().st_size for file in files]
+    return all(size % 16 == 0 for size in sizes) and any(size % _DELFT.itemsize for size in sizes)
 
 
 def _content(path: Path) -> bytes:

@@ -1,7 +1,7 @@
 """A source outside ROS containers: a list of times, with messages built on demand."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +11,17 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
+from calib_core.recordings.plain_files.folder_cameras import FolderCamera
 from calib_core.recordings.plain_files.messages import header_bytes
 from calib_core.results import DataWarning
 
 __all__ = ["PlainSource", "topic_of"]
 
 _HEADER_BYTES = 16
+
+
+def _no_numbers() -> dict[int, TimeNs]:
+    return {}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +38,11 @@ class PlainSource:
         warnings: problems found on opening it.
         closed: called on closing.
         assumptions: what it does not state and reading it takes for granted.
+        zoneless: whether its times come from dates without a time zone.
+        counted: whether its times come from the numbers of files or scans.
+        mapped: whether --map was applied to it.
+        numbers: times of its files by their numbers, for files of other folders that are only numbered.
+        camera: the intrinsics that its data set publishes; None if there are none.
     """
 
     path: Path
@@ -44,6 +54,11 @@ class PlainSource:
     warnings: tuple[DataWarning, ...] = ()
     closed: Callable[[], None] | None = None
     assumptions: tuple[Assumption, ...] = ()
+    zoneless: bool = False
+    counted: bool = False
+    mapped: bool = False
+    numbers: Mapping[int, TimeNs] = field(default_factory=_no_numbers)
+    camera: FolderCamera | None = None
 
     def __post_init__(self) -> None:
         """Refuse times that a message cannot represent.
@@ -106,6 +121,7 @@ class PlainSource:
 
 
 def topic_of(path: Path, word: str) -> str:
-    """Name a topic after a folder or file."""
+    """Name a topic after a folder or file; after the folder above if its own name is "data" (raw KITTI)."""
+    path = path.parent if path.name == "data" and path.parent.name else path
     name = "".join(letter if letter.isalnum() else "_" for letter in path.stem).strip("_")
     return f"/{name or word}/{word}"

@@ -6,9 +6,10 @@ python -m calib_core.recordings.radar.registry_table docs/radar-formats.md
 import sys
 from pathlib import Path
 
-from calib_core.recordings.plain_files.radar_csv import CSV_EXAMPLE, csv_columns
+from calib_core.recordings.plain_files.tables.csv_files import CSV_EXAMPLE, csv_columns
 from calib_core.recordings.radar.column_plans import plan_for
 from calib_core.recordings.radar.registry import DECODERS, Decoder, MessageKind
+from calib_core.recordings.time.written_dates import DATE_SPELLINGS
 
 __all__ = ["main", "radar_formats"]
 
@@ -69,30 +70,91 @@ _FILES = """\
 ## Files without ROS
 
 Folders and files can be opened with or without ROS recordings: `cocalib open RADAR_FRONT/ CAM_FRONT/`, or the
-folder that contains them.
+folder that contains them, or the folder of a data set, five levels deep. What was looked at and not used is named with the reason
+(`unused-files`).
 
 | what | read as |
 |---|---|
 | folder of `.pcd` (version 0.7, binary or ascii), such as nuScenes | radar, one scan per file; recognised like a PointCloud2 |
-| folder of `.bin` | View-of-Delft radar, one scan per file |
-| `.csv` | radar; the first line names columns and units: `{example}` |
-| folder of pictures | camera |
+| folder of `.bin` | View-of-Delft radar, one scan per file; four floats a point (KITTI) are a lidar's and not used |
+| `.csv`, `.txt`, `.jsonl`, `.ndjson`, `.json` | radar; see below. The first line of a CSV names columns and units: `{example}` |
+| folder of `.csv`, `.txt` or `.json` with one scan each | radar; times inside, or in the file names |
+| folder of pictures | camera; pictures that cannot be decoded are left out and counted (`unreadable-pictures`) |
 | video file, with `--video-start` | camera; most videos do not store the original frame times: use the recording if possible |
 
-The time of a file comes from a CSV in or next to its folder (`file,time_ns`), or from its name: the last number of 19
-digits (ns), 16 (us), 13 (ms) or 10 (s, with or without a fraction) that is a date after 2001. Files that are only numbered
-are assumed to be 0.1 s apart, and a warning says so.
+### Times of files
 
-### Columns of a radar CSV
+The time of a file comes from a table in or next to its folder (`file,time_ns`, or `timestamps.txt` with one time per line), or from its
+name: the last number of 19 digits (ns), 16 (us), 13 (ms) or 10 (s, with or without a fraction) that is a date after 2001, or a date
+with a time of day. These are one moment:
 
-Columns are separated by commas, semicolons or tabs. The unit follows the name, as in `x_m` or `x [m]`. Rows with the same time
-form one scan. An unknown or missing unit is an error; columns with other names are ignored, and `cocalib info` lists them.
-Axes and signs are those of the radar frame.
+{dates}
 
-| column | units |
+The digits after the second may also be 3 or 9, or none. With 3, 6 or 9 digits they are a fraction, unless they count the files
+(steps of one within a second, or through all of them): the files of a second are then spread evenly over it. Anything else is read
+the way that gives the steadiest rate. Both are stated as assumptions. Numbers in the names that contradict the order of the times give
+the warning `file-order`. Files that are only numbered have the times of the pictures with the same numbers if those have any;
+otherwise they are 0.1 s apart. A warning says so (`numbered-files`), and next to a sensor with real times it is an assumption.
+
+Dates without a time zone are UTC. Where the other sensor's times are not of this kind that is an assumption: state the zone with
+`--time-zone +02:00`. If only a zone separates radar and camera, the error names it.
+
+### Data sets
+
+| data set | open | intrinsics | published pose |
+|---|---|---|---|
+| View-of-Delft, KITTI object | its root, or a folder with `image_2` and `velodyne` | P2 of `calib/NUMBER.txt` | `--calibration calib/NUMBER.txt` |
+| KITTI raw | a drive | `calib_cam_to_cam.txt` of the day: rectified, or raw if the pictures have the raw size | lidar only |
+| nuScenes | its root | `v1.0-*/calibrated_sensor.json`, of the car the pictures come from | in the same file |
+
+Intrinsics without a size are for the pictures' own size. Of several cameras or radars the one whose name contains "front" is chosen;
+`--radar-topic` and `--image-topic` choose another.
+
+### Warnings about files
+
+| code | meaning |
 |---|---|
+| `unused-files` | files and folders that were looked at and not used, each with the reason; at most six are named |
+| `unreadable-pictures` | pictures with no bytes, cut off, or of another kind of file; they are no frames |
+| `unstamped-files` | files without a time in a folder where others have one; they are skipped |
+| `numbered-files` | numbers instead of times: those of the pictures with the same numbers, or 0.1 s apart |
+| `file-order` | the times and the numbers in the file names disagree about the order |
+| `camera-changes` | the data set has other intrinsics for other frames; those of the first are used |
+| `assumed` | one per assumption below |
+
+## Radar CSV and JSON lines
+
+Columns are separated by commas, semicolons, tabs, bars or spaces, in UTF-8, UTF-16 or Latin-1, with decimal points or commas. Lines before the
+header, comments (`#`, `%`, `//`), quotes and a line of units under the header are understood. Case, separators, letters for the type
+(`f_Range`) and words for a return (`detections.`) do not matter: `f_PosX [m]`, `posX_m` and `position.x` are all x. The unit follows the
+name, as in `x_m`, `x [m]` or `xMeters`. Rows with the same time form one scan. A cell may hold a list (`"[1.0, 2.0]"` or `1;2`): the row
+is then a whole scan. Columns that nobody knows are ignored and named in the list of files.
+
+JSON is read alike: one return or one scan per line or array element, with nested objects, lists of objects, or lists of numbers.
+A position in a list of two or three numbers is x, y, z.
+
+What names do not state is decided by the values if they can: range and x, y, z verify each other, and so do azimuth and x, y; angles
+above 2 pi are degrees; a number that is a time between 1990 and 2060 in one unit has that unit. What is then still open is
+**assumed and stated** (`cocalib info`; `solve` exits with 2 until it is confirmed), and can be said with `--map`:
+
+| key | given when | stated by |
+|---|---|---|
+| `length-unit`, `angle-unit`, `speed-unit`, `time-unit` | a column has no unit, and no other column decides it | `--map x=posX:m` |
+| `azimuth-sign` | only angles are given, and their column is not spelled `azimuth_deg` or `azimuth_rad`, which is positive to the left | `--map azimuth=-theta:deg` |
+| `axes` | names such as lateral, posY; or y is never negative and x has both signs: read as x right, y forward | `--radar-axes` |
+| `field-meaning` | two columns have the name of one quantity | `--map range=range_m:m` |
+| `time-scale` | a column named GPS: 18 s ahead of UTC | |
+| `time-zone`, `frame-interval`, `name-times` | see the times of files | `--time-zone`, a table of times |
+
+A column that `--map` names and that does not exist is an error with the nearest name. A file without a header needs one, or `--map` with
+numbers of columns: `--map time=1:s --map x=2:m --map y=3:m`.
+
+Spellings, without case, separators and prefixes, and units; the first is ours:
+
+| quantity | spellings | units |
+|---|---|---|
 {columns}
-"""
+"""  # noqa: E501
 
 
 def radar_formats() -> str:
@@ -100,7 +162,9 @@ def radar_formats() -> str:
     parts = [_INTRODUCTION.rstrip("\n"), ""]
     for kind, title in _KINDS.items():
         parts += [f"## {title}", "", *_table([decoder for decoder in DECODERS if decoder.kind == kind]), ""]
-    parts += [_FILES.format(example=CSV_EXAMPLE, columns="\n".join(csv_columns())).rstrip("\n"), "", "## Notes", ""]
+    dates = "\n".join(f"* `{spelling}`" for spelling in DATE_SPELLINGS)
+    files = _FILES.format(example=CSV_EXAMPLE, columns="\n".join(csv_columns()), dates=dates)
+    parts += [files.rstrip("\n"), "", "## Notes", ""]
     parts += [
         f"* **{d.name}**: {'; '.join(filter(None, (d.note, d.assumed)))}." for d in DECODERS if d.note or d.assumed
     ]

@@ -1,0 +1,212 @@
+"""Choose the columns of a table that hold a radar's quantities and times: by their names, or as --map says."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from pathlib import Path
+
+from calib_core.errors import RecordingError
+from calib_core.recordings.column_map import UNITS, MappedColumn
+from calib_core.recordings.field_words import FIELD_SPELLINGS, FieldWords, read_field
+from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE
+
+__all__ = ["QUANTITIES", "TableColumn", "TableColumns", "choose_columns", "units_of"]
+
+_TIME_QUANTITIES = ("time", "sec", "nanosec", "date", "frame")
+QUANTITIES: tuple[str, ...] = tuple(name for name in FIELD_SPELLINGS if name not in _TIME_QUANTITIES)
+"""What a column of numbers may hold, and the name it has from then on."""
+
+_SAME_UNITS = {"vx": "doppler", "vy": "doppler", "vz": "doppler", "snr": "amplitude", "rcs": "amplitude", "power": "amplitude",
+               "intensity": "amplitude"}  # fmt: skip
+_POSITION = ("x", "y", "z", "range", "azimuth", "elevation")
+_CLOCK = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?")
+
+
+def units_of(quantity: str) -> dict[str, float]:
+    """Return the units of a quantity with their factors to m, rad, m/s, dB or ns; the first is assumed if none is given."""
+    return dict(UNITS[_SAME_UNITS.get(quantity, quantity)])
+
+
+@dataclass(frozen=True, slots=True)
+class TableColumn:
+    """One column in use.
+
+    Attributes:
+        place: its index in a row.
+        written: its name in the file.
+        quantity: one of QUANTITIES or of the quantities of time.
+        unit: a key of units_of(quantity); "" if the file does not state it.
+        rank: 0 if the name is the documented one; see FieldWords.
+        mapped: whether --map chose it.
+        sign: -1 where --map turns its sign.
+    """
+
+    place: int
+    written: str
+    quantity: str
+    unit: str = ""
+    rank: int = 0
+    mapped: bool = False
+    sign: int = 1
+
+    @property
+    def is_documented(self) -> bool:
+        """Whether it is spelled exactly as in the documentation, which then states its sign: azimuth_deg."""
+        return self.written == f"{self.quantity}_{self.unit}"
+
+
+@dataclass(frozen=True, slots=True)
+class TableColumns:
+    """The columns in use.
+
+    Attributes:
+        values: of the returns.
+        time: one column (a number or a date), two (seconds and nanoseconds, or date and time of day), or none.
+        frame: the column that numbers the scans, if there is one and no time.
+        unused: names of all other columns.
+        rivals: of columns in use, with the names of others that claim the same quantity.
+    """
+
+    values: tuple[TableColumn, ...]
+    time: tuple[TableColumn, ...]
+    frame: TableColumn | None
+    unused: tuple[str, ...]
+    rivals: dict[str, str] = field(default_factory=dict)
+
+    def of(self, quantity: str) -> TableColumn | None:
+        """Return the column of a quantity."""
+        return next((column for column in self.values if column.quantity == quantity), None)
+
+
+def choose_columns(
+    path: Path,
+    names: Sequence[str],
+    units: Sequence[str],
+    first_row: Sequence[str],
+    mapped: Sequence[MappedColumn] = (),
+) -> TableColumns:
+    """Choose the columns to read.
+
+    Args:
+        path: for messages.
+        names: of all columns, as written.
+        units: of all columns, from a line under the header; () if there is none.
+        first_row: cells of the first row.
+        mapped: the user's --map.
+
+    Raises:
+        RecordingError: a mapped column does not exist, a position is missing, or its unit is unknown.
+    """
+    stated = [_mapped(path, names, one) for one in mapped]
+    taken = {column.place for column in stated}
+    given = {column.quantity for column in stated}
+    claims: dict[str, list[TableColumn]] = {}
+    foreign: list[tuple[str, FieldWords]] = []
+    for place, written in enumerate(names):
+        words = read_field(written)
+        if place in taken or words is None or words.quantity in given:
+            continue
+        if not words.unit and place < len(units) and units[place].strip("[]() -"):
+            below = read_field(f"x [{units[place].strip('[]() ')}]")
+            words = replace(words, unit=below.unit if below else "")
+        if words.unit and not words.unit_is_known and words.quantity in (*QUANTITIES, "time"):
+            foreign.append((written, words))
+            continue
+        claims.setdefault(words.quantity, []).append(
+            TableColumn(place, written.strip(), words.quantity, words.unit, words.rank)
+        )
+    chosen, rivals = _best(claims)
+    values = [column for column in (*stated, *chosen) if column.quantity in QUANTITIES]
+    _require_position(path, names, values, foreign)
+    mapped_time = [column for column in stated if column.quantity == "time"]
+    time = tuple(mapped_time) or _time_columns(claims, first_row)
+    if not time and any(words.quantity == "time" for _, words in foreign):
+        raise _foreign_unit(path, *next(one for one in foreign if one[1].quantity == "time"))
+    frame = None if time else next(iter(claims.get("frame", ())), None)
+    used = {column.place for column in (*values, *time, *((frame,) if frame else ()))}
+    unused = tuple(name.strip() for place, name in enumerate(names) if place not in used and name.strip())
+    return TableColumns(tuple(values), time, frame, unused, rivals)
+
+
+def _mapped(path: Path, names: Sequence[str], one: MappedColumn) -> TableColumn:
+    spelt = [name.strip().strip("#% ") for name in names]
+    place = next((n for n, name in enumerate(spelt) if name == one.column), None)
+    if place is None:
+        place = next((n for n, name in enumerate(spelt) if name.lower() == one.column.lower()), None)
+    if place is None:
+        near = get_close_matches(one.column, spelt, 1, 0.0)
+        hint = f"; did you mean '{near[0]}'? " if near else "; "
+        raise RecordingError(
+            f"{path}: --map {one.words}: no column '{one.column}'{hint}The columns are {_listed(spelt)}"
+        )
+    return TableColumn(place, spelt[place], one.quantity, one.unit, 0, True, one.sign)
+
+
+def _best(claims: dict[str, list[TableColumn]]) -> tuple[list[TableColumn], dict[str, str]]:
+    """Choose one column per quantity: with a unit above without, then by the order of spellings."""
+    chosen, rivals = [], {}
+    for quantity in QUANTITIES:
+        columns = sorted(claims.get(quantity, ()), key=lambda column: (not column.unit, column.rank, column.place))
+        if not columns:
+            continue
+        chosen.append(columns[0])
+        others = [column.written for column in columns[1:] if bool(column.unit) == bool(columns[0].unit)]
+        if others and quantity in _POSITION:
+            rivals[quantity] = ", ".join(others)
+    return chosen, rivals
+
+
+def _require_position(
+    path: Path, names: Sequence[str], values: Sequence[TableColumn], foreign: Sequence[tuple[str, FieldWords]]
+) -> None:
+    have = {column.quantity for column in values}
+    if {"x", "y"} <= have or {"range", "azimuth"} <= have:
+        return
+    claimed = have | {words.quantity for _, words in foreign}
+    for written, words in foreign:
+        if words.quantity in _POSITION and ({"x", "y"} <= claimed or {"range", "azimuth"} <= claimed):
+            raise _foreign_unit(path, written, words)
+    raise RecordingError(
+        f"{path}: no position columns; x_m and y_m, or range_m and azimuth_deg, are required, such as {TABLE_EXAMPLE}; "
+        f"the columns are {_listed([name.strip() for name in names])}: say which is which with --map x=NAME:m --map y=NAME:m"
+    )
+
+
+def _foreign_unit(path: Path, written: str, words: FieldWords) -> RecordingError:
+    units = units_of(words.quantity)
+    return RecordingError(
+        f"{path}: column '{written.strip()}' has the unknown unit '{words.unit}'; known units: {', '.join(units)}; "
+        f"if it is one of these, say so with --map {words.quantity}={written.strip()}:{next(iter(units))}"
+    )
+
+
+def _time_columns(claims: dict[str, list[TableColumn]], first_row: Sequence[str]) -> tuple[TableColumn, ...]:
+    """Choose the columns of time: date and time of day, seconds and nanoseconds, or a single one."""
+
+    def cell(column: TableColumn) -> str:
+        return first_row[column.place].strip() if column.place < len(first_row) else ""
+
+    times = sorted(
+        claims.get("time", ()), key=lambda c: (cell(c) in ("0", "0.0", ""), "stamp" not in c.written.lower(), not c.unit, c.rank)
+    )  # fmt: skip
+    dates = claims.get("date", [])
+    clock = next((column for column in times if _CLOCK.fullmatch(cell(column))), None)
+    if dates and clock is not None:
+        return dates[0], clock
+    whole = [*claims.get("sec", ()), *(column for column in times if column.unit == "s")]
+    parts = [*claims.get("nanosec", ()), *(column for column in times if column.unit == "ns")]
+    for seconds in whole:
+        for nanoseconds in parts:
+            if cell(seconds).isdigit() and cell(nanoseconds).isdigit() and len(cell(nanoseconds)) <= 9:
+                return seconds, nanoseconds
+    if times:
+        return (times[0],)
+    if claims.get("sec"):
+        return (replace(claims["sec"][0], unit="s"),)
+    return tuple(dates[:1])
+
+
+def _listed(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:12])
+    return f"{shown} and {len(names) - 12} more" if len(names) > 12 else shown or "none"

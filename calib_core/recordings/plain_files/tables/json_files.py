@@ -1,0 +1,175 @@
+"""Read radar returns from JSON: one return or one scan per line or array element, with nested objects and lists."""
+
+import json
+import re
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib_core.errors import RecordingError
+from calib_core.recordings.plain_files.tables.columns import TableColumns
+from calib_core.recordings.plain_files.tables.times import TimeReader
+
+__all__ = ["JsonTable", "open_json_table", "read_json_rows"]
+
+_MAX_BYTES = 1 << 28
+_SAMPLED_ROWS = 500
+_POINTS = ("position", "pos", "xyz", "point", "location", "coordinates")
+_NOTHING = ("", "null", "none")
+
+
+@dataclass(frozen=True, slots=True)
+class JsonTable:
+    """The returns of a JSON file as a table; see TextTable.
+
+    Attributes:
+        path: the file.
+        names: of all fields of the first returns, nested ones dotted.
+        sample: cells of the first rows.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    sample: tuple[tuple[str, ...], ...]
+
+    @property
+    def first_row(self) -> tuple[str, ...]:
+        """Cells of the first row; () if there is none."""
+        return self.sample[0] if self.sample else ()
+
+
+def open_json_table(path: Path) -> JsonTable:
+    """Find the fields of a JSON file's returns.
+
+    Raises:
+        RecordingError: it is not JSON, or contains no objects.
+    """
+    first = list(islice(_rows(path), _SAMPLED_ROWS))
+    names = tuple(dict.fromkeys(name for _, row in first for name in row))
+    if not names:
+        raise RecordingError(
+            f"{path}: no objects with named numbers in it; write one object per line, such as "
+            '{"time_ns": 1, "x_m": 2, "y_m": 3}'
+        )
+    return JsonTable(path, names, tuple(tuple(row.get(name, "") for name in names) for _, row in first))
+
+
+def read_json_rows(table: JsonTable, columns: TableColumns, times: TimeReader | None) -> tuple[np.ndarray, np.ndarray]:
+    """Read times (n,) [ns], zero without a time reader, and values (n, k) as written.
+
+    Raises:
+        RecordingError: a line is damaged; the message names it.
+    """
+    stamps, values = array("q"), array("d")
+    for line, row in _rows(table.path):
+        cells = [row.get(name, "") for name in table.names]
+        try:
+            numbers = [_number(cells[column.place]) for column in columns.values]
+            stamps.append(times.read(times.key(cells)) if times else 0)
+        except (ValueError, OverflowError, RecordingError) as error:
+            raise RecordingError(f"{table.path}: line {line}: {error}; fix or remove the line") from error
+        values.extend(numbers)
+    return np.array(stamps, dtype=np.int64), np.array(values, dtype=np.float64).reshape(-1, len(columns.values))
+
+
+def _number(text: str) -> float:
+    return float("nan") if text.lower() in _NOTHING else float(text)
+
+
+def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
+    """Yield every return with its line (or element) number, as the text of its fields."""
+    for number, record in _records(path):
+        try:
+            for row in _rows_of(record, "", {}):
+                if row:
+                    yield number, row
+        except RecursionError:
+            raise RecordingError(f"{path}: line {number}: nested too deeply for a radar return") from None
+
+
+def _records(path: Path) -> Iterator[tuple[int, Any]]:
+    """Yield the lines of JSON lines, or the elements of an array, or one object."""
+    try:
+        if path.suffix.lower() == ".json" and path.stat().st_size <= _MAX_BYTES:
+            text = path.read_text(encoding="utf-8-sig")
+            try:
+                whole = _parse(text)
+            except ValueError:
+                if not re.search(r"\}\s*\n", text):
+                    raise
+            else:
+                yield from enumerate(whole if isinstance(whole, list) else [whole], start=1)
+                return
+        yield from _lines(path)
+    except (OSError, ValueError, RecursionError) as error:
+        raise RecordingError(f"{path}: cannot be read as JSON: {error}") from error
+
+
+def _lines(path: Path) -> Iterator[tuple[int, Any]]:
+    with path.open(encoding="utf-8-sig") as file:
+        for number, line in enumerate(file, start=1):
+            if line.strip():
+                try:
+                    yield number, _parse(line)
+                except (ValueError, RecursionError) as error:
+                    raise RecordingError(
+                        f"{path}: line {number}: not JSON ({error}); fix or remove the line"
+                    ) from error
+
+
+def _parse(text: str) -> Any:
+    """Parse JSON; numbers stay text, because a float rounds nanoseconds."""
+    return json.loads(text, parse_float=str, parse_int=str, parse_constant=str)
+
+
+def _rows_of(value: Any, prefix: str, above: Mapping[str, str]) -> Iterator[dict[str, str]]:
+    """Yield the returns in a value: the elements of its lists of objects, the entries of its lists, or itself."""
+    if isinstance(value, list):
+        value = {str(number): part for number, part in enumerate(value)}
+    if not isinstance(value, dict):
+        return
+    single: dict[str, str] = {}
+    lists: dict[str, list[Any]] = {}
+    _sort_fields(value, prefix, single, lists)
+    nested = {name: parts for name, parts in lists.items() if any(isinstance(part, dict | list) for part in parts)}
+    if nested:
+        inherited = {**single, **above}
+        for name, parts in nested.items():
+            for part in parts:
+                yield from _rows_of(part, f"{name}.", inherited)
+        return
+    length = max((len(parts) for parts in lists.values()), default=0)
+    full = {name: parts for name, parts in lists.items() if len(parts) == length}
+    if not lists:
+        yield {**single, **above}
+    for number in range(length):
+        yield {**{name: _text(parts[number]) for name, parts in full.items()}, **single, **above}
+
+
+def _sort_fields(value: Mapping[str, Any], prefix: str, single: dict[str, str], lists: dict[str, list[Any]]) -> None:
+    """Sort the fields of an object into single values and lists; names of nested objects are dotted."""
+    for key, part in value.items():
+        name = f"{prefix}{key}"
+        if isinstance(part, dict):
+            _sort_fields(part, f"{name}.", single, lists)
+        elif isinstance(part, list) and key.lower() in _POINTS and _is_point(part):
+            single.update({f"{name}.{axis}": _text(number) for axis, number in zip("xyz", part, strict=False)})
+        elif isinstance(part, list):
+            lists[name] = part
+        else:
+            single[name] = _text(part)
+
+
+def _is_point(part: Sequence[Any]) -> bool:
+    return len(part) in (2, 3) and not any(isinstance(number, dict | list) for number in part)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "1" if value else "0"
+    return "" if value is None else str(value)
