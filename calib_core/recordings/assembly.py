@@ -26,8 +26,9 @@ from calib_core.recordings.radar.list_messages import PointLayout
 from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.stamping import StampedTopic, read_stamps
-from calib_core.recordings.time.clock_choice import ClockChoice, Stamps, choose_clock, choose_clocks
+from calib_core.recordings.time.clock_choice import ClockChoice, choose_clock, choose_clocks
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
+from calib_core.recordings.time.clock_faults import Stamps
 from calib_core.recordings.topics import Rhythm, Topic, TopicSummary, join_topics
 from calib_core.recordings.usages import Usage, usage_of
 from calib_core.results import DataWarning
@@ -77,13 +78,13 @@ def assemble(
     inventory = Inventory(name, topics, {topic.name: usage_of(topic).read_as(axes) for topic in topics})
     selection = select(inventory, options, require)
     selection, stamped, lost = _stamped(selection, inventory)
-    clocks, stamps, about_choice = _clocks(stamped, options)
+    clocks, stamps, about_choice = _clocks(stamped, inventory, options)
     warnings.extend([*lost, *about_choice])
     heads = {name: both.heads for name, both in stamped.items()}
     radar = _radar_stream(selection.radar, inventory, stamps, heads)
     images = _image_stream(selection.image, inventory, stamps)
     warnings.extend(check_overlap(name, radar, images, required=len(require) == 2))
-    diagnoses = _diagnoses(stamped, (radar, images), clocks, options)
+    diagnoses = _diagnoses(stamped, (radar, images), clocks, inventory, options)
     warnings.extend(about_clocks(list(diagnoses.values())))
     camera, about_camera = recorded_camera(selection.camera_info, images)
     warnings.extend(
@@ -131,11 +132,15 @@ def _head_bytes(usage: Usage) -> int:
     return usage.radar.group_bytes if isinstance(usage.radar, PointLayout) else 12
 
 
+def _both_clocks(both: StampedTopic, inventory: Inventory) -> Stamps:
+    return both.clocks(inventory.usages[both.topic.name].distinct_times)
+
+
 def _clocks(
-    stamped: Mapping[str, StampedTopic], options: RecordingOptions
+    stamped: Mapping[str, StampedTopic], inventory: Inventory, options: RecordingOptions
 ) -> tuple[Mapping[str, Literal["header", "receive"]], Mapping[str, TimesNs], tuple[DataWarning, ...]]:
     """Choose the clock of each topic in use, the radar first; return clocks and times by topic, and warnings."""
-    read = [Stamps(name, both.topic.receive_ns, both.header_ns) for name, both in stamped.items()]
+    read = [_both_clocks(both, inventory) for both in stamped.values()]
     if options.clock == "header":
         for both in read:
             if both.header_ns is None:
@@ -153,6 +158,7 @@ def _diagnoses(
     stamped: Mapping[str, StampedTopic],
     streams: Sequence[RadarStream | ImageStream | None],
     clocks: Mapping[str, Literal["header", "receive"]],
+    inventory: Inventory,
     options: RecordingOptions,
 ) -> Mapping[str, ClockDiagnosis]:
     """Diagnose the clocks of the topics in use."""
@@ -161,7 +167,7 @@ def _diagnoses(
         if stream is not None:
             name = stream.topic.name
             found[name] = diagnose(
-                Stamps(name, stamped[name].topic.receive_ns, stamped[name].header_ns),
+                _both_clocks(stamped[name], inventory),
                 times_ns=stream.times_ns,
                 chosen=clocks[name],
                 requested=options.clock,
