@@ -14,6 +14,7 @@ from calib_core.measurements import Stamp, TimeNs
 from calib_core.recordings.assumptions import Assumption, about_assumptions
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.camera.images import ImageLayout
+from calib_core.recordings.camera.picture_sizes import frames_of_one_size
 from calib_core.recordings.camera.recorded_intrinsics import recorded_camera
 from calib_core.recordings.camera.video_stream import about_video, image_stream
 from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap
@@ -82,7 +83,8 @@ def assemble(
     warnings.extend([*lost, *about_choice])
     heads = {name: both.heads for name, both in stamped.items()}
     radar = _radar_stream(selection.radar, inventory, stamps, heads)
-    images = _image_stream(selection.image, inventory, stamps)
+    images, about_pictures = frames_of_one_size(_image_stream(selection.image, inventory, stamps))
+    warnings.extend(about_pictures)
     warnings.extend(check_overlap(name, radar, images, required=len(require) == 2))
     diagnoses = _diagnoses(stamped, (radar, images), clocks, inventory, options)
     warnings.extend(about_clocks(list(diagnoses.values())))

@@ -10,7 +10,7 @@ from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.axes import RadarAxes
 from calib_core.recordings.radar.layouts import RadarLayout, recognise
 from calib_core.recordings.radar.list_messages import PointLayout
-from calib_core.recordings.time.clock_faults import PICTURES_DISTINCT, RETURNS_DISTINCT, SCANS_DISTINCT
+from calib_core.recordings.time.clock_faults import HALF_DISTINCT, RETURNS_DISTINCT
 from calib_core.recordings.topics import Topic, TopicKind
 
 __all__ = ["Usage", "usage_of"]
@@ -41,9 +41,7 @@ class Usage:
     @property
     def distinct_times(self) -> float:
         """The least share of different times that is plausible among its messages."""
-        if self.radar is None:
-            return PICTURES_DISTINCT
-        return RETURNS_DISTINCT if isinstance(self.radar, PointLayout) else SCANS_DISTINCT
+        return RETURNS_DISTINCT if isinstance(self.radar, PointLayout) else HALF_DISTINCT
 
     def read_as(self, axes: RadarAxes | None) -> "Usage":
         """Apply the user's --radar-axes."""

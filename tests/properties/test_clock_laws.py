@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings.time.clock_choice import choose_clock, choose_clocks
 from calib_core.recordings.time.clock_faults import (
-    PICTURES_DISTINCT,
     Stamps,
     distinct_times,
     header_fault,
@@ -19,8 +18,8 @@ PERIOD_NS = 50_000_000
 KINDS = (
     "sound", "zero", "constant", "boot", "far-future", "backwards", "set-back", "some-zero", "coarse", "pairs", "slow",
 )  # fmt: skip
-SHARE = PICTURES_DISTINCT
-"""A clock may lack a tenth of the other's times: a picture sent twice is one picture."""
+SHARES = {"receive": 0.9, "header": 0.5}
+"""Least share of the other clock's times: stamps may repeat, because a picture that is sent twice is one picture."""
 
 
 def clock(kind: str, count: int, shift_ns: int) -> np.ndarray:
@@ -66,7 +65,7 @@ def never_worse(stamps: Stamps, chosen: str) -> None:
     faults = {"header": header_fault(stamps), "receive": receive_fault(stamps)}
     (unused,) = faults.keys() - {chosen}
     if other is not None and faults[unused] is None:
-        assert distinct_times(used) >= SHARE * distinct_times(other)
+        assert distinct_times(used) >= SHARES[chosen] * distinct_times(other)
 
 
 @given(TOPICS)
@@ -91,7 +90,7 @@ def test_sound_stamps_are_used_whatever_the_recorder_wrote(radar_receive, camera
         assert (choice.clocks, choice.warnings) == (("header", "header"), ())
 
 
-@given(st.sampled_from(["zero", "constant", "far-future", "some-zero", "coarse", "pairs"]), st.integers(60, 200))
+@given(st.sampled_from(["zero", "constant", "far-future", "some-zero", "coarse"]), st.integers(60, 200))
 def test_sound_receive_times_replace_stamps_that_cannot_be_right_with_a_warning(kind, count):
     stamps = topic("/camera", kind, "sound", count, 0)
     choice = choose_clock(stamps)

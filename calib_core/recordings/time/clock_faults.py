@@ -8,10 +8,9 @@ from calib_core.arrays import Indices, TimesNs
 from calib_core.measurements import NS_PER_S
 
 __all__ = [
+    "HALF_DISTINCT",
     "MANY",
-    "PICTURES_DISTINCT",
     "RETURNS_DISTINCT",
-    "SCANS_DISTINCT",
     "YEAR_2000_NS",
     "Stamps",
     "ancient",
@@ -24,9 +23,10 @@ __all__ = [
 YEAR_2000_NS = 946_684_800 * NS_PER_S
 _YEAR_2100_NS = 4_102_444_800 * NS_PER_S
 MANY = 0.01
-PICTURES_DISTINCT, SCANS_DISTINCT, RETURNS_DISTINCT = 0.9, 0.5, 0.0
-"""Plausible shares of different times: of pictures, of which some may be sent twice; of scans; of messages of one return."""
+HALF_DISTINCT, RETURNS_DISTINCT = 0.5, 0.0
+"""Plausible shares of different stamps: of pictures and scans, which some drivers send twice; of messages of one return."""
 
+_RECEIVE_DISTINCT = 0.9
 _WORST_BACK_S = 1.0
 
 
@@ -38,15 +38,15 @@ class Stamps:
         topic: its name.
         receive_ns: (n,) the recorder's clock.
         header_ns: (n,) the stamps in the messages; None if they carry none.
-        distinct: the least share of different times that is plausible: a camera's pictures all have their own time, while
-            the returns of one scan may share one.
+        distinct: the least share of different stamps that is plausible: a few pictures may be sent twice, and the returns
+            of one scan may share one.
         written: (n,) the messages in the order of the file, which shows a recorder's clock that was set back; None if unknown.
     """
 
     topic: str
     receive_ns: TimesNs
     header_ns: TimesNs | None
-    distinct: float = PICTURES_DISTINCT
+    distinct: float = HALF_DISTINCT
     written: Indices | None = None
 
     @property
@@ -93,7 +93,7 @@ def receive_fault(stamps: Stamps) -> str | None:
     header = stamps.header_ns
     if header is None or not header.any():
         return None
-    if distinct_times(receive) < stamps.distinct * distinct_times(header):
+    if stamps.distinct and distinct_times(receive) < _RECEIVE_DISTINCT * distinct_times(header):
         return f"{n} messages have only {distinct_times(receive)} different receive times"
     if (
         stamps.written is not None
