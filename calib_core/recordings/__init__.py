@@ -8,6 +8,8 @@ from calib_core.recordings.selection import RecordingOptions
 from calib_core.recordings.summary import RecordingSummary, recording_summary
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.topics import TopicSummary
+from calib_core.recordings.verification import Verification, verify_recording
+from calib_core.recordings.verification_text import verification_text
 from calib_core.recordings.video_writing import WrittenVideo, write_video
 
 __all__ = [
@@ -17,6 +19,7 @@ __all__ = [
     "RecordingOptions",
     "RecordingSummary",
     "TopicSummary",
+    "Verification",
     "WrittenVideo",
     "clock_lines",
     "describe",
@@ -25,5 +28,7 @@ __all__ = [
     "open_recording",
     "recording_summary",
     "require_files",
+    "verification_text",
+    "verify_recording",
     "write_video",
 ]

@@ -38,6 +38,7 @@ def open_picture_folder(folder: Path, files: Sequence[Path]) -> PlainSource:
         stamped.times_ns,
         message,
         stamped.warnings,
+        file_of=lambda row: stamped.files[row],
     )
 
 

@@ -53,6 +53,7 @@ def _open(folder: Path, files: Sequence[Path], what: str, points: Callable[[Path
         stamped.times_ns,
         message,
         stamped.warnings,
+        file_of=lambda row: stamped.files[row],
     )
 
 

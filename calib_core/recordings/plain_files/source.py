@@ -10,6 +10,7 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
 from calib_core.recordings.plain_files.messages import header_bytes
 from calib_core.results import DataWarning
@@ -17,6 +18,7 @@ from calib_core.results import DataWarning
 __all__ = ["PlainSource", "topic_of"]
 
 _HEADER_BYTES = 16
+_MAX_FAULTS = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +35,8 @@ class PlainSource:
         warnings: problems found on opening it.
         closed: called on closing.
         assumptions: what it does not state and reading it takes for granted.
+        file_of: the file of a row, in a folder of one file per row.
+        account_of: accounts for the bytes of a file whose format says what they are.
     """
 
     path: Path
@@ -44,6 +48,8 @@ class PlainSource:
     warnings: tuple[DataWarning, ...] = ()
     closed: Callable[[], None] | None = None
     assumptions: tuple[Assumption, ...] = ()
+    file_of: Callable[[int], Path] | None = None
+    account_of: Callable[[Progress | None], FileAccount] | None = None
 
     def __post_init__(self) -> None:
         """Refuse times that a message cannot represent.
@@ -99,10 +105,35 @@ class PlainSource:
             rows[place, : min(len(head), size)] = np.frombuffer(head[:size], dtype=np.uint8)
         return Heads(rows, lengths, fault)
 
+    def account(self, progress: Progress | None = None) -> FileAccount:
+        """Account for every byte: files that are read, damaged ones, and files of a folder that are not used."""
+        if self.account_of is not None:
+            return self.account_of(progress)
+        bad, faults = set(), []
+        for row in range(len(self.times_ns)):
+            if progress is not None:
+                progress(row, len(self.times_ns))
+            try:
+                self.message(row)
+            except RecordingError as error:
+                bad.add(self.file_of(row) if self.file_of is not None else self.path)
+                faults.append(str(error))
+        damaged = min(sum(path.stat().st_size for path in bad), self.size_bytes)
+        unused = _folder_bytes(self.path) - self.size_bytes if self.path.is_dir() else 0
+        return FileAccount(
+            {"messages": self.size_bytes - damaged, "damaged": damaged, "unknown": max(0, unused)},
+            damaged={self.channel.id: len(faults)} if faults else {},
+            faults=tuple(faults[:_MAX_FAULTS]),
+        )
+
     def close(self) -> None:
         """Close the source."""
         if self.closed is not None:
             self.closed()
+
+
+def _folder_bytes(folder: Path) -> int:
+    return sum(file.stat().st_size for file in folder.iterdir() if file.is_file())
 
 
 def topic_of(path: Path, word: str) -> str:

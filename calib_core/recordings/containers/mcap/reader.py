@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calib_core.errors import RecordingError
+from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource
+from calib_core.recordings.containers.indexed_places import IndexedPlaces
+from calib_core.recordings.containers.mcap.account import account_for_mcap
 from calib_core.recordings.containers.mcap.records import (
     BETWEEN_CHUNKS,
     CHUNK_INDEX,
@@ -256,6 +259,11 @@ class McapSource(ChunkedSource):
             f"{self.path.name} declares {self._counted} messages, but contains {count}",
             "check that the data you need is there; the rest was lost before or while the file was written",
         )
+
+    def account(self, progress: Progress | None = None) -> FileAccount:
+        """Account for every byte, reading the whole file."""
+        places = IndexedPlaces(self.indexes, [chunk.position for chunk in self.chunks])
+        return account_for_mcap(self.file, places, progress)
 
     # -- reading
 

@@ -2,7 +2,8 @@
 
 import re
 import zlib
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.containers.chunks import Chunk
@@ -29,7 +30,7 @@ from calib_core.recordings.containers.mcap.records import (
 )
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
 
-__all__ = ["FoundInMcap", "scan_mcap"]
+__all__ = ["FoundInMcap", "Part", "parts_of_mcap", "scan_mcap"]
 
 _CANDIDATE = re.compile(rb"[\x03-\x06][\x00-\xff]{4}\x00\x00\x00\x00")
 _COMPRESSIONS = ("", "lz4", "zstd")
@@ -65,6 +66,23 @@ class FoundInMcap:
     tried: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One record of the data section, or bytes between records that do not parse.
+
+    Attributes:
+        kind: of the record; 0 for bytes that do not parse.
+        place: position of its first byte.
+        start: position of its body.
+        end: position after it.
+    """
+
+    kind: int
+    place: int
+    start: int
+    end: int
+
+
 def scan_mcap(file: FileBytes) -> FoundInMcap:
     """Scan a file from its first record.
 
@@ -72,27 +90,40 @@ def scan_mcap(file: FileBytes) -> FoundInMcap:
         file: the file.
     """
     found = FoundInMcap(Declarations(), [Chunk(0, file.size_bytes, file.size_bytes, "")])
+    for part in parts_of_mcap(file, found):
+        if not part.kind:
+            found.lost_bytes += part.end - part.place
+    return found
+
+
+def parts_of_mcap(file: FileBytes, found: FoundInMcap) -> Iterator[Part]:
+    """Walk through the data section, and note what is in it; stop before the summary.
+
+    Args:
+        file: the file.
+        found: takes messages, declarations and losses inside chunks.
+    """
     stretch = FileStretch(file, 0, file.size_bytes)
     place = len(MAGIC)
     while place + RECORD.size <= stretch.size and not found.ended:
         kind, size = RECORD.unpack(stretch.up_to(place, RECORD.size))
         start = place + RECORD.size
         whole = size <= stretch.size - start
+        part = Part(kind, place, start, start + size)
         if kind == CHUNK and (head := chunk_head(stretch.up_to(start, 64))) and _sound(head):
             room = min(head.stored_bytes, stretch.size - start - head.size)
             _scan_chunk(file, start + head.size, room, head, found)
-            place = start + head.size + room
-        elif _END_SIZES.get(kind) == size and not _data_after(stretch, start + size, found):
+            part = replace(part, start=start + head.size, end=start + head.size + room)
+        elif whole and _END_SIZES.get(kind) == size and not _data_after(stretch, start + size, found):
             found.ended = True
-        elif whole and (kind in DATA_KINDS or kind >= PRIVATE) and _note(stretch, kind, start, size, found):
-            place = start + size
-        else:
-            after = _following(stretch, place + 1, found)
-            found.lost_bytes += after - place
-            place = after
-    if not found.ended:
-        found.lost_bytes += stretch.size - min(place, stretch.size)
-    return found
+            if kind == FOOTER:
+                return
+        elif not (whole and (kind in DATA_KINDS or kind >= PRIVATE) and _note(stretch, kind, start, size, found)):
+            part = Part(0, place, place, _following(stretch, place + 1, found))
+        yield part
+        place = part.end
+    if not found.ended and place < stretch.size:
+        yield Part(0, place, place, stretch.size)
 
 
 def _data_after(stretch: Stretch, place: int, found: FoundInMcap) -> bool:
