@@ -29,6 +29,9 @@ class Video:
         ):
             written = write_video(recording, self.out, progress=progress)
         print(f"{self.out}: {written.frames} frames, {written.duration_s:.3f} s, from {seconds_text(written.start)}")
+        for warning in recording.warnings:
+            if warning.code in ("picture-sizes", "unreadable-pictures"):
+                print(f"{warning.message}")
         if written.other_size:
             print(f"{written.other_size} frames are left out: their size differs from the first frame's")
         if written.unreadable:

@@ -9,6 +9,8 @@ from calib_core.recordings.selection import RecordingOptions
 from calib_core.recordings.summary import RecordingSummary, recording_summary
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis
 from calib_core.recordings.topics import TopicSummary
+from calib_core.recordings.verification import Verification, verify_recording
+from calib_core.recordings.verification_text import verification_text
 from calib_core.recordings.video_writing import WrittenVideo, write_video
 
 __all__ = [
@@ -18,6 +20,7 @@ __all__ = [
     "RecordingOptions",
     "RecordingSummary",
     "TopicSummary",
+    "Verification",
     "WrittenVideo",
     "clock_lines",
     "describe",
@@ -27,5 +30,7 @@ __all__ = [
     "recording_summary",
     "require_files",
     "size_of_pictures_beside",
+    "verification_text",
+    "verify_recording",
     "write_video",
 ]

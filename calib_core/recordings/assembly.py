@@ -14,6 +14,7 @@ from calib_core.measurements import Stamp, TimeNs
 from calib_core.recordings.assumptions import Assumption, about_assumptions
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.camera.images import ImageLayout
+from calib_core.recordings.camera.picture_sizes import frames_of_one_size
 from calib_core.recordings.camera.recorded_intrinsics import published_camera, recorded_camera
 from calib_core.recordings.camera.video_stream import about_video, image_stream
 from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap
@@ -28,8 +29,9 @@ from calib_core.recordings.radar.list_messages import PointLayout
 from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.stamping import StampedTopic, read_stamps
-from calib_core.recordings.time.clock_choice import ClockChoice, Stamps, choose_clock, choose_clocks
+from calib_core.recordings.time.clock_choice import ClockChoice, choose_clock, choose_clocks
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
+from calib_core.recordings.time.clock_faults import Stamps
 from calib_core.recordings.topics import Rhythm, Topic, TopicSummary, join_topics
 from calib_core.recordings.usages import Usage, usage_of
 from calib_core.results import DataWarning
@@ -79,14 +81,15 @@ def assemble(
     inventory = Inventory(name, topics, {topic.name: usage_of(topic).read_as(axes) for topic in topics})
     selection = select(inventory, options, require)
     selection, stamped, lost = _stamped(selection, inventory)
-    clocks, stamps, about_choice = _clocks(stamped, options)
+    clocks, stamps, about_choice = _clocks(stamped, inventory, options)
     warnings.extend([*lost, *about_choice])
     heads = {name: both.heads for name, both in stamped.items()}
     radar = _radar_stream(selection.radar, inventory, stamps, heads)
-    images = _image_stream(selection.image, inventory, stamps)
+    images, about_pictures = frames_of_one_size(_image_stream(selection.image, inventory, stamps))
+    warnings.extend(about_pictures)
     zoneless = {s.channel.topic for s in sources if isinstance(s, PlainSource) and s.zoneless}
     warnings.extend(check_overlap(name, radar, images, required=len(require) == 2, zoneless=zoneless))
-    diagnoses = _diagnoses(stamped, (radar, images), clocks, options)
+    diagnoses = _diagnoses(stamped, (radar, images), clocks, inventory, options)
     warnings.extend(about_clocks(list(diagnoses.values())))
     camera, about_camera = recorded_camera(selection.camera_info, images)
     beside = _camera_beside(sources, selection)
@@ -146,11 +149,15 @@ def _head_bytes(usage: Usage) -> int:
     return usage.radar.group_bytes if isinstance(usage.radar, PointLayout) else 12
 
 
+def _both_clocks(both: StampedTopic, inventory: Inventory) -> Stamps:
+    return both.clocks(inventory.usages[both.topic.name].distinct_times)
+
+
 def _clocks(
-    stamped: Mapping[str, StampedTopic], options: RecordingOptions
+    stamped: Mapping[str, StampedTopic], inventory: Inventory, options: RecordingOptions
 ) -> tuple[Mapping[str, Literal["header", "receive"]], Mapping[str, TimesNs], tuple[DataWarning, ...]]:
     """Choose the clock of each topic in use, the radar first; return clocks and times by topic, and warnings."""
-    read = [Stamps(name, both.topic.receive_ns, both.header_ns) for name, both in stamped.items()]
+    read = [_both_clocks(both, inventory) for both in stamped.values()]
     if options.clock == "header":
         for both in read:
             if both.header_ns is None:
@@ -168,6 +175,7 @@ def _diagnoses(
     stamped: Mapping[str, StampedTopic],
     streams: Sequence[RadarStream | ImageStream | None],
     clocks: Mapping[str, Literal["header", "receive"]],
+    inventory: Inventory,
     options: RecordingOptions,
 ) -> Mapping[str, ClockDiagnosis]:
     """Diagnose the clocks of the topics in use."""
@@ -176,7 +184,7 @@ def _diagnoses(
         if stream is not None:
             name = stream.topic.name
             found[name] = diagnose(
-                Stamps(name, stamped[name].topic.receive_ns, stamped[name].header_ns),
+                _both_clocks(stamped[name], inventory),
                 times_ns=stream.times_ns,
                 chosen=clocks[name],
                 requested=options.clock,

@@ -16,6 +16,7 @@ from calib_core.recordings.topics import TopicSummary
 
 __all__ = ["clock_lines", "describe", "summary_text"]
 
+_CLOCKS = {"header": "stamps", "receive": "receive times"}
 _USE = {"radar": "radar", "image": "camera", "camera-info": "intrinsics"}
 
 
@@ -63,8 +64,15 @@ def _times(summary: RecordingSummary) -> list[str]:
     counts = [topic.count for topic in summary.topics]
     lines.append(f"{_counted(sum(counts), 'message')} in {_counted(len(counts), 'topic')}")
     if summary.overlap_s is not None:
-        lines.append(f"radar and camera overlap for {duration_text(summary.overlap_s)}")
+        lines.append(_shared_text(summary.overlap_s, summary.overlap_stretches or 0))
     return _labelled("time", lines)
+
+
+def _shared_text(seconds: float, stretches: int) -> str:
+    if not stretches:
+        return "radar and camera never have data at the same time"
+    pieces = f", in {stretches} stretches" if stretches > 1 else ""
+    return f"radar and camera both have data for {duration_text(seconds)}{pieces}"
 
 
 def _seconds(stamp: Stamp) -> str:
@@ -74,7 +82,7 @@ def _seconds(stamp: Stamp) -> str:
 def _topic_table(topics: Sequence[TopicSummary]) -> list[str]:
     if not topics:
         return _labelled("topics", ["none"])
-    rows = [("used as", "topic", "type", "messages", "rate", "longest gap", "jitter", "clock")]
+    rows = [("used as", "topic", "type", "messages", "rate", "longest gap", "jitter", "times used")]
     for topic in topics:
         rows.append(
             (
@@ -85,14 +93,16 @@ def _topic_table(topics: Sequence[TopicSummary]) -> list[str]:
                 "" if topic.rate_hz is None else f"{topic.rate_hz:.1f} Hz",
                 "" if topic.longest_gap_s is None else f"{topic.longest_gap_s:.3f} s",
                 "" if topic.jitter_s is None else f"{topic.jitter_s * 1e3:.1f} ms",
-                topic.clock if topic.count else "",
+                _CLOCKS[topic.clock] if topic.clocks is not None else "",
             )
         )
     lines = list(_columns(rows, right={3, 4, 5, 6}))
-    for topic in topics:
-        if topic.problem and topic.problem != "no messages":
-            lines.append(topic.problem if topic.name in topic.problem else f"{topic.name}: {topic.problem}")
-    return lines
+    problems = [
+        topic.problem if topic.name in topic.problem else f"{topic.name}: {topic.problem}"
+        for topic in topics
+        if topic.problem and topic.problem != "no messages"
+    ]
+    return [*lines, *(line for problem in problems for line in ("", *_labelled("problem", [problem])))]
 
 
 def _clocks(topics: Sequence[TopicSummary]) -> list[str]:
@@ -108,14 +118,15 @@ def _clocks(topics: Sequence[TopicSummary]) -> list[str]:
 
 def clock_lines(found: ClockDiagnosis) -> tuple[str, ...]:
     """Describe which clock a topic uses and why, and in a second line, if needed, what is known about both clocks."""
-    used = {"header": "header stamps", "receive": "receive times"}[found.chosen]
+    used = {"header": "header stamps", "receive": "the recorder's receive times"}[found.chosen]
     about = []
     if found.delay_s == 0 and found.delay_jitter_s == 0:
-        about.append("receive times are identical")
+        about.append("the recorder's receive times are equal to the stamps")
     elif found.delay_s is not None:
-        about.append(f"received {_delay_text(found.delay_s)} the stamp (± {(found.delay_jitter_s or 0) * 1e3:.1f} ms)")
+        jitter = f"± {(found.delay_jitter_s or 0) * 1e3:.1f} ms"
+        about.append(f"the recorder received each message {_delay_text(found.delay_s)} its stamp ({jitter})")
     about.extend(found.remarks)
-    return (f"{used}, because {found.reason}", *(["; ".join(about)] if about else []))
+    return (f"times are {used}, because {found.reason}", *(["; ".join(about)] if about else []))
 
 
 def _delay_text(delay_s: float) -> str:

@@ -8,7 +8,7 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.radar.list_messages import PointLayout, first_of_scans
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.stamping import StampedTopic, read_stamps
-from calib_core.recordings.time.clock_choice import Stamps, choose_clock
+from calib_core.recordings.time.clock_choice import choose_clock
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, diagnose
 from calib_core.recordings.topics import join_topics
 from calib_core.recordings.usages import usage_of
@@ -38,9 +38,10 @@ def other_clocks(recording: Recording) -> Mapping[str, ClockDiagnosis]:
 
 
 def _diagnosis(both: StampedTopic) -> ClockDiagnosis:
-    stamps = Stamps(both.topic.name, both.topic.receive_ns, both.header_ns)
+    usage = usage_of(both.topic)
+    one_per_return = isinstance(usage.radar, PointLayout)
+    stamps = both.clocks(usage.distinct_times)
     clock = choose_clock(stamps).clocks[0]
     times = both.header_ns if clock == "header" and both.header_ns is not None else both.topic.receive_ns
-    one_per_return = isinstance(usage_of(both.topic).radar, PointLayout)
     times = np.sort(times[first_of_scans(times)] if one_per_return else times)
     return diagnose(stamps, times_ns=times, chosen=clock, requested="auto", one_per_return=one_per_return)

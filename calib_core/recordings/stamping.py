@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import TimesNs
+from calib_core.recordings.time.clock_faults import Stamps
 from calib_core.recordings.topics import Topic, read_heads
 
 __all__ = ["StampedTopic", "read_stamps"]
@@ -28,6 +29,17 @@ class StampedTopic:
     heads: np.ndarray
     lost: int = 0
     fault: str = ""
+
+    def clocks(self, distinct: float) -> Stamps:
+        """Return both clocks of the topic.
+
+        Args:
+            distinct: the least share of different times that is plausible, see Stamps.
+        """
+        files = list({id(source): None for source, _ in self.topic.parts})
+        number = np.array([files.index(id(source)) for source, _ in self.topic.parts], dtype=np.int64)[self.topic.part]
+        written = np.lexsort((self.topic.offset, self.topic.chunk, number))
+        return Stamps(self.topic.name, self.topic.receive_ns, self.header_ns, distinct, written)
 
 
 def read_stamps(topics: Sequence[tuple[Topic, int]]) -> tuple[StampedTopic, ...]:

@@ -9,6 +9,7 @@ from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, Stamp, TimeNs
 from calib_core.recordings.other_clocks import other_clocks
 from calib_core.recordings.recording import Recording
+from calib_core.recordings.time.shared_time import SharedTime, shared_time
 from calib_core.recordings.topics import Rhythm, TopicSummary
 from calib_core.results import DataWarning
 
@@ -98,7 +99,8 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
         start: first stamp of the topics in use, or of all topics if none is in use.
         end: last stamp of the same topics.
         duration_s: from start to end.
-        overlap_s: time covered by both radar and camera [s]; None if one is missing.
+        overlap_s: time for which radar and camera both have data, without gaps of either [s]; None if one is missing.
+        overlap_stretches: number of stretches of that time; None if one is missing.
         topics: by name.
         radar: None if there is none.
         camera: None if there is none.
@@ -110,6 +112,7 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
     end: Stamp | None
     duration_s: float
     overlap_s: float | None
+    overlap_stretches: int | None
     topics: tuple[TopicSummary, ...]
     radar: RadarSummary | None
     camera: CameraSummary | None
@@ -123,12 +126,14 @@ def recording_summary(recording: Recording) -> RecordingSummary:
     timed = used or recording.topics
     start = min((topic.start.time for topic in timed if topic.start is not None), default=None)
     end = max((topic.end.time for topic in timed if topic.end is not None), default=None)
+    shared = _shared(recording)
     return RecordingSummary(
         files=tuple(FileSummary(s.path.name, s.size_bytes, s.container) for s in recording.sources),
         start=Stamp.of(start) if start is not None else None,
         end=Stamp.of(end) if end is not None else None,
         duration_s=(end - start) / NS_PER_S if start is not None and end is not None else 0.0,
-        overlap_s=_overlap_s(recording),
+        overlap_s=shared.seconds if shared is not None else None,
+        overlap_stretches=shared.stretches if shared is not None else None,
         topics=tuple(replace(topic, clocks=topic.clocks or spare.get(topic.name)) for topic in recording.topics),
         radar=_radar(recording),
         camera=_camera(recording),
@@ -136,11 +141,9 @@ def recording_summary(recording: Recording) -> RecordingSummary:
     )
 
 
-def _overlap_s(recording: Recording) -> float | None:
+def _shared(recording: Recording) -> SharedTime | None:
     radar, images = recording.radar_times, recording.image_times
-    if not (len(radar) and len(images)):
-        return None
-    return max(0.0, (min(int(radar[-1]), int(images[-1])) - max(int(radar[0]), int(images[0]))) / NS_PER_S)
+    return shared_time(radar, images) if len(radar) and len(images) else None
 
 
 def _radar(recording: Recording) -> RadarSummary | None:

@@ -9,6 +9,8 @@ from calib_core.recordings.camera.images import ImageLayout, is_picture
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.axes import RadarAxes
 from calib_core.recordings.radar.layouts import RadarLayout, recognise
+from calib_core.recordings.radar.list_messages import PointLayout
+from calib_core.recordings.time.clock_faults import HALF_DISTINCT, RETURNS_DISTINCT
 from calib_core.recordings.topics import Topic, TopicKind
 
 __all__ = ["Usage", "usage_of"]
@@ -35,6 +37,11 @@ class Usage:
     problem: str | None = None
     radar: RadarLayout | None = None
     image: ImageLayout | None = None
+
+    @property
+    def distinct_times(self) -> float:
+        """The least share of different times that is plausible among its messages."""
+        return RETURNS_DISTINCT if isinstance(self.radar, PointLayout) else HALF_DISTINCT
 
     def read_as(self, axes: RadarAxes | None) -> "Usage":
         """Apply the user's --radar-axes."""

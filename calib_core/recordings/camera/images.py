@@ -1,6 +1,7 @@
 """Read camera images: JPEG and PNG are passed through, raw pixels are converted and encoded once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import takewhile
 from typing import Literal
 
 import numpy as np
@@ -129,6 +130,24 @@ class ImageLayout:
         except MessageError as error:
             raise self._refused(str(error)) from error
         return pixels.shape[1], pixels.shape[0]
+
+    def size_in_head(self, head: bytes) -> tuple[int, int] | None:
+        """Return width and height from the first bytes of a message; None if they are further on or cannot be read."""
+        try:
+            if not self.compressed:
+                message = decode(self._before("encoding"), head)
+                return message.whole("width"), message.whole("height")
+            start = min((place for magic in (JPEG_MAGIC, PNG_MAGIC) if (place := head.find(magic)) >= 0), default=-1)
+            data = head[start:] if start >= 0 else b""
+            return png_size(data)[:2] if data.startswith(PNG_MAGIC) else repaired_jpeg(data)[1:]
+        except MessageError:
+            return None
+
+    def _before(self, name: str) -> Definition:
+        """Return a definition of the fields before one of them."""
+        definition = self.definition
+        fields = tuple(takewhile(lambda field: field.name != name, definition.fields))
+        return replace(definition, types={**definition.types, definition.type: fields})
 
     def encoded(self, payload: bytes) -> EncodedImage:
         """Return the frame as an image file: the recorded one, or raw pixels encoded as JPEG.

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from calib_core.errors import MessageError
 
-__all__ = ["JPEG_MAGIC", "PNG_MAGIC", "png_size", "repaired_jpeg"]
+__all__ = ["JPEG_MAGIC", "PNG_MAGIC", "has_end", "png_size", "repaired_jpeg"]
 
 JPEG_MAGIC = b"\xff\xd8\xff"
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
@@ -40,7 +40,12 @@ def repaired_jpeg(data: bytes) -> tuple[bytes, int, int]:
     if kept:
         data = b"".join([*kept, data[kept_from:]])
     height, width = size
-    return (data if _END in data[-1024:] else data + _END), width, height
+    return (data if has_end(data) else data + _END), width, height
+
+
+def has_end(data: bytes) -> bool:
+    """Return whether a JPEG ends with its end marker, or shortly before its end: some cameras pad with zeros."""
+    return _END in data[-1024:]
 
 
 def _segments(data: bytes) -> Iterator[tuple[int, int, int]]:

@@ -79,8 +79,8 @@ def image_stream(topic: Topic, layouts: Sequence[ImageLayout], stamps_ns: TimesN
         return stream
     kept = stream.row >= key
     return VideoStream(
-        topic, layouts, stream.times_ns[kept], stream.row[kept], stream.repeated, PacketDecoder(video_packet, len(topic)),
-        int((~kept).sum()),
+        topic, layouts, stream.times_ns[kept], stream.row[kept], stream.repeated,
+        decoder=PacketDecoder(video_packet, len(topic)), before_key=int((~kept).sum()),
     )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from calib_core.arrays import Indices, TimesNs
 from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.results import DataWarning
 
 __all__ = ["Channel", "Encoding", "Heads", "MessageIndex", "Source"]
@@ -139,6 +140,10 @@ class Source(Protocol):
             size: number of bytes of each message.
             keep: store them in the user's cache, because the next opening will need the same ones.
         """
+        ...
+
+    def account(self, progress: Progress | None = None) -> FileAccount:
+        """Account for every byte, reading the whole file."""
         ...
 
     def close(self) -> None:

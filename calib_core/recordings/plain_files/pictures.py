@@ -62,6 +62,7 @@ def open_picture_folder(
         counted=stamped.counted,
         numbers=stamped.numbers,
         camera=camera,
+        file_of=lambda row: stamped.files[row],
     )
 
 

@@ -10,6 +10,7 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera
 from calib_core.recordings.plain_files.messages import header_bytes
@@ -18,6 +19,7 @@ from calib_core.results import DataWarning
 __all__ = ["PlainSource", "topic_of"]
 
 _HEADER_BYTES = 16
+_MAX_FAULTS = 5
 
 
 def _no_numbers() -> dict[int, TimeNs]:
@@ -43,6 +45,8 @@ class PlainSource:
         mapped: whether --map was applied to it.
         numbers: times of its files by their numbers, for files of other folders that are only numbered.
         camera: the intrinsics that its data set publishes; None if there are none.
+        file_of: the file of a row, in a folder of one file per row.
+        account_of: accounts for the bytes of a file whose format says what they are.
     """
 
     path: Path
@@ -59,6 +63,8 @@ class PlainSource:
     mapped: bool = False
     numbers: Mapping[int, TimeNs] = field(default_factory=_no_numbers)
     camera: FolderCamera | None = None
+    file_of: Callable[[int], Path] | None = None
+    account_of: Callable[[Progress | None], FileAccount] | None = None
 
     def __post_init__(self) -> None:
         """Refuse times that a message cannot represent.
@@ -114,10 +120,35 @@ class PlainSource:
             rows[place, : min(len(head), size)] = np.frombuffer(head[:size], dtype=np.uint8)
         return Heads(rows, lengths, fault)
 
+    def account(self, progress: Progress | None = None) -> FileAccount:
+        """Account for every byte: files that are read, damaged ones, and files of a folder that are not used."""
+        if self.account_of is not None:
+            return self.account_of(progress)
+        bad, faults = set(), []
+        for row in range(len(self.times_ns)):
+            if progress is not None:
+                progress(row, len(self.times_ns))
+            try:
+                self.message(row)
+            except RecordingError as error:
+                bad.add(self.file_of(row) if self.file_of is not None else self.path)
+                faults.append(str(error))
+        damaged = min(sum(path.stat().st_size for path in bad), self.size_bytes)
+        unused = _folder_bytes(self.path) - self.size_bytes if self.path.is_dir() else 0
+        return FileAccount(
+            {"messages": self.size_bytes - damaged, "damaged": damaged, "unknown": max(0, unused)},
+            damaged={self.channel.id: len(faults)} if faults else {},
+            faults=tuple(faults[:_MAX_FAULTS]),
+        )
+
     def close(self) -> None:
         """Close the source."""
         if self.closed is not None:
             self.closed()
+
+
+def _folder_bytes(folder: Path) -> int:
+    return sum(file.stat().st_size for file in folder.iterdir() if file.is_file())
 
 
 def topic_of(path: Path, word: str) -> str:

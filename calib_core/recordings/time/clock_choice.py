@@ -1,7 +1,8 @@
 """Choose between the two clocks of a recording: the stamps in the messages and the recorder's receive times.
 
 Header stamps are the time of measurement and the default. Receive times are used if the stamps cannot be right; the
-other sensor must then not silently stay on a different clock.
+other sensor must then not silently stay on a different clock. Receive times that cannot be right themselves are used
+only where the stamps are worse.
 """
 
 from dataclasses import dataclass
@@ -11,39 +12,25 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S
+from calib_core.recordings.time.clock_faults import (
+    Stamps,
+    ancient,
+    disorder,
+    distinct_times,
+    header_fault,
+    receive_fault,
+)
 from calib_core.recordings.time.dates import span_text
 from calib_core.results import DataWarning
 
-__all__ = ["Clock", "ClockChoice", "Stamps", "choose_clock", "choose_clocks", "header_fault"]
+__all__ = ["Clock", "ClockChoice", "choose_clock", "choose_clocks"]
 
 Clock = Literal["auto", "header", "receive"]
-_YEAR_2000_NS = 946_684_800 * NS_PER_S
-_MANY = 0.01
 _AGREE_NS = NS_PER_S
 _BLOCK = 11
 _FEW_BLOCKS = 0.05
 _FEWEST_BLOCKS, _MOST_BLOCKS = 4, 1000
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Stamps:
-    """Both clocks of one topic, message by message in the order received.
-
-    Attributes:
-        topic: its name.
-        receive_ns: (n,) the recorder's clock.
-        header_ns: (n,) the stamps in the messages; None if they carry none.
-    """
-
-    topic: str
-    receive_ns: TimesNs
-    header_ns: TimesNs | None
-
-    @property
-    def offset_ns(self) -> float:
-        """Median of receive time minus stamp [ns]."""
-        assert self.header_ns is not None
-        return float(np.median(self.receive_ns - self.header_ns))
+_CLOCK_WORDS = {"header": "stamps", "receive": "receive times"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,39 +46,6 @@ class ClockChoice:
     warnings: tuple[DataWarning, ...]
 
 
-def header_fault(stamps: Stamps) -> str | None:
-    """Explain why the header stamps of a topic cannot be used, as a phrase that follows its name; None if they can."""
-    header, n = stamps.header_ns, len(stamps.receive_ns)
-    if header is None:
-        return "has no stamps"
-    if n == 0:
-        return None
-    zero = int(np.count_nonzero(header == 0))
-    if zero == n:
-        return f"has only zero stamps ({n} messages)"
-    if n > 1 and np.all(header == header[0]):
-        return f"has the same stamp in all {n} messages"
-    if zero > _MANY * n:
-        return f"has {zero} zero stamps in {n} messages"
-    if _ancient(header) and not _ancient(stamps.receive_ns):
-        seconds = float(np.median(header)) / NS_PER_S
-        return f"has stamps from the year 1970 ({seconds:.3f} s), which count from the start of a device"
-    return _disorder(header[header != 0])
-
-
-def _ancient(times_ns: TimesNs) -> bool:
-    return bool(np.median(times_ns) < _YEAR_2000_NS)
-
-
-def _disorder(header: TimesNs) -> str | None:
-    steps = np.diff(header)
-    back = int(np.count_nonzero(steps < 0))
-    worst_s = -float(steps.min(initial=0)) / NS_PER_S
-    if back > max(1, _MANY * len(steps)) or worst_s > 1.0:
-        return f"has {back} of {len(header)} stamps that go backwards, by up to {worst_s:.3f} s"
-    return None
-
-
 def choose_clocks(radar: Stamps, camera: Stamps, requested: Clock = "auto") -> ClockChoice:
     """Choose the clock of both sensors so that their times can be compared.
 
@@ -103,6 +57,8 @@ def choose_clocks(radar: Stamps, camera: Stamps, requested: Clock = "auto") -> C
     if requested != "auto":
         return ClockChoice((requested, requested), ())
     both = (radar, camera)
+    if any(receive_fault(stamps) for stamps in both):
+        return _without_the_recorder(both)
     faults = tuple(header_fault(stamps) for stamps in both)
     if faults == (None, None) or (_from_boot(radar) and _from_boot(camera) and _near(radar, camera)):
         return _both_usable(radar, camera)
@@ -117,12 +73,52 @@ def choose_clocks(radar: Stamps, camera: Stamps, requested: Clock = "auto") -> C
     return ClockChoice(("receive", "receive"), tuple(warnings))
 
 
+def _without_the_recorder(both: tuple[Stamps, Stamps]) -> ClockChoice:
+    """Choose the better clock of each topic where receive times cannot be right, and so tell nothing about the stamps."""
+    choices = [_better(stamps) for stamps in both]
+    clocks = tuple(choice.clocks[0] for choice in choices)
+    warnings = [warning for choice in choices for warning in choice.warnings]
+    if len(set(clocks)) > 1:
+        names = " and ".join(
+            f"{stamps.topic} ({_CLOCK_WORDS[clock]})" for stamps, clock in zip(both, clocks, strict=True)
+        )
+        warnings.append(
+            DataWarning(
+                "mixed-clocks",
+                f"the times of {names} come from clocks that cannot be compared, because each topic has only one usable clock",
+                "check in the page that radar and picture show the same moment; if they do not, record again",
+            )
+        )
+    return ClockChoice(clocks, tuple(warnings))
+
+
+def _better(stamps: Stamps) -> ClockChoice:
+    """Choose the better clock of one topic: the one without fault, or else the one with more different times."""
+    fault, received = header_fault(stamps), receive_fault(stamps)
+    if fault is None or (_from_boot(stamps) and received is not None):
+        return ClockChoice(("header",), ())
+    if received is None:
+        return ClockChoice(("receive",), (_fell_back(stamps, fault),))
+    by_stamps = stamps.header_ns is not None and distinct_times(stamps.header_ns) > distinct_times(stamps.receive_ns)
+    clock: Literal["header", "receive"] = "header" if by_stamps else "receive"
+    return ClockChoice(
+        (clock,),
+        (
+            DataWarning(
+                "stamps-unusable",
+                f"{stamps.topic} {fault}, and {received}; its {_CLOCK_WORDS[clock]} are used, which have more different times",
+                "do not trust times of this topic: record again with a driver that fills in header.stamp",
+            ),
+        ),
+    )
+
+
 def _from_boot(stamps: Stamps) -> bool:
     """Return whether stamps are sound but close to 1970: simulated time, or a machine whose date is not set."""
     if stamps.header_ns is None or not len(stamps.header_ns) or not stamps.header_ns.any():
         return False
     constant = len(stamps.header_ns) > 1 and bool(np.all(stamps.header_ns == stamps.header_ns[0]))
-    return _ancient(stamps.header_ns) and not constant and _disorder(stamps.header_ns) is None
+    return ancient(stamps.header_ns) and not constant and disorder(stamps.header_ns) is None
 
 
 def _near(radar: Stamps, camera: Stamps) -> bool:
@@ -203,7 +199,4 @@ def choose_clock(stamps: Stamps, requested: Clock = "auto") -> ClockChoice:
     """Choose the clock of a single topic."""
     if requested != "auto":
         return ClockChoice((requested,), ())
-    fault = header_fault(stamps)
-    if fault is None or _from_boot(stamps):
-        return ClockChoice(("header",), ())
-    return ClockChoice(("receive",), (_fell_back(stamps, fault),))
+    return ClockChoice(("header",), ()) if _from_boot(stamps) else _better(stamps)

@@ -8,13 +8,13 @@ import numpy as np
 
 from calib_core.arrays import TimesNs, Values
 from calib_core.measurements import NS_PER_S
-from calib_core.recordings.time.clock_choice import Clock, Stamps, header_fault
+from calib_core.recordings.time.clock_choice import Clock
+from calib_core.recordings.time.clock_faults import YEAR_2000_NS, Stamps, header_fault, receive_fault
 from calib_core.recordings.time.dates import span_text
 from calib_core.results import DataWarning
 
 __all__ = ["ClockDiagnosis", "about_clocks", "between_islands", "diagnose"]
 
-_YEAR_2000_NS = 946_684_800 * NS_PER_S
 _GAP_PERIODS = 5.0
 _ISLAND_S = 10.0
 _JUMP_S = 0.25
@@ -37,7 +37,7 @@ class ClockDiagnosis:
         repeated_stamps: number of stamps equal to the previous one.
         backward_stamps: number of stamps earlier than the previous one.
         worst_step_back_s: the largest such step [s].
-        delay_s: median receive time minus stamp [s].
+        delay_s: median receive time minus stamp [s]; None if the receive times cannot be right.
         delay_jitter_s: median absolute deviation of that delay from its median [s].
         drift_ppm: by how much the stamps run faster than the receive times [ppm]; None for short recordings.
         drift_s: the total drift over the recording [s].
@@ -136,7 +136,10 @@ def diagnose(
     found = _with_rhythm(found, times_ns)
     if stamps.header_ns is None or not len(stamps.header_ns):
         return found
-    found = _with_delay(_with_order(found, stamps.header_ns), stamps.header_ns, stamps.receive_ns)
+    found = _with_order(found, stamps.header_ns)
+    if receive_fault(stamps) is not None:
+        return found
+    found = _with_delay(found, stamps.header_ns, stamps.receive_ns)
     if chosen == "header" and requested == "auto" and (found.jumps or found._drifts):
         return replace(
             found, reason="the stamps are in order, although they jump or drift relative to the receive times"
@@ -147,7 +150,9 @@ def diagnose(
 def _reason(stamps: Stamps, chosen: str, requested: Clock) -> str:
     if requested != "auto":
         return f"--clock {requested} was given"
-    fault = header_fault(stamps)
+    fault, received = header_fault(stamps), receive_fault(stamps)
+    if chosen == "header" and received is not None:
+        return f"{received}, and the stamps {'are sound' if fault is None else 'have more different times'}"
     if chosen == "header":
         return (
             "the stamps are sound" if fault is None else "the stamps are not dates, but both sensors use the same clock"
@@ -182,7 +187,7 @@ def _with_order(found: ClockDiagnosis, header_ns: TimesNs) -> ClockDiagnosis:
     return replace(
         found,
         zero_stamps=len(header_ns) - len(dated),
-        from_1970=bool(len(dated)) and bool(np.median(dated) < _YEAR_2000_NS),
+        from_1970=bool(len(dated)) and bool(np.median(dated) < YEAR_2000_NS),
         repeated_stamps=int(np.count_nonzero(steps_ns == 0)),
         backward_stamps=int(np.count_nonzero(steps_ns < 0)),
         worst_step_back_s=max(0.0, -float(steps_ns.min(initial=0)) / NS_PER_S),

@@ -29,18 +29,18 @@ files     recording.bag  {size}  ROS 1 bag, lz4
 time      2023-11-14 22:13:20.030 UTC to 2023-11-14 22:13:21.950 UTC, 1.9 s
           1700000000.030 to 1700000001.950 s since 1970
           61 messages in 4 topics
-          radar and camera overlap for 1.9 s
+          radar and camera both have data for 1.9 s
 
-used as     topic                     type                         messages     rate  longest gap  jitter  clock
-intrinsics  /camera/camera_info       sensor_msgs/CameraInfo             20  10.0 Hz      0.100 s  0.0 ms  receive
-camera      /camera/image/compressed  sensor_msgs/CompressedImage        20  10.0 Hz      0.100 s  0.0 ms  header
-            /odd                      std_msgs/String                     1                                receive
-radar       /radar/points             sensor_msgs/PointCloud2            20  10.0 Hz      0.100 s  0.0 ms  header
+used as     topic                     type                         messages     rate  longest gap  jitter  times used
+intrinsics  /camera/camera_info       sensor_msgs/CameraInfo             20  10.0 Hz      0.100 s  0.0 ms
+camera      /camera/image/compressed  sensor_msgs/CompressedImage        20  10.0 Hz      0.100 s  0.0 ms  stamps
+            /odd                      std_msgs/String                     1
+radar       /radar/points             sensor_msgs/PointCloud2            20  10.0 Hz      0.100 s  0.0 ms  stamps
 
-clocks    /camera/image/compressed: header stamps, because the stamps are sound
-            received 30.0 ms after the stamp (± 0.0 ms)
-          /radar/points: header stamps, because the stamps are sound
-            receive times are identical
+clocks    /camera/image/compressed: times are header stamps, because the stamps are sound
+            the recorder received each message 30.0 ms after its stamp (± 0.0 ms)
+          /radar/points: times are header stamps, because the stamps are sound
+            the recorder's receive times are equal to the stamps
 radar     /radar/points, frame 'radar': 20 scans at 10.0 Hz, longest gap 0.100 s
           returns per scan: 4 (4 to 4)
           position from x, y, z (forward, left, up); speed from velocity; amplitude from snr

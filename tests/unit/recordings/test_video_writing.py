@@ -44,7 +44,7 @@ def test_every_frame_is_in_the_video_as_recorded_at_its_recorded_time(ros, write
     assert [path.name for path in tmp_path.glob("*.part")] == []
 
 
-def test_png_is_encoded_and_unusable_frames_are_skipped_and_counted(ros1, write, jpeg, tmp_path):
+def test_png_is_encoded_and_unusable_frames_are_skipped_with_warnings(ros1, write, jpeg, tmp_path):
     pytest.importorskip("av")
     import cv2
 
@@ -53,8 +53,9 @@ def test_png_is_encoded_and_unusable_frames_are_skipped_and_counted(ros1, write,
     path = write(ros1, camera_rows(ros1, [jpeg, png, other, jpeg[:2] + bytes(50), jpeg]))
     with open_recording(path, require=("image",)) as recording:
         written = write_video(recording, tmp_path / "camera.mp4")
-    assert (written.frames, written.other_size, written.unreadable) == (3, 1, 1)
-    assert "neither JPEG nor PNG" in written.fault
+        assert [warning.code for warning in recording.warnings] == ["picture-sizes", "unreadable-pictures"]
+        assert "neither JPEG nor PNG" in recording.warnings[1].message
+    assert (written.frames, written.other_size, written.unreadable) == (3, 0, 0)
     assert [data[:2] for _, data in packets(tmp_path / "camera.mp4")] == [b"\xff\xd8"] * 3
 
 

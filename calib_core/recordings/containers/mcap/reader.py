@@ -2,13 +2,18 @@
 
 import struct
 import zlib
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calib_core.errors import RecordingError
+from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.recordings.containers.chunks import FIRST_CHUNKS, ChannelFilter, Chunk, ChunkedSource
+from calib_core.recordings.containers.indexed_places import IndexedPlaces
+from calib_core.recordings.containers.mcap.account import account_for_mcap
 from calib_core.recordings.containers.mcap.records import (
+    BETWEEN_CHUNKS,
     CHUNK_INDEX,
     FOOTER,
     MAGIC,
@@ -16,6 +21,7 @@ from calib_core.recordings.containers.mcap.records import (
     MESSAGE,
     MESSAGE_HEAD,
     MESSAGE_INDEX,
+    PRIVATE,
     RECORD,
     STATISTICS,
     ChunkInfo,
@@ -55,7 +61,7 @@ class McapSource(ChunkedSource):
     def __init__(self, file: "FileBytes", *, first_of: ChannelFilter | None = None) -> None:
         super().__init__(file, whole=first_of is None)
         self._found: dict[int, list[np.ndarray]] = {}
-        self._counted = 0
+        self._counted = self._private_bytes = 0
         if first_of is not None:
             self._read_beginning(first_of)
         elif not self.restore():
@@ -78,6 +84,8 @@ class McapSource(ChunkedSource):
         if not indexed:
             self._scan(closed=closed)
         self._found.clear()
+        if self._private_bytes:
+            self.warnings = (*self.warnings, _about_private(self.path, self._private_bytes))
 
     def _summary_start(self) -> int | None:
         """Return the position of the summary; 0 for a file without one, None for a file that was not closed."""
@@ -98,13 +106,36 @@ class McapSource(ChunkedSource):
         if not self._summary_is_sound(start):
             raise self._damaged(start)
         infos = self._read_chunk_infos(start)
+        if not infos:
+            return False
+        self._require_nothing_unindexed(infos, start)
         self.file.expect([info.index_place for info in infos])
         for info in infos:
             self._read_chunk_index(info)
         known = {channel.id for channel in self.channels}
-        count = sum(len(part) for parts in self._found.values() for part in parts)
-        complete = all(info.index_bytes > 0 for info in infos)
-        return bool(infos) and complete and known >= self._found.keys() and count >= self._counted
+        found = {channel: sum(map(len, parts)) for channel, parts in self._found.items()}
+        complete = all(info.index_bytes > 0 for info in infos) and sum(found.values()) >= self._counted
+        complete = complete and all(found.get(channel, 0) >= count for channel, count in self.counts.items())
+        return complete and known >= self._found.keys()
+
+    def _require_nothing_unindexed(self, infos: list[ChunkInfo], end: int) -> None:
+        """Refuse chunks, messages and unknown bytes between the chunks that the summary names.
+
+        Raises:
+            RecordingError: there are some, or chunks overlap.
+        """
+        place = len(MAGIC)
+        for begin, after in sorted([(info.position, info.index_place[1]) for info in infos] + [(end, end)]):
+            while place < begin:
+                head = self.file.up_to(place, RECORD.size)
+                kind, size = RECORD.unpack(head) if len(head) == RECORD.size else (0, 0)
+                if kind not in BETWEEN_CHUNKS and kind < PRIVATE:
+                    raise self._damaged(place)
+                self._private_bytes += RECORD.size + size if kind >= PRIVATE else 0
+                place += RECORD.size + size
+            if place != begin:
+                raise self._damaged(begin)
+            place = after
 
     def _read_beginning(self, first_of: ChannelFilter) -> None:
         """Read the indexes of the first chunks of some channels.
@@ -164,20 +195,26 @@ class McapSource(ChunkedSource):
         first_byte, last_byte = info.index_place
         block = MemoryStretch(self.file.at(first_byte, last_byte - first_byte))
         end = 0
+        indexed = set()
         for kind, first, length in walk(block):
             end = first + length
-            if kind == MESSAGE_INDEX:
-                self._read_message_index(number, block.data[first:end], first_byte + first)
-        if end != block.size:
+            if kind != MESSAGE_INDEX:
+                raise self._damaged(first_byte + first)
+            indexed.add(self._read_message_index(number, block.data[first:end], first_byte + first))
+        if end != block.size or (block.size and not indexed >= set(info.channels)):
             raise self._damaged(first_byte + end)
 
-    def _read_message_index(self, chunk: int, record: bytes, position: int) -> None:
+    def _read_message_index(self, chunk: int, record: bytes, position: int) -> int:
+        """Record the entries of one channel in a chunk; return its number."""
         channel, size = struct.unpack_from("<HI", record.ljust(6, b"\xff"))
-        if len(record) < 6 + size:
+        if len(record) != 6 + size or size % _INDEX_ENTRY.itemsize or not size:
             raise self._damaged(position)
         entries = np.frombuffer(record, dtype=_INDEX_ENTRY, count=size // _INDEX_ENTRY.itemsize, offset=6)
         times, offsets = entries["time"].astype(np.int64), entries["offset"].astype(np.int64)
+        if len(np.unique(offsets)) < len(offsets):
+            raise self._damaged(position)
         self._found.setdefault(channel, []).append(np.stack([times, np.full_like(times, chunk), offsets], axis=1))
+        return int(channel)
 
     def _note_indexes(self) -> None:
         for channel, parts in self._found.items():
@@ -191,6 +228,7 @@ class McapSource(ChunkedSource):
             closed: whether the file ends properly; a scan without losses then needs no warning.
         """
         found = scan_mcap(self.file)
+        self._private_bytes = found.private_bytes
         self.chunks, self.channels, self.recovered = found.chunks, found.declarations.channels, True
         self.indexes = {}
         self._found = {channel: [np.array(entries, dtype=np.int64)] for channel, entries in found.messages.items()}
@@ -222,6 +260,11 @@ class McapSource(ChunkedSource):
             "check that the data you need is there; the rest was lost before or while the file was written",
         )
 
+    def account(self, progress: Progress | None = None) -> FileAccount:
+        """Account for every byte, reading the whole file."""
+        places = IndexedPlaces(self.indexes, [chunk.position for chunk in self.chunks])
+        return account_for_mcap(self.file, places, progress)
+
     # -- reading
 
     def checksum(self, chunk: int) -> int:
@@ -244,6 +287,14 @@ class McapSource(ChunkedSource):
         """Recognise message records, which all have the same layout."""
         sizes = np.ascontiguousarray(rows[:, 1:9]).view("<i8")[:, 0] - MESSAGE_HEAD.size
         return (rows[:, 0] == MESSAGE) & (sizes >= 0) & (sizes <= MAX_RECORD_BYTES), sizes
+
+
+def _about_private(path: Path, count: int) -> DataWarning:
+    return DataWarning(
+        "unknown-records",
+        f"{path.name} contains {count} bytes in records of kinds that the format leaves to other programs; they are skipped",
+        "no action needed if the program that wrote the file adds such records; otherwise the file is damaged: copy it again",
+    )
 
 
 def _shows(infos: list[ChunkInfo], declared: Declarations, first_of: ChannelFilter) -> bool:

@@ -8,19 +8,24 @@ from calib_core.recordings.containers.positioned_reads import Stretch
 from calib_core.recordings.containers.sources import Channel
 
 __all__ = [
+    "BETWEEN_CHUNKS",
     "CHANNEL",
     "CHUNK",
     "CHUNK_INDEX",
+    "CHUNK_KINDS",
     "DATA_END",
+    "DATA_KINDS",
     "FOOTER",
     "MAGIC",
     "MAX_RECORD_BYTES",
     "MESSAGE",
     "MESSAGE_HEAD",
     "MESSAGE_INDEX",
+    "PRIVATE",
     "RECORD",
     "SCHEMA",
     "STATISTICS",
+    "SUMMARY_KINDS",
     "ChunkHead",
     "ChunkInfo",
     "Declarations",
@@ -35,6 +40,16 @@ __all__ = [
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 2, 3, 4, 5, 6, 7, 8
 STATISTICS, DATA_END = 11, 15
+_HEADER, _ATTACHMENT, _ATTACHMENT_INDEX, _METADATA, _METADATA_INDEX, _SUMMARY_OFFSET = 1, 9, 10, 12, 13, 14
+CHUNK_KINDS = frozenset({SCHEMA, CHANNEL, MESSAGE})
+BETWEEN_CHUNKS = frozenset({_HEADER, SCHEMA, CHANNEL, _ATTACHMENT, _METADATA, DATA_END})
+DATA_KINDS = BETWEEN_CHUNKS - {DATA_END} | {MESSAGE, MESSAGE_INDEX}
+SUMMARY_KINDS = frozenset(
+    {SCHEMA, CHANNEL, STATISTICS, CHUNK_INDEX, _ATTACHMENT_INDEX, _METADATA_INDEX, _SUMMARY_OFFSET, FOOTER}
+)
+PRIVATE = 0x80
+"""Kinds from here on belong to other programs."""
+
 RECORD = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 MAX_RECORD_BYTES = 1 << 28

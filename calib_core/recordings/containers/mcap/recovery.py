@@ -2,7 +2,8 @@
 
 import re
 import zlib
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.containers.chunks import Chunk
@@ -10,14 +11,18 @@ from calib_core.recordings.containers.compression import refuse_bomb, unpack, un
 from calib_core.recordings.containers.mcap.records import (
     CHANNEL,
     CHUNK,
+    CHUNK_KINDS,
     DATA_END,
+    DATA_KINDS,
     FOOTER,
     MAGIC,
     MAX_RECORD_BYTES,
     MESSAGE,
     MESSAGE_HEAD,
+    PRIVATE,
     RECORD,
     SCHEMA,
+    SUMMARY_KINDS,
     ChunkHead,
     Declarations,
     chunk_head,
@@ -25,12 +30,13 @@ from calib_core.recordings.containers.mcap.records import (
 )
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
 
-__all__ = ["FoundInMcap", "scan_mcap"]
+__all__ = ["FoundInMcap", "Part", "parts_of_mcap", "scan_mcap"]
 
 _CANDIDATE = re.compile(rb"[\x03-\x06][\x00-\xff]{4}\x00\x00\x00\x00")
 _COMPRESSIONS = ("", "lz4", "zstd")
 _MAX_TRIES = 20_000
-_LAST_KIND, _PRIVATE = 15, 0x80
+_LAST_KIND = 15
+_END_SIZES = {DATA_END: 4, FOOTER: 20}
 
 
 @dataclass(slots=True)
@@ -43,6 +49,7 @@ class FoundInMcap:
         messages: (log time [ns], chunk, offset) by channel.
         ended: whether the scan reached the end of the data without errors.
         lost_bytes: number of bytes that could not be parsed, in the file and in decompressed chunks.
+        private_bytes: number of bytes in records of kinds that the format leaves to other programs.
         damaged_chunks: number of chunks that could not be fully decompressed.
         fault: why the first of those could not.
         tried: number of attempts to find a record after a damaged stretch; bounded.
@@ -53,9 +60,27 @@ class FoundInMcap:
     messages: dict[int, list[tuple[int, int, int]]] = field(default_factory=dict)
     ended: bool = False
     lost_bytes: int = 0
+    private_bytes: int = 0
     damaged_chunks: int = 0
     fault: str = ""
     tried: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One record of the data section, or bytes between records that do not parse.
+
+    Attributes:
+        kind: of the record; 0 for bytes that do not parse.
+        place: position of its first byte.
+        start: position of its body.
+        end: position after it.
+    """
+
+    kind: int
+    place: int
+    start: int
+    end: int
 
 
 def scan_mcap(file: FileBytes) -> FoundInMcap:
@@ -65,45 +90,76 @@ def scan_mcap(file: FileBytes) -> FoundInMcap:
         file: the file.
     """
     found = FoundInMcap(Declarations(), [Chunk(0, file.size_bytes, file.size_bytes, "")])
+    for part in parts_of_mcap(file, found):
+        if not part.kind:
+            found.lost_bytes += part.end - part.place
+    return found
+
+
+def parts_of_mcap(file: FileBytes, found: FoundInMcap) -> Iterator[Part]:
+    """Walk through the data section, and note what is in it; stop before the summary.
+
+    Args:
+        file: the file.
+        found: takes messages, declarations and losses inside chunks.
+    """
     stretch = FileStretch(file, 0, file.size_bytes)
     place = len(MAGIC)
     while place + RECORD.size <= stretch.size and not found.ended:
         kind, size = RECORD.unpack(stretch.up_to(place, RECORD.size))
         start = place + RECORD.size
-        whole = _possible(kind) and size <= stretch.size - start
+        whole = size <= stretch.size - start
+        part = Part(kind, place, start, start + size)
         if kind == CHUNK and (head := chunk_head(stretch.up_to(start, 64))) and _sound(head):
             room = min(head.stored_bytes, stretch.size - start - head.size)
             _scan_chunk(file, start + head.size, room, head, found)
-            place = start + head.size + room
-        elif whole and not (kind == MESSAGE and size > MAX_RECORD_BYTES):
-            found.ended = kind in (DATA_END, FOOTER)
-            _note(stretch, kind, start, size, found)
-            place = start + size
-        else:
-            after = _following(stretch, place + 1, found)
-            found.lost_bytes += after - place
-            place = after
-    if not found.ended:
-        found.lost_bytes += stretch.size - min(place, stretch.size)
-    return found
+            part = replace(part, start=start + head.size, end=start + head.size + room)
+        elif whole and _END_SIZES.get(kind) == size and not _data_after(stretch, start + size, found):
+            found.ended = True
+            if kind == FOOTER:
+                return
+        elif not (whole and (kind in DATA_KINDS or kind >= PRIVATE) and _note(stretch, kind, start, size, found)):
+            part = Part(0, place, place, _following(stretch, place + 1, found))
+        yield part
+        place = part.end
+    if not found.ended and place < stretch.size:
+        yield Part(0, place, place, stretch.size)
 
 
-def _possible(kind: int) -> bool:
-    return 0 < kind <= _LAST_KIND or kind >= _PRIVATE
+def _data_after(stretch: Stretch, place: int, found: FoundInMcap) -> bool:
+    """Return whether messages follow a place where only the summary should, which may be damaged."""
+    for kind, start, size in walk(stretch, place):
+        if kind not in SUMMARY_KINDS:
+            break
+        place = start + size
+    if place + len(MAGIC) >= stretch.size:
+        return False
+    after = _following(stretch, place, found)
+    while after < stretch.size:
+        if stretch.up_to(after, 1)[0] in (CHUNK, MESSAGE):
+            return True
+        after = _following(stretch, after + 1, found)
+    return False
 
 
 def _sound(head: ChunkHead) -> bool:
     return head.compression in _COMPRESSIONS and (bool(head.compression) or head.stored_bytes == head.unpacked_bytes)
 
 
-def _note(stretch: Stretch, kind: int, start: int, size: int, found: FoundInMcap, chunk: int = 0) -> None:
-    """Record a message, a schema or a channel."""
-    if kind == MESSAGE and size >= MESSAGE_HEAD.size:
+def _note(stretch: Stretch, kind: int, start: int, size: int, found: FoundInMcap, chunk: int = 0) -> bool:
+    """Record a message, a schema or a channel; False if it is damaged."""
+    if kind == MESSAGE:
+        if not MESSAGE_HEAD.size <= size <= MAX_RECORD_BYTES:
+            return False
         channel, _, log_time, _ = MESSAGE_HEAD.unpack(stretch.up_to(start, MESSAGE_HEAD.size))
-        if log_time < 1 << 63:
-            found.messages.setdefault(channel, []).append((log_time, chunk, start - RECORD.size))
-    elif kind in (SCHEMA, CHANNEL) and size <= MAX_RECORD_BYTES:
-        found.declarations.note(kind, stretch.up_to(start, size))
+        if log_time >= 1 << 63:
+            return False
+        found.messages.setdefault(channel, []).append((log_time, chunk, start - RECORD.size))
+    elif kind in (SCHEMA, CHANNEL):
+        return size <= MAX_RECORD_BYTES and found.declarations.note(kind, stretch.up_to(start, size))
+    elif kind >= PRIVATE:
+        found.private_bytes += RECORD.size + size
+    return True
 
 
 def _following(stretch: Stretch, start: int, found: FoundInMcap) -> int:
@@ -137,9 +193,8 @@ def _scan_chunk(file: FileBytes, position: int, stored: int, head: ChunkHead, fo
     end = 0
     while end + RECORD.size <= size:
         for kind, start, length in walk(stretch, end):
-            if not _possible(kind):
+            if kind not in CHUNK_KINDS or not _note(stretch, kind, start, length, found, number):
                 break
-            _note(stretch, kind, start, length, found, number)
             end = start + length
         if end + RECORD.size > size:
             break

@@ -15,6 +15,7 @@ from calib_core.recordings.containers.sources import MessageIndex
 __all__ = ["BagIndex", "read_indexes"]
 
 _CHUNK = 5
+_INDEX, _CONNECTION = b"\x04", b"\x07"
 _U32 = struct.Struct("<I")
 _ENTRY = np.dtype([("sec", "<u4"), ("nanosec", "<u4"), ("offset", "<u4")])
 _MAX_HEADER_BYTES = 1 << 24
@@ -22,6 +23,7 @@ _MAX_INDEX_BYTES = 1 << 26
 _HEAD_BYTES = 256
 _BLOCK_BYTES = 128  # longer than the header of an index record
 _AHEAD = 256
+_GAP_BYTES = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +34,9 @@ class BagIndex:
     indexes: Mapping[int, MessageIndex]
 
 
-def read_indexes(file: FileBytes, infos: Sequence[ChunkInfo], end: int, picked: Sequence[ChunkInfo]) -> BagIndex:
+def read_indexes(
+    file: FileBytes, infos: Sequence[ChunkInfo], span: tuple[int, int], picked: Sequence[ChunkInfo] | None
+) -> BagIndex:
     """Read the index blocks that follow each chunk.
 
     One read covers the block of a chunk and the header of the next chunk.
@@ -40,12 +44,14 @@ def read_indexes(file: FileBytes, infos: Sequence[ChunkInfo], end: int, picked: 
     Args:
         file: the bag.
         infos: of all chunks.
-        end: end of the last block.
-        picked: the chunks to read.
+        span: end of the bag's header, and end of the last block.
+        picked: the chunks to read; None for all, which must then account for all bytes in between.
 
     Raises:
-        RecordingError: a chunk or a block is damaged.
+        RecordingError: a chunk or a block is damaged, or the file contains chunks or messages that are not indexed.
     """
+    begin, end = span
+    whole, picked = picked is None, infos if picked is None else picked
     ordered = sorted(infos, key=lambda info: info.position)
     following = [info.position for info in ordered[1:]] + [end] * bool(ordered)
     wanted = {info.position for info in picked}
@@ -53,15 +59,62 @@ def read_indexes(file: FileBytes, infos: Sequence[ChunkInfo], end: int, picked: 
     chunks: list[Chunk] = []
     found: dict[int, list[tuple[int, bytes]]] = {}
     windows = _Windows(file, [_window(info, after) for info, after in places])
+    if whole:
+        _require_nothing_unindexed(file, begin, ordered[0].position if ordered else end)
     for number, (info, after) in enumerate(places):
         chunk = _chunk(file, info.position, windows.before(number, info.position))
         chunks.append(chunk)
-        records = _records_of(windows, number, (chunk.position + chunk.stored_bytes, after), info)
-        if records is None:
-            raise damaged(file, chunk.position + chunk.stored_bytes)
-        for connection, entries in records:
+        block = chunk.position + chunk.stored_bytes
+        records = _records_of(windows, number, (block, after), info)
+        if records is None or not _plausible(records.entries, info):
+            raise damaged(file, block)
+        if whole:
+            _require_nothing_unindexed(file, block + records.size, after)
+        for connection, entries in records.entries:
             found.setdefault(connection, []).append((number, entries))
     return BagIndex(chunks, {connection: _merged(parts) for connection, parts in found.items()})
+
+
+def _plausible(records: Sequence[tuple[int, bytes]], info: ChunkInfo) -> bool:
+    """Return whether the entries of a chunk are all different and within the chunk's time."""
+    entries = np.frombuffer(b"".join(data for _, data in records), dtype=_ENTRY)
+    if not len(entries):
+        return True
+    times = entries["sec"].astype(np.int64) * 1_000_000_000 + entries["nanosec"]
+    if int(times.min()) < info.start_ns or int(times.max()) > info.end_ns:
+        return False
+    return len(np.unique(entries["offset"])) == len(entries)
+
+
+def _require_nothing_unindexed(file: FileBytes, begin: int, end: int) -> None:
+    """Refuse chunks, messages, index entries and unknown bytes between the chunks that the index names.
+
+    Raises:
+        RecordingError: there are some.
+    """
+    place = begin
+    while place != end:
+        if place < end and not any(file.up_to(place, min(_GAP_BYTES, end - place))):
+            return  # an empty gap, as some recorders leave it
+        head = file.up_to(place, 4)
+        length = _U32.unpack(head)[0] if len(head) == 4 else _MAX_HEADER_BYTES
+        if place > end or length >= _MAX_HEADER_BYTES:
+            raise damaged(file, begin)
+        record = file.up_to(place + 4, length + 4)
+        fields = fields_of(record[:length]) if len(record) == length + 4 else None
+        kind = fields.get("op", b"") if fields is not None else b""
+        size = _U32.unpack_from(record, length)[0] if fields is not None else 0
+        if kind != _CONNECTION and not (kind == _INDEX and size == 0):
+            raise damaged(file, begin)
+        place += 8 + length + size
+
+
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """The index of one chunk: the entries of each connection, and its size in the file."""
+
+    entries: list[tuple[int, bytes]]
+    size: int
 
 
 def _block_bytes(info: ChunkInfo) -> int:
@@ -74,9 +127,7 @@ def _window(info: ChunkInfo, following: int) -> tuple[int, int]:
     return max(info.position, following - _block_bytes(info)), following + _HEAD_BYTES
 
 
-def _records_of(
-    windows: "_Windows", number: int, place: tuple[int, int], info: ChunkInfo
-) -> list[tuple[int, bytes]] | None:
+def _records_of(windows: "_Windows", number: int, place: tuple[int, int], info: ChunkInfo) -> _Block | None:
     """Return the entries of each connection in a chunk; None if they are damaged.
 
     Args:
@@ -88,7 +139,7 @@ def _records_of(
     room = max(0, min(place[1] - place[0], _MAX_INDEX_BYTES))
     usual = min(_block_bytes(info), room)
     records = _index_records(windows.piece(number, place[0], usual), _connections_in(info))
-    if usual < room and (records is None or len(records) < _connections_in(info)):
+    if usual < room and (records is None or len(records.entries) < _connections_in(info)):
         records = _index_records(windows.piece(number, place[0], room), _connections_in(info))
     return records
 
@@ -153,7 +204,7 @@ def _chunk(file: FileBytes, position: int, ahead: bytes) -> Chunk:
     )
 
 
-def _index_records(block: bytes, wanted: int) -> list[tuple[int, bytes]] | None:
+def _index_records(block: bytes, wanted: int) -> _Block | None:
     """Return the entries of the wanted number of connections, or fewer if the block ends; None if damaged or truncated."""
     records: list[tuple[int, bytes]] = []
     place = 0
@@ -170,7 +221,7 @@ def _index_records(block: bytes, wanted: int) -> list[tuple[int, bytes]] | None:
                 return None
             records.append((_U32.unpack_from(header, mark + 5)[0], block[start : start + size]))
         place = start + size
-    return records
+    return _Block(records, place)
 
 
 def _merged(parts: Sequence[tuple[int, bytes]]) -> MessageIndex:

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calib_core.errors import RecordingError
+from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.recordings.containers.chunks import ChannelFilter, ChunkedSource
+from calib_core.recordings.containers.indexed_places import IndexedPlaces
 from calib_core.recordings.containers.recovery_warnings import about_recovery
+from calib_core.recordings.containers.rosbag1.account import account_for_bag
 from calib_core.recordings.containers.rosbag1.index import read_indexes
 from calib_core.recordings.containers.rosbag1.records import fields_of
 from calib_core.recordings.containers.rosbag1.recovery import scan_bag
@@ -63,7 +66,7 @@ class Rosbag1Source(ChunkedSource):
             return
         try:
             infos, end = self._read_tail(header, first_of)
-            self._read_indexes(infos, end, first_of)
+            self._read_indexes(infos, (after[0] + after[1], end), first_of)
         except RecordingError as fault:
             if first_of is not None:
                 raise
@@ -87,16 +90,18 @@ class Rosbag1Source(ChunkedSource):
             raise damaged(self.file, position)
         return infos, position
 
-    def _read_indexes(self, infos: list[ChunkInfo], end: int, first_of: ChannelFilter | None) -> None:
+    def _read_indexes(self, infos: list[ChunkInfo], span: tuple[int, int], first_of: ChannelFilter | None) -> None:
         """Read the locations of the messages."""
         self.counts = counts_of(infos)
-        picked = infos if first_of is None else first_chunks(infos, [c.id for c in self.channels if first_of(c)])
-        found = read_indexes(self.file, infos, end, picked)
+        picked = None if first_of is None else first_chunks(infos, [c.id for c in self.channels if first_of(c)])
+        found = read_indexes(self.file, infos, span, picked)
+        if first_of is None and not found.indexes.keys() <= {channel.id for channel in self.channels}:
+            raise damaged(self.file, span[1])
         self.chunks = found.chunks
         for connection, index in found.indexes.items():
             self.note_index(connection, index)
-        if sum(map(len, self.indexes.values())) < sum(counts_of(picked).values()):
-            raise damaged(self.file, end)
+        if sum(map(len, self.indexes.values())) < sum(counts_of(infos if picked is None else picked).values()):
+            raise damaged(self.file, span[1])
 
     def _recover(self, start: int, fault: RecordingError) -> None:
         """Index a bag with a missing or damaged index by scanning all of it."""
@@ -129,6 +134,11 @@ class Rosbag1Source(ChunkedSource):
             unknown=count - sum(map(len, known.values())),
         )
         self.warnings = (*self.file.warnings, warning)
+
+    def account(self, progress: Progress | None = None) -> FileAccount:
+        """Account for every byte, reading the whole file."""
+        places = IndexedPlaces(self.indexes, [chunk.position for chunk in self.chunks], leads=True)
+        return account_for_bag(self.file, places, progress)
 
     # -- opening
 

@@ -15,9 +15,10 @@ from calib_core.recordings.containers.compression import refuse_bomb, unpack, un
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
 from calib_core.recordings.containers.rosbag1.records import fields_of
 
-__all__ = ["FoundInBag", "Record", "scan_bag"]
+__all__ = ["BagWalk", "FoundInBag", "Record", "note_record", "scan_bag", "scan_chunk"]
 
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
+_OTHER_KINDS = frozenset({3, 4, 6})  # the bag's header, and its index
 _U32 = struct.Struct("<I")
 _MAX_HEADER_BYTES = 1 << 24
 _MAX_STORED_BYTES = 1 << 28
@@ -81,7 +82,7 @@ def _record(stretch: Stretch, place: int) -> Record | None:
     return Record(fields, fields["op"][0], place, place + 8 + length, _U32.unpack_from(head, 4 + length)[0])
 
 
-class _Walk:
+class BagWalk:
     """Iterate over records; after a damaged stretch, continue at the next plausible record.
 
     Args:
@@ -135,15 +136,15 @@ def scan_bag(file: FileBytes, start: int) -> FoundInBag:
     """
     found = FoundInBag([Chunk(0, file.size_bytes, file.size_bytes, "none")])
     stretch = FileStretch(file, 0, file.size_bytes)
-    for record in _Walk(stretch, found, inside=False).records(start):
+    for record in BagWalk(stretch, found, inside=False).records(start):
         if record.kind == _CHUNK:
-            _scan_chunk(file, record, found)
-        else:
-            _note(stretch, record, 0, found)
+            scan_chunk(file, record, found)
+        elif record.kind not in _OTHER_KINDS and not note_record(stretch, record, 0, found):
+            found.lost_bytes += record.end - record.place
     return found
 
 
-def _scan_chunk(file: FileBytes, record: Record, found: FoundInBag) -> None:
+def scan_chunk(file: FileBytes, record: Record, found: FoundInBag) -> None:
     """Record all complete messages of a chunk; in a damaged compressed chunk, those before the damage."""
     stored = min(record.data_size, file.size_bytes - record.data_place)
     compression = record.fields.get("compression", b"").decode("utf-8", "replace")
@@ -156,18 +157,22 @@ def _scan_chunk(file: FileBytes, record: Record, found: FoundInBag) -> None:
         data = _unpacked(file, record, stored, compression, size, found)
         stretch, size = MemoryStretch(data), len(data)
     found.chunks.append(Chunk(record.data_place, stored, size, compression))
-    for inner in _Walk(stretch, found, inside=True).records(0):
-        _note(stretch, inner, number, found)
+    for inner in BagWalk(stretch, found, inside=True).records(0):
+        if not note_record(stretch, inner, number, found):
+            found.lost_bytes += inner.end - inner.place
 
 
-def _note(stretch: Stretch, record: Record, chunk: int, found: FoundInBag) -> None:
-    """Record a message or a connection."""
+def note_record(stretch: Stretch, record: Record, chunk: int, found: FoundInBag) -> bool:
+    """Record a message or a connection; False if it is neither, or damaged."""
     if record.kind == _CONNECTION:
-        _note_connection(record, stretch.up_to(record.data_place, record.data_size), found)
-    elif record.kind == _MESSAGE and {"conn", "time"} <= record.fields.keys() and len(record.fields["time"]) == 8:
-        sec, nanosec = struct.unpack("<II", record.fields["time"])
-        connection = int.from_bytes(record.fields["conn"], "little")
-        found.messages.setdefault(connection, []).append((sec * 1_000_000_000 + nanosec, chunk, record.place))
+        return _note_connection(record, stretch.up_to(record.data_place, record.data_size), found)
+    fields = record.fields
+    if record.kind != _MESSAGE or len(fields.get("time", b"")) != 8 or len(fields.get("conn", b"")) != 4:
+        return False
+    sec, nanosec = struct.unpack("<II", fields["time"])
+    connection = int.from_bytes(fields["conn"], "little")
+    found.messages.setdefault(connection, []).append((sec * 1_000_000_000 + nanosec, chunk, record.place))
+    return True
 
 
 def _unpacked(file: FileBytes, record: Record, stored: int, compression: str, size: int, found: FoundInBag) -> bytes:
@@ -189,6 +194,8 @@ def _unpacked(file: FileBytes, record: Record, stored: int, compression: str, si
     return unpack_what_is_there(data, compression, size)
 
 
-def _note_connection(record: Record, data: bytes, found: FoundInBag) -> None:
-    if len(record.fields.get("conn", b"")) == 4:
-        found.connections.setdefault(int.from_bytes(record.fields["conn"], "little"), (record.fields, data))
+def _note_connection(record: Record, data: bytes, found: FoundInBag) -> bool:
+    if len(record.fields.get("conn", b"")) != 4:
+        return False
+    found.connections.setdefault(int.from_bytes(record.fields["conn"], "little"), (record.fields, data))
+    return True

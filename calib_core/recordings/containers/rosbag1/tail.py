@@ -16,6 +16,7 @@ _CHUNK_INFO, CONNECTION = 6, 7
 _U32 = struct.Struct("<I")
 _MAX_HEADER_BYTES = 1 << 24
 _HEAD_BYTES = 256
+_INFO_NAMES = (b"\x12\0\0\0chunk_pos=", b"\x13\0\0\0start_time=", b"\x11\0\0\0end_time=")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +26,13 @@ class ChunkInfo:
     Attributes:
         position: of its record in the file.
         start_ns: when its first message was received.
+        end_ns: when its last message was received.
         counts: number of messages by connection.
     """
 
     position: int
     start_ns: int
+    end_ns: int
     counts: Mapping[int, int]
 
 
@@ -123,29 +126,33 @@ class _InfoShape:
     kind: int
     position: int
     start: int
+    end: int
 
     @classmethod
     def of(cls, header: bytes) -> "_InfoShape | None":
         fields = fields_of(header) or {}
-        if len(fields.get("chunk_pos", b"")) != 8 or len(fields.get("start_time", b"")) != 8:
+        if any(len(fields.get(name, b"")) != 8 for name in ("chunk_pos", "start_time", "end_time")):
             return None
-        places = [header.find(name) for name in (b"\x04\0\0\0op=", b"\x12\0\0\0chunk_pos=", b"\x13\0\0\0start_time=")]
+        places = [header.find(name) for name in (b"\x04\0\0\0op=", *_INFO_NAMES)]
         return None if min(places) < 0 else cls(len(header), *places)
 
     def fits(self, header: bytes) -> bool:
         return (
             len(header) == self.length
             and header.startswith(b"\x04\0\0\0op=\x06", self.kind)
-            and header.startswith(b"\x12\0\0\0chunk_pos=", self.position)
-            and header.startswith(b"\x13\0\0\0start_time=", self.start)
+            and all(
+                header.startswith(name, place)
+                for name, place in zip(_INFO_NAMES, (self.position, self.start, self.end), strict=True)
+            )
         )
 
     def info(self, header: bytes, data: bytes) -> ChunkInfo:
         sec, nanosec = struct.unpack_from("<II", header, self.start + 15)
+        last_sec, last_nanosec = struct.unpack_from("<II", header, self.end + 13)
         numbers = struct.unpack_from(f"<{len(data) // 8 * 2}I", data)
         counts = dict(zip(numbers[::2], numbers[1::2], strict=True))
         position = int.from_bytes(header[self.position + 14 : self.position + 22], "little")
-        return ChunkInfo(position, sec * 1_000_000_000 + nanosec, counts)
+        return ChunkInfo(position, sec * 1_000_000_000 + nanosec, last_sec * 1_000_000_000 + last_nanosec, counts)
 
 
 def channel_of(header: Mapping[str, bytes], data: bytes) -> Channel | None:

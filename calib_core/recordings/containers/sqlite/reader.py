@@ -11,10 +11,12 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.recordings.containers.cached_indexes import heads_from, keep_heads
 from calib_core.recordings.containers.compression import unpack_message
 from calib_core.recordings.containers.index_cache import cache_of
 from calib_core.recordings.containers.sources import Channel, Heads, MessageIndex
+from calib_core.recordings.containers.sqlite.account import account_for_database
 from calib_core.recordings.containers.sqlite.recovery import (
     FoundRows,
     about_rows,
@@ -60,6 +62,8 @@ class SqliteSource:
             self._connection = connect(file, self._until_closed)
             self._until_closed.callback(self._connection.close)
             self.channels: tuple[Channel, ...] = self._read_channels()
+            if not self.channels:
+                self.index(0)  # warns about messages of unknown topics
         except RecordingError:
             self._until_closed.close()
             raise
@@ -143,7 +147,7 @@ class SqliteSource:
             return FoundRows(kept["columns"].reshape(-1, 3))
         with self._lock:
             found = scan_rows(self._connection, self.path)
-        if self._kept is not None and not (found.fault or found.strange):
+        if self._kept is not None and not (found.fault or found.strange or found.repeated or found.absent):
             self._kept.put("rows", {"columns": found.columns})
         return found
 
@@ -217,7 +221,9 @@ class SqliteSource:
                 answer = self._rows(query, size, int(stretch[0]), int(stretch[-1]))
             except RecordingError:
                 continue  # damaged somewhere: read one by one
-            found = [row for row in answer if type(row[1]) is bytes]
+            found = sorted(
+                (row for row in answer if type(row[1]) is bytes), key=lambda row: row[0]
+            )  # damage may disorder them
             ids = np.fromiter((row[0] for row in found), dtype=np.int64, count=len(found))
             heads = np.frombuffer(b"".join(row[1].ljust(size, b"\0") for row in found), dtype=np.uint8).reshape(
                 -1, size
@@ -238,6 +244,10 @@ class SqliteSource:
                 return blob.read(size), len(blob)
         except sqlite3.Error as error:
             raise self._damaged(error) from error
+
+    def account(self, progress: Progress | None = None) -> FileAccount:
+        """Account for every byte of the database, reading the whole file; the log beside it is not part of it."""
+        return account_for_database(self._file, progress)
 
     def close(self) -> None:
         """Close the database."""

@@ -5,7 +5,7 @@ import sqlite3
 from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import quote
@@ -34,12 +34,26 @@ class FoundRows:
         holes: ranges of row numbers in damaged parts of the file; the end of the last may be unknown.
         strange: number of rows whose time or topic is not a number.
         fault: SQLite's error message for the damage; "" if there is none.
+        repeated: number of rows with the number of another row, which a damaged table can contain.
     """
 
     columns: np.ndarray
     holes: tuple[tuple[int, int], ...] = ()
     strange: int = 0
     fault: str = ""
+    repeated: int = 0
+
+    @property
+    def absent(self) -> tuple[tuple[int, int], ...]:
+        """Ranges of row numbers before the last row that no row has, apart from the holes."""
+        numbers = self.columns[:, 2]
+        if len(numbers) and int(numbers.max()) == len(numbers):
+            return ()  # they count from 1, and none is repeated
+        numbers = np.unique(numbers)
+        before = np.concatenate([[0], numbers[:-1]]) if len(numbers) else numbers
+        places = np.flatnonzero(numbers - before > 1)
+        gaps = [(int(before[place]) + 1, int(numbers[place]) - 1) for place in places.tolist()]
+        return tuple(gap for gap in gaps if not any(low <= gap[0] and gap[1] <= high for low, high in self.holes))
 
 
 def connect(file: FileBytes, until_closed: ExitStack) -> sqlite3.Connection:
@@ -126,10 +140,14 @@ def scan_rows(connection: sqlite3.Connection, path: Path) -> FoundRows:
     """
     try:
         batches, strange = _batches(connection, "SELECT topic_id, timestamp, id FROM messages", ())
-        return FoundRows(_joined(batches), strange=strange)
+        found = FoundRows(_joined(batches), strange=strange)
     except sqlite3.Error as error:
         fault = " ".join(str(error).split())
-    return _around_damage(connection, _last_row(connection, path), fault)
+        found = _around_damage(connection, _last_row(connection, path), fault)
+    if (np.diff(found.columns[:, 2]) > 0).all():
+        return found
+    _, first = np.unique(found.columns[:, 2], return_index=True)
+    return replace(found, columns=found.columns[np.sort(first)], repeated=len(found.columns) - len(first))
 
 
 def _batches(connection: sqlite3.Connection, query: str, values: tuple[int, ...]) -> tuple[list[np.ndarray], int]:
@@ -221,6 +239,16 @@ def about_rows(path: Path, found: FoundRows, unknown: int) -> list[DataWarning]:
                 if where
                 else "none are known to be lost"
             )
+        )
+    if found.repeated:
+        lost.append(
+            f"{found.repeated} rows have the number of another row, so others are lost; each number is used once"
+        )
+    if found.absent and not found.strange:
+        where = ", ".join(_rows_text(low, high) for low, high in found.absent[:3])
+        count = sum(high - low + 1 for low, high in found.absent)
+        lost.append(
+            f"{count} rows are absent ({where}{', ...' if len(found.absent) > 3 else ''}): they were deleted or are lost"
         )
     if found.strange:
         lost.append(f"{found.strange} rows without a time or a topic are skipped")

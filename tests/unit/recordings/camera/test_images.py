@@ -223,10 +223,51 @@ def test_one_damaged_frame_does_not_affect_the_others(ros, write, jpeg):
     with opened(
         write, ros, *(ros.compressed(START_NS + i * 10**8, d) for i, d in enumerate([jpeg, broken, jpeg]))
     ) as recording:
-        assert len(recording.image_times) == 3
-        assert recording.image_bytes(2).data == jpeg
-        with pytest.raises(MessageError, match="topic /camera/image: the JPEG"):
+        assert recording.image_times.tolist() == [START_NS, START_NS + 2 * 10**8]
+        assert [recording.image_bytes(index).data for index in range(2)] == [jpeg, jpeg]
+        (warning,) = recording.warnings
+        assert warning.code == "unreadable-pictures"
+        assert (
+            "1 of 3 pictures of /camera/image cannot be read and are skipped (2023-11-14 22:13:20.100"
+            in warning.message
+        )
+        assert "the JPEG ends before its image data" in warning.message
+
+
+@pytest.mark.parametrize("count", [6, 200])
+def test_pictures_of_another_size_are_skipped_and_told_with_their_times(count, ros, write, jpeg):
+    large = cv2.imencode(".jpg", np.zeros((96, 128, 3), dtype=np.uint8))[1].tobytes()
+    odd = range(2, count, 5)
+    messages = [ros.compressed(START_NS + i * 10**8, large if i in odd else jpeg) for i in range(count)]
+    with opened(write, ros, *messages) as recording:
+        assert len(recording.image_times) == count - len(odd)
+        assert START_NS + 2 * 10**8 not in recording.image_times
+        assert {recording.image_bytes(index).width_px for index in range(len(recording.image_times))} == {64}
+        (warning,) = recording.warnings
+    assert warning.code == "picture-sizes"
+    assert (
+        f"{count - len(odd)} have 64 x 48 pixels and are used; {len(odd)} have 128 x 96 (2023-11-14" in warning.message
+    )
+
+
+def test_raw_pictures_of_another_size_are_skipped(ros, write):
+    small, large = np.zeros((8, 12), dtype=np.uint8), np.zeros((16, 24), dtype=np.uint8)
+    messages = [ros.image(START_NS + i * 10**8, large if i == 2 else small, "mono8") for i in range(5)]
+    with opened(write, ros, *messages) as recording:
+        assert len(recording.image_times) == 4
+        assert [warning.code for warning in recording.warnings] == ["picture-sizes"]
+
+
+def test_a_single_picture_of_another_size_in_a_long_recording_is_refused_when_it_is_read(ros1, write, jpeg):
+    large = cv2.imencode(".jpg", np.zeros((96, 128, 3), dtype=np.uint8))[1].tobytes()
+    messages = [ros1.compressed(START_NS + i * 10**8, large if i == 1 else jpeg) for i in range(300)]
+    with opened(write, ros1, *messages) as recording:
+        with pytest.raises(
+            MessageError, match=r"this frame has 128 x 96 pixels, the others have 64 x 48; choose another"
+        ):
             recording.image_bytes(1)
+        with pytest.raises(MessageError, match="128 x 96"):
+            recording.image(1)
 
 
 def test_frames_with_the_same_stamp_are_shown_once_with_a_warning(ros, write, jpeg):

@@ -160,6 +160,16 @@ def test_one_damaged_picture_does_not_affect_the_others(tmp_path) -> None:
     )
 
 
+def test_a_picture_of_another_size_in_a_folder_is_skipped_and_told(tmp_path) -> None:
+    folder = pictures(tmp_path / "front", [f"{START_NS + i}.png" for i in range(4)])
+    cv2.imwrite(str(folder / f"{START_NS + 1}.png"), np.zeros((200, 300, 3), dtype=np.uint8))
+    with open_recording(folder, require=("image",)) as recording:
+        assert recording.image_times.tolist() == [START_NS, START_NS + 2, START_NS + 3]
+        (warning,) = recording.warnings
+    assert warning.code == "picture-sizes"
+    assert "1 have 300 x 200 (" in warning.message
+
+
 # -- radar files
 
 NUSCENES_HEAD = """\

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import RecordingOptions, open_recording
-from calib_core.recordings.time.clock_choice import Stamps, choose_clock, choose_clocks, header_fault
+from calib_core.recordings.time.clock_choice import choose_clock, choose_clocks
+from calib_core.recordings.time.clock_faults import Stamps, header_fault
 
 START_NS = 1_700_000_000 * NS_PER_S
 YEAR_NS = 365 * 86_400 * NS_PER_S
@@ -222,3 +223,25 @@ def test_types_without_stamps_cannot_use_the_header_clock(ros1, write, plain, jp
         assert "has no stamps" in recording.warnings[0].message
     with pytest.raises(RecordingError, match=r"has no stamps; use the receive times: --clock receive"):
         open_recording(path, RecordingOptions(clock="header"))
+
+
+@pytest.mark.parametrize("received_ns", [0, START_NS])
+def test_equal_receive_times_are_not_preferred_to_sound_stamps(received_ns, ros, write, plain, jpeg):
+    """Radar and camera with sound stamps of clocks an hour apart, and a recorder without a clock."""
+    rows = [(topic, received_ns, message) for topic, _, message in plain(ros, jpeg, n=40)]
+    with open_recording(write(ros, rows)) as recording:
+        assert len(recording.image_times) == len(recording.radar_times) == 40
+        assert recording.image_clock == recording.radar_clock == "header"
+        (clocks,) = [topic.clocks for topic in recording.topics if topic.name == "/radar/points"]
+    assert clocks is not None
+    assert clocks.reason.endswith("and the stamps are sound")
+
+
+def test_a_recorders_clock_that_was_set_back_is_not_mistaken_for_stamps_out_of_order(ros1, write, plain, jpeg):
+    rows = [
+        (topic, at - (10 * NS_PER_S if number >= 90 else 0), message)
+        for number, (topic, at, message) in enumerate(plain(ros1, jpeg, n=60))
+    ]
+    with open_recording(write(ros1, rows)) as recording:
+        assert recording.image_clock == recording.radar_clock == "header"
+        assert [warning.code for warning in recording.warnings] == []

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from calib_core.measurements import NS_PER_S
 from calib_core.recordings import describe, inspect_recording, open_recording, recording_summary
-from calib_core.recordings.time.clock_choice import Stamps
 from calib_core.recordings.time.clock_diagnosis import about_clocks, diagnose
+from calib_core.recordings.time.clock_faults import Stamps
 from calib_core.recordings.topics import Rhythm
 
 START_NS = 1_700_000_000 * NS_PER_S
@@ -99,8 +99,8 @@ def test_the_diagnosis_is_in_the_text_and_the_summary(ros, write, plain, jpeg):
     with inspect_recording(path) as recording:
         text = describe(recording)
         reports = {topic.name: topic.clocks for topic in recording_summary(recording).topics}
-    assert "/radar/points: header stamps, because the stamps are sound" in text
-    assert "received 30.0 ms after the stamp (± 0.0 ms)" in text
+    assert "/radar/points: times are header stamps, because the stamps are sound" in text
+    assert "the recorder received each message 30.0 ms after its stamp (± 0.0 ms)" in text
     assert reports["/camera/camera_info"] is None
     radar = reports["/radar/points"]
     assert radar is not None
@@ -115,7 +115,10 @@ def test_clocks_of_sensors_that_are_not_in_use_are_shown_too(ros, write, plain, 
         (rear,) = [topic for topic in recording_summary(recording).topics if topic.name == "/rear/points"]
     assert rear.clocks is not None
     assert (rear.chosen, rear.clocks.chosen, rear.clocks.zero_stamps) == (False, "receive", 10)
-    assert "/rear/points: not in use; receive times, because it has only zero stamps (10 messages)" in text
+    assert (
+        "/rear/points: not in use; times are the recorder's receive times, because it has only zero stamps (10 messages)"
+        in text
+    )
 
 
 def test_the_warnings_of_the_clocks_reach_the_recording(ros1, write, plain, jpeg):

@@ -1,0 +1,186 @@
+"""`cocalib info --verify`: every byte and every message of a recording is accounted for."""
+
+import gzip
+import json
+import random
+import sqlite3
+
+import cv2
+import numpy as np
+import pytest
+
+from app.cli import run
+from calib_core.errors import RecordingError
+from calib_core.measurements import NS_PER_S
+from calib_core.recordings import inspect_recording, verification_text, verify_recording
+from tests.unit.recordings.containers.damage import KINDS, damaged, read_by_us, records, sound
+
+START_NS = 1_700_000_000 * NS_PER_S
+
+
+def verified(path, *, decode_pictures=False):
+    with inspect_recording(path) as recording:
+        return verify_recording(recording, decode_pictures=decode_pictures)
+
+
+def counts(found, topic):
+    (one,) = [one for one in found.topics if one.topic == topic]
+    return one.read, one.unread, one.unindexed, one.damaged, one.undecodable
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_sound_file_is_read_whole(kind, tmp_path):
+    file = sound(kind, tmp_path)
+    path = tmp_path / f"copy.{kind.partition('-')[0]}"
+    path.write_bytes(file.data)
+    found = verified(path)
+    assert found.sound
+    assert [counts(found, topic) for topic in ("/radar/points", "/rear/points")] == [(15, 0, 0, 0, 0)] * 2
+    (one,) = found.files
+    assert sum(one.bytes_by.values()) == one.size_bytes == len(file.data)
+    assert not one.bytes_by.get("damaged")
+    assert not one.bytes_by.get("unknown")
+    assert "result    sound" in verification_text(found)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_byte_of_a_damaged_file_is_accounted_for_and_no_loss_is_called_sound(kind, tmp_path):
+    file = sound(kind, tmp_path)
+    path = tmp_path / f"damaged.{kind.partition('-')[0]}"
+    opened = unsound = 0
+    for way, data in damaged(file, random.Random("verify " + kind), 60):
+        path.write_bytes(data)
+        try:
+            found = verified(path)
+        except RecordingError:
+            continue
+        opened += 1
+        (one,) = found.files
+        assert sum(one.bytes_by.values()) == len(data), way
+        given, _ = read_by_us(path)
+        if file.readable(data) - given:
+            assert not found.sound, way
+        unsound += not found.sound
+    assert opened > 20
+    assert unsound > 10
+
+
+def test_a_chunk_that_no_index_names_is_found(tmp_path):
+    """Its messages are recovered by opening, and the file is not called sound."""
+    file = sound("mcap", tmp_path)
+    begin, end = next(place for place in records("mcap", file.data) if file.data[place[0]] == 8)
+    data = file.data[:begin] + file.data[end:]
+    path = tmp_path / "copy.mcap"
+    path.write_bytes(data)
+    found = verified(path)
+    assert counts(found, "/radar/points")[0] + counts(found, "/rear/points")[0] == 30
+    assert [warning.code for warning in found.warnings if warning.code == "not-closed"]
+    assert not found.sound
+
+
+def test_a_wrong_checksum_makes_all_messages_of_its_chunk_damaged(tmp_path):
+    file = sound("mcap-checksums", tmp_path)
+    data = bytearray(file.data)
+    data[data.index(list(file.messages)[12]) + 100] ^= 1
+    path = tmp_path / "copy.mcap"
+    path.write_bytes(data)
+    found = verified(path)
+    assert [counts(found, topic)[3] for topic in ("/radar/points", "/rear/points")] == [4, 4]
+    assert found.files[0].bytes_by["damaged"] > 3000
+    assert any("wrong checksum" in fault for fault in found.files[0].faults)
+
+
+def test_rows_that_are_absent_and_a_page_that_nothing_uses_are_told(tmp_path):
+    file = sound("db3", tmp_path)
+    path = tmp_path / "copy.db3"
+    path.write_bytes(file.data)
+    with sqlite3.connect(path) as database:
+        database.execute("DELETE FROM messages WHERE id BETWEEN 11 AND 13")
+    database.close()
+    path.write_bytes(path.read_bytes() + b"\x55" * 4096)
+    found = verified(path)
+    assert not found.sound
+    assert any("3 rows are absent (11 to 13)" in warning.message for warning in found.warnings)
+    assert found.files[0].bytes_by["unknown"] == 4096
+
+
+def pictures(ros, jpeg, others):
+    rows = [("/camera/image", START_NS + i * 10**8, ros.compressed(START_NS + i * 10**8, jpeg)) for i in range(8)]
+    return rows + [
+        ("/camera/image", START_NS + i * 10**8, ros.compressed(START_NS + i * 10**8, other))
+        for i, other in enumerate(others, start=8)
+    ]
+
+
+def big_jpeg() -> bytes:
+    pixels = np.random.default_rng(5).integers(0, 255, (240, 320, 3), dtype=np.uint8)
+    return bytes(cv2.imencode(".jpg", cv2.GaussianBlur(pixels, (5, 5), 0))[1].tobytes())
+
+
+def test_pictures_that_are_cut_or_none_are_undecodable(ros, write):
+    jpeg = big_jpeg()
+    path = write(ros, pictures(ros, jpeg, [jpeg[: len(jpeg) // 2], b"not a picture at all", b""]))
+    found = verified(path)
+    assert counts(found, "/camera/image") == (8, 0, 0, 0, 3)
+    assert not found.sound
+
+
+def test_a_picture_that_is_zeroed_in_the_middle_is_found_by_decoding_it(ros, write):
+    jpeg = big_jpeg()
+    third = len(jpeg) // 3
+    path = write(ros, pictures(ros, jpeg, [jpeg[:third] + bytes(third) + jpeg[2 * third :]]))
+    assert counts(verified(path), "/camera/image") == (9, 0, 0, 0, 0)
+    found = verified(path, decode_pictures=True)
+    assert counts(found, "/camera/image") == (8, 0, 0, 0, 1)
+    assert "the decoder says" in found.topics[0].fault
+
+
+def test_a_driver_that_writes_no_end_markers_is_not_blamed(ros, write, jpeg):
+    found = verified(write(ros, pictures(ros, jpeg[:-2], [jpeg[:-2]])))
+    assert counts(found, "/camera/image") == (9, 0, 0, 0, 0)
+    assert found.sound
+
+
+def test_types_that_are_not_supported_are_unread(ros1, write, jpeg):
+    path = write(ros1, [("/camera/qoi", START_NS, ros1.compressed(START_NS, b"qoif" + bytes(30), "qoi"))])
+    found = verified(path)
+    assert counts(found, "/camera/qoi") == (0, 1, 0, 0, 0)
+    assert found.sound
+
+
+def test_a_folder_names_the_pictures_that_cannot_be_read(tmp_path, jpeg):
+    folder = tmp_path / "front"
+    folder.mkdir()
+    for number in range(4):
+        (folder / f"{START_NS + number * 10**8}.jpg").write_bytes(jpeg if number != 2 else b"nothing of the kind")
+    (folder / "notes.md").write_text("a test")
+    found = verified(folder)
+    assert counts(found, "/front/image") == (3, 0, 0, 1, 0)
+    assert found.files[0].bytes_by == {"messages": 3 * len(jpeg), "damaged": 19, "unknown": 6}
+    assert not found.sound
+
+
+def test_a_compressed_file_is_accounted_for_as_decompressed(tmp_path):
+    file = sound("bag", tmp_path)
+    path = tmp_path / "copy.bag.gz"
+    packed = gzip.compress(file.data)
+    path.write_bytes(packed)
+    found = verified(path)
+    assert (found.sound, found.files[0].size_bytes) == (True, len(file.data))
+    path.write_bytes(packed[: len(packed) * 2 // 3])
+    assert not verified(path).sound
+
+
+def test_the_command_exits_with_1_for_damage_and_2_for_what_cannot_be_read(tmp_path, capsys):
+    file = sound("bag", tmp_path)
+    path = tmp_path / "copy.bag"
+    path.write_bytes(file.data)
+    assert run(["info", "--verify", str(path)]) == 0
+    assert "result    sound" in capsys.readouterr().out
+    path.write_bytes(file.data[: len(file.data) // 2])
+    assert run(["info", "--verify", "--json", str(path)]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["sound"] is False
+    assert sum(found["files"][0]["bytes_by"].values()) == len(file.data) // 2
+    path.write_bytes(b"")
+    assert run(["info", "--verify", str(path)]) == 2
