@@ -134,6 +134,7 @@ def _file(source: Source, topics: _Topics, reading: _Reading) -> FileCheck:
     for channel in source.channels:
         check = topics.of(channel.topic, channel.type)
         check.unindexed += account.unindexed.get(channel.id, 0)
+        check.damaged += account.skipped.get(channel.id, 0)
         _read_channel(source, channel, check, account.damaged.get(channel.id, 0), reading)
     known = {channel.id for channel in source.channels}
     unindexed, damaged = (

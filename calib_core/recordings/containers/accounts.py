@@ -28,12 +28,14 @@ class FileAccount:
         unindexed: number of messages by channel that the file contains but its index does not name.
         damaged: number of messages by channel whose bytes are damaged or fail their checksum.
         faults: the first faults found, each with its position.
+        skipped: number of messages by channel that are damaged and were skipped on opening, so that no index names them.
     """
 
     bytes_by: Mapping[ByteKind, int]
     unindexed: Mapping[int, int] = field(default_factory=dict[int, int])
     damaged: Mapping[int, int] = field(default_factory=dict[int, int])
     faults: tuple[str, ...] = ()
+    skipped: Mapping[int, int] = field(default_factory=dict[int, int])
 
 
 class AccountBuilder:

@@ -63,6 +63,7 @@ def open_picture_folder(
         numbers=stamped.numbers,
         camera=camera,
         file_of=lambda row: stamped.files[row],
+        unreadable=faults,
     )
 
 

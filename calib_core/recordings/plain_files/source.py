@@ -22,6 +22,10 @@ _HEADER_BYTES = 16
 _MAX_FAULTS = 5
 
 
+def _no_faults() -> dict[Path, str]:
+    return {}
+
+
 def _no_numbers() -> dict[int, TimeNs]:
     return {}
 
@@ -46,6 +50,7 @@ class PlainSource:
         numbers: times of its files by their numbers, for files of other folders that are only numbered.
         camera: the intrinsics that its data set publishes; None if there are none.
         file_of: the file of a row, in a folder of one file per row.
+        unreadable: files of the folder that were skipped on opening, and why.
         account_of: accounts for the bytes of a file whose format says what they are.
     """
 
@@ -64,6 +69,7 @@ class PlainSource:
     numbers: Mapping[int, TimeNs] = field(default_factory=_no_numbers)
     camera: FolderCamera | None = None
     file_of: Callable[[int], Path] | None = None
+    unreadable: Mapping[Path, str] = field(default_factory=_no_faults)
     account_of: Callable[[Progress | None], FileAccount] | None = None
 
     def __post_init__(self) -> None:
@@ -134,11 +140,14 @@ class PlainSource:
                 bad.add(self.file_of(row) if self.file_of is not None else self.path)
                 faults.append(str(error))
         damaged = min(sum(path.stat().st_size for path in bad), self.size_bytes)
-        unused = _folder_bytes(self.path) - self.size_bytes if self.path.is_dir() else 0
+        skipped = sum(path.stat().st_size for path in self.unreadable)
+        unused = _folder_bytes(self.path) - self.size_bytes - skipped if self.path.is_dir() else 0
+        faults += [f"{path.name} {fault}" for path, fault in self.unreadable.items()]
         return FileAccount(
-            {"messages": self.size_bytes - damaged, "damaged": damaged, "unknown": max(0, unused)},
-            damaged={self.channel.id: len(faults)} if faults else {},
+            {"messages": self.size_bytes - damaged, "damaged": damaged + skipped, "unknown": max(0, unused)},
+            damaged={self.channel.id: len(faults) - len(self.unreadable)} if bad else {},
             faults=tuple(faults[:_MAX_FAULTS]),
+            skipped={self.channel.id: len(self.unreadable)},
         )
 
     def close(self) -> None:
