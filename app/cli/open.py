@@ -17,6 +17,7 @@ from app.cli.output import read_text, required_camera
 from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.input_files import name_text
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, RecordingOptions
 
@@ -112,7 +113,7 @@ class Open:
             session=self.session or recording_session_folder(paths),
             fresh=self.fresh,
             serving=self.serving,
-            name=paths[0].name,
+            name=name_text(paths[0].name),
             camera_file=self.camera,
             clicks_file=self.clicks,
             calibration_file=self.calibration,

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from app.error_boundary import error_boundary
 from app.view import sentence
 from app.web.channel.hub import Hub
 from app.web.channel.newest import NewestWins
@@ -73,9 +74,9 @@ class Channel:
         self.scene: TabScene | None = None
         self._hub = hub
         self._cursor = Cursor()
-        self._frames = NewestWins(self._send_frame)
-        self._overlay = NewestWins(self._send_overlay)
-        self._space = NewestWins(self._draw_space)
+        self._frames = NewestWins(self._send_frame, self._report)
+        self._overlay = NewestWins(self._send_overlay, self._report)
+        self._space = NewestWins(self._draw_space, self._report)
         self._forward = True
 
     async def run(self, socket: Socket) -> None:
@@ -103,11 +104,17 @@ class Channel:
     async def _read(self, socket: Socket) -> None:
         while True:
             text = await socket.recv()
-            try:
-                incoming = parse(text)
-                await self._obey(incoming)
-            except CalibrationError as error:
-                self.outbox.put(encode(Problem(sentence(str(error)), request=request_of(text))))
+            with error_boundary("a page's message", partial(self._refuse, text)):
+                try:
+                    await self._obey(parse(text))
+                except CalibrationError as error:
+                    self._refuse(text, str(error))
+
+    def _report(self, line: str) -> None:
+        self.outbox.put(encode(Problem(sentence(line))))
+
+    def _refuse(self, text: str | bytes, reason: str) -> None:
+        self.outbox.put(encode(Problem(sentence(reason), request=request_of(text))))
 
     async def _obey(self, incoming: Incoming) -> None:
         """Carry out a command of the page.

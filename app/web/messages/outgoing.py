@@ -10,6 +10,7 @@ import msgspec
 from app.option_changes import OptionGroup, option_groups
 from app.view import View
 from calib_core.arrays import TimesNs
+from calib_core.input_files import encodable
 from calib_core.measurements import NS_PER_S, Stamp
 from calib_core.results import DataWarning
 
@@ -266,7 +267,10 @@ TYPES: Mapping[type, str] = {
 
 def encode(message: Outgoing) -> str:
     """Encode a message to a page as JSON text, with its "type"; a number that is not finite becomes null."""
-    body = msgspec.json.encode(message).decode()
+    try:
+        body = msgspec.json.encode(message).decode()
+    except UnicodeEncodeError:  # a file name that is not UTF-8, somewhere in a text
+        body = msgspec.json.encode(encodable(msgspec.to_builtins(message))).decode()
     separator = "," if len(body) > 2 else ""
     return f'{{"type":"{TYPES[type(message)]}"{separator}{body[1:]}'
 

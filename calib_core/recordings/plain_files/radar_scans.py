@@ -98,11 +98,7 @@ def points_of_pcd(path: Path) -> np.ndarray:
             raise MessageError(
                 f"{path.name} has {len(rows)} numbers, but {count * fields} are required: the file is damaged"
             )
-        table = np.array(rows[: count * fields], dtype=np.float64).reshape(count, fields)
-        points = np.zeros(count, dtype=dtype)
-        for number, name in enumerate(dtype.names or ()):
-            points[name] = table[:, number]
-        return points
+        return _table(path, rows[: count * fields], count, dtype)
     if kind != "binary":
         raise MessageError(
             f"{path.name} has '{kind}' data, but only binary and ascii are supported; "
@@ -113,6 +109,24 @@ def points_of_pcd(path: Path) -> np.ndarray:
             f"{path.name} has {len(body)} bytes of points, but {count * dtype.itemsize} are required: the file is truncated"
         )
     return np.frombuffer(body, dtype=dtype, count=count)
+
+
+def _table(path: Path, words: Sequence[str], count: int, dtype: "np.dtype[np.void]") -> np.ndarray:
+    """Convert the numbers of an ascii file, row by row.
+
+    Raises:
+        MessageError: a word is not a number, or does not fit the type of its field.
+    """
+    names = dtype.names or ()
+    points = np.zeros(count, dtype=dtype)
+    try:
+        table = np.array(words, dtype=np.float64).reshape(count, len(names))
+        with np.errstate(over="raise", invalid="raise"):
+            for number, name in enumerate(names):
+                points[name] = table[:, number]
+    except (ValueError, OverflowError, FloatingPointError) as error:
+        raise MessageError(f"{path.name} has points that are not numbers of their fields' types ({error})") from error
+    return points
 
 
 def _head(path: Path, data: bytes) -> tuple[dict[str, list[str]], bytes]:
