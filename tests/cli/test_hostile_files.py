@@ -146,7 +146,7 @@ def test_a_file_name_that_is_not_utf8_is_shown(cocalib: Cocalib, made: MadeRecor
 
 
 def test_names_from_a_recording_do_not_reach_the_terminal(cocalib: Cocalib, tmp_path: Path) -> None:
-    topic = "/radar\x1b[2J\x1b]0;owned\x07\x9b31m\u202egab"
+    topic = "/radar\nwarning   forged\x1b[2J\x1b]0;owned\x07\x9b31m\u202egab"
     messages = [replace(message, topic=topic) if "radar" in message.topic else message for message in Made().messages()]
     assert all(isinstance(message, RecordedMessage) for message in messages)
     path = write_ros2(tmp_path / "hostile.mcap", messages, container="mcap")
@@ -155,4 +155,5 @@ def test_names_from_a_recording_do_not_reach_the_terminal(cocalib: Cocalib, tmp_
     for printed in (text.out, data.out, refused.err):
         assert all(character.isprintable() or character == "\n" for character in printed)
     assert "\\u001b[2J" in text.out
+    assert not any(line.startswith("warning   forged") for line in text.out.splitlines())
     assert any(row["name"] == topic for row in json.loads(data.out)["topics"])

@@ -41,6 +41,9 @@ __all__ = ["Channel", "Socket"]
 _SPACE_EVERY_S = 0.34
 """Minimum time between two drawings of the 3D view while playing: it shares the page's main thread [s]."""
 
+_GREET_EVERY_S = 0.25
+"""Minimum time between two greetings of one page [s]."""
+
 
 class Socket(Protocol):
     """The part of a WebSocket that a channel needs."""
@@ -74,6 +77,7 @@ class Channel:
         self.scene: TabScene | None = None
         self._hub = hub
         self._cursor = Cursor()
+        self._greetings = NewestWins(self._greet, self._report)
         self._frames = NewestWins(self._send_frame, self._report)
         self._overlay = NewestWins(self._send_overlay, self._report)
         self._space = NewestWins(self._draw_space, self._report)
@@ -90,7 +94,7 @@ class Channel:
                 task.result()
         finally:
             self._hub.tabs.discard(self)
-            for worker in (self._frames, self._overlay, self._space):
+            for worker in (self._greetings, self._frames, self._overlay, self._space):
                 worker.close()
             for task in (sending, reading):
                 task.cancel()
@@ -128,7 +132,7 @@ class Channel:
         elif isinstance(command, CursorMoved):
             self._move(command)
         elif isinstance(command, Hello):
-            self._hub.greet(self.outbox)
+            self._greetings.give(command)
         elif isinstance(command, ViewpointWanted):
             if self.scene is not None:
                 self.scene.look_from(command.viewpoint)
@@ -148,6 +152,11 @@ class Channel:
             return
         self._cursor = Cursor(command.index, command.playing, command.selected, command.light)
         self.refresh()
+
+    async def _greet(self, _wanted: Hello) -> None:
+        """Greet the page, at most so often: a greeting costs more than asking for it."""
+        self._hub.greet(self.outbox)
+        await asyncio.sleep(_GREET_EVERY_S)
 
     async def _send_frame(self, wanted: FrameWanted) -> None:
         store, size = self._hub.frames, wanted.size
