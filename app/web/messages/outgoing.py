@@ -10,7 +10,6 @@ import msgspec
 from app.option_changes import OptionGroup, option_groups
 from app.view import View
 from calib_core.arrays import TimesNs
-from calib_core.input_files import encodable
 from calib_core.measurements import NS_PER_S, Stamp
 from calib_core.results import DataWarning
 
@@ -267,10 +266,7 @@ TYPES: Mapping[type, str] = {
 
 def encode(message: Outgoing) -> str:
     """Encode a message to a page as JSON text, with its "type"; a number that is not finite becomes null."""
-    try:
-        body = msgspec.json.encode(message).decode()
-    except UnicodeEncodeError:  # a file name that is not UTF-8, somewhere in a text
-        body = msgspec.json.encode(encodable(msgspec.to_builtins(message))).decode()
+    body = msgspec.json.encode(message).decode()
     separator = "," if len(body) > 2 else ""
     return f'{{"type":"{TYPES[type(message)]}"{separator}{body[1:]}'
 

@@ -2,10 +2,13 @@
 
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 
 import pytest
+import websockets.http11
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from app.web.port.request_head import read_head
 from app.web.port.server import RunningServer, ServerOptions, start
@@ -184,3 +187,32 @@ def test_no_answer_ever_holds_a_file_from_elsewhere(server: RunningServer, cooki
                 answer = asked(server, b"GET " + target + b" HTTP/1.1\r\n" + HOST, cookie, b"")
                 assert status(answer) == 404
                 assert secret not in answer
+
+
+PIECES = st.sampled_from(
+    [b"GET", b"HEAD", b"POST", b" ", b"/", b"HTTP/1.1", b"\r\n", b"\r\n\r\n", b"Host: 127.0.0.1", b"Content-Length: 3",
+     b"X:", b"\xff", b"Upgrade: websocket", b"Transfer-Encoding: chunked", b"\x00", b"%2e%2e", b"?token=", b":", b"\n",
+     b"a" * 9000]
+)  # fmt: skip
+
+
+@given(st.lists(st.one_of(PIECES, st.binary(max_size=5)), max_size=20).map(b"".join))
+@example(b"GET / HTTP/1.1\r\n" + HOST + b"\r\n")
+def test_websockets_can_read_every_head_that_it_is_given(received: bytes) -> None:
+    head = read_head(received)
+    if head is None:
+        return
+    lines = iter(head.data.splitlines(keepends=True))
+
+    def read_line(_size: int) -> Generator[None, None, bytes]:
+        yield
+        return next(lines)
+
+    found: list[websockets.http11.Request] = []
+
+    def read() -> Generator[None, None, None]:
+        found.append((yield from websockets.http11.Request.parse(read_line)))
+
+    for _ in read():
+        pass
+    assert len(found) == 1

@@ -14,7 +14,6 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from app.web.messages import Problem, encode
 from app.web.port.entrance import MAX_SOCKETS
 from app.web.port.server import RunningServer, ServerOptions, start
 from app.workspace import Workspace, open_workspace
@@ -317,12 +316,6 @@ def test_half_a_character_is_refused_and_the_channel_stays_open(server: RunningS
             assert wanted(socket, "error")["message"]
         socket.send('{"type":"hello","request":2}')
         assert wanted(socket, "done")["request"] == 2
-
-
-def test_a_name_that_is_not_utf8_reaches_the_page_as_text(server: RunningServer, cookie: str) -> None:
-    assert (
-        json.loads(encode(Problem("odd-\udcff.bag: not a recording")))["message"] == "odd-\\udcff.bag: not a recording"
-    )
 
 
 def test_after_closing_no_connection_is_accepted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
