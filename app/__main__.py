@@ -1,15 +1,15 @@
 """The command `cocalib`."""
 
 import os
-import signal
 import sys
-from types import FrameType
 
 # Our matrices are small: threads within one product only slow down the server. Must be set before NumPy loads.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from app.cli import run
+from app.error_boundary import report_thread_errors
 from app.memory import keep_freed_memory
+from app.signals import stop_on_signals
 
 __all__ = ["main"]
 
@@ -17,13 +17,9 @@ __all__ = ["main"]
 def main() -> None:
     """Run the command given on the command line and exit with its code."""
     keep_freed_memory()
-    signal.signal(signal.SIGTERM, _interrupt)
+    stop_on_signals()
+    report_thread_errors()
     sys.exit(run(sys.argv[1:]))
-
-
-def _interrupt(number: int, _: FrameType | None) -> None:
-    """Treat SIGTERM like Ctrl+C: a server that a script starts in the background ignores SIGINT, but must close its session."""
-    raise KeyboardInterrupt(number)
 
 
 if __name__ == "__main__":

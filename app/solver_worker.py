@@ -7,6 +7,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 
+from app.error_boundary import report_of
 from app.session import Solved
 from app.solving import RadarSource, check_clicks, solve_in_steps
 from calib_core.camera import Camera
@@ -105,9 +106,8 @@ def _failure(error: BaseException) -> Unsolvable:
         return Unsolvable(
             "unreadable", str(error), "the clicks are kept; fix the problem, then change any click to try again"
         )
-    _log.error("the solver failed", exc_info=error)
+    line = report_of(error, "solving")
+    _log.error("%s", line)
     return Unsolvable(
-        "internal-error",
-        f"the solver failed: {type(error).__name__}: {error}",
-        "this is a bug in cocalib, not a problem with your data; the clicks are kept, and the log has details for a bug report",
+        "internal-error", f"the solver failed: {line}", "the clicks are kept; change any click to try again"
     )

@@ -102,7 +102,7 @@ def matrix_from_quaternion_wxyz(quaternion: np.ndarray) -> Matrix33:
         ValueError: the quaternion is zero or not finite.
     """
     q = np.asarray(quaternion, dtype=np.float64)
-    norm = float(np.linalg.norm(q))
+    norm = math.hypot(*q)  # does not overflow below the largest float
     if not np.isfinite(norm) or norm < 1e-12:
         raise ValueError(f"not a rotation: quaternion {q.tolist()}")
     w, x, y, z = q / norm

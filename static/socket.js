@@ -4,6 +4,8 @@
  * messages to their reader. Undo and redo are not resent, because they must not be applied twice.
  */
 
+import { comeBack, keepTicket } from "./admission.js";
+
 /** @type {WebSocket|null} */
 let socket = null;
 let nextRequest = 1;
@@ -34,6 +36,7 @@ function open() {
     socket?.send(JSON.stringify({ type: "hello" }));
     for (const [request, { message }] of waiting) socket?.send(JSON.stringify({ ...message, request }));
     reader.connection(true);
+    keepTicket();
   };
   socket.onmessage = (event) => (typeof event.data === "string" ? receive(JSON.parse(event.data)) : unpack(event.data));
   socket.onclose = lost;
@@ -47,7 +50,7 @@ function lost() {
     resolve("The connection was lost before the server confirmed the change.");
   }
   reader.connection(false);
-  setTimeout(open, delay);
+  setTimeout(() => comeBack().finally(open), delay);
   delay = Math.min(opened ? 1000 : 4000, delay * 2);
 }
 

@@ -1,10 +1,12 @@
 """The command line: parses the arguments, runs the command, and turns each error into one line and an exit code.
 
-Exit codes: 0 done; 1 no calibration possible from the data; 2 wrong usage or unreadable input; 130 stopped by
-Ctrl+C, 143 by SIGTERM.
+Exit codes: 0 done, also when a signal ends `open` or `demo` after the page was served; 1 no calibration possible from the
+data; 2 wrong usage or unreadable input; 70 an internal error, with a report; 129 stopped by SIGHUP, 130 by Ctrl+C, 143 by
+SIGTERM before there was a result.
 A command imports only what it needs: `--version` and `--help` need neither NumPy nor tyro.
 """
 
+import contextlib
 import os
 import signal
 import sys
@@ -12,6 +14,8 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from app.cli.commands import COMMANDS, PROGRAM, overview
+from app.error_boundary import INTERNAL_ERROR, error_boundary
+from app.terminal import escaped_output
 from calib_core.errors import CalibrationError, InputError
 
 __all__ = ["refuse", "run"]
@@ -26,6 +30,15 @@ def run(arguments: Sequence[str]) -> int:
     Returns:
         The exit code.
     """
+    codes: list[int] = []
+    with escaped_output():
+        with error_boundary(f"{PROGRAM} {' '.join(arguments[:1])}".rstrip(), lambda line: codes.append(_fail(line))):
+            codes.append(_ended(arguments))
+        return codes[0]
+
+
+def _ended(arguments: Sequence[str]) -> int:
+    """Run one command; turn its expected errors and its end by a signal into an exit code."""
     try:
         return _run(*arguments)
     except CalibrationError as error:
@@ -36,7 +49,8 @@ def run(arguments: Sequence[str]) -> int:
     except OSError as error:
         return refuse(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
     except KeyboardInterrupt as stop:  # carries the signal number if it was not Ctrl+C
-        print(file=sys.stderr)
+        with contextlib.suppress(OSError):  # the terminal may be gone
+            print(file=sys.stderr)
         return 128 + int(stop.args[0] if stop.args else signal.SIGINT)
 
 
@@ -44,6 +58,12 @@ def refuse(reason: str) -> int:
     """Print one line to stderr that says why a command cannot run; return exit code 2."""
     print(f"{PROGRAM}: {' '.join(reason.split())}", file=sys.stderr)
     return 2
+
+
+def _fail(line: str) -> int:
+    """Print the line about an internal error; return its exit code."""
+    refuse(line)
+    return INTERNAL_ERROR
 
 
 def _run(first: str = "--help", *others: str) -> int:

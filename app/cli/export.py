@@ -9,6 +9,7 @@ import tyro
 
 from app.cli.flags import File, Switch, called
 from app.cli.output import write_whole
+from app.terminal import print_exactly
 from calib_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class Export:
         elif isinstance(written.content, bytes):
             raise InputError(f"{self.to} is a binary format and needs a file: --out {written.file_name}")
         else:
-            print(written.content, end="")
+            print_exactly(written.content)
         return 0
 
 

@@ -11,6 +11,7 @@ import tyro
 from app.cli.flags import File, NewFile, called
 from app.cli.output import write_whole
 from calib_core.errors import InputError
+from calib_core.input_files import name_text
 
 if TYPE_CHECKING:
     from app.view import Reference
@@ -44,7 +45,7 @@ class Import:
         camera = (
             read_camera_file(self.camera) if self.camera else _sized_camera(found, self.calibration, self.image_size)
         )
-        origin = InputFile(self.calibration.name, len(data), hashlib.sha256(data).hexdigest())
+        origin = InputFile(name_text(self.calibration.name), len(data), hashlib.sha256(data).hexdigest())
         file = adopt(found, str(self.calibration), camera=camera, provenance=Provenance(inputs=(origin,)))
         for note in found.notes:
             print(f"note: {note}", file=sys.stderr)
@@ -104,4 +105,4 @@ def reference_from(path: Path, camera: "Camera | None") -> "Reference":
 
     if camera is None:
         raise InputError(f"{path}: showing this calibration needs intrinsics; give --camera FILE")
-    return Reference(path.name, adopted_calibration(read_any_file(path), str(path), camera=camera))
+    return Reference(name_text(path.name), adopted_calibration(read_any_file(path), str(path), camera=camera))

@@ -27,13 +27,15 @@ class Info:
         """Print the description; return the exit code."""
         import msgspec
 
+        from calib_core.input_files import encodable
         from calib_core.recordings import describe, inspect_recording, recording_summary
 
         if self.verify:
             return self._verify()
         with inspect_recording(self.recording, self.topics) as recording:
             if self.json:
-                print(msgspec.json.format(msgspec.json.encode(recording_summary(recording)), indent=2).decode())
+                summary = encodable(msgspec.to_builtins(recording_summary(recording)))
+                print(msgspec.json.format(msgspec.json.encode(summary), indent=2).decode())
             else:
                 print(describe(recording))
         return 0

@@ -1,5 +1,6 @@
 """`cocalib demo` and `cocalib open`: calibrate in the browser."""
 
+import contextlib
 import dataclasses
 import hashlib
 from collections.abc import Sequence
@@ -17,6 +18,7 @@ from app.cli.output import read_text, required_camera, told_clicks_at_frames
 from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.input_files import name_text
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, RecordingOptions
 
@@ -42,7 +44,9 @@ class ServingFlags:
     port: int = 8080
     """Port; if it is taken, the next free one; 0 for any free port."""
     token: Annotated[str | None, called("TOKEN")] = None
-    """Token that the link must contain; generated and printed if omitted."""
+    """Token that the link must contain, 8 characters or more, 16 for other machines; generated and printed if omitted."""
+    socket: Annotated[Path | None, called("PATH")] = None
+    """Serve on a Unix socket that only you can reach, for shared robots; the ssh command that forwards it is printed."""
     no_browser: Switch = False
     """Print the link, do not open a browser."""
 
@@ -58,7 +62,7 @@ class Demo:
     serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
 
     def run(self) -> int:
-        """Serve until Ctrl+C or SIGTERM; return the exit code."""
+        """Serve until Ctrl+C, SIGTERM or SIGHUP; return the exit code."""
         from app.resources import sample_folder
         from app.session.file import user_session_folder
 
@@ -103,7 +107,7 @@ class Open:
     serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
 
     def run(self) -> int:
-        """Serve until Ctrl+C or SIGTERM; return the exit code."""
+        """Serve until Ctrl+C, SIGTERM or SIGHUP; return the exit code."""
         from calib_core.recordings import require_files
 
         paths = require_files(self.recording)
@@ -112,7 +116,7 @@ class Open:
             session=self.session,
             fresh=self.fresh,
             serving=self.serving,
-            name=paths[0].name,
+            name=name_text(paths[0].name),
             camera_file=self.camera,
             clicks_file=self.clicks,
             calibration_file=self.calibration,
@@ -134,25 +138,29 @@ def _serve(
     topics: RecordingOptions | None = None,
     options: CalibrationOptions | None = None,
 ) -> int:
-    """Open everything, serve until Ctrl+C or SIGTERM, close everything.
+    """Open everything, serve until Ctrl+C, SIGTERM or SIGHUP, close everything.
 
     Raises:
         CalibrationError: the recording, the intrinsics, the clicks or the session cannot be used.
     """
     from app.resources import check_installation
     from app.session import ClicksImported, OptionsChanged
+    from app.session.file import recording_session_folder
     from app.view import sentence
-    from app.web.port.address import require_address, require_token
+    from app.web.port.address import require_address, require_one_address, require_token
+    from app.web.port.guard import is_loopback
     from app.workspace import open_workspace
     from calib_core.interchange import read_clicks
     from calib_core.recordings import open_recording
 
     check_installation()
     require_address(serving.host, serving.port)
-    require_token(serving.token)
+    require_one_address(serving.socket, serving.host)
+    require_token(serving.token, reachable=not is_loopback(serving.host))
     _require_given(camera_file, calibration_file, clicks_file)
     topics = topics or RecordingOptions()
-    with _service(paths, topics, serving, name) as service, ExitStack() as stack:
+    admissions = session or recording_session_folder(paths)
+    with _service(paths, topics, serving, name, admissions) as service, ExitStack() as stack:
         recording = stack.enter_context(open_recording(paths, topics))
         camera = _camera(recording, camera_file, calibration_file)
         reference = reference_from(calibration_file, camera) if calibration_file else None
@@ -171,6 +179,9 @@ def _serve(
         elif clicks_file is not None:
             print(f"Continuing the existing session; {clicks_file} was not imported (start over with --fresh)")
         service.serve(workspace, recording)
+        closed = workspace.close()
+    with contextlib.suppress(OSError):  # the terminal may be gone
+        print(f"\nStopped; {closed.note}.")
     return 0
 
 
@@ -189,7 +200,9 @@ def _session_folder(
     return FoundFolder(folder)
 
 
-def _service(paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str) -> "Service":
+def _service(
+    paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str, session: Path
+) -> "Service":
     """Return the service; it serves the page of a large recording before the recording is open."""
     from app.web.messages import Opening
     from app.web.port.server import ServerOptions
@@ -199,7 +212,7 @@ def _service(paths: Sequence[Path], topics: RecordingOptions, serving: ServingFl
     size_bytes = sum(map(_size_bytes, paths))
     size = f" ({size_bytes / 1e9:.1f} GB)" if size_bytes >= _LARGE_BYTES / 10 else ""
     return Service(
-        ServerOptions(**dataclasses.asdict(serving)),
+        ServerOptions(**dataclasses.asdict(serving), session=str(session.absolute())),
         Opening(name, f"Opening {name}{size}: reading its index and times…"),
         partial(first_picture, paths, topics),
         let_in_after_s=0.0 if size_bytes >= _LARGE_BYTES else _SOON_S,

@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app import whole_file
+from app.terminal import terminal_stream
 from calib_core.errors import InputError
+from calib_core.input_files import file_text, read_input
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
@@ -41,14 +43,10 @@ def read_text(path: Path) -> str:
     """Read a text file.
 
     Raises:
-        InputError: it is missing, a folder, unreadable, too large or not text.
+        InputError: it is missing, a folder, a pipe or a device, unreadable, too large or not text.
     """
     try:
-        if path.stat().st_size > _MAX_TEXT_BYTES:
-            raise InputError(
-                f"{path}: larger than {_MAX_TEXT_BYTES // 2**20} MB, too large for clicks or pairs; check the path"
-            )
-        return path.read_text(encoding="utf-8-sig")
+        return file_text(read_input(path, max_bytes=_MAX_TEXT_BYTES, is_what="a file of clicks or pairs"))
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; check the path") from None
     except OSError as error:
@@ -104,7 +102,7 @@ def progress_bar(label: str) -> Iterator[Callable[[int, int], None]]:
     from rich.console import Console
     from rich.progress import Progress
 
-    console = Console(stderr=True)
+    console = Console(file=terminal_stream(sys.stderr))
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(label, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)

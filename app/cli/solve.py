@@ -19,9 +19,11 @@ from app.cli.output import (
     write_whole,
 )
 from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
+from app.terminal import print_exactly
 from app.view import summary_lines
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.input_files import name_text
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
@@ -109,11 +111,11 @@ class Solve:
         outcome = solve_pairs(text, source=str(path), options=self.measured.over(self.options))
         if isinstance(outcome, Unsolvable):
             return explain_unsolvable(outcome)
-        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name=path.name))
+        return self._deliver(outcome, calibration_text_of_pairs(outcome, text, name=name_text(path.name)))
 
     def _deliver(self, calibration: Calibration, text: str) -> int:
         if self.out is None:
-            print(text, end="")
+            print_exactly(text)
             return 0
         write_whole(self.out, text)
         print("\n".join([*summary_lines(calibration), f"written to {self.out}"]))

@@ -16,6 +16,7 @@ from app.cli.tyro_hook import (
     flags_of,
     parse,
 )
+from app.terminal import with_colours
 from calib_core.errors import InputError
 
 __all__ = ["read_command"]
@@ -39,9 +40,10 @@ def read_command(command: Command, arguments: Sequence[str]) -> Runnable:
     def refuse(fault: Fault) -> NoReturn:
         raise InputError(f"{_reason(fault, kind)}; see {program} --help")
 
-    parsed = parse(kind, arguments, program=program, refuse=refuse)
-    default = parsed.file_defaults() if isinstance(parsed, HasFileDefaults) else None
-    return parsed if default is None else parse(kind, arguments, program=program, refuse=refuse, default=default)
+    with with_colours():  # of the help
+        parsed = parse(kind, arguments, program=program, refuse=refuse)
+        default = parsed.file_defaults() if isinstance(parsed, HasFileDefaults) else None
+        return parsed if default is None else parse(kind, arguments, program=program, refuse=refuse, default=default)
 
 
 def _reason(fault: Fault, kind: type[Runnable]) -> str:

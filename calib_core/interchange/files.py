@@ -5,6 +5,7 @@ from typing import TypeAlias
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.input_files import file_text, read_input
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance
 from calib_core.interchange.cameras.files import read_camera_file
 from calib_core.interchange.check import report as reports
@@ -180,9 +181,7 @@ def _imported(calibration: PathLike | Calibration | CalibrationFile) -> Imported
 def _text(path: PathLike) -> str:
     file = Path(path)
     try:
-        if file.stat().st_size > _MAX_TEXT_BYTES:
-            raise InputError(f"{file}: larger than {_MAX_TEXT_BYTES >> 20} MB; is it the right file?")
-        return file.read_text(encoding="utf-8-sig")
+        return file_text(read_input(file, max_bytes=_MAX_TEXT_BYTES, is_what="one of cocalib's files"))
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
     except UnicodeDecodeError as error:

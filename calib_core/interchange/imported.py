@@ -1,5 +1,6 @@
 """What a reader found in a file: the pose as written, and what it means."""
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Literal
@@ -81,8 +82,9 @@ class WrittenPose:
         if self.form == "rpy":
             return matrix_from_rpy(self.rotation)
         wxyz = np.roll(self.rotation, 1) if self.form == "quaternion_xyzw" else self.rotation
-        if abs(float(np.linalg.norm(wxyz)) - 1.0) > _ROUNDING:
-            raise ValueError(f"the quaternion {self.rotation.tolist()} has length {np.linalg.norm(wxyz):.4g}, not 1")
+        length = math.hypot(*wxyz)  # does not overflow below the largest float
+        if not abs(length - 1.0) <= _ROUNDING:
+            raise ValueError(f"the quaternion {self.rotation.tolist()} has length {length:.4g}, not 1")
         return matrix_from_quaternion_wxyz(wxyz)
 
     def as_written(self) -> RigidTransform:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from calib_core.errors import InputError
+from calib_core.input_files import read_input
 from calib_core.interchange.formats.registry import readers
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.syntax.content import Content, readings
@@ -34,9 +35,7 @@ def calibration_bytes(path: str | Path) -> bytes:
     """
     file = Path(path)
     try:
-        if file.stat().st_size > _MAX_BYTES:
-            raise InputError(f"{file}: too large for a calibration; is it the right file?")
-        return file.read_bytes()
+        return read_input(file, max_bytes=_MAX_BYTES, is_what="a calibration")
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
 

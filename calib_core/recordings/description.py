@@ -43,7 +43,7 @@ def summary_text(summary: RecordingSummary) -> str:
         lines.append("")
         for warning in summary.warnings:
             lines.extend(_labelled("warning", [f"{warning.message}.", f"{warning.hint}. [{warning.code}]"]))
-    return "\n".join(line.rstrip() for line in lines)
+    return "\n".join(line.rstrip().replace("\n", "\\u000a") for line in lines)  # a name may hold a line feed
 
 
 def _counted(count: int, what: str) -> str:

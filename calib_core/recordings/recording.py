@@ -12,6 +12,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
+from calib_core.input_files import name_text, special_kind
 from calib_core.measurements import RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.assumptions import Assumption
@@ -88,7 +89,7 @@ class Recording:
     @property
     def name(self) -> str:
         """The name of the recording for messages."""
-        return " + ".join(path.name for path in self.paths)
+        return " + ".join(name_text(path.name) for path in self.paths)
 
     @property
     def radar_clock(self) -> str | None:
@@ -234,7 +235,7 @@ class Recording:
                                 progress(min(done, total), total)
             except OSError as error:
                 raise RecordingError(f"{source.path}: can no longer be read: {error.strerror}") from error
-            files.append(InputFile(source.path.name, source.size_bytes, digest.hexdigest()))
+            files.append(InputFile(name_text(source.path.name), source.size_bytes, digest.hexdigest()))
         self._fingerprint = tuple(files)
         return self._fingerprint
 
@@ -308,14 +309,18 @@ def inspect_recording(paths: "str | Path | Sequence[str | Path]", options: Recor
 
 
 def require_files(paths: Sequence[Path]) -> tuple[Path, ...]:
-    """Return the paths if all of them exist.
+    """Return the paths if all of them are files or folders.
 
     Raises:
-        RecordingError: one does not exist, or none was given.
+        RecordingError: one does not exist or is a pipe, a device or a socket, or none was given.
     """
     if not paths:
         raise RecordingError("no recording given; name one or more .bag, .mcap, .db3 files or bag folders")
     for path in paths:
         if not path.exists():
             raise RecordingError(f"{path}: no such file or folder; check the path")
+        if (kind := special_kind(path)) is not None:
+            raise RecordingError(
+                f"{path}: is {kind}; a recording must be a regular file or a folder: save it to a file first"
+            )
     return tuple(paths)

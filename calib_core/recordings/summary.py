@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 
 from calib_core.errors import RecordingError
+from calib_core.input_files import name_text
 from calib_core.measurements import NS_PER_S, Stamp, TimeNs
 from calib_core.recordings.other_clocks import other_clocks
 from calib_core.recordings.recording import Recording
@@ -128,7 +129,7 @@ def recording_summary(recording: Recording) -> RecordingSummary:
     end = max((topic.end.time for topic in timed if topic.end is not None), default=None)
     shared = _shared(recording)
     return RecordingSummary(
-        files=tuple(FileSummary(s.path.name, s.size_bytes, s.container) for s in recording.sources),
+        files=tuple(FileSummary(name_text(s.path.name), s.size_bytes, s.container) for s in recording.sources),
         start=Stamp.of(start) if start is not None else None,
         end=Stamp.of(end) if end is not None else None,
         duration_s=(end - start) / NS_PER_S if start is not None and end is not None else 0.0,

@@ -1,6 +1,7 @@
 """Drive the page: wait for a condition, click an image point, read the state."""
 
 import math
+import re
 import time
 from typing import Any
 
@@ -31,11 +32,17 @@ class Driver:
         page.on("request", lambda request: self.addresses.add(request.url))
         page.on("websocket", lambda socket: self.addresses.add(socket.url))
         page.goto(url)
+        page.wait_for_url(re.compile(r"^http[^?]*$"))  # the link leads on to the page
         self.until(ready)
 
     def _console(self, message: Any) -> None:
         if message.type == "error":
             self.complaints.append(message.text)
+
+    def forget_lost_connections(self) -> None:
+        """Drop the browser's own complaints about a server that was down or did not know the page yet."""
+        expected = ("WebSocket connection", "ERR_CONNECTION_REFUSED", "status of 401")
+        self.complaints[:] = [text for text in self.complaints if not any(words in text for words in expected)]
 
     def until(self, condition: str, seconds: float = 40) -> None:
         """Wait until a JavaScript condition holds. The page's policy forbids eval, so the condition goes in as a function."""

@@ -4,11 +4,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from queue import Queue
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser
 
 from app.web.messages import Opening
+from app.web.port.hand_over import HandOver
 from app.web.port.server import RunningServer, ServerOptions
 from app.web.port.serving import Service
 from app.workspace import Workspace
@@ -101,7 +104,7 @@ def test_why_it_cannot_be_opened_stays_on_the_page(
     assert "no radar topic" in page.text("#status-text")
     assert not page.page.is_visible("#guide")
     assert not page.page.is_visible("#progress")
-    page.complaints[:] = [text for text in page.complaints if "WebSocket connection" not in text]
+    page.forget_lost_connections()
 
 
 def test_a_page_that_comes_back_to_a_recording_still_being_opened_loses_no_click(
@@ -122,4 +125,20 @@ def test_a_page_that_comes_back_to_a_recording_still_being_opened_loses_no_click
         second.admit(workspace, sample)
         page.settle()
         assert [round(row["u_px"]) for row in page.view["clicks"]] == [300]
-    page.complaints[:] = [text for text in page.complaints if "WebSocket connection" not in text]
+    page.forget_lost_connections()
+
+
+def test_the_private_file_leads_the_browser_to_the_page(
+    chromium: Browser, server: RunningServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A browser sends no SameSite=Strict cookie along a redirect that a file began."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    opened: Queue[str] = Queue()
+    given = HandOver(server.url, opened.put)
+    context = chromium.new_context()
+    page = context.new_page()
+    page.goto(opened.get(timeout=20))
+    page.wait_for_url(f"{server.origin}/")
+    page.wait_for_function("() => window.__cocalib && window.__cocalib.state.shown")
+    given.discard()
+    context.close()

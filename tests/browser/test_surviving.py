@@ -93,7 +93,7 @@ def test_killing_the_server_loses_no_click_and_the_page_reconnects_by_itself(
     )
     assert not page.page.is_visible("#banner")
     page.page.frame_locator("#space-view").locator("canvas").last.wait_for(state="attached")
-    page.complaints[:] = [text for text in page.complaints if "WebSocket connection" not in text]
+    page.forget_lost_connections()
 
 
 def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Driver], tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Where a session is stored: next to its recording if that folder is writable, else in the user's state folder."""
 
 import hashlib
+import os
 import re
 import tempfile
 from collections.abc import Sequence
@@ -36,7 +37,7 @@ def user_session_folder(name: str, *, key: str = "") -> Path:
         name: what the session is of.
         key: distinguishes sessions of the same name, such as the recording's path.
     """
-    distinct = f"-{hashlib.sha256(key.encode()).hexdigest()[:8]}" if key else ""
+    distinct = f"-{hashlib.sha256(os.fsencode(key)).hexdigest()[:8]}" if key else ""
     return state_folder() / "sessions" / f"{name}{distinct}{_SUFFIX}"
 
 

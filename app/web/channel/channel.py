@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from app.error_boundary import error_boundary
 from app.view import sentence
 from app.web.channel.hub import Hub
 from app.web.channel.newest import NewestWins
@@ -41,6 +42,9 @@ __all__ = ["Channel", "Socket"]
 
 _SPACE_EVERY_S = 0.34
 """Minimum time between two drawings of the 3D view while playing: it shares the page's main thread [s]."""
+
+_GREET_EVERY_S = 0.25
+"""Minimum time between two greetings of one page [s]."""
 
 
 class Socket(Protocol):
@@ -76,9 +80,10 @@ class Channel:
         self._hub = hub
         self._cursor = Cursor()
         self._shown: Shown | None = None
-        self._frames = NewestWins(self._send_frame)
-        self._overlay = NewestWins(self._send_overlay)
-        self._space = NewestWins(self._draw_space)
+        self._greetings = NewestWins(self._greet, self._report)
+        self._frames = NewestWins(self._send_frame, self._report)
+        self._overlay = NewestWins(self._send_overlay, self._report)
+        self._space = NewestWins(self._draw_space, self._report)
         self._forward = True
 
     async def run(self, socket: Socket) -> None:
@@ -92,7 +97,7 @@ class Channel:
                 task.result()
         finally:
             self._hub.tabs.discard(self)
-            for worker in (self._frames, self._overlay, self._space):
+            for worker in (self._greetings, self._frames, self._overlay, self._space):
                 worker.close()
             for task in (sending, reading):
                 task.cancel()
@@ -110,11 +115,17 @@ class Channel:
     async def _read(self, socket: Socket) -> None:
         while True:
             text = await socket.recv()
-            try:
-                incoming = parse(text)
-                await self._obey(incoming)
-            except CalibrationError as error:
-                self.outbox.put(encode(Problem(sentence(str(error)), request=request_of(text))))
+            with error_boundary("a page's message", partial(self._refuse, text)):
+                try:
+                    await self._obey(parse(text))
+                except CalibrationError as error:
+                    self._refuse(text, str(error))
+
+    def _report(self, line: str) -> None:
+        self.outbox.put(encode(Problem(sentence(line))))
+
+    def _refuse(self, text: str | bytes, reason: str) -> None:
+        self.outbox.put(encode(Problem(sentence(reason), request=request_of(text))))
 
     async def _obey(self, incoming: Incoming) -> None:
         """Carry out a command of the page.
@@ -128,8 +139,7 @@ class Channel:
         elif isinstance(command, CursorMoved):
             self._move(command)
         elif isinstance(command, Hello):
-            self._shown = None
-            self._hub.greet(self)
+            self._greetings.give(command)
         elif isinstance(command, ViewWanted):
             self._shown = None
             self.show()
@@ -157,6 +167,12 @@ class Channel:
             return
         self._cursor = Cursor(command.index, command.playing, command.selected, command.light)
         self.refresh()
+
+    async def _greet(self, _wanted: Hello) -> None:
+        """Greet the page, at most so often: a greeting costs more than asking for it."""
+        self._shown = None
+        self._hub.greet(self)
+        await asyncio.sleep(_GREET_EVERY_S)
 
     async def _send_frame(self, wanted: FrameWanted) -> None:
         store, size = self._hub.frames, wanted.size

@@ -7,6 +7,7 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
 from typing import Protocol
 
+from app.error_boundary import error_boundary
 from app.resources import version
 from app.view import View, warning_in_sentences
 from app.web.channel.outbox import Outbox
@@ -111,12 +112,14 @@ class Hub:
     async def _search(self) -> None:
         """Survey the radar once, off the event loop."""
         options = self.workspace.session.options.gating
-        try:
-            self.survey = await asyncio.get_running_loop().run_in_executor(
-                self.executor, lambda: survey_of(self.recording.radar_windows(), self.recording.image_times, options)
-            )
-        except CalibrationError as error:
-            _log.warning("the radar could not be searched for placements: %s", error)
+        with error_boundary("searching the radar for placements", _log.error):
+            try:
+                self.survey = await asyncio.get_running_loop().run_in_executor(
+                    self.executor,
+                    lambda: survey_of(self.recording.radar_windows(), self.recording.image_times, options),
+                )
+            except CalibrationError as error:
+                _log.warning("the radar could not be searched for placements: %s", error)
         self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
         self.broadcast(Placements(self.survey.rows if self.survey else ()), "placements")
         for tab in self.tabs:

@@ -5,6 +5,8 @@ import logging
 from collections.abc import Awaitable, Callable
 from typing import Generic, TypeVar
 
+from app.error_boundary import error_boundary
+
 __all__ = ["NewestWins"]
 
 Item = TypeVar("Item")
@@ -14,8 +16,15 @@ _log = logging.getLogger(__name__)
 class NewestWins(Generic[Item]):
     """Processes one item at a time; of those that arrive meanwhile, only the newest is kept. Runs on one event loop."""
 
-    def __init__(self, work: Callable[[Item], Awaitable[None]]) -> None:
+    def __init__(self, work: Callable[[Item], Awaitable[None]], tell: Callable[[str], None] = _log.error) -> None:
+        """Set up the work.
+
+        Args:
+            work: processes one item.
+            tell: takes the line about an internal error in it.
+        """
         self._work = work
+        self._tell = tell
         self._next: list[Item] = []
         self._task: asyncio.Task[None] | None = None
 
@@ -34,9 +43,8 @@ class NewestWins(Generic[Item]):
 
     async def _run(self) -> None:
         while self._next:
-            await self._work(self._next.pop())
+            with error_boundary("a picture or drawing for a page", self._tell):
+                await self._work(self._next.pop())
 
-    def _ended(self, task: "asyncio.Task[None]") -> None:
+    def _ended(self, _task: "asyncio.Task[None]") -> None:
         self._task = None
-        if not task.cancelled() and (error := task.exception()) is not None:
-            _log.error("work for a page failed", exc_info=error)

@@ -1,12 +1,14 @@
 """Check the address, port and token of the server before anything is opened."""
 
 import socket
+from pathlib import Path
 
 from calib_core.errors import CalibrationError
 
-__all__ = ["AddressError", "require_address", "require_token"]
+__all__ = ["AddressError", "require_address", "require_one_address", "require_token"]
 
 _LAST_PORT = 65535
+_LEAST, _LEAST_REACHABLE, _LEAST_DIFFERENT = 8, 16, 4
 
 
 class AddressError(CalibrationError):
@@ -38,11 +40,34 @@ def require_address(host: str, port: int) -> None:
         ) from None
 
 
-def require_token(token: str | None) -> None:
-    """Refuse an empty token, which would protect nothing.
+def require_token(token: str | None, *, reachable: bool) -> None:
+    """Refuse a token that could be guessed.
+
+    Args:
+        token: the user's; None to have one generated.
+        reachable: other machines can reach the server.
 
     Raises:
-        AddressError: it is empty.
+        AddressError: it is empty or too short.
     """
-    if token is not None and not token.strip():
-        raise AddressError("--token: the token is empty; omit the flag to have one generated and printed in the link")
+    omit = "omit the flag to have one generated and printed in the link"
+    if token is None:
+        return
+    if not token.strip():
+        raise AddressError(f"--token: the token is empty; {omit}")
+    least = _LEAST_REACHABLE if reachable else _LEAST
+    if len(token) < least or len(set(token)) < _LEAST_DIFFERENT:
+        where = "when other machines can reach the page" if reachable else "against other users of this machine"
+        raise AddressError(
+            f"--token: at least {least} characters, {_LEAST_DIFFERENT} of them different, are needed {where}; {omit}"
+        )
+
+
+def require_one_address(socket_path: Path | None, host: str) -> None:
+    """Refuse a Unix socket together with an address.
+
+    Raises:
+        AddressError: both are given.
+    """
+    if socket_path is not None and host != "127.0.0.1":
+        raise AddressError("--socket takes the place of --host; give one of them")

@@ -4,18 +4,18 @@ The port serves the pictures and clicks of a recording, which may be confidentia
 names and other users of the machine must not get access.
 """
 
-import hashlib
 import hmac
 import ipaddress
 import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
-__all__ = ["COOKIE_NAME", "Admitted", "Allowed", "Guard", "Refused", "Request", "Verdict", "is_loopback"]
+from app.web.port.admissions import Admissions
 
-COOKIE_NAME = "cocalib"
+__all__ = ["Admitted", "Allowed", "Guard", "Refused", "Request", "Verdict", "host_name", "is_address", "is_loopback"]
+
 _LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
 
 
@@ -26,10 +26,12 @@ class Request:
     Attributes:
         path: path and query as sent.
         headers: all values of each header; names in lower case.
+        method: such as GET.
     """
 
     path: str
     headers: Mapping[str, Sequence[str]]
+    method: str = "GET"
 
     @property
     def is_websocket(self) -> bool:
@@ -39,15 +41,24 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Allowed:
-    """Serve it."""
+    """Serve it.
+
+    Attributes:
+        cookie: the value of the cookie that it came with.
+    """
+
+    cookie: str
 
 
 @dataclass(frozen=True, slots=True)
 class Admitted:
-    """The link's token is correct: set the cookie and redirect to the address without the token."""
+    """The link's token is correct: set the cookie and go on to the address without the token.
 
-    set_cookie: str
-    location: str
+    Attributes:
+        cookie: the value of the new cookie.
+    """
+
+    cookie: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,21 +91,23 @@ class Guard:
     """Decides which requests a server answers.
 
     The link printed in the terminal contains a token. A generated token works once and is then replaced; a token chosen by
-    the user stays valid. A browser admitted by a link gets a cookie, which stays valid after a restart if the key is the same.
+    the user stays valid. A browser admitted by a link gets a cookie.
     """
 
-    def __init__(self, *, host: str, key: bytes, token: str | None = None, more_hosts: Sequence[str] = ()) -> None:
+    def __init__(
+        self, admissions: Admissions, *, host: str, token: str | None = None, more_hosts: Sequence[str] = ()
+    ) -> None:
         """Set up the access control.
 
         Args:
+            admissions: who has been admitted.
             host: the address that the server binds.
-            key: secret from which the cookie is derived; with the same key, cookies of an earlier process are accepted.
             token: the user's own token; None generates one-time tokens.
             more_hosts: further host names that requests may use.
         """
+        self._admissions = admissions
         self._names = {*_LOOPBACK_NAMES, host.lower(), *(name.lower() for name in more_hosts)}
         self._takes_addresses = not is_loopback(host)
-        self._cookie = hmac.new(key, b"cocalib cookie 1", hashlib.sha256).hexdigest()
         self._fixed = token is not None
         self._token = token if token is not None else secrets.token_urlsafe(24)
 
@@ -103,28 +116,44 @@ class Guard:
         """The token that is currently valid."""
         return self._token
 
-    @property
-    def cookie(self) -> str:
-        """Name and value of the cookie, as sent by a client."""
-        return f"{COOKIE_NAME}={self._cookie}"
+    def screen(self, request: Request) -> Refused | None:
+        """Refuse requests under a foreign host name or from a foreign page, whoever sends them."""
+        host = self._host_of(request)
+        return host if isinstance(host, Refused) else self._foreign_origin(request, host)
+
+    def tries_token(self, request: Request) -> bool:
+        """Return whether a request has to wait for its turn: it offers a token that may have been guessed.
+
+        A generated token is too long to be guessed at any rate, so the right one need not wait behind wrong ones.
+        """
+        offered = self._offered(request)
+        if not offered or self._admissions.admitted(request.headers) is not None:
+            return False
+        return self._fixed or not self._is_token(offered[0])
 
     def check(self, request: Request) -> Verdict:
         """Decide on a request before anything else handles it."""
-        host = self._host_of(request)
-        if isinstance(host, Refused):
-            return host
-        foreign = self._foreign_origin(request, host)
-        if foreign is not None:
-            return foreign
-        return self._admission(request)
+        if (refused := self.screen(request)) is not None:
+            return refused
+        offered = self._offered(request)
+        cookie = self._admissions.admitted(request.headers)
+        if cookie is not None:
+            return Admitted(cookie) if offered else Allowed(cookie)
+        if offered and self._is_token(offered[0]):
+            if not self._fixed:
+                self._token = secrets.token_urlsafe(24)
+            return Admitted(self._admissions.admit())
+        return Refused(
+            401, "Open the link shown in the terminal. Each link works once; the terminal then shows a new one."
+        )
 
     def _host_of(self, request: Request) -> str | Refused:
         """Return the Host header; refuse names that are not ours, to prevent DNS rebinding."""
         hosts = request.headers.get("host", ())
         if len(hosts) != 1:
             return Refused(400, "A request needs exactly one Host header.")
-        name = _without_port(hosts[0].strip().lower())
-        if name in self._names or (self._takes_addresses and _is_address(name)):
+        name = host_name(hosts[0].strip().lower())
+        if name in self._names or (self._takes_addresses and is_address(name)):
             return hosts[0].strip().lower()
         return Refused(421, "This server does not accept that host name. Use the link shown in the terminal.")
 
@@ -138,44 +167,31 @@ class Guard:
             return None
         return Refused(403, "This request came from another site. Open the link shown in the terminal.")
 
-    def _admission(self, request: Request) -> Verdict:
-        address = urlsplit(request.path)
-        offered = parse_qs(address.query).get("token", [])
-        if request.is_websocket:
-            offered = []
-        if _same(_cookies(request), self._cookie):
-            return Admitted(self._set_cookie(), address.path) if offered else Allowed()
-        if offered and hmac.compare_digest(offered[0].encode(), self._token.encode()):
-            if not self._fixed:
-                self._token = secrets.token_urlsafe(24)
-            return Admitted(self._set_cookie(), address.path)
-        return Refused(
-            401, "Open the link shown in the terminal. Each link works once; the terminal then shows a new one."
-        )
+    def _offered(self, request: Request) -> list[str]:
+        """Return the tokens in the address: only opening it as a page uses a link up, not a preview or a WebSocket."""
+        if request.is_websocket or request.method != "GET":
+            return []
+        return parse_qs(request.path.partition("?")[2]).get("token", [])
 
-    def _set_cookie(self) -> str:
-        return f"{COOKIE_NAME}={self._cookie}; HttpOnly; SameSite=Strict; Path=/"
+    def _is_token(self, offered: str) -> bool:
+        return hmac.compare_digest(_bytes(offered), _bytes(self._token))
 
 
-def _without_port(host: str) -> str:
+def _bytes(text: str) -> bytes:
+    return text.encode("utf-8", "backslashreplace")
+
+
+def host_name(host: str) -> str:
+    """Return a Host header without its port."""
     if host.startswith("["):
         return host.partition("]")[0] + "]"
     return host.partition(":")[0]
 
 
-def _is_address(name: str) -> bool:
+def is_address(name: str) -> bool:
     """Return whether a host is an address rather than a name: DNS cannot rebind an address."""
     try:
         ipaddress.ip_address(name.strip("[]"))
     except ValueError:
         return False
     return True
-
-
-def _cookies(request: Request) -> list[str]:
-    pairs = (pair.strip().partition("=") for header in request.headers.get("cookie", ()) for pair in header.split(";"))
-    return [value for name, _, value in pairs if name == COOKIE_NAME]
-
-
-def _same(offered: list[str], wanted: str) -> bool:
-    return any(hmac.compare_digest(value.encode(), wanted.encode()) for value in offered)

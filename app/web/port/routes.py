@@ -25,7 +25,7 @@ from calib_core.measurements import MIN_PAIRS, Unsolvable
 from calib_core.recordings import Recording
 from calib_core.results import Calibration
 
-__all__ = ["Reply", "Routes", "refusal"]
+__all__ = ["Reply", "Routes", "json_reply", "landing", "refusal"]
 
 _TYPES = {
     ".html": "text/html; charset=utf-8",
@@ -50,6 +50,10 @@ _VISER_POLICY = (
     "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; worker-src blob: data: 'self'; base-uri 'none'; "
     "form-action 'none'; frame-ancestors 'self'"
 )
+_LANDING = (
+    b'<!doctype html><meta charset="utf-8"><title>cocalib</title><link rel="icon" href="/icon.svg">'
+    b'<p><a href="/">Open the page</a>'
+)
 _VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
 
 
@@ -68,11 +72,13 @@ class Reply:
         status: such as 200.
         headers: all except Content-Length.
         body: the content.
+        length: of the content, even if it is not sent [bytes].
     """
 
     status: http.HTTPStatus
     headers: tuple[tuple[str, str], ...]
     body: bytes
+    length: int
 
 
 def _reply(
@@ -83,13 +89,30 @@ def _reply(
     policy: str = _OWN_POLICY,
     more: tuple[tuple[str, str], ...] = (),
 ) -> Reply:
-    headers = (("Content-Type", content_type), *_ALWAYS, ("Content-Security-Policy", policy), *more)
-    return Reply(http.HTTPStatus(status), headers, body)
+    named = {name for name, _ in more}
+    always = (header for header in _ALWAYS if header[0] not in named)
+    headers = (("Content-Type", content_type), *always, ("Content-Security-Policy", policy), *more)
+    return Reply(http.HTTPStatus(status), headers, body, len(body))
 
 
-def refusal(status: int, reason: str) -> Reply:
-    """Return a refusal in plain text."""
-    return _reply(f"{reason}\n".encode(), "text/plain; charset=utf-8", status=status)
+def refusal(status: int, reason: str, *, more: tuple[tuple[str, str], ...] = ()) -> Reply:
+    """Return a refusal in plain text, with further headers."""
+    return _reply(f"{reason}\n".encode(), "text/plain; charset=utf-8", status=status, more=more)
+
+
+def json_reply(body: bytes, *, more: tuple[tuple[str, str], ...] = ()) -> Reply:
+    """Return JSON that no cache may keep."""
+    return _reply(body, _TYPES[".json"], more=(("Cache-Control", "no-store"), *more))
+
+
+def landing(set_cookie: str) -> Reply:
+    """Return the page behind a link, which goes on to the page itself.
+
+    It is a page and not a redirect: a browser that came here from a file or a message sends no SameSite=Strict cookie along
+    a redirect, but does once our own page goes on.
+    """
+    more = (("Refresh", "0; url=/"), ("Set-Cookie", set_cookie), ("Cache-Control", "no-store"))
+    return _reply(_LANDING, _TYPES[".html"], more=more)
 
 
 class Routes:

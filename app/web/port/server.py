@@ -2,11 +2,11 @@
 
 import asyncio
 import contextlib
-import os
-import secrets
+import logging
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
@@ -15,14 +15,19 @@ from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
-from app.resources import state_folder, static_folder
+from app.error_boundary import error_boundary
+from app.resources import static_folder
 from app.web.channel.channel import Channel, Socket
 from app.web.channel.hub import Hub
 from app.web.port import guard
+from app.web.port.admissions import Admissions
+from app.web.port.entrance import Entrance
+from app.web.port.resumption import Resumption
 from app.web.port.routes import Reply, Routes, refusal
-from app.web.port.viser_hook import path_of_client, start_viser, stop_viser
+from app.web.port.unix_socket import listening_socket, remove_socket
+from app.web.port.viser_hook import only_allowed, path_of_client, start_viser, stop_viser
 from app.web.port.waiting import WaitingRoom
-from app.web.port.websockets_hook import ProcessRequest, SocketHandler
+from app.web.port.websockets_hook import ProcessRequest, SocketHandler, head_of
 from app.web.view3d.scene import FIELD_OF_VIEW_RAD, LOOK_AT, STAND_AT, TabScene
 from app.workspace import Workspace
 from calib_core.recordings import EncodedImage, Recording
@@ -31,6 +36,9 @@ if TYPE_CHECKING:
     import viser
 
 __all__ = ["RunningServer", "ServerOptions", "start"]
+
+_FORWARDED_PORT = 8080
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +51,8 @@ class ServerOptions:
         token: token that the link must contain; None generates one-time tokens.
         no_browser: print the link, do not open a browser.
         more_hosts: further host names that requests may use.
+        socket: serve on this Unix socket instead of a port.
+        session: what is served, such as the session's folder: cookies and tickets are for it only.
     """
 
     host: str = "127.0.0.1"
@@ -50,6 +60,8 @@ class ServerOptions:
     token: str | None = None
     no_browser: bool = False
     more_hosts: tuple[str, ...] = ()
+    socket: Path | None = None
+    session: str = ""
 
 
 class RunningServer:
@@ -57,20 +69,28 @@ class RunningServer:
 
     def __init__(self, options: ServerOptions, room: WaitingRoom) -> None:
         self._options = options
-        self._guard = guard.Guard(
-            host=options.host, key=_cookie_key(), token=options.token, more_hosts=options.more_hosts
-        )
+        admissions = Admissions(options.session)
+        self._guard = guard.Guard(admissions, host=options.host, token=options.token, more_hosts=options.more_hosts)
         self._executor = ThreadPoolExecutor(max_workers=3, thread_name_prefix="frames")
         self._room = room
         self._routes = Routes(static_folder())
+        self._port = 0
+        self._entrance = Entrance(
+            admissions, self._guard, self._routes, Resumption(options.session), self._direct_origin
+        )
         self._hub: Hub | None = None
         self._is_closed = False
         self._channels: dict[str, Channel] = {}
         self._scenes: dict[str, tuple[int, TabScene]] = {}
-        self.on_new_link: Callable[[], None] = lambda: None
+        listening = None if options.socket is None else listening_socket(options.socket)
         self._viser = start_viser(
-            options.host, options.port, wrap_request=self._wrap_request, wrap_handler=self._wrap_handler
+            options.host,
+            options.port,
+            wrap_request=self._wrap_request,
+            wrap_handler=self._wrap_handler,
+            listening=listening,
         )
+        self._port = (options.port or _FORWARDED_PORT) if options.socket else self._viser.get_port()
         self._viser.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         self._viser.initial_camera.position, self._viser.initial_camera.look_at = STAND_AT, LOOK_AT
         self._viser.initial_camera.fov = FIELD_OF_VIEW_RAD
@@ -102,10 +122,14 @@ class RunningServer:
         if self._hub is None and not self._is_closed:
             asyncio.run_coroutine_threadsafe(self._room.refuse(problem), self._viser.get_event_loop()).result()
 
+    def on_admitted(self, call: Callable[[], None]) -> None:
+        """Call this whenever a link was used."""
+        self._entrance.on_admitted = call
+
     @property
     def port(self) -> int:
-        """The bound port."""
-        return self._viser.get_port()
+        """The bound port; with a Unix socket, the port to forward to it."""
+        return self._port
 
     @property
     def origin(self) -> str:
@@ -119,6 +143,11 @@ class RunningServer:
         """The link that opens the page; it works once unless the user chose the token."""
         return f"{self.origin}/?token={quote(self._guard.token)}"
 
+    def _direct_origin(self) -> str:
+        """Return the origin of pages that reach this server at its own address; "" if a name or a tunnel is in between."""
+        host = "127.0.0.1" if self._options.host == "0.0.0.0" else self._options.host
+        return self.origin if self._options.socket is None and guard.is_address(host) else ""
+
     def close(self) -> None:
         """Stop serving; the workspace and the recording stay open. Safe to call twice."""
         if self._is_closed:
@@ -128,37 +157,36 @@ class RunningServer:
             asyncio.run_coroutine_threadsafe(self._hub.end(), self._viser.get_event_loop()).result()
             self._hub.steps.shutdown(wait=True, cancel_futures=True)
         stop_viser(self._viser)
+        if self._options.socket is not None:
+            remove_socket(self._options.socket)
         self._executor.shutdown(wait=True, cancel_futures=True)
 
     def _wrap_request(self, _viser_files: object) -> ProcessRequest:
         """Send every request through the guard; viser's own file server is not used."""
 
-        async def process(_connection: ServerConnection, request: Request) -> Response | None:
-            asked = guard.Request(request.path, _all_headers(request.headers))
-            link = self._guard.token
-            verdict = self._guard.check(asked)
-            if isinstance(verdict, guard.Refused):
-                return _response(refusal(verdict.status, verdict.reason))
-            if isinstance(verdict, guard.Admitted):
-                if self._guard.token != link:
-                    self.on_new_link()
-                return _redirect(verdict)
-            path = request.path.partition("?")[0]
-            if asked.is_websocket:
-                known = path.startswith(("/ws/", "/viser/"))
-                return None if known else _response(refusal(404, "No WebSocket at this address."))
-            return _response(await self._routes.answer(request.path))
+        async def process(connection: ServerConnection, request: Request) -> Response | None:
+            head = head_of(connection)
+            if head.fault is not None:
+                return _response(refusal(head.fault, "This request cannot be understood."))
+            reply = await self._entrance.answer(_asked(request, head.method))
+            return None if reply is None else _response(reply)
 
         return process
 
     def _wrap_handler(self, viser_handler: SocketHandler) -> SocketHandler:
         async def handle(connection: ServerConnection) -> None:
-            path = connection.request.path if connection.request else ""
-            if not path.startswith("/ws/"):
-                await viser_handler(connection)
-                return
-            with contextlib.suppress(websockets.ConnectionClosed, BufferError):
-                await self._run_channel(connection, path.removeprefix("/ws/"))
+            assert connection.request is not None
+            path = connection.request.path
+            cookie = self._entrance.entered(_asked(connection.request))
+            try:
+                with error_boundary("a page's connection", _log.error):
+                    if not path.startswith("/ws/"):
+                        await viser_handler(only_allowed(connection))
+                        return
+                    with contextlib.suppress(websockets.ConnectionClosed, BufferError):
+                        await self._run_channel(connection, path.removeprefix("/ws/"))
+            finally:
+                self._entrance.left(cookie)
 
         return handle
 
@@ -201,36 +229,16 @@ def start(workspace: Workspace, recording: Recording, options: ServerOptions) ->
     return server
 
 
-def _all_headers(headers: Headers) -> dict[str, list[str]]:
-    return {name.lower(): headers.get_all(name) for name in headers}
+def _asked(request: Request, method: str = "GET") -> guard.Request:
+    headers = {name.lower(): request.headers.get_all(name) for name in request.headers}
+    return guard.Request(request.path, headers, method)
 
 
 def _response(reply: Reply) -> Response:
-    headers = Headers([*reply.headers, ("Content-Length", str(len(reply.body))), ("Connection", "close")])
+    headers = Headers([*reply.headers, ("Content-Length", str(reply.length)), ("Connection", "close")])
     return Response(reply.status.value, reply.status.phrase, headers, reply.body)
-
-
-def _redirect(admitted: guard.Admitted) -> Response:
-    location = admitted.location if admitted.location.startswith("/") and admitted.location[:2] != "//" else "/"
-    return Response(303, "See Other", Headers([("Location", location), ("Set-Cookie", admitted.set_cookie),
-                    ("Content-Length", "0"), ("Referrer-Policy", "no-referrer"), ("Connection", "close")]), b"")  # fmt: skip
 
 
 def _tab_of(server: "viser.ViserServer", client_id: int) -> str:
     """Return the name of the tab that a 3D view belongs to: the last part of its address."""
     return path_of_client(server, client_id).partition("?")[0].rstrip("/").rpartition("/")[2]
-
-
-def _cookie_key() -> bytes:
-    """Return the secret for the cookies, stored in the user's state folder so that pages stay admitted after a restart."""
-    path = state_folder() / "cookie.key"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with contextlib.suppress(FileExistsError):
-            descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)
-            with os.fdopen(descriptor, "wb") as file:
-                file.write(secrets.token_bytes(32))
-        key = path.read_bytes()
-    except OSError:
-        key = b""
-    return key if len(key) == 32 else secrets.token_bytes(32)

@@ -1,4 +1,4 @@
-"""Serve the page of a recording until Ctrl+C or SIGTERM.
+"""Serve the page of a recording until Ctrl+C, SIGTERM or SIGHUP.
 
 If opening the recording takes long, the page is served before the recording is open.
 """
@@ -6,16 +6,18 @@ If opening the recording takes long, the page is served before the recording is 
 import contextlib
 import logging
 import threading
-import webbrowser
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from types import TracebackType
 from typing import Self
 
 from app.view import sentence
 from app.web.messages import Opening
 from app.web.port.guard import is_loopback
+from app.web.port.hand_over import HandOver
 from app.web.port.server import RunningServer, ServerOptions
+from app.web.port.unix_socket import forwarding_command
 from app.web.port.waiting import WaitingRoom
 from app.workspace import Workspace
 from calib_core.errors import CalibrationError
@@ -54,6 +56,7 @@ class Service:
         self._first_picture = first_picture
         self._let_in_after_s = let_in_after_s
         self._is_settled = threading.Event()
+        self._hand_over: HandOver | None = None
         self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="early")
 
     def __enter__(self) -> Self:
@@ -72,7 +75,7 @@ class Service:
         self._end(error)
 
     def serve(self, workspace: Workspace, recording: Recording) -> None:
-        """Serve the opened recording until Ctrl+C or SIGTERM.
+        """Serve the opened recording until a signal ends it; the caller then closes the session and says so.
 
         Raises:
             OSError: no port can be bound.
@@ -80,13 +83,11 @@ class Service:
         self._is_settled.set()
         server = self._early.result() or self._start(WaitingRoom())
         try:
-            server.admit(workspace, recording)
-            threading.Event().wait()
-        except KeyboardInterrupt:
-            server.close()
-            print(f"\nStopped; {workspace.close().note}.")
+            with contextlib.suppress(KeyboardInterrupt):
+                server.admit(workspace, recording)
+                threading.Event().wait()
         finally:
-            server.close()
+            self._close(server)
 
     def _end(self, error: BaseException | None) -> None:
         """Show the error on the waiting pages, and stop serving."""
@@ -95,7 +96,7 @@ class Service:
         if server is not None:
             if isinstance(error, Exception):
                 server.refuse(_problem_text(error))
-            server.close()
+            self._close(server)
         self._threads.shutdown()
 
     def _start_if_slow(self) -> RunningServer | None:
@@ -115,12 +116,27 @@ class Service:
                 f"Warning: serving on {options.host}: anyone who has the link and can reach this machine sees the recording. "
                 "From another machine, use this machine's address in the link."
             )
+        if options.socket is not None:
+            print("On the machine with the browser, run:")
+            print(f"  {forwarding_command(options.socket, server.port)}")
         print(f"Open {server.url}", flush=True)
-        if options.token is None:
-            server.on_new_link = lambda: print(f"For another browser, open {server.url}", flush=True)
-        if not options.no_browser:
-            threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
+        if not options.no_browser and options.socket is None:
+            self._hand_over = HandOver(server.url)
+        server.on_admitted(partial(self._link_used, server, server.url))
         return server
+
+    def _link_used(self, server: RunningServer, used: str) -> None:
+        """Delete the file with the link; a link that works once is followed by the next one."""
+        if self._hand_over is not None:
+            self._hand_over.discard()
+        if server.url != used:
+            print(f"For another browser, open {server.url}", flush=True)
+            server.on_admitted(partial(self._link_used, server, server.url))
+
+    def _close(self, server: RunningServer) -> None:
+        if self._hand_over is not None:
+            self._hand_over.discard()
+        server.close()
 
 
 def _show(server: RunningServer, picture: "Future[EncodedImage | None]") -> None:

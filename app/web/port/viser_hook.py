@@ -7,9 +7,13 @@ tests/unit/app/web/port/test_viser_hook.py and test_server.py test these parts.
 
 import contextlib
 import io
+import socket
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
+
+import msgspec
+from websockets.asyncio.server import ServerConnection
 
 from app.resources import InstallationError
 from app.web.port.websockets_hook import ProcessRequest, SocketHandler, wrapped_serve
@@ -17,8 +21,11 @@ from app.web.port.websockets_hook import ProcessRequest, SocketHandler, wrapped_
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["client_page", "missing_parts", "path_of_client", "start_viser", "stop_viser"]
+__all__ = ["client_page", "missing_parts", "only_allowed", "path_of_client", "start_viser", "stop_viser"]
 
+_ALLOWED_MESSAGES = ("ViewerCameraMessage",)
+"""What our page's 3D view sends: where its camera is. It has no controls, no clicks and no uploads."""
+_MAX_MESSAGE_BYTES = 4096
 _TUNNEL_MESSAGES = ("ShareUrlRequest", "ShareUrlDisconnect")
 _STYLE = """<style>
 .mantine-Notifications-root, .mantine-Paper-root, [data-portal], [data-dock-root] > :not(:first-child) {
@@ -31,12 +38,19 @@ html[data-theme="light"] { background: #e4e8ed !important; }
 </head>"""
 
 
+class _Typed(msgspec.Struct):
+    """A message of viser, of which only the type is read here."""
+
+    type: str
+
+
 def start_viser(
     host: str,
     port: int,
     *,
     wrap_request: Callable[[Any], ProcessRequest],
     wrap_handler: Callable[[SocketHandler], SocketHandler],
+    listening: socket.socket | None = None,
 ) -> "viser.ViserServer":
     """Start viser with our request processing wrapped around its own.
 
@@ -45,6 +59,7 @@ def start_viser(
         port: first port to try; viser takes the next free one. 0 for any free port.
         wrap_request: given viser's `process_request`, returns the one to use.
         wrap_handler: given viser's WebSocket handler, returns the one to use.
+        listening: a socket to serve on instead of the address and port.
 
     Raises:
         InstallationError: this version of viser starts its server differently, or lacks a required part.
@@ -52,7 +67,7 @@ def start_viser(
     import viser
 
     with (
-        wrapped_serve(wrap_request, wrap_handler) as used,
+        wrapped_serve(wrap_request, wrap_handler, listening) as used,
         contextlib.redirect_stdout(io.StringIO()),  # viser prints an address without the token
     ):
         server = viser.ViserServer(host=host, port=port, verbose=False)
@@ -62,7 +77,7 @@ def start_viser(
     if missing := missing_parts(server):
         stop_viser(server)
         raise _unknown_viser(f"it has no {', '.join(missing)}")
-    # In viser, any client can request a public tunnel; disable that.
+    # In viser, any client can request a public tunnel; the allow-list drops the request, and nothing handles it.
     for name in _TUNNEL_MESSAGES:
         server._websock_server.unregister_handler(getattr(viser._messages, name))
     return server
@@ -72,6 +87,36 @@ def stop_viser(server: "viser.ViserServer") -> None:
     """Stop a viser server without its printed message."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
+
+
+class _Filtered:
+    """A connection that receives the messages of the allow-list only; everything else is as in the connection."""
+
+    def __init__(self, connection: ServerConnection) -> None:
+        self._connection = connection
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._connection, name)
+
+    async def recv(self) -> bytes:
+        while True:
+            message = await self._connection.recv()
+            if isinstance(message, bytes) and _is_allowed(message):
+                return message
+
+
+def only_allowed(connection: ServerConnection) -> ServerConnection:
+    """Return the connection with every message dropped that our 3D view does not need, also those of a newer viser."""
+    return cast(ServerConnection, _Filtered(connection))
+
+
+def _is_allowed(message: bytes) -> bool:
+    if len(message) > _MAX_MESSAGE_BYTES:
+        return False
+    try:
+        return msgspec.msgpack.decode(message, type=_Typed).type in _ALLOWED_MESSAGES
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return False
 
 
 def path_of_client(server: "viser.ViserServer", client_id: int) -> str:
@@ -97,7 +142,7 @@ def missing_parts(server: "viser.ViserServer") -> tuple[str, ...]:
 
     sockets = getattr(server, "_websock_server", None)
     parts = {
-        **{f"viser._messages.{name}": hasattr(_messages, name) for name in _TUNNEL_MESSAGES},
+        **{f"viser._messages.{name}": hasattr(_messages, name) for name in (*_TUNNEL_MESSAGES, *_ALLOWED_MESSAGES)},
         "ViserServer._websock_server": sockets is not None,
         "ViserServer._websock_server.unregister_handler": hasattr(sockets, "unregister_handler"),
         "ViserServer._websock_server._live_connections": hasattr(sockets, "_live_connections"),

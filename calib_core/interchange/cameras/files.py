@@ -7,6 +7,7 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
+from calib_core.input_files import file_text, read_input
 from calib_core.interchange.cameras.fields import FoundCamera, find_cameras
 from calib_core.interchange.syntax.opencv_xml import load_opencv_xml
 from calib_core.interchange.syntax.strict_json import json_object
@@ -55,9 +56,7 @@ def read_camera_file(path: str | Path, *, image_size_px: tuple[int, int] | None 
         head, _, name = str(path).rpartition("#")
         file = Path(head)
     try:
-        if file.stat().st_size > _MAX_BYTES:
-            raise InputError(f"{file}: too large for a camera file; is it the right file?")
-        text = file.read_text(encoding="utf-8-sig")
+        text = file_text(read_input(file, max_bytes=_MAX_BYTES, is_what="a camera file"))
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
     except UnicodeDecodeError:

@@ -9,6 +9,7 @@ from calib_core.arrays import Points2, Points3, Values, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
+from calib_core.input_files import file_text, read_input
 from calib_core.interchange.check.comparison import shown
 from calib_core.interchange.check.explanation import CheckResult, explain, explained
 from calib_core.interchange.imported import WrittenPose
@@ -69,13 +70,12 @@ def read_check_pairs_file(path: Path) -> CheckPairs:
         InputError: the file cannot be read, is neither, or contains fewer than four pairs.
     """
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise InputError(f"{path}: too large for a file of pairs; is it the right file?")
-        return read_check_pairs(path.read_text(encoding="utf-8-sig"), str(path))
+        text = file_text(read_input(path, max_bytes=_MAX_BYTES, is_what="a file of pairs"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the path") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: not a text file; give pairs-1 or calibration-1 JSON") from None
+    return read_check_pairs(text, str(path))
 
 
 def read_check_pairs(text: str, source: str = "pairs") -> CheckPairs:

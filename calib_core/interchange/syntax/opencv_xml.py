@@ -44,8 +44,15 @@ def is_file_storage(root: ElementTree.Element) -> bool:
 
 
 def opencv_values(root: ElementTree.Element) -> dict[str, Any]:
-    """Return the values of parsed FileStorage XML."""
-    return {child.tag: _value(child) for child in root}
+    """Return the values of parsed FileStorage XML.
+
+    Raises:
+        InputError: it is nested too deeply.
+    """
+    try:
+        return {child.tag: _value(child) for child in root}
+    except RecursionError:
+        raise InputError("the XML is nested too deeply; correct the file") from None
 
 
 def _value(element: ElementTree.Element) -> Any:

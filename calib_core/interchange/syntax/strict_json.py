@@ -17,6 +17,8 @@ __all__ = ["checked", "fields_of", "item_type", "json_object", "json_value", "pa
 
 Document = TypeVar("Document")
 
+_MAX_DEPTH = 100
+_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]|[\ud800-\udfff]")
 MAX_CHARACTERS = 256 * 1024 * 1024
 """Far more than any of our files; keeps a wrong file (a recording) from filling the memory."""
 
@@ -85,13 +87,36 @@ def json_value(text: str, *, source: str) -> Any:
             f"{source}: {len(text):,} characters is too large for this kind of file; is it the right file?"
         )
     try:
-        return json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_without_repeats)
+        content = json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_without_repeats)
+        if _is_too_deep(content):
+            raise RecursionError
+        if _SURROGATE.search(text):
+            json.dumps(content, ensure_ascii=False).encode()  # half a character cannot be written or shown again
+        return content
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
         raise InputError(f"{source}: {where}: not JSON ({error.msg}); correct it there") from None
+    except UnicodeEncodeError as error:
+        half = f"\\u{ord(error.object[error.start]):04x}"
+        raise InputError(f"{source}: {half} is half of a character, which is not text; correct the file") from None
     except (ValueError, RecursionError) as error:
         reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise InputError(f"{source}: {reason}; correct the file") from None
+
+
+def _is_too_deep(content: Any) -> bool:
+    """Return whether values are nested deeper than any of our files, level by level: what walks them later recurses."""
+    level = [content]
+    for _ in range(_MAX_DEPTH):
+        level = [
+            inner
+            for value in level
+            if isinstance(value, dict | list)
+            for inner in (value.values() if isinstance(value, dict) else value)
+        ]
+        if not level:
+            return False
+    return True
 
 
 def _without_repeats(items: list[tuple[str, Any]]) -> dict[str, Any]:

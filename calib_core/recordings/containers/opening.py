@@ -168,8 +168,8 @@ def _metadata(path: Path) -> dict[str, object]:
 
     try:
         content = YAML(typ="safe", pure=True).load(path) if path.stat().st_size <= _MAX_METADATA_BYTES else None
-    except (YAMLError, OSError, UnicodeDecodeError):
-        return {}
+    except (YAMLError, OSError, UnicodeDecodeError, ValueError, TypeError, LookupError, AttributeError, RecursionError):
+        return {}  # ruamel's constructors raise the builtin ones for values that are not what their tags say
     information = content.get("rosbag2_bagfile_information") if isinstance(content, dict) else None
     return information if isinstance(information, dict) else {}
 

@@ -4,6 +4,7 @@ import logging
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -91,7 +92,10 @@ def test_a_recording_that_cannot_be_read_is_reported_as_the_answer() -> None:
     assert (outcome.code, outcome.reason) == ("unreadable", "radar.bag: chunk 7 is damaged; copy the file again")
 
 
-def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(
+    caplog: pytest.LogCaptureFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     faults = iter([True])
 
     def faulty() -> RadarScans:
@@ -105,7 +109,9 @@ def test_a_bug_in_the_program_is_logged_and_reported_and_the_worker_continues(ca
         worker.request(1, [CLICK], CalibrationOptions(), answers)
         outcome = answers.wait().outcome
     assert isinstance(outcome, Unsolvable)
-    assert (outcome.code, outcome.reason) == ("internal-error", "the solver failed: ZeroDivisionError: by zero")
+    assert outcome.code == "internal-error"
+    assert "internal error (ZeroDivisionError: by zero)" in outcome.reason
+    assert str(tmp_path) in outcome.reason, "the report's place is told"
     assert "ZeroDivisionError" in caplog.text
     worker.request(2, [CLICK], CalibrationOptions(), answers)
     assert answers.wait().revision == 2

@@ -1,8 +1,10 @@
 """Addresses, ports and tokens that cannot be used are refused with a clear error before anything is opened."""
 
+from pathlib import Path
+
 import pytest
 
-from app.web.port.address import AddressError, require_address, require_token
+from app.web.port.address import AddressError, require_address, require_one_address, require_token
 
 
 @pytest.mark.parametrize("port", [-1, 65536, 99999])
@@ -26,12 +28,37 @@ def test_addresses_of_this_machine_are_accepted(host: str) -> None:
     require_address(host, 8080)
 
 
+@pytest.mark.parametrize("reachable", [False, True])
 @pytest.mark.parametrize("token", ["", "  "])
-def test_an_empty_token_is_refused(token: str) -> None:
+def test_an_empty_token_is_refused(token: str, reachable: bool) -> None:
     with pytest.raises(AddressError, match="empty"):
-        require_token(token)
+        require_token(token, reachable=reachable)
 
 
-def test_no_token_and_a_real_one_are_accepted() -> None:
-    require_token(None)
-    require_token("secret")
+@pytest.mark.parametrize(
+    ("token", "reachable"),
+    [
+        ("x", False),
+        ("abcdefg", False),
+        ("aaaaaaaaaa", False),
+        ("abcdefgh", True),
+        ("a" * 40, True),
+        ("abcdefghijklmno", True),
+    ],
+)
+def test_a_token_that_could_be_guessed_is_refused(token: str, reachable: bool) -> None:
+    with pytest.raises(AddressError, match="16 characters" if reachable else "8 characters"):
+        require_token(token, reachable=reachable)
+
+
+@pytest.mark.parametrize("token", [None, "abcdefghijklmnop"])
+@pytest.mark.parametrize("reachable", [False, True])
+def test_no_token_and_a_long_one_are_accepted(token: str | None, reachable: bool) -> None:
+    require_token(token, reachable=reachable)
+
+
+def test_a_unix_socket_takes_the_place_of_an_address() -> None:
+    require_one_address(None, "0.0.0.0")
+    require_one_address(Path("s"), "127.0.0.1")
+    with pytest.raises(AddressError, match="give one"):
+        require_one_address(Path("s"), "0.0.0.0")

@@ -2,9 +2,8 @@
 
 import pytest
 
+from app.web.port.admissions import MAX_IDLE_S, Admissions
 from app.web.port.guard import Admitted, Allowed, Guard, Refused, Request, is_loopback
-
-KEY = b"k" * 32
 
 
 def request(path: str = "/", **headers: str | list[str]) -> Request:
@@ -14,8 +13,32 @@ def request(path: str = "/", **headers: str | list[str]) -> Request:
     )
 
 
-def guard(**changes: object) -> Guard:
-    return Guard(**{"host": "127.0.0.1", "key": KEY, **changes})  # type: ignore[arg-type]
+class Clock:
+    """A clock that a test sets."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+class Door(Guard):
+    """A guard together with its admissions and the cookie of one admitted browser."""
+
+    def __init__(self, *, session: str = "a", clock: Clock | None = None, **changes: object) -> None:
+        self.clock = clock or Clock()
+        self.admissions = Admissions(session, self.clock)
+        super().__init__(self.admissions, **{"host": "127.0.0.1", **changes})  # type: ignore[arg-type]
+        self.value = self.admissions.admit()
+        self.cookie = f"{self.admissions.cookie_name}={self.value}"
+
+
+def guard(**changes: object) -> Door:
+    return Door(**changes)  # type: ignore[arg-type]
+
+
+def allowed(door: Guard, asked: Request) -> bool:
+    return isinstance(door.check(asked), Allowed)
 
 
 def status(verdict: object) -> int:
@@ -28,12 +51,13 @@ def test_the_link_admits_once_and_its_cookie_stays_valid() -> None:
     link = f"/?token={door.token}"
     admitted = door.check(request(link))
     assert isinstance(admitted, Admitted)
-    assert admitted.location == "/"
-    assert "HttpOnly" in admitted.set_cookie
-    assert "SameSite=Strict" in admitted.set_cookie
     assert status(door.check(request(link))) == 401
-    cookie = admitted.set_cookie.partition(";")[0]
-    assert door.check(request("/", cookie=cookie)) == Allowed()
+    header = door.admissions.set_cookie(admitted.cookie)
+    assert "HttpOnly" in header
+    assert "SameSite=Strict" in header
+    assert "Max-Age=" in header
+    cookie = header.partition(";")[0]
+    assert allowed(door, request("/", cookie=cookie))
     assert isinstance(door.check(request(link, cookie=cookie)), Admitted), (
         "reloading the used link must work with the cookie"
     )
@@ -47,6 +71,15 @@ def test_after_a_link_was_used_the_next_one_works() -> None:
     assert isinstance(door.check(request(f"/?token={door.token}")), Admitted)
 
 
+@pytest.mark.parametrize("method", ["HEAD", "POST", "OPTIONS"])
+def test_only_opening_a_link_uses_it_up(method: str) -> None:
+    door = guard()
+    link = f"/?token={door.token}"
+    preview = Request(link, {"host": ["127.0.0.1:8080"]}, method)
+    assert status(door.check(preview)) == 401
+    assert isinstance(door.check(request(link)), Admitted)
+
+
 def test_a_token_chosen_by_the_user_stays_valid() -> None:
     door = guard(token="mine")
     assert isinstance(door.check(request("/?token=mine")), Admitted)
@@ -54,15 +87,62 @@ def test_a_token_chosen_by_the_user_stays_valid() -> None:
     assert status(door.check(request("/?token=other"))) == 401
 
 
-def test_a_cookie_outlives_the_process_with_its_key_and_no_other() -> None:
-    assert guard().check(request(cookie=guard().cookie)) == Allowed()
-    assert status(guard(key=b"x" * 32).check(request(cookie=guard().cookie))) == 401
+@pytest.mark.parametrize("session", ["a", "b"])
+def test_a_cookie_is_for_one_server_only(session: str) -> None:
+    one, other = guard(session="a"), guard(session=session)
+    assert allowed(one, request(cookie=one.cookie))
+    assert status(other.check(request(cookie=one.cookie))) == 401
+    stolen = f"{other.admissions.cookie_name}={one.value}"
+    assert status(other.check(request(cookie=stolen))) == 401
 
 
-@pytest.mark.parametrize("cookie", ["", "cocalib=", "cocalib=0", "other=1; cocalib=nonsense", "cocalib=\u00e4"])
-def test_without_the_cookie_nothing_is_served(cookie: str) -> None:
-    assert status(guard().check(request("/", cookie=cookie))) == 401
-    assert status(guard().check(request("/api/clicks.json", cookie=cookie))) == 401
+def test_servers_of_different_sessions_do_not_overwrite_each_others_cookies() -> None:
+    one, other = guard(session="a"), guard(session="b")
+    assert one.admissions.cookie_name != other.admissions.cookie_name
+    both = f"{other.cookie}; {one.cookie}"
+    assert allowed(one, request(cookie=both))
+    assert allowed(other, request(cookie=both))
+
+
+def test_an_admission_ends_when_it_is_not_used() -> None:
+    door = guard()
+    for _ in range(5):
+        door.clock.now += MAX_IDLE_S - 1
+        assert allowed(door, request(cookie=door.cookie)), "each use renews it"
+    door.clock.now += MAX_IDLE_S + 1
+    assert status(door.check(request(cookie=door.cookie))) == 401
+    door.clock.now -= MAX_IDLE_S
+    assert status(door.check(request(cookie=door.cookie))) == 401, "it has ended for good"
+
+
+def test_a_page_that_is_open_all_day_stays_admitted() -> None:
+    door = guard()
+    door.admissions.opened(door.value)
+    door.clock.now += 30 * MAX_IDLE_S
+    assert allowed(door, request(cookie=door.cookie))
+    door.clock.now += 2 * MAX_IDLE_S
+    door.admissions.closed(door.value)
+    assert allowed(door, request(cookie=door.cookie))
+    door.clock.now += 2 * MAX_IDLE_S
+    assert status(door.check(request(cookie=door.cookie))) == 401
+
+
+def test_admissions_do_not_pile_up_and_open_pages_stay() -> None:
+    door = guard(token="mine")
+    door.admissions.opened(door.value)
+    for _ in range(1000):
+        door.clock.now += 1
+        door.check(request("/?token=mine"))
+    assert len(door.admissions._last_use) <= 256
+    assert allowed(door, request(cookie=door.cookie))
+
+
+@pytest.mark.parametrize("value", ["", "0", "nonsense", "\u00e4", "\udce4", "="])
+def test_without_the_cookie_nothing_is_served(value: str) -> None:
+    door = guard()
+    for cookie in (value, f"{door.admissions.cookie_name}={value}", f"other=1; {door.admissions.cookie_name}={value}"):
+        assert status(door.check(request("/", cookie=cookie))) == 401
+        assert status(door.check(request("/api/clicks.json", cookie=cookie))) == 401
 
 
 def test_a_token_does_not_open_a_websocket() -> None:
@@ -81,7 +161,8 @@ def test_a_foreign_host_name_is_not_answered(host: str) -> None:
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost:8080", "LOCALHOST:9000", "[::1]:8080", "127.0.0.1"])
 def test_names_of_this_machine_are_answered_under_any_port_for_tunnels(host: str) -> None:
-    assert guard().check(request(host=host, cookie=guard().cookie)) == Allowed()
+    door = guard()
+    assert allowed(door, request(host=host, cookie=door.cookie))
 
 
 @pytest.mark.parametrize("hosts", [[], ["127.0.0.1", "evil.example"]])
@@ -99,8 +180,9 @@ def test_a_websocket_from_another_origin_or_none_is_refused(path: str, origin: s
 
 
 def test_a_websocket_of_our_own_page_is_let_in() -> None:
-    opening = request("/ws", upgrade="WebSocket", origin="http://127.0.0.1:8080", cookie=guard().cookie)
-    assert guard().check(opening) == Allowed()
+    door = guard()
+    opening = request("/ws", upgrade="WebSocket", origin="http://127.0.0.1:8080", cookie=door.cookie)
+    assert allowed(door, opening)
 
 
 def test_a_plain_request_that_names_another_origin_is_refused() -> None:
@@ -111,8 +193,8 @@ def test_a_plain_request_that_names_another_origin_is_refused() -> None:
 
 def test_bound_to_the_network_it_answers_to_addresses_but_not_to_strange_names() -> None:
     door = guard(host="0.0.0.0", more_hosts=["bench.local"])
-    assert door.check(request(host="192.168.0.7:8080", cookie=door.cookie)) == Allowed()
-    assert door.check(request(host="bench.local:8080", cookie=door.cookie)) == Allowed()
+    assert allowed(door, request(host="192.168.0.7:8080", cookie=door.cookie))
+    assert allowed(door, request(host="bench.local:8080", cookie=door.cookie))
     assert status(door.check(request(host="evil.example:8080", cookie=door.cookie))) == 421
 
 
@@ -130,3 +212,12 @@ def test_bound_to_the_network_it_answers_to_addresses_but_not_to_strange_names()
 )
 def test_loopback_is_recognised(host: str, expected: bool) -> None:
     assert is_loopback(host) is expected
+
+
+def test_only_tokens_that_may_be_guessed_wait_for_their_turn() -> None:
+    generated, chosen = guard(), guard(token="mine")
+    assert not generated.tries_token(request("/"))
+    assert generated.tries_token(request("/?token=wrong"))
+    assert not generated.tries_token(request(f"/?token={generated.token}"))
+    assert chosen.tries_token(request("/?token=mine"))
+    assert not chosen.tries_token(request("/?token=wrong", cookie=chosen.cookie)), "an admitted page never waits"

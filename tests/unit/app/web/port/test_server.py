@@ -4,7 +4,9 @@ import gzip
 import json
 import logging
 import re
+import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,9 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from app.web.port.entrance import MAX_SOCKETS
 from app.web.port.server import RunningServer, ServerOptions, start
-from app.workspace import open_workspace
+from app.workspace import Workspace, open_workspace
 from tests.page_view import PageView
 from tests.picture_recording import START, PictureRecording, grey_pictures
 from tests.port_client import channel, come_in, get, wanted
@@ -89,7 +92,7 @@ def test_without_a_cookie_nothing_is_served(server: RunningServer, path: str) ->
 
 def test_a_link_works_once(server: RunningServer, cookie: str) -> None:
     used = server.url.removeprefix(server.origin)
-    assert get(server, used).status == 303
+    assert get(server, used).status == 200
     assert get(server, used).status == 401
 
 
@@ -140,9 +143,12 @@ def test_no_tunnel_can_be_asked_for(server: RunningServer) -> None:
     assert _messages.ShareUrlDisconnect not in handled
 
 
-def test_a_redirect_never_leaves_the_server(server: RunningServer) -> None:
-    token = server.url.partition("=")[2]
-    assert get(server, f"//evil.example/?token={token}").headers["Location"] == "/"
+@pytest.mark.parametrize("path", ["//evil.example/", "/\\evil.example/", "/%2F%2Fevil.example", "/..//evil.example"])
+def test_a_link_leads_to_the_page_and_nowhere_else(server: RunningServer, path: str) -> None:
+    answer = get(server, f"{path}?token={server.url.partition('=')[2]}")
+    assert answer.headers["Refresh"] == "0; url=/"
+    assert answer.headers["Location"] is None
+    assert b"evil" not in answer.body
 
 
 def test_a_page_is_greeted_with_recording_and_view(server: RunningServer, cookie: str) -> None:
@@ -248,6 +254,83 @@ def test_the_clicks_can_be_downloaded_at_any_time(server: RunningServer, cookie:
     assert answer.headers["Content-Disposition"] == 'attachment; filename="clicks.json"'
 
 
+def test_a_flood_of_greetings_leaves_other_pages_served(server: RunningServer, cookie: str) -> None:
+    with channel(server, cookie, "/ws/flood") as flood:
+        for _ in range(20_000):
+            flood.send('{"type":"hello"}')
+        with channel(server, cookie, "/ws/new") as page:
+            page.send('{"type":"hello","request":1}')
+            assert wanted(page, "recording")["name"] == "five greys"
+        flood.send('{"type":"hello","request":2}')
+        greetings = 0
+        while (message := json.loads(flood.recv(timeout=60))).get("request") != 2:
+            greetings += message["type"] == "recording"
+        assert greetings < 200, "20,000 were asked for"
+
+
+def test_one_browser_opens_only_so_many_sockets(server: RunningServer) -> None:
+    full, other = come_in(server), come_in(server)
+    with ExitStack() as pages:
+        for number in range(MAX_SOCKETS):
+            pages.enter_context(channel(server, full, f"/ws/{number}"))
+        with pytest.raises(InvalidStatus) as refused, channel(server, full, "/ws/more"):
+            pass
+        assert refused.value.response.status_code == 429
+        with channel(server, other, "/ws/other") as page:
+            page.send('{"type":"hello"}')
+            assert wanted(page, "recording")["name"] == "five greys"
+    deadline = time.monotonic() + 20
+    while server._entrance._admissions.open_sockets(full.partition("=")[2]) and time.monotonic() < deadline:
+        get(server, "/", Cookie=full)
+    with channel(server, full, "/ws/again"):
+        pass
+
+
+def test_an_internal_error_is_told_to_the_page_and_its_channel_stays_open(
+    server: RunningServer, cookie: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise RecursionError("a bug")
+
+    with channel(server, cookie) as socket:
+        monkeypatch.setattr(Workspace, "dispatch", broken)
+        socket.send('{"type":"undo","request":5}')
+        problem = wanted(socket, "error")
+        assert problem["request"] == 5
+        assert "nternal error (RecursionError: a bug)" in problem["message"]
+        monkeypatch.undo()
+        socket.send('{"type":"hello","request":6}')
+        assert wanted(socket, "done")["request"] == 6
+
+
+def test_an_internal_error_in_a_request_is_a_500_and_the_server_goes_on(
+    server: RunningServer, cookie: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(*_: object) -> None:
+        raise RecursionError("a bug")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Workspace, "clicks_text", broken)
+        assert get(server, "/api/clicks.json", Cookie=cookie).status == 500
+    assert "internal error (RecursionError: a bug)" in caplog.text
+    assert get(server, "/api/clicks.json", Cookie=cookie).status == 200
+
+
+@pytest.mark.parametrize("half", ["\\ud800", "\\\\ud800", "\\udc00\\ud800"])
+def test_half_a_character_is_refused_and_the_channel_stays_open(server: RunningServer, cookie: str, half: str) -> None:
+    clicks = '{\\"schema\\":\\"cocalib/clicks-1\\",\\"clicks\\":[{\\"id\\":\\"HALF\\",\\"image_time\\":{},\\"pixel_px\\":[1,1]}]}'
+    with channel(server, cookie) as socket:
+        for message in (
+            '{"type":"import_clicks","text":"' + clicks.replace("HALF", half) + '","request":1}',
+            '{"type":"click_removed","id":"' + half + '","request":1}',
+            '{"type":"' + half + '","request":1}',
+        ):
+            socket.send(message)
+            assert wanted(socket, "error")["message"]
+        socket.send('{"type":"hello","request":2}')
+        assert wanted(socket, "done")["request"] == 2
+
+
 def test_after_closing_no_connection_is_accepted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     recording = PictureRecording(grey_pictures(1))
@@ -262,7 +345,7 @@ def test_after_closing_no_connection_is_accepted(tmp_path: Path, monkeypatch: py
             wanted(socket, "never")
     with pytest.raises(ConnectionRefusedError):
         get(running, "/")
-    assert (tmp_path / "cocalib" / "cookie.key").stat().st_mode & 0o077 == 0
+    assert (tmp_path / "cocalib" / "page.key").stat().st_mode & 0o077 == 0
 
 
 def test_failures_are_logged_but_disconnecting_clients_are_not(

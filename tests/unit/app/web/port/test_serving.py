@@ -200,9 +200,7 @@ def test_a_recording_that_opens_at_once_is_served_without_an_opening_message(
         opening.serve(workspace, RECORDING)
     ((server, first),) = started
     assert first == "recording"
-    printed = capsys.readouterr().out
-    assert "Opening" not in printed
-    assert "all clicks are saved" in printed
+    assert "Opening" not in capsys.readouterr().out
     with pytest.raises(ConnectionRefusedError):
         get(server, "/")
 
@@ -292,7 +290,8 @@ def started(arguments: Sequence[object], *, patch: str, sigint: str) -> subproce
     program = f"import signal, threading\nsignal.signal(signal.SIGINT, signal.{sigint})\n{patch}"
     return subprocess.Popen(
         [sys.executable, "-c", f"{program}\nfrom app.__main__ import main\nmain()", *map(str, arguments)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )  # fmt: skip
 
 
@@ -308,8 +307,8 @@ def stopped(running: subprocess.Popen[str], *, once_printed: str, by: signal.Sig
 @POSIX_SIGNALS
 @pytest.mark.parametrize(
     ("sigint", "sent", "code"),
-    [("default_int_handler", signal.SIGINT, 130), ("SIG_IGN", signal.SIGTERM, 143)],
-    ids=["SIGINT", "SIGTERM"],
+    [("default_int_handler", signal.SIGINT, 130), ("SIG_IGN", signal.SIGTERM, 143), ("SIG_IGN", signal.SIGHUP, 129)],
+    ids=["SIGINT", "SIGTERM", "SIGHUP"],
 )
 def test_a_signal_while_opening_ends_the_program_quietly(
     tmp_path: Path, sigint: str, sent: signal.Signals, code: int
@@ -324,8 +323,8 @@ def test_a_signal_while_opening_ends_the_program_quietly(
 @POSIX_SIGNALS
 @pytest.mark.parametrize(
     ("sigint", "sent"),
-    [("default_int_handler", signal.SIGINT), ("SIG_IGN", signal.SIGTERM)],
-    ids=["SIGINT", "SIGTERM"],
+    [("default_int_handler", signal.SIGINT), ("SIG_IGN", signal.SIGTERM), ("SIG_IGN", signal.SIGHUP)],
+    ids=["SIGINT", "SIGTERM", "SIGHUP"],
 )
 def test_a_signal_while_serving_closes_the_session(tmp_path: Path, sigint: str, sent: signal.Signals) -> None:
     arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
@@ -334,6 +333,50 @@ def test_a_signal_while_serving_closes_the_session(tmp_path: Path, sigint: str, 
     assert (code, errors) == (0, "")
     assert "all clicks are saved" in printed
     assert (tmp_path / "session" / "session.json").is_file()
+
+
+SLOW_TO_CLOSE = f"""{PRINTS_WHEN_IT_SERVES}
+import os, sys, time
+from app.session.file import SessionFile
+close = SessionFile.close
+def close_slowly(session):
+    sys.stdout.write("closing\\n")
+    sys.stdin.readline()
+    close(session)
+SessionFile.close = close_slowly
+"""
+
+
+@POSIX_SIGNALS
+@pytest.mark.parametrize("second", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda sent: sent.name)
+def test_a_second_signal_does_not_interrupt_the_closing(tmp_path: Path, second: signal.Signals) -> None:
+    arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
+    running = started(arguments, patch=SLOW_TO_CLOSE, sigint="default_int_handler")
+    assert running.stdout is not None
+    assert any("serving" in line for line in running.stdout)
+    running.send_signal(signal.SIGTERM)
+    assert any("closing" in line for line in running.stdout)
+    running.send_signal(second)
+    out, errors = running.communicate("\n", timeout=30)
+    assert (running.returncode, errors) == (0, "")
+    assert "all clicks are saved" in out
+    assert (tmp_path / "session" / "session.json").is_file()
+
+
+@POSIX_SIGNALS
+def test_a_signal_that_is_switched_off_stays_off(tmp_path: Path) -> None:
+    """`nohup cocalib open` outlives its terminal."""
+    arguments = ["demo", "--no-browser", "--port", 0, "--session", tmp_path / "session"]
+    patch = f"signal.signal(signal.SIGHUP, signal.SIG_IGN)\n{PRINTS_WHEN_IT_SERVES}"
+    running = started(arguments, patch=patch, sigint="SIG_IGN")
+    assert running.stdout is not None
+    assert any("serving" in line for line in running.stdout)
+    running.send_signal(signal.SIGHUP)
+    running.send_signal(signal.SIGINT)
+    running.send_signal(signal.SIGTERM)
+    out, errors = running.communicate(timeout=30)
+    assert (running.returncode, errors) == (0, "")
+    assert "all clicks are saved" in out
 
 
 def test_a_large_recording_has_its_link_before_it_is_opened(

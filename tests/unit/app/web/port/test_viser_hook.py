@@ -1,9 +1,12 @@
 """The private parts of viser that we use still exist, and a viser without them is refused before anything is served."""
 
+import asyncio
+import contextlib
 import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import msgspec
 import pytest
 import viser
 
@@ -43,6 +46,66 @@ def test_nobody_can_ask_viser_for_a_public_tunnel(server: viser.ViserServer) -> 
     handled = {kind.__name__ for kind in server._websock_server._incoming_handlers}
     assert handled.isdisjoint({"ShareUrlRequest", "ShareUrlDisconnect"})
     assert handled != set(), CHANGED
+
+
+class Spoken:
+    """A connection that says what a test gives it."""
+
+    subprotocol = "viser"
+
+    def __init__(self, *messages: object) -> None:
+        self._messages = list(messages)
+
+    async def recv(self) -> object:
+        if not self._messages:
+            raise EOFError
+        return self._messages.pop(0)
+
+
+def heard(*messages: object) -> list[bytes]:
+    """Return what viser would receive of these messages."""
+
+    async def run() -> list[bytes]:
+        connection, received = viser_hook.only_allowed(Spoken(*messages)), []  # type: ignore[arg-type]
+        assert connection.subprotocol == "viser"
+        with contextlib.suppress(EOFError):
+            while True:
+                received.append(await connection.recv())
+        return received
+
+    return asyncio.run(run())  # type: ignore[arg-type]
+
+
+CAMERA = msgspec.msgpack.encode({"type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "fov": 1.0})
+
+
+def test_only_the_camera_of_the_3d_view_is_heard() -> None:
+    from viser import _messages
+
+    known = _messages.Message._subclass_from_type_string()
+    assert "ViewerCameraMessage" in known, CHANGED
+    assert len(known) > 50, CHANGED
+    others = [msgspec.msgpack.encode({"type": name}) for name in known if name != "ViewerCameraMessage"]
+    assert heard(*others, CAMERA) == [CAMERA]
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        msgspec.msgpack.encode({"type": "BrandNewMessage", "run": "this"}),
+        msgspec.msgpack.encode({"no": "type"}),
+        msgspec.msgpack.encode({"type": ["ViewerCameraMessage"]}),
+        msgspec.msgpack.encode(["ViewerCameraMessage"]),
+        msgspec.msgpack.encode({"type": "ViewerCameraMessage", "wxyz": [0.0] * 5000}),
+        b"\x81" * 4000,
+        b"\xff\x00",
+        b"",
+        "text",
+    ],
+    ids=["unknown", "untyped", "list type", "list", "huge", "deep", "damaged", "empty", "text"],
+)
+def test_a_message_that_a_newer_viser_may_understand_is_dropped(message: object) -> None:
+    assert heard(message, CAMERA, message) == [CAMERA]
 
 
 def test_a_client_that_has_left_has_no_address(server: viser.ViserServer) -> None:

@@ -1,15 +1,20 @@
 """websockets' `serve` is wrapped only inside the context, and the filter matches its log messages for disconnecting clients."""
 
 import asyncio
+import contextlib
 import logging
 import socket
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from websockets.asyncio import server as websocket_server
 from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
+from app.web.port import websockets_hook
 from app.web.port.websockets_hook import SocketHandler, wrapped_serve
 
 CHANGED = (
@@ -84,3 +89,76 @@ def test_port_scans_and_disconnecting_clients_are_not_logged(
         [],
         ["server closing", "server closed"],
     ), CHANGED
+
+
+def crowd(port: int) -> None:
+    """Open more connections than may be waiting, then ask; the first ones have been closed."""
+    idle = [socket.create_connection(("127.0.0.1", port), timeout=10) for _ in range(140)]
+    try:
+        ask(port)
+        with contextlib.suppress(ConnectionResetError):
+            assert idle[0].recv(1) == b""
+        idle[-1].setblocking(False)
+        with pytest.raises(BlockingIOError):
+            idle[-1].recv(1)
+    finally:
+        for connection in idle:
+            connection.close()
+
+
+def test_connections_that_ask_nothing_make_room_for_others(caplog: pytest.LogCaptureFixture) -> None:
+    behaviour(crowd, caplog)
+
+
+SHORT_OF_FILES = """
+import asyncio, resource, sys
+from websockets.asyncio import server
+from tests.unit.app.web.port.test_websockets_hook import echo, kept, serve_nobody
+from app.web.port.websockets_hook import wrapped_serve
+
+async def main():
+    with wrapped_serve(lambda _given: serve_nobody, kept):
+        async with server.serve(echo, "127.0.0.1", 0) as running:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (60, 60))
+            print(next(iter(running.sockets)).getsockname()[1], flush=True)
+            await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
+
+asyncio.run(main())
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX limits")
+def test_a_server_without_free_descriptors_says_so_once_and_recovers() -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", SHORT_OF_FILES], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+    assert process.stdin is not None and process.stdout is not None and process.stderr is not None  # noqa: PT018
+    port = int(process.stdout.readline())
+    idle = [socket.create_connection(("127.0.0.1", port), timeout=10) for _ in range(100)]
+    complaint = process.stderr.readline()
+    assert "no connection can be accepted" in complaint
+    for connection in idle:
+        connection.close()
+    ask(port)
+    _, others = process.communicate("", timeout=30)
+    assert others == "", "said once"
+
+
+def test_what_the_event_loop_reports_is_one_line_with_a_report(
+    caplog: pytest.LogCaptureFixture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    complaints = websockets_hook._Complaints()
+    loop = asyncio.new_event_loop()
+    for _ in range(6200):
+        complaints.handle(
+            loop, {"message": "socket.accept() out of system resource", "exception": OSError(24, "Too many")}
+        )
+    complaints.handle(loop, {"message": "a callback failed", "exception": LookupError("of ours")})
+    complaints.handle(loop, {"message": "something else"})
+    loop.close()
+    first, second, third = (record.getMessage() for record in caplog.records)
+    assert "Too many" in first
+    assert "internal error (LookupError: of ours)" in second
+    assert third == "something else"

@@ -1,0 +1,159 @@
+"""Files that are not what they seem: pipes, devices, deep nesting, halves of characters, names that are not UTF-8."""
+
+import json
+import os
+import socket
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from calib_core import input_files
+from calib_core.recordings.containers.writing import RecordedMessage, write_ros2
+from tests.cli.conftest import Made
+
+Cocalib = Callable[..., Any]
+MadeRecording = Callable[..., Path]
+POSIX = pytest.mark.skipif(sys.platform == "win32", reason="needs POSIX files")
+INPUTS = {
+    "info": ["info", "{}"],
+    "open": ["open", "{}", "--no-browser"],
+    "video": ["video", "{}", "--out", "v.mp4"],
+    "clicks": ["solve", "absent.bag", "--clicks", "{}"],
+    "pairs": ["solve", "--pairs", "{}"],
+    "check": ["check", "{}"],
+    "import": ["import", "{}", "--out", "c.json"],
+    "export": ["export", "{}", "--to", "tf2"],
+}
+
+
+def one_line(answer: Any) -> str:
+    assert answer.code == 2, answer
+    (line,) = answer.err.splitlines()
+    assert line.startswith("cocalib: ")
+    assert "internal error" not in line
+    return str(line)
+
+
+@POSIX
+@pytest.mark.parametrize("arguments", INPUTS.values(), ids=INPUTS)
+@pytest.mark.parametrize("kind", ["pipe", "device", "socket"])
+def test_what_could_never_end_is_refused_at_once(
+    cocalib: Cocalib, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], kind: str
+) -> None:
+    monkeypatch.setattr(input_files, "_WRITER_TIMEOUT_S", 0.02)
+    path = tmp_path / "input"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "socket":
+        with socket.socket(socket.AF_UNIX) as bound:
+            bound.bind(str(path))
+    else:
+        path = Path("/dev/zero")
+    line = one_line(cocalib(*(argument.format(path) for argument in arguments)))
+    assert kind in line
+    assert str(path) in line
+
+
+@POSIX
+def test_the_output_of_another_command_can_be_given_as_pairs(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    reading, writing = os.pipe()
+    os.write(writing, pairs_file().read_bytes())
+    os.close(writing)
+    try:
+        assert cocalib("solve", "--pairs", f"/dev/fd/{reading}", "--out", tmp_path / "c.json").code == 0
+    finally:
+        os.close(reading)
+
+
+@pytest.mark.parametrize(
+    "text", ["a: " + "[" * 5000, "- " * 5000 + "x", "a: 2001-99-99", "!!int x", "? [a]\n: b"], ids=str.__len__
+)
+def test_a_metadata_file_of_another_kind_does_no_harm(
+    cocalib: Cocalib, made: MadeRecording, tmp_path: Path, text: str
+) -> None:
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    made().rename(folder / "bag_0.mcap")
+    (folder / "metadata.yaml").write_text(text)
+    answer = cocalib("info", folder)
+    assert answer.code == 0
+    assert "bag_0.mcap" in answer.out
+
+
+@pytest.mark.parametrize("word", ["abc", "1e400x", "--"])
+def test_letters_in_an_ascii_scan_are_reported_by_file(cocalib: Cocalib, tmp_path: Path, word: str) -> None:
+    folder = tmp_path / "radar"
+    folder.mkdir()
+    head = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA ascii\n"
+    for second in range(3):
+        (folder / f"{1_700_000_000 + second}.000000000.pcd").write_text(f"{head}1 {word} 3\n")
+    answer = cocalib("info", folder)
+    assert (answer.code, answer.err) == (0, "")
+    assert "not numbers of their fields' types" in answer.out
+
+
+@pytest.mark.parametrize("half", ["\\ud800", "\\uDC00x", "x\\ud83d"])
+def test_half_a_character_in_our_files_is_refused(
+    cocalib: Cocalib, clicks_file: Path, made: MadeRecording, half: str
+) -> None:
+    document = json.loads(clicks_file.read_text())
+    document["clicks"][0]["id"] = "HALF"
+    clicks_file.write_text(json.dumps(document).replace("HALF", half))
+    assert "half of a character" in one_line(cocalib("solve", made(), "--clicks", clicks_file))
+
+
+@pytest.mark.parametrize("depth", [101, 300, 900, 100_000])
+@pytest.mark.parametrize("kind", ["json", "yaml", "xml"])
+def test_deep_nesting_is_refused(cocalib: Cocalib, tmp_path: Path, depth: int, kind: str) -> None:
+    opening, closing = ("<a>", "</a>") if kind == "xml" else ("[", "]")
+    outside = {
+        "json": '{{"a": {}}}',
+        "yaml": "a: {}",
+        "xml": '<?xml version="1.0"?><opencv_storage>{}</opencv_storage>',
+    }
+    path = tmp_path / f"deep.{kind}"
+    path.write_text(outside[kind].format(opening * depth + closing * depth))
+    for command in (("check", path), ("import", path, "--out", tmp_path / "c.json")):
+        assert "deep" in one_line(cocalib(*command))
+
+
+@pytest.mark.parametrize("value", ["1e308", "-1e308", "1e200", "1e400"])
+def test_a_quaternion_of_huge_numbers_is_refused(cocalib: Cocalib, tmp_path: Path, value: str) -> None:
+    path = tmp_path / "static.txt"
+    path.write_text(
+        "ros2 run tf2_ros static_transform_publisher --x 0 --y 0 --z 0 "
+        f"--qx {value} --qy {value} --qz {value} --qw 1 --frame-id camera --child-frame-id radar\n"
+    )
+    one_line(cocalib("check", path))
+
+
+@POSIX
+def test_a_file_name_that_is_not_utf8_is_shown(cocalib: Cocalib, made: MadeRecording, clicks_file: Path) -> None:
+    plain = made()
+    odd = plain.rename(Path(os.fsdecode(os.fsencode(plain.parent) + b"/odd-\xff\xfe.mcap")))
+    assert "odd-\\xff\\xfe.mcap" in cocalib("info", odd).out
+    assert json.loads(cocalib("info", "--json", odd).out)["files"][0]["name"] == "odd-\\xff\\xfe.mcap"
+    solved = cocalib("solve", odd, "--clicks", clicks_file)
+    assert solved.code == 0
+    assert json.loads(solved.out)["provenance"]["inputs"][0]["name"] == "odd-\\xff\\xfe.mcap"
+    assert "odd-" in one_line(cocalib("solve", odd, "--clicks", odd))
+
+
+def test_names_from_a_recording_do_not_reach_the_terminal(cocalib: Cocalib, tmp_path: Path) -> None:
+    topic = "/radar\nwarning   forged\x1b[2J\x1b]0;owned\x07\x9b31m\u202egab"
+    messages = [replace(message, topic=topic) if "radar" in message.topic else message for message in Made().messages()]
+    assert all(isinstance(message, RecordedMessage) for message in messages)
+    path = write_ros2(tmp_path / "hostile.mcap", messages, container="mcap")
+    text, data = cocalib("info", path), cocalib("info", "--json", path)
+    refused = cocalib("solve", path, "--clicks", "x", "--radar-topic", "\x1b[31mnone")
+    for printed in (text.out, data.out, refused.err):
+        assert all(character.isprintable() or character == "\n" for character in printed)
+    assert "\\u001b[2J" in text.out
+    assert not any(line.startswith("warning   forged") for line in text.out.splitlines())
+    assert any(row["name"] == topic for row in json.loads(data.out)["topics"])

@@ -1,0 +1,218 @@
+"""Requests that no browser sends: each gets the right status, and none an internal error."""
+
+import socket
+import sys
+from collections.abc import Generator, Iterator
+from pathlib import Path
+
+import pytest
+import websockets.http11
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from app.web.port.request_head import read_head
+from app.web.port.server import RunningServer, ServerOptions, start
+from app.workspace import open_workspace
+from tests.picture_recording import PictureRecording, grey_pictures
+from tests.port_client import come_in
+
+HOST = b"Host: 127.0.0.1\r\n"
+UPGRADE = (
+    b"Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nOrigin: http://127.0.0.1\r\n"
+)
+UNREADABLE = {
+    "no target": (b"GET  HTTP/1.1\r\n" + HOST, 400),
+    "no version": (b"GET /\r\n" + HOST, 400),
+    "four words": (b"GET / x HTTP/1.1\r\n" + HOST, 400),
+    "not ASCII": (b"GET /\xc3\xa4 HTTP/1.1\r\n" + HOST, 400),
+    "HTTP/1.0": (b"GET / HTTP/1.0\r\n" + HOST, 505),
+    "HTTP/2": (b"PRI * HTTP/2.0\r\n", 505),
+    "another protocol": (b"GET / RTSP/1.0\r\n" + HOST, 400),
+    "TLS": (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 400),
+    "a long target": (b"GET /" + b"a" * 9000 + b" HTTP/1.1\r\n" + HOST, 414),
+    "a long header": (b"GET / HTTP/1.1\r\n" + HOST + b"X: " + b"a" * 9000 + b"\r\n", 431),
+    "many headers": (b"GET / HTTP/1.1\r\n" + HOST + b"X: 1\r\n" * 200, 431),
+    "endless headers": (b"GET / HTTP/1.1\r\n" + HOST + b"X: 1\r\n" * 20_000, 431),
+    "no colon": (b"GET / HTTP/1.1\r\n" + HOST + b"nonsense\r\n", 400),
+    "a folded header": (b"GET / HTTP/1.1\r\n" + HOST + b"X: 1\r\n 2\r\n", 400),
+    "a space before the colon": (b"GET / HTTP/1.1\r\nHost : 127.0.0.1\r\n", 400),
+    "NUL in a header": (b"GET / HTTP/1.1\r\n" + HOST + b"X: \x00\r\n", 400),
+    "GET with a body": (b"GET / HTTP/1.1\r\n" + HOST + b"Content-Length: 5\r\n", 400),
+    "GET with chunks": (b"GET / HTTP/1.1\r\n" + HOST + b"Transfer-Encoding: chunked\r\n", 400),
+    "a length that is none": (b"GET / HTTP/1.1\r\n" + HOST + b"Content-Length: many\r\n", 400),
+}
+"""What is answered whoever asks."""
+ODD = {
+    "an absolute address": (b"GET http://127.0.0.1/ HTTP/1.1\r\n" + HOST, 401, 400),
+    "a foreign absolute address": (b"GET http://evil.example/ HTTP/1.1\r\n" + HOST, 401, 400),
+    "a star": (b"OPTIONS * HTTP/1.1\r\n" + HOST, 401, 405),
+    "no slash": (b"GET index.html HTTP/1.1\r\n" + HOST, 401, 400),
+    "an open bracket": (b"GET //[ HTTP/1.1\r\n" + HOST, 401, 404),
+    "a bad bracket": (b"GET http://[::1/ HTTP/1.1\r\n" + HOST, 401, 400),
+    "bad escapes": (b"GET /%zz%?token=%zz%e4 HTTP/1.1\r\n" + HOST, 401, 200),
+    "an escaped NUL": (b"GET /%00 HTTP/1.1\r\n" + HOST, 401, 404),
+    "parents": (b"GET /../../etc/passwd HTTP/1.1\r\n" + HOST, 401, 404),
+    "escaped parents": (b"GET /%2e%2e%2f%2e%2e/etc/passwd HTTP/1.1\r\n" + HOST, 401, 404),
+    "doubly escaped parents": (b"GET /%252e%252e%252fetc/passwd HTTP/1.1\r\n" + HOST, 401, 404),
+    "backslashes": (b"GET /..\\..\\etc\\passwd HTTP/1.1\r\n" + HOST, 401, 404),
+    "parents in an export": (b"GET /api/export/../../etc/passwd HTTP/1.1\r\n" + HOST, 401, 404),
+    "parents in the 3D view": (b"GET /viser/../x/ HTTP/1.1\r\n" + HOST, 401, 404),
+    "a header that is not ASCII": (b"GET / HTTP/1.1\r\n" + HOST + b"X-Name: \xe4\xff\r\n", 401, 200),
+    "a cookie that is not ASCII": (b"GET / HTTP/1.1\r\n" + HOST + b"Cookie: cocalib=\xe4\xff\r\n", 401, 200),
+    "a token that is not ASCII": (b"GET /?token=%E4%FF%F0%9F HTTP/1.1\r\n" + HOST, 401, 200),
+    "two cookie headers": (b"GET / HTTP/1.1\r\n" + HOST + b"Cookie: a=1\r\nCookie: b=2\r\n", 401, 200),
+    "a host that is not ASCII": (b"GET / HTTP/1.1\r\nHost: \xe4\r\n", 421, 421),
+    "an empty host": (b"GET / HTTP/1.1\r\nHost:\r\n", 421, 421),
+    "no host": (b"GET / HTTP/1.1\r\n", 400, 400),
+    "two hosts": (b"GET / HTTP/1.1\r\n" + HOST + HOST, 400, 400),
+    "another origin": (b"GET / HTTP/1.1\r\n" + HOST + b"Origin: null\r\n", 403, 403),
+    "HEAD": (b"HEAD / HTTP/1.1\r\n" + HOST, 401, 200),
+    "HEAD of nothing": (b"HEAD /nothing HTTP/1.1\r\n" + HOST, 401, 404),
+    "POST": (b"POST /api/clicks.json HTTP/1.1\r\n" + HOST + b"Content-Length: 5\r\n", 401, 405),
+    "chunked POST": (b"POST / HTTP/1.1\r\n" + HOST + b"Transfer-Encoding: chunked\r\n", 401, 405),
+    "PUT": (b"PUT / HTTP/1.1\r\n" + HOST, 401, 405),
+    "DELETE": (b"DELETE / HTTP/1.1\r\n" + HOST, 401, 405),
+    "OPTIONS": (b"OPTIONS / HTTP/1.1\r\n" + HOST, 401, 405),
+    "TRACE": (b"TRACE / HTTP/1.1\r\n" + HOST, 401, 405),
+    "CONNECT": (b"CONNECT evil.example:443 HTTP/1.1\r\n" + HOST, 401, 405),
+    "an unknown method": (b"BREW /pot HTTP/1.1\r\n" + HOST, 401, 405),
+    "a POST that wants a WebSocket": (b"POST /ws/tab HTTP/1.1\r\n" + HOST + UPGRADE, 401, 405),
+    "a WebSocket elsewhere": (b"GET /nothing HTTP/1.1\r\n" + HOST + UPGRADE, 401, 404),
+    "a resumption without a proof": (b"GET /api/resume HTTP/1.1\r\n" + HOST, 401, 401),
+    "a resumption with nonsense": (
+        b"GET /api/resume?ticket=%FF.9&challenge=%E4&proof=%00 HTTP/1.1\r\n" + HOST,
+        401,
+        401,
+    ),
+}
+"""What is answered to a stranger, and to an admitted browser."""
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningServer]:
+    patch = pytest.MonkeyPatch()
+    patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+    recording = PictureRecording(grey_pictures(1))
+    workspace = open_workspace(
+        recording, camera=None, session_folder=tmp_path_factory.mktemp("s") / "s", name="one grey"
+    )
+    running = start(workspace, recording, ServerOptions(port=0, no_browser=True))
+    yield running
+    running.close()
+    workspace.close()
+    patch.undo()
+
+
+def asked(server: RunningServer, head: bytes, cookie: str = "", rest: bytes = b"") -> bytes:
+    """Send a request as it is; return everything that is answered until the server closes the connection."""
+    sent = head + (f"Cookie: {cookie}\r\n".encode() if cookie else b"") + b"\r\n"
+    with socket.create_connection(("127.0.0.1", server.port), timeout=20) as connection:
+        connection.sendall(sent + rest)
+        answer = b""
+        while part := connection.recv(65536):
+            answer += part
+    return answer
+
+
+def status(answer: bytes) -> int:
+    return int(answer.split(b" ")[1]) if answer else 0
+
+
+@pytest.mark.parametrize(("head", "wanted"), UNREADABLE.values(), ids=UNREADABLE)
+def test_a_request_that_cannot_be_read_is_answered(server: RunningServer, head: bytes, wanted: int) -> None:
+    assert status(asked(server, head, rest=b"")) == wanted
+
+
+@pytest.mark.parametrize(("head", "wanted", "_admitted"), ODD.values(), ids=ODD)
+def test_an_odd_request_of_a_stranger_is_refused(
+    server: RunningServer, head: bytes, wanted: int, _admitted: int
+) -> None:
+    answer = asked(server, head, rest=b"" if UPGRADE in head else b"hello")
+    assert status(answer) == wanted
+    assert b"Set-Cookie" not in answer
+
+
+@pytest.mark.parametrize(("head", "_stranger", "wanted"), ODD.values(), ids=ODD)
+def test_an_odd_request_of_an_admitted_browser_gets_its_status(
+    server: RunningServer, head: bytes, _stranger: int, wanted: int, cookie: str
+) -> None:
+    answer = asked(server, head, cookie, b"" if UPGRADE in head else b"hello")
+    assert status(answer) == wanted
+    assert b"Location" not in answer
+    assert (b"Allow: GET, HEAD" in answer) == (wanted == 405)
+    if head.startswith(b"HEAD"):
+        assert answer.endswith(b"\r\n\r\n"), "no body"
+        assert b"Content-Length: 0" not in answer, "but its length"
+
+
+@pytest.fixture(scope="module")
+def cookie(server: RunningServer) -> str:
+    return come_in(server)
+
+
+def test_a_cookie_of_an_admitted_browser_is_renewed_by_each_answer(server: RunningServer, cookie: str) -> None:
+    answer = asked(server, b"GET /main.js HTTP/1.1\r\n" + HOST, cookie)
+    assert f"Set-Cookie: {cookie}; Max-Age=".encode() in answer
+
+
+def test_versions_are_not_told(server: RunningServer) -> None:
+    assert b"websockets" not in asked(server, b"GET / HTTP/1.1\r\n" + HOST)
+
+
+@pytest.mark.parametrize("cut", [1, 3, 14, 15, 16, 40])
+def test_a_head_may_arrive_in_any_pieces(cut: int) -> None:
+    whole = b"HEAD /a HTTP/1.1\r\n" + HOST + b"Content-Length: 3\r\n\r\nabc"
+    for end in range(0, whole.index(b"\r\n\r\n") + 4, cut):
+        assert read_head(whole[:end]) is None
+    head = read_head(whole)
+    assert head is not None
+    assert (head.method, head.fault) == ("HEAD", None)
+    assert head.data == b"GET /a HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
+
+
+def test_what_follows_a_websockets_head_reaches_it() -> None:
+    head = read_head(b"GET /ws/t HTTP/1.1\r\n" + HOST + UPGRADE + b"\r\n\x81\x00")
+    assert head is not None
+    assert head.data.endswith(b"\r\n\r\n\x81\x00")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no parents to reach")
+def test_no_answer_ever_holds_a_file_from_elsewhere(server: RunningServer, cookie: str, project_root: Path) -> None:
+    secret = (project_root / "pyproject.toml").read_bytes()[:40]
+    for dots in (b"..", b"%2e%2e", b"%2E.", b"%252e%252e", b"..%00", b"%c0%ae%c0%ae", b"..;", b"...", b"..%5c"):
+        for slash in (b"/", b"%2f", b"%5c", b"\\", b"//"):
+            for start_at in (b"/", b"/static/", b"/viser/a/", b"/api/export/", b"/main.js/"):
+                target = start_at + (dots + slash) * 3 + b"pyproject.toml"
+                answer = asked(server, b"GET " + target + b" HTTP/1.1\r\n" + HOST, cookie, b"")
+                assert status(answer) == 404
+                assert secret not in answer
+
+
+PIECES = st.sampled_from(
+    [b"GET", b"HEAD", b"POST", b" ", b"/", b"HTTP/1.1", b"\r\n", b"\r\n\r\n", b"Host: 127.0.0.1", b"Content-Length: 3",
+     b"X:", b"\xff", b"Upgrade: websocket", b"Transfer-Encoding: chunked", b"\x00", b"%2e%2e", b"?token=", b":", b"\n",
+     b"a" * 9000]
+)  # fmt: skip
+
+
+@given(st.lists(st.one_of(PIECES, st.binary(max_size=5)), max_size=20).map(b"".join))
+@example(b"GET / HTTP/1.1\r\n" + HOST + b"\r\n")
+def test_websockets_can_read_every_head_that_it_is_given(received: bytes) -> None:
+    head = read_head(received)
+    if head is None:
+        return
+    lines = iter(head.data.splitlines(keepends=True))
+
+    def read_line(_size: int) -> Generator[None, None, bytes]:
+        yield
+        return next(lines)
+
+    found: list[websockets.http11.Request] = []
+
+    def read() -> Generator[None, None, None]:
+        found.append((yield from websockets.http11.Request.parse(read_line)))
+
+    for _ in read():
+        pass
+    assert len(found) == 1
