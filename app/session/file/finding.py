@@ -69,7 +69,8 @@ def _chosen(named: Path, same: Sequence[_Candidate], facts: RecordingFacts) -> F
     warnings = [_about(candidate, facts) for candidate in same if candidate is not chosen]
     if chosen is None:
         return FoundFolder(named, tuple(warnings))
-    message = f"continuing the session of '{chosen.recording.name}' in {chosen.path}, which has the same frames as {facts.name}"
+    of = "" if chosen.recording.name == facts.name else f" of '{chosen.recording.name}'"
+    message = f"continuing the session{of} in {chosen.path}, which has the frames of {facts.name}"
     hint = f"to start a new session instead, give another folder: --session {named}"
     return FoundFolder(chosen.path, (DataWarning("session-of-other-name", message, hint), *warnings))
 

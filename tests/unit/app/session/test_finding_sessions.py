@@ -78,7 +78,7 @@ def test_a_moved_recording_continues_the_session_in_the_users_folder(
     folder = clicked(state_folder / "drive.bag-12345678.cocalib-session")
     found = find_session_folder([home / "drive.bag"], FACTS)
     assert found.path == folder
-    assert "continuing the session" in found.warnings[0].message
+    assert f"continuing the session in {folder}, which has the frames of drive.bag" in found.warnings[0].message
 
 
 def test_of_two_sessions_the_newest_is_continued_and_the_other_named(home: Path, state_folder: Path) -> None:
