@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import hashlib
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -25,6 +26,7 @@ from calib_core.recordings import Recording, RecordingOptions
 if TYPE_CHECKING:
     from app.session.file import FoundFolder
     from app.web.port.serving import Service
+    from app.workspace import Workspace
 
 __all__ = ["Demo", "Open"]
 
@@ -168,7 +170,7 @@ def _serve(
         workspace = open_workspace(
             recording, camera=camera, session_folder=found.path, name=name, reference=reference, warnings=found.warnings
         )
-        stack.callback(workspace.close)
+        stack.push(partial(_close, workspace))
         for warning in workspace.restored.warnings:
             print(f"{sentence(warning.message)} {sentence(warning.hint)}")
         if options is not None and options != CalibrationOptions():
@@ -198,6 +200,13 @@ def _session_folder(
     if (kept := set_aside(folder)) is not None:
         print(f"The previous session is kept in {kept}")
     return FoundFolder(folder)
+
+
+def _close(workspace: "Workspace", kind: type[BaseException] | None, *_: object) -> None:
+    """Close the workspace; if an error ends the program, print whether the clicks are where they should be."""
+    closed = workspace.close()
+    if kind is not None and closed.fault:
+        print(f"cocalib: {closed.note}", file=sys.stderr)
 
 
 def _service(
