@@ -59,6 +59,10 @@ def _checked_name(name: str, role: str) -> str:
         raise InputError(
             f"the {role} frame is called {name!r}; use a name without control characters, quotes or any of $ ` \\ < > &"
         )
+    if {".", ".."} & set(shown.split("/")):
+        raise InputError(
+            f"the {role} frame is called {name!r}, which is a path; use a name without . and .. between slashes"
+        )
     if len(shown) > 200:
         raise InputError(f"the {role} frame's name has {len(shown)} characters; use at most 200")
     return shown
