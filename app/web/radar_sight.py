@@ -9,18 +9,18 @@ from app.session import Session
 from app.solving import RadarSource
 from app.view import Reference, shown_calibration
 from app.web.messages import Overlay, OverlayReturn, RadarLook, RadarReturn
-from calib_core.arrays import Flags, Points3
+from calib_core.arrays import Flags, Indices, Points3
 from calib_core.association.gating import static_returns
 from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.results import Calibration
 
-__all__ = ["RadarSight", "look_of", "overlay_of", "still_returns"]
+__all__ = ["RadarSight", "look_of", "overlay_of", "shown_rows", "still_returns"]
 
 _NEAREST_WITHIN_S = 0.3
 _MOST_RETURNS = 4000
-"""So many of the last returns are shown at most."""
+"""So many returns are shown from above at most; of more, every other or every tenth and so on."""
 _MARGIN_S = 1e-3
 
 
@@ -53,6 +53,12 @@ def still_returns(scan: RadarScan, options: GatingOptions) -> Flags:
     return ~(np.abs(scan.doppler_mps) > options.max_speed_mps)
 
 
+def shown_rows(scans: RadarScans, most: int) -> Indices:
+    """Return the rows of the returns that have a position; evenly spaced ones if there are too many."""
+    rows = np.flatnonzero(np.isfinite(scans.points_radar_m).all(axis=1))
+    return rows[:: -(-len(rows) // most)] if len(rows) > most else rows
+
+
 def look_of(index: int, time: TimeNs, trail: RadarScans, options: GatingOptions) -> RadarLook:
     """Return the returns of the last seconds, seen from above.
 
@@ -63,7 +69,7 @@ def look_of(index: int, time: TimeNs, trail: RadarScans, options: GatingOptions)
         options: which returns can be the reflector.
     """
     ages_s = (time - trail.times_ns[trail.scan_of_return()]) / NS_PER_S
-    rows = np.flatnonzero(np.isfinite(trail.points_radar_m).all(axis=1))[-_MOST_RETURNS:]
+    rows = shown_rows(trail, _MOST_RETURNS)
     still = ~(np.abs(trail.doppler_mps) > options.max_speed_mps)
     return RadarLook(
         index,

@@ -7,8 +7,10 @@ from app.view.number_format import plain
 from app.web.messages import PlacementRow
 from calib_core.measurements import MIN_PAIRS
 
-__all__ = ["placement_figures", "placement_note", "placement_summary"]
+__all__ = ["SHORTEST_S", "placement_figures", "placement_note", "placement_summary"]
 
+SHORTEST_S = 2.0
+"""A placement lasts at least this long [s]."""
 _SHORT_S = 3.0
 """A click averages the returns of this time [s]; a shorter placement has fewer."""
 _LITTLE_DB = 6.0
@@ -32,10 +34,19 @@ def placement_note(lasted_s: float, stands_out_db: float | None) -> str:
     return ", ".join(notes)
 
 
-def placement_summary(rows: Sequence[PlacementRow]) -> str:
-    """Return one line about all placements: how many, where, the strongest, and those to look at."""
+def placement_summary(rows: Sequence[PlacementRow], length_s: float) -> str:
+    """Return one line about all placements: how many, where, the strongest, and those to look at.
+
+    Args:
+        rows: the placements.
+        length_s: of the recording [s].
+    """
+    if length_s < SHORTEST_S:
+        return f"The recording is {length_s:.1f} s long, too short for a placement of {SHORTEST_S:.0f} s or longer"
     if not rows:
-        return "No placement found: nothing appeared, stood still for 2 s or longer, and went away again"
+        return (
+            f"No placement found: nothing appeared, stood still for {SHORTEST_S:.0f} s or longer, and went away again"
+        )
     ranges = [row.range_m for row in rows]
     words = [
         f"{len(rows)} placement{'s' if len(rows) > 1 else ''} found, {min(ranges):.1f} to {max(ranges):.1f} m, "

@@ -51,7 +51,8 @@ class RadarMapSum:
         """Return the cells that were seen most often."""
         seen = np.flatnonzero(self._shown >= _LEAST_SCANS)
         kept = np.sort(seen[np.argsort(-self._shown[seen], kind="stable")][:_MOST_CELLS])
-        has_db = bool(self._histogram.sum())
+        low_db, high_db = (self._quantile_db(share) for share in (_LOW_QUANTILE, _HIGH_QUANTILE))
+        has_db = low_db < high_db  # equal amplitudes say nothing
         middle = (np.stack(np.divmod(kept, _CELLS_ACROSS)) - _CELLS_ACROSS // 2 + 0.5) * self._cell_m
         mean_db = self._sum_db[kept] / np.maximum(self._measured[kept], 1.0)
         return RadarMap(
@@ -61,11 +62,12 @@ class RadarMapSum:
             z_m=_numbers(self._sum_z_m[kept] / self._returns[kept], 3),
             share=_numbers(self._shown[kept] / max(self._scans, 1), 4),
             snr_db=_numbers(mean_db, 1) if has_db else (),
-            low_db=self._quantile_db(_LOW_QUANTILE) if has_db else None,
-            high_db=self._quantile_db(_HIGH_QUANTILE) if has_db else None,
+            low_db=low_db if has_db else None,
+            high_db=high_db if has_db else None,
         )
 
     def _quantile_db(self, share: float) -> float:
+        """Return the amplitude that this share of the returns is below; the lowest one without any."""
         summed = np.cumsum(self._histogram)
         return float(_DB_STEPS[int(np.searchsorted(summed, share * summed[-1]))])
 

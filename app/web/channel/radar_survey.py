@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.web.channel.placement_words import placement_figures, placement_note, placement_summary
+from app.web.channel.placement_words import SHORTEST_S, placement_figures, placement_note, placement_summary
 from app.web.channel.radar_map import RadarMapSum
 from app.web.messages import PlacementRow, Placements, RadarMap
 from calib_core.arrays import TimesNs
@@ -22,8 +22,6 @@ _MOST_SLICES = 800
 _MOST_STATIC_RETURNS = 1_000_000
 """Limit of one stretch: more than an hour of 25 static returns in each of 10 scans a second; searching it takes about 200 MB."""
 
-_SHORTEST_S = 2.0
-"""A placement lasts at least this long, and a recording that is shorter is not searched: dense clouds would take minutes."""
 _AT_RANGE_M = 1.0
 _OWN_RETURNS_M, _OWN_SHARE = 0.5, 0.1
 """Returns this far from a placement belong to it [m], and this share of its range more: angles scatter."""
@@ -77,13 +75,13 @@ def survey_of(windows: Iterable[RadarScans], moments: TimesNs, options: GatingOp
     seen = [
         (placement, row)
         for stretch in _stretches(map(activity.note, windows), options, cells)
-        if _length_s(stretch) >= _SHORTEST_S
-        for placement in find_placements(stretch, options, min_dwell_s=_SHORTEST_S)
+        if _length_s(stretch.times_ns) >= SHORTEST_S  # searching a few dense clouds in vain would take minutes
+        for placement in find_placements(stretch, options, min_dwell_s=SHORTEST_S)
         if (row := _row(placement, moments, stretch)) is not None
     ]
     rows = tuple(pair[1] for pair in seen)
     figures = placement_figures(rows, *activity.rates())
-    message = Placements(rows, placement_summary(rows), figures)
+    message = Placements(rows, placement_summary(rows, _length_s(moments)), figures)
     return Survey(tuple(pair[0] for pair in seen), rows, activity.total(), cells.total(), message)
 
 
@@ -99,8 +97,8 @@ def _stretches(windows: Iterable[RadarScans], options: GatingOptions, cells: Rad
     yield join_scans(pieces)
 
 
-def _length_s(scans: RadarScans) -> float:
-    return (int(scans.times_ns[-1]) - int(scans.times_ns[0])) / NS_PER_S if len(scans) else 0.0
+def _length_s(times_ns: TimesNs) -> float:
+    return (int(times_ns[-1]) - int(times_ns[0])) / NS_PER_S if len(times_ns) else 0.0
 
 
 def _row(placement: Placement, moments: TimesNs, static: RadarScans) -> PlacementRow | None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from app.web.messages import RadarMap, ReturnColour
+from app.web.radar_sight import shown_rows
 from app.web.view3d.nodes import add_cloud, add_lines, fill_cloud, fill_lines
 from app.web.view3d.shapes import DARK, LIGHT, next_place
 from calib_core.arrays import Values
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["Look", "LookNodes", "amplitude_colours", "trail_colours"]
 
 _MOST_LABELS = 60
+_MOST_RETURNS = 20_000
 _LABEL_ABOVE_M = np.array([0.0, 0.0, 0.3])
 _OLDEST_WEIGHT = 0.2
 _BACKGROUND = {False: np.array([13, 16, 20]), True: np.array([233, 236, 240])}
@@ -67,8 +69,8 @@ class LookNodes:
 
     def show(self, look: Look, options: GatingOptions, *, light: bool) -> None:
         """Draw a Look."""
-        known = np.isfinite(look.trail.points_radar_m).all(axis=1)
-        fill_cloud(self._trail, look.trail.points_radar_m[known], trail_colours(look, options, light=light)[known])
+        rows = shown_rows(look.trail, _MOST_RETURNS)
+        fill_cloud(self._trail, look.trail.points_radar_m[rows], trail_colours(look, options, light=light)[rows])
         self._show_map(look, light=light)
         self._rings.colors = np.array((LIGHT if light else DARK).next, dtype=np.uint8)
         if look.placements is self._labelled:

@@ -7,7 +7,7 @@ from app.web.channel.placement_words import placement_figures, placement_note, p
 from app.web.channel.radar_map import RadarMapSum
 from app.web.channel.radar_survey import survey_of
 from app.web.messages import PlacementRow, RadarMap
-from app.web.radar_sight import RadarSight, look_of
+from app.web.radar_sight import RadarSight, look_of, shown_rows
 from app.web.view3d.looking import Look, amplitude_colours, map_colours, trail_colours
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
@@ -81,12 +81,16 @@ def test_a_short_placement_is_named() -> None:
 
 def test_the_summary_says_how_many_where_and_which_to_look_at() -> None:
     rows = [row(), row(azimuth_deg=-31.2, snr_db=41.0), row(2.1, 28.4, note="lasted only 2.1 s"), row(), row()]
-    assert placement_summary(rows) == (
+    assert placement_summary(rows, 60.0) == (
         "5 placements found, 5.0 to 5.0 m, azimuth 31° right to 28° left; strongest: placement 2, 41 dB; "
         "placement 3 lasted only 2.1 s"
     )
-    assert placement_summary([row(snr_db=None)] * 5) == "5 placements found, 5.0 to 5.0 m, azimuth 10° left to 10° left"
-    assert placement_summary([]).startswith("No placement found")
+    assert (
+        placement_summary([row(snr_db=None)] * 5, 60.0)
+        == "5 placements found, 5.0 to 5.0 m, azimuth 10° left to 10° left"
+    )
+    assert placement_summary([], 60.0).startswith("No placement found")
+    assert placement_summary([], 0.4) == "The recording is 0.4 s long, too short for a placement of 2 s or longer"
 
 
 def test_few_placements_are_a_warning() -> None:
@@ -118,6 +122,12 @@ def test_a_radar_without_amplitude_has_a_map_without_amplitude() -> None:
     assert found.share == (1.0,)
 
 
+def test_equal_amplitudes_are_not_coloured() -> None:
+    total = RadarMapSum(GatingOptions())
+    total.add(RadarScans.from_scans([scan(time_s, [(5.0, 0.0, 0.0, 0.0, 1.0)]) for time_s in range(5)]))
+    assert (total.total().snr_db, total.total().low_db) == ((), None)
+
+
 def test_returns_of_the_last_seconds_are_shown_with_their_age() -> None:
     sight, now = RadarSight(Radar()), TimeNs(6 * NS_PER_S)  # type: ignore[arg-type]
     trail = sight.trail(now, 2.0)
@@ -129,6 +139,7 @@ def test_returns_of_the_last_seconds_are_shown_with_their_age() -> None:
     walker = next(seen for seen in look.returns if seen.x_m == 4.0)
     assert (walker.static, walker.doppler_mps, walker.snr_db) == (False, 1.0, 25.0)
     assert len(sight.trail(now, 0.0)) == 1, "one scan"
+    assert len(shown_rows(trail, 10)) <= 10 < len(shown_rows(trail, 1000)) == len(trail.points_radar_m)
 
 
 def test_colours_fade_with_age_and_follow_the_amplitude() -> None:
