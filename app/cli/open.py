@@ -163,9 +163,11 @@ def _serve(
     topics = topics or RecordingOptions()
     admissions = session or recording_session_folder(paths)
     with _service(paths, topics, serving, name, admissions) as service, ExitStack() as stack:
-        recording = stack.enter_context(open_recording(paths, topics))
+        recording = stack.enter_context(open_recording(paths, topics, require=("radar",)))
+        if not len(recording.image_times):
+            _require_nothing_to_calibrate(recording, camera_file, calibration_file, clicks_file)
         camera = _camera(recording, camera_file, calibration_file)
-        reference = reference_from(calibration_file, camera) if calibration_file else None
+        reference = reference_from(calibration_file, camera) if calibration_file and camera else None
         found = _session_folder(session, paths, recording, name, fresh=fresh)
         workspace = open_workspace(
             recording, camera=camera, session_folder=found.path, name=name, reference=reference, warnings=found.warnings
@@ -249,12 +251,37 @@ def _require_given(*files: Path | None) -> None:
             raise InputError(f"{path}: no such file; check the path")
 
 
-def _camera(recording: Recording, camera_file: Path | None, calibration_file: Path | None) -> Camera:
-    """Return the intrinsics: from the file, else from the recording, else from the calibration to show.
+def _require_nothing_to_calibrate(recording: Recording, *files: Path | None) -> None:
+    """Say that there is no camera; refuse files that need one.
+
+    Raises:
+        InputError: a file of intrinsics, of a calibration or of clicks was given.
+    """
+    name, found = recording.paths[0].name, _unusable_pictures(recording)
+    needless = [path for path in files if path is not None]
+    if needless:
+        raise InputError(
+            f"{name}: no pictures{found}, so {needless[0]} cannot be used; give the camera's recording as well"
+        )
+    print(f"{name}: no pictures{found}: showing the radar only. To calibrate, give the camera's recording as well.")
+
+
+def _unusable_pictures(recording: Recording) -> str:
+    """Return which image topics cannot be used and why, in brackets; "" if there are none."""
+    problems = [
+        f"{topic.name}: {topic.problem or 'has no messages'}" for topic in recording.topics if topic.kind == "image"
+    ]
+    return f" ({'; '.join(problems)})" if problems else ""
+
+
+def _camera(recording: Recording, camera_file: Path | None, calibration_file: Path | None) -> Camera | None:
+    """Return the intrinsics: from the file, else from the recording, else from the calibration to show; None without pictures.
 
     Raises:
         InputError: there are none.
     """
+    if not len(recording.image_times):
+        return None
     if camera_file is None and calibration_file is not None and recording.camera() is None:
         picture = recording.image_bytes(0)
         found = camera_in(calibration_file, picture.width_px, picture.height_px)

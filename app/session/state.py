@@ -39,6 +39,16 @@ class RecordingFacts:
         for name in ("image_times", "radar_times"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), (None,), dtype=np.int64))
 
+    @property
+    def has_pictures(self) -> bool:
+        """Whether there are frames to click in."""
+        return len(self.image_times) > 0
+
+    @property
+    def moments(self) -> TimesNs:
+        """The stamps (m,) that can be looked at [ns]: of the frames, or of the radar scans if there are no frames."""
+        return self.image_times if self.has_pictures else self.radar_times
+
     def frame_at(self, time: TimeNs) -> int | None:
         """Return the index of the frame with exactly this stamp; None when no frame has it."""
         index = int(np.searchsorted(self.image_times, time))

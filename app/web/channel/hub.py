@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
 from typing import Protocol
@@ -57,6 +57,7 @@ class Hub:
         self.executor = executor
         self.frames = FrameStore(recording, len(recording.image_times), executor)
         self.radar = RadarSight(recording)
+        self.moments = workspace.facts.moments
         self.camera = recording.camera()
         self.survey: Survey | None = None
         self.tabs: set[Tab] = set()
@@ -90,7 +91,8 @@ class Hub:
         outbox.put(encode(self._recording_note()), kind="recording")
         tab.show()
         if self.survey is not None:
-            outbox.put(encode(Placements(self.survey.rows)), kind="placements")
+            for kind, message in self._found(self.survey):
+                outbox.put(encode(message), kind=kind)
         else:
             outbox.put(encode(Progress(_SEARCHING, 0, 1)), kind="progress")
 
@@ -115,15 +117,21 @@ class Hub:
         with error_boundary("searching the radar for placements", _log.error):
             try:
                 self.survey = await asyncio.get_running_loop().run_in_executor(
-                    self.executor,
-                    lambda: survey_of(self.recording.radar_windows(), self.recording.image_times, options),
+                    self.executor, lambda: survey_of(self.recording.radar_windows(), self.moments, options)
                 )
             except CalibrationError as error:
                 _log.warning("the radar could not be searched for placements: %s", error)
         self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
-        self.broadcast(Placements(self.survey.rows if self.survey else ()), "placements")
+        for kind, message in self._found(self.survey):
+            self.broadcast(message, kind)
         for tab in self.tabs:
             tab.refresh()
+
+    def _found(self, survey: Survey | None) -> Iterator[tuple[str, Outgoing]]:
+        """Yield the messages about the whole radar recording, each with its kind; the map is drawn only without pictures."""
+        if survey is not None and not self.workspace.facts.has_pictures:
+            yield "radar_map", survey.map
+        yield "placements", survey.message if survey else Placements(())
 
     def _recording_note(self) -> RecordingNote:
         facts, recording, restored = self.workspace.facts, self.recording, self.workspace.restored
@@ -133,8 +141,9 @@ class Hub:
             image_topic=recording.image_topic or "none",
             width_px=facts.width_px,
             height_px=facts.height_px,
-            frame_times=StampColumns.of(facts.image_times),
-            start=Stamp.of(TimeNs(int(facts.image_times[0]))),
+            has_pictures=facts.has_pictures,
+            frame_times=StampColumns.of(facts.moments),
+            start=Stamp.of(TimeNs(int(facts.moments[0]))),
             radar=StampColumns.of(recording.radar_times),
             warnings=tuple(map(warning_in_sentences, (*restored.warnings, *recording.warnings))),
             sensors=(

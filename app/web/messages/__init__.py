@@ -12,6 +12,7 @@ from app.web.messages.incoming import (
     Hello,
     ImportWanted,
     Incoming,
+    ReturnColour,
     Viewpoint,
     ViewpointWanted,
     ViewWanted,
@@ -25,8 +26,6 @@ from app.web.messages.outgoing import (
     Outgoing,
     Overlay,
     OverlayReturn,
-    PlacementRow,
-    Placements,
     Problem,
     Progress,
     RecordingNote,
@@ -36,6 +35,7 @@ from app.web.messages.outgoing import (
     encode,
     encode_frame,
 )
+from app.web.messages.radar_messages import PlacementRow, Placements, RadarLook, RadarMap, RadarReturn
 from app.web.messages.view_changes import ClickChange, RowValues, ViewChange, change_between
 
 __all__ = [
@@ -57,7 +57,11 @@ __all__ = [
     "Placements",
     "Problem",
     "Progress",
+    "RadarLook",
+    "RadarMap",
+    "RadarReturn",
     "RecordingNote",
+    "ReturnColour",
     "RowValues",
     "SensorNote",
     "SessionNote",

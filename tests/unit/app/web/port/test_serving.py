@@ -260,7 +260,7 @@ def test_a_late_error_is_one_line_and_exit_code_2(
 ) -> None:
     link_is_out = threading.Event()
 
-    def slow_and_wrong(*_: object) -> None:
+    def slow_and_wrong(*_: object, **_options: object) -> None:
         assert link_is_out.wait(20)
         raise RecordingError("holiday.bag: not a recording")
 
@@ -286,7 +286,7 @@ def test_a_named_file_that_is_missing_is_refused_before_anything_is_read(
 
 SLOW_TO_OPEN = """
 import calib_core.recordings as recordings
-recordings.open_recording = lambda *_: threading.Event().wait()
+recordings.open_recording = lambda *_, **_options: threading.Event().wait()
 """
 PRINTS_WHEN_IT_SERVES = """
 from app.web.port.server import RunningServer
@@ -400,7 +400,7 @@ def test_a_large_recording_has_its_link_before_it_is_opened(
 ) -> None:
     printed_before = []
 
-    def look(*_: object) -> None:
+    def look(*_: object, **_options: object) -> None:
         printed_before.append(capsys.readouterr().out)
         raise RecordingError("long: not a recording")
 
