@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.cli.flags import File, NewFile
+from app.cli.flags import File, NewFile, called
 from app.cli.output import write_whole
 from calib_core.errors import InputError
 
@@ -30,7 +30,7 @@ class Import:
     """Output file (calibration-1 JSON)."""
     camera: File = None
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
-    image_size: Annotated[tuple[int, int] | None, tyro.conf.arg(metavar="WIDTH HEIGHT")] = None
+    image_size: Annotated[tuple[int, int] | None, called("WIDTH HEIGHT")] = None
     """Size of the pictures [px], if the file has a camera matrix but no size; by default that of the pictures beside it."""
 
     def run(self) -> int:
