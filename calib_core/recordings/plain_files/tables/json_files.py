@@ -20,6 +20,7 @@ __all__ = ["JsonTable", "open_json_table", "read_json_rows"]
 
 _MAX_BYTES = 1 << 28
 _SAMPLED_ROWS = 500
+_DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
 _LAST_BYTES = 1 << 20
 _POINTS = ("position", "pos", "xyz", "point", "location", "coordinates")
 _NOTHING = ("", "null", "none")
@@ -140,7 +141,7 @@ def _lines(path: Path) -> Iterator[tuple[int, Any]]:
 
 def _parse(text: str) -> Any:
     """Parse JSON; numbers stay text, because a float rounds nanoseconds."""
-    return json.loads(text, parse_float=str, parse_int=str, parse_constant=str)
+    return _DECODER.decode(text)
 
 
 def _rows_of(value: Any, prefix: str, above: Mapping[str, str]) -> Iterator[dict[str, str]]:
