@@ -119,6 +119,7 @@ Intrinsics without a size are for the pictures' own size. Of several cameras or 
 | `unstamped-files` | files without a time in a folder where others have one; they are skipped |
 | `numbered-files` | numbers instead of times: those of the pictures with the same numbers, or 0.1 s apart |
 | `file-order` | the times and the numbers in the file names disagree about the order |
+| `cut-off-row` | a table ends within a row, which is left out |
 | `camera-changes` | the data set has other intrinsics for other frames; those of the first are used |
 | `assumed` | one per assumption below |
 
