@@ -29,6 +29,7 @@ class TopicFlags(RecordingOptions):
     )
     confirm_assumptions: Annotated[bool, called()] = same(RecordingOptions, "confirm_assumptions")
     video_start: Annotated[str | None, called("TIME")] = same(RecordingOptions, "video_start")
+    radar_start: Annotated[str | None, called("TIME[,SECONDS]")] = same(RecordingOptions, "radar_start")
 
 
 Topics: TypeAlias = Annotated[TopicFlags, tyro.conf.arg(name="")]

@@ -19,6 +19,7 @@ from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.plain_files.opening import files_behind, open_plain_sources
+from calib_core.recordings.plain_files.ti_uart import open_uart_streams
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.topics import TopicSummary
@@ -257,9 +258,11 @@ def open_recording(
     """
     chosen = (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
     options = options or RecordingOptions()
-    plain, others = open_plain_sources(require_files(chosen), options.video_start)
-    sources: tuple[Source, ...] = plain
+    streams, rest = open_uart_streams(require_files(chosen), options.radar_start)
+    sources: tuple[Source, ...] = streams
     try:
+        plain, others = open_plain_sources(rest, options.video_start) if rest else ((), ())
+        sources = plain = (*streams, *plain)
         sources = (*(open_sources(others) if others else ()), *plain)
         return Recording(chosen, sources, assemble(chosen, sources, options, require), options.video_start)
     except BaseException:

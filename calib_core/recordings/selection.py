@@ -45,6 +45,10 @@ class RecordingOptions:
         None,
         "Time of a video's first frame: seconds since 1970, or a date such as 2024-05-01T12:00:00.25+02:00.",
     )
+    radar_start: str | None = option(
+        None,
+        "Time of the first frame of a TI data-port stream, as --video-start; after a comma, the seconds between frames.",
+    )
     clock: Clock = option(
         "auto",
         "Times to use: stamps in the message headers, receive times, or auto: stamps unless they cannot be right.",
