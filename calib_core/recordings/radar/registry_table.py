@@ -75,6 +75,7 @@ folder that contains them.
 |---|---|
 | folder of `.pcd` (version 0.7, binary or ascii), such as nuScenes | radar, one scan per file; recognised like a PointCloud2 |
 | folder of `.bin` | View-of-Delft radar, one scan per file |
+| `.bin`, `.dat` of a TI data port, or a folder of them | radar, judged by the bytes; [see below](#data-port-of-ti-radars) |
 | `.csv` | radar; the first line names columns and units: `{example}` |
 | folder of pictures | camera |
 | video file, with `--video-start` | camera; most videos do not store the original frame times: use the recording if possible |
@@ -83,7 +84,22 @@ The time of a file comes from a CSV in or next to its folder (`file,time_ns`), o
 digits (ns), 16 (us), 13 (ms) or 10 (s, with or without a fraction) that is a date after 2001. Files that are only numbered
 are assumed to be 0.1 s apart, and a warning says so.
 
-### Columns of a radar CSV
+### Data port of TI radars
+
+The bytes that the demos of TI's mmWave SDK send over the data port (AWR1843, IWR6843 and others), as a terminal program or a
+script stored them. Packets begin with the magic word `02 01 04 03 06 05 08 07`; after garbage or a cut packet reading goes on
+at the next one, and `cocalib info` counts what was skipped and which frame numbers are missing. Read are the points (SDK 3:
+metres and m/s as floats; SDK 1 and 2: fixed point) and the SNR in 0.1 dB (amplitude); range profiles, heat maps, statistics
+and temperatures are named and skipped. SDK 1 and 2 send the Doppler only as the number of a bin whose size the stream does
+not state: such scans have no speed. TI counts x to the right, y forward and z up; points are turned to x forward, y left, z up.
+
+The stream carries no dates. `--radar-start TIME` is the time of its first frame, and `--radar-start TIME,SECONDS` also the
+time between frames. Otherwise that is measured by the processor cycles in the packets, read as 200 MHz, which the stream does
+not state: an assumption that `cocalib info` lists. A list beside the file, `NAME.csv` or `NAME.txt` with one time per packet
+in the last column, takes precedence over both. Logs of the configuration port and raw samples of a DCA1000 (`adc_data.bin`)
+hold no detections and are refused by name.
+
+## Columns of a radar CSV
 
 Columns are separated by commas, semicolons or tabs. The unit follows the name, as in `x_m` or `x [m]`. Rows with the same time
 form one scan. An unknown or missing unit is an error; columns with other names are ignored, and `cocalib info` lists them.
