@@ -99,7 +99,7 @@ not state: an assumption that `cocalib info` lists. A list beside the file, `NAM
 in the last column, takes precedence over both. Logs of the configuration port and raw samples of a DCA1000 (`adc_data.bin`)
 hold no detections and are refused by name.
 
-## Columns of a radar CSV
+### Columns of a radar CSV
 
 Columns are separated by commas, semicolons or tabs. The unit follows the name, as in `x_m` or `x [m]`. Rows with the same time
 form one scan. An unknown or missing unit is an error; columns with other names are ignored, and `cocalib info` lists them.
