@@ -22,6 +22,7 @@ from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.plain_files.opening import files_behind, open_plain_sources
 from calib_core.recordings.plain_files.reading_options import PlainOptions
+from calib_core.recordings.plain_files.ti_uart import open_uart_streams
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.selection import Need, RecordingOptions
@@ -262,9 +263,11 @@ def open_recording(
     """
     chosen = (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
     options = options or RecordingOptions()
-    plain, others = open_plain_sources(require_files(chosen), _plain_options(options))
-    sources: tuple[Source, ...] = plain
+    streams, rest = open_uart_streams(require_files(chosen), options.radar_start)
+    sources: tuple[Source, ...] = streams
     try:
+        plain, others = open_plain_sources(rest, _plain_options(options)) if rest else ((), ())
+        sources = plain = (*streams, *plain)
         sources = (*(open_sources(others) if others else ()), *plain)
         return Recording(chosen, sources, _assembled(chosen, sources, options, require), options.video_start)
     except BaseException:

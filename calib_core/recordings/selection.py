@@ -48,6 +48,10 @@ class RecordingOptions:
     time_zone: str | None = option(
         None, "Time zone of dates in file names and columns that state none, such as +02:00; UTC if not given."
     )
+    radar_start: str | None = option(
+        None,
+        "Time of the first frame of a TI data-port stream, as --video-start; after a comma, the seconds between frames.",
+    )
     clock: Clock = option(
         "auto",
         "Times to use: stamps in the message headers, receive times, or auto: stamps unless they cannot be right.",

@@ -129,6 +129,7 @@ def open_table_folder(
         zoneless=stamped.zoneless,
         counted=stamped.counted,
         mapped=any(column.mapped for column in (*columns.values, *columns.time)),
+        file_of=lambda row: stamped.files[row],
     )
 
 
