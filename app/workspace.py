@@ -142,7 +142,7 @@ class Workspace:
 
     def clicks_text(self) -> str:
         """Return the clicks as a clicks-1 file."""
-        return write_clicks(self.session.clicks)
+        return write_clicks(self.session.clicks, radar_topics=self.facts.radar_topics)
 
     def import_clicks(self, text: str, source: str) -> None:
         """Add the clicks of a clicks-1 file to the session.
@@ -199,7 +199,9 @@ def recording_facts(recording: Recording, name: str) -> RecordingFacts:
             f"{name}: has no frames to click in; give the camera's recording as well, or another --image-topic"
         )
     picture = recording.image_bytes(0)
-    return RecordingFacts(name, recording.image_times, picture.width_px, picture.height_px, recording.radar_axes)
+    return RecordingFacts(
+        name, recording.image_times, picture.width_px, picture.height_px, recording.radar_axes, recording.radar_topics
+    )
 
 
 def open_workspace(

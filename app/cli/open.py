@@ -154,6 +154,8 @@ def _serve(
     topics = topics or RecordingOptions()
     with _service(paths, topics, serving, name) as service, ExitStack() as stack:
         recording = stack.enter_context(open_recording(paths, topics))
+        if recording.radar_choice:
+            print(f"radar: {recording.radar_choice}")
         camera = _camera(recording, camera_file, calibration_file)
         reference = reference_from(calibration_file, camera) if calibration_file else None
         if fresh and (kept := set_aside(session)) is not None:

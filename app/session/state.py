@@ -25,6 +25,7 @@ class RecordingFacts:
         width_px: columns of a frame.
         height_px: rows of a frame.
         radar_axes: what the user specified about the radar's axes and units; None if nothing.
+        radar_topics: all topics of the radar.
     """
 
     name: str
@@ -32,6 +33,7 @@ class RecordingFacts:
     width_px: int
     height_px: int
     radar_axes: str | None = None
+    radar_topics: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "image_times", frozen_array(self.image_times, (None,), dtype=np.int64))

@@ -109,7 +109,8 @@ def _belong_together(one: Dwell, other: Dwell) -> bool:
         )
         if shown
     ]
-    return _near(one, other, _SAME_RETURN) or (bool(together) and all(together))
+    one_return = _near(one, other, _SAME_RETURN) or one.is_alternative_of(other)
+    return one_return or (bool(together) and all(together))
 
 
 def _near(one: Dwell, other: Dwell, reaches: float) -> bool:

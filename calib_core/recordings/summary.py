@@ -8,6 +8,7 @@ import numpy as np
 from calib_core.errors import RecordingError
 from calib_core.measurements import NS_PER_S, Stamp, TimeNs
 from calib_core.recordings.other_clocks import other_clocks
+from calib_core.recordings.radar.sensors import RadarSensor
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.topics import Rhythm, TopicSummary
 from calib_core.results import DataWarning
@@ -40,6 +41,8 @@ class RadarSummary:
         topic: its topic.
         frame: its frame_id.
         layout: what is read from its messages.
+        topics: all topics of this radar.
+        choice: why it is used, with the figures of the others; "" if there was no choice.
         scans: number of scans.
         rate_hz: scans per second; None with fewer than two.
         longest_gap_s: longest time between scans [s].
@@ -50,6 +53,8 @@ class RadarSummary:
     topic: str
     frame: str
     layout: str
+    topics: tuple[str, ...]
+    choice: str
     scans: int
     rate_hz: float | None
     longest_gap_s: float | None
@@ -101,6 +106,7 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
         overlap_s: time covered by both radar and camera [s]; None if one is missing.
         topics: by name.
         radar: None if there is none.
+        sensors: the radars that were compared, the one in use first.
         camera: None if there is none.
         warnings: what the user must know.
     """
@@ -112,6 +118,7 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
     overlap_s: float | None
     topics: tuple[TopicSummary, ...]
     radar: RadarSummary | None
+    sensors: tuple[RadarSensor, ...]
     camera: CameraSummary | None
     warnings: tuple[DataWarning, ...]
 
@@ -131,6 +138,7 @@ def recording_summary(recording: Recording) -> RecordingSummary:
         overlap_s=_overlap_s(recording),
         topics=tuple(replace(topic, clocks=topic.clocks or spare.get(topic.name)) for topic in recording.topics),
         radar=_radar(recording),
+        sensors=recording.radar_sensors,
         camera=_camera(recording),
         warnings=recording.warnings,
     )
@@ -157,6 +165,8 @@ def _radar(recording: Recording) -> RadarSummary | None:
         topic=topic.name,
         frame=recording.radar_frame,
         layout=topic.layout,
+        topics=recording.radar_topics,
+        choice=recording.radar_choice,
         scans=len(times),
         rate_hz=rhythm.rate_hz,
         longest_gap_s=rhythm.longest_gap_s,
