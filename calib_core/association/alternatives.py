@@ -11,7 +11,7 @@ import numpy as np
 from calib_core.arrays import Flags, Indices
 from calib_core.measurements import RadarScans
 
-__all__ = ["alternative_rows", "cluster_alternatives", "joined_labels", "return_keys"]
+__all__ = ["alternative_rows", "cluster_alternatives", "first_rows", "joined_labels", "return_keys"]
 
 _LEAST_SHARE = 0.25  # of the larger one's returns: a third azimuth may take half of them, and noise some
 
@@ -22,6 +22,13 @@ def return_keys(scans: RadarScans) -> Indices:
         return np.full(len(scans.points_radar_m), -1, dtype=np.int64)
     width = int(scans.alternative_of.max(initial=-1)) + 1
     return np.where(scans.alternative_of >= 0, scans.scan_of_return() * width + scans.alternative_of, -1)
+
+
+def first_rows(keys: Indices) -> Flags:
+    """Return which returns (n,) the radar lists first among their alternatives: the likeliest, if it orders them at all."""
+    first = keys < 0
+    first[np.unique(keys, return_index=True)[1]] = True
+    return first
 
 
 def cluster_alternatives(window: RadarScans, cluster_of: Indices, count: int) -> Indices:

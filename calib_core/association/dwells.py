@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3
-from calib_core.association.alternatives import return_keys
+from calib_core.association.alternatives import first_rows, return_keys
 from calib_core.association.cluster_scale import cluster_scale
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.association.gating import static_returns
@@ -67,6 +67,7 @@ class _Grid:
         points_radar_m: (n, 3).
         snr_db: (n,) NaN where unknown.
         key: (n,) as of `return_keys`.
+        listed_first: (n,) as of `first_rows`.
         cell: (3,) size of a cell.
         reach: (3,) of a dwell's returns about their median.
     """
@@ -81,6 +82,7 @@ class _Grid:
     points_radar_m: Points3
     snr_db: Values
     key: Indices
+    listed_first: Flags
     cell: Vector3
     reach: Vector3
 
@@ -90,6 +92,7 @@ class _Grid:
         cosines = direction_cosines(static.points_radar_m)
         cells = np.floor(cosines / (CELL * growth)).astype(np.int64)
         keys = _keys(cells)
+        keys_of_returns = return_keys(static)
         order = np.argsort(keys, kind="stable")
         unique, first = np.unique(keys[order], return_index=True)
         start_ns = static.times_ns[0] if len(static) else 0
@@ -103,7 +106,8 @@ class _Grid:
             cosines=cosines[order],
             points_radar_m=static.points_radar_m[order],
             snr_db=static.snr_db[order],
-            key=return_keys(static)[order],
+            key=keys_of_returns[order],
+            listed_first=first_rows(keys_of_returns)[order],
             cell=CELL * growth,
             reach=_REACH * growth,
         )
@@ -170,6 +174,7 @@ class Dwell:
         begins: the scans show that it was not there before its start.
         ends: the same after its end.
         keys: (k,) numbers of those returns that have alternatives, which these share; ascending.
+        listed_first: share of its returns that the radar lists first among their alternatives.
     """
 
     start: TimeNs
@@ -183,6 +188,7 @@ class Dwell:
     begins: bool
     ends: bool
     keys: Indices
+    listed_first: float
 
     def is_alternative_of(self, other: "Dwell") -> bool:
         """Return whether both are the same returns, at positions of which at most one is true."""
@@ -257,6 +263,7 @@ def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwel
         begins=_any_within(grid.times_s, start_s - _BEFORE_S[1], start_s - _BEFORE_S[0]),
         ends=_any_within(grid.times_s, end_s + _BEFORE_S[0], end_s + _BEFORE_S[1]),
         keys=np.unique(grid.key[mine][grid.key[mine] >= 0]),
+        listed_first=float(grid.listed_first[mine].mean()),
     )
 
 

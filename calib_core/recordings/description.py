@@ -137,6 +137,7 @@ def _radar(radar: RadarSummary | None) -> list[str]:
         f"{' + '.join(radar.topics)}, frame '{radar.frame}': {_counted(radar.scans, 'scan')}{rate}{gap}",
         f"returns per scan: {middle:.0f} ({low} to {high}{sample})",
         radar.layout,
+        *([f"other azimuths of the same returns: {', '.join(radar.other_azimuths)}"] if radar.other_azimuths else []),
     ]
 
 

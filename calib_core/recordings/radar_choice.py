@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from calib_core.recordings.radar.scan_stream import RadarStream
-from calib_core.recordings.radar.sensors import Examined, Figures, RadarSensor, figures_of, sensors_of
+from calib_core.recordings.radar.sensors import Examined, Figures, RadarSensor, sensors_of
 from calib_core.recordings.selection import Inventory, Selection, holds_objects, radar_rank, unknown_radar
 from calib_core.results import DataWarning
 
@@ -47,7 +47,7 @@ def choose_radar(
     if not streams:
         return RadarChoice()
     examined = [
-        Examined(stream, frame, figures_of(stream), _has_returns(stream, inventory))
+        Examined.of(stream, frame, returns=_has_returns(stream, inventory))
         for stream, frame in zip(streams, frames, strict=True)
     ]
     if selection.radar_named:

@@ -20,7 +20,7 @@ from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.plain_files.opening import files_behind, open_plain_sources
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
-from calib_core.recordings.radar.scan_stream import RadarStream
+from calib_core.recordings.radar.merged_stream import MergedStream
 from calib_core.recordings.radar.sensors import RadarSensor, figures_of
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.topics import TopicSummary
@@ -142,13 +142,19 @@ class Recording:
                 )
 
     @property
+    def other_azimuths(self) -> tuple[str, ...]:
+        """The topics or columns with other azimuths of the radar's returns, of which at most one is true."""
+        radar = self._assembly.radar
+        return radar.other_azimuths if isinstance(radar, MergedStream) else ()
+
+    @property
     def radar_sensors(self) -> tuple[RadarSensor, ...]:
         """The radars that were compared, the one in use first, with their figures; reads a sample if there is only one."""
         radar = self._assembly.radar
-        if self._assembly.radar_sensors or radar is None or not isinstance(radar, RadarStream):
+        if self._assembly.radar_sensors or radar is None:
             return self._assembly.radar_sensors
         name = radar.topic.name
-        return (RadarSensor(name, (name,), (0,), (), self.radar_frame, figures_of(radar)),)
+        return (RadarSensor(name, (name,), (0,), (), self.radar_frame, figures_of(radar.parts[0])),)
 
     def image_bytes(self, index: int) -> EncodedImage:
         """Return a frame as an image file: the recorded JPEG or PNG, or raw pixels encoded as JPEG.

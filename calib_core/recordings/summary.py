@@ -42,6 +42,7 @@ class RadarSummary:
         frame: its frame_id.
         layout: what is read from its messages.
         topics: all topics of this radar.
+        other_azimuths: topics or columns with other azimuths of its returns, of which at most one is true.
         choice: why it is used, with the figures of the others; "" if there was no choice.
         scans: number of scans.
         rate_hz: scans per second; None with fewer than two.
@@ -54,6 +55,7 @@ class RadarSummary:
     frame: str
     layout: str
     topics: tuple[str, ...]
+    other_azimuths: tuple[str, ...]
     choice: str
     scans: int
     rate_hz: float | None
@@ -166,6 +168,7 @@ def _radar(recording: Recording) -> RadarSummary | None:
         frame=recording.radar_frame,
         layout=topic.layout,
         topics=recording.radar_topics,
+        other_azimuths=recording.other_azimuths,
         choice=recording.radar_choice,
         scans=len(times),
         rate_hz=rhythm.rate_hz,

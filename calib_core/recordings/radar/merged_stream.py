@@ -37,6 +37,16 @@ class MergedStream(ScanBlocks):
         super().__init__(moments.times_ns)
 
     @property
+    def other_azimuths(self) -> tuple[str, ...]:
+        """The topics, or the columns of a topic, that hold other azimuths of the returns of another topic."""
+        found = []
+        for place, part in enumerate(self.parts):
+            column = part.layout.plan.azimuth_from
+            if self._repeats[place] != place:
+                found.append(part.topic.name if column is None else f"{column} of {part.topic.name}")
+        return tuple(found)
+
+    @property
     def most_together(self) -> int:
         """The largest number of scans to decode at once."""
         return min(part.most_together for part in self.parts)

@@ -69,13 +69,20 @@ class Examined:
         stream: of its scans.
         frame: frame_id of its first message; "" if there is none.
         figures: of a sample.
+        spread: how far apart two reports of one return lie.
         returns: whether it has returns, not tracked objects, and is no lidar.
     """
 
     stream: RadarStream
     frame: str
     figures: Figures
+    spread: Spread
     returns: bool = True
+
+    @classmethod
+    def of(cls, stream: RadarStream, frame: str = "", *, returns: bool = True) -> "Examined":
+        """Examine a topic."""
+        return cls(stream, frame, figures_of(stream), measured_spread(stream), returns)
 
     @property
     def name(self) -> str:
@@ -211,7 +218,7 @@ def relation(one: Examined, other: Examined) -> Relation:
     both = _common_moments(one.stream, other.stream)
     if both is None:
         return "apart"
-    spreads = measured_spread(one.stream), measured_spread(other.stream)
+    spreads = one.spread, other.spread
     spread = Spread(np.hypot(spreads[0].step, spreads[1].step), max(spread.doppler_mps for spread in spreads))
     first, second = both
     fewer = min(_count(first), _count(second))
@@ -229,13 +236,9 @@ def other_azimuths(stream: RadarStream) -> tuple[RadarStream, ...]:
     found = []
     for column in stream.layout.plan.other_azimuths:
         other = stream.at_azimuth(column)
-        if relation(_examined(stream), _examined(other)) == "alternatives":
+        if relation(Examined.of(stream), Examined.of(other)) == "alternatives":
             found.append(other)
     return tuple(found)
-
-
-def _examined(stream: RadarStream) -> Examined:
-    return Examined(stream, "", figures_of(stream))
 
 
 def _common_moments(one: RadarStream, other: RadarStream) -> tuple[RadarScans, RadarScans] | None:
