@@ -135,10 +135,11 @@ def test_alternatives_share_what_their_return_gets_against_its_companion() -> No
 def test_both_azimuths_of_one_reflector_are_one_placement() -> None:
     found = find_placements(SCANS, GatingOptions())
     assert len(found) == len(STAYS)
-    for placement, ((range_m, _), (start_s, end_s)) in zip(found, STAYS.items(), strict=True):
+    for placement, ((range_m, azimuth_rad), (start_s, end_s)) in zip(found, STAYS.items(), strict=True):
         assert placement.start / NS_PER_S == pytest.approx(start_s, abs=0.3)
         assert placement.end / NS_PER_S == pytest.approx(end_s, abs=0.3)
-        assert np.linalg.norm(placement.position_radar_m) == pytest.approx(range_m, abs=0.05)
+        shown = cartesian_from_polar(np.array([[range_m, azimuth_rad, 0.0]]))[0]  # listed before the other azimuth
+        assert placement.position_radar_m == pytest.approx(shown, abs=0.05)
 
 
 def test_without_the_scans_around_it_a_dwell_is_still_one_placement() -> None:
