@@ -157,7 +157,7 @@ class Workspace:
 
     def clicks_text(self) -> str:
         """Return the clicks as a clicks-1 file."""
-        return write_clicks(self.session.clicks)
+        return write_clicks(self.session.clicks, radar_topics=self.facts.radar_topics)
 
     def import_clicks(self, text: str, source: str) -> None:
         """Add the clicks of a clicks-1 file to the session.
@@ -215,8 +215,15 @@ def recording_facts(recording: Recording, name: str) -> RecordingFacts:
     if not len(recording.image_times) and not len(recording.radar_times):
         raise InputError(f"{name}: has neither pictures nor radar scans; give the files of the radar and of the camera")
     picture = recording.image_bytes(0) if len(recording.image_times) else None
-    size_px = (picture.width_px, picture.height_px) if picture else (0, 0)
-    return RecordingFacts(name, recording.image_times, *size_px, recording.radar_axes, recording.radar_times)
+    return RecordingFacts(
+        name,
+        recording.image_times,
+        picture.width_px if picture else 0,
+        picture.height_px if picture else 0,
+        recording.radar_axes,
+        recording.radar_times,
+        recording.radar_topics,
+    )
 
 
 def open_workspace(

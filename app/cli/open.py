@@ -166,6 +166,8 @@ def _serve(
         recording = stack.enter_context(open_recording(paths, topics, require=("radar",)))
         if not len(recording.image_times):
             _require_nothing_to_calibrate(recording, camera_file, calibration_file, clicks_file)
+        if recording.radar_choice:
+            print(f"radar: {recording.radar_choice}")
         camera = _camera(recording, camera_file, calibration_file)
         reference = reference_from(calibration_file, camera) if calibration_file and camera else None
         found = _session_folder(session, paths, recording, name, fresh=fresh)

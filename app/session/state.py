@@ -26,6 +26,7 @@ class RecordingFacts:
         height_px: rows of a frame.
         radar_axes: what the user specified about the radar's axes and units; None if nothing.
         radar_times: (k,) stamps of the radar's scans [ns], ascending; they identify a recording without frames.
+        radar_topics: all topics of the radar.
     """
 
     name: str
@@ -34,6 +35,7 @@ class RecordingFacts:
     height_px: int
     radar_axes: str | None = None
     radar_times: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    radar_topics: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("image_times", "radar_times"):

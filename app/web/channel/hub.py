@@ -4,6 +4,7 @@ import asyncio
 import logging
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
@@ -147,12 +148,20 @@ class Hub:
             radar=StampColumns.of(recording.radar_times),
             warnings=tuple(map(warning_in_sentences, (*restored.warnings, *recording.warnings))),
             sensors=(
-                _sensor("radar", recording.radar_topic, recording.topics),
+                _radar_sensor(recording),
                 _sensor("camera", recording.image_topic, recording.topics),
             ),
             session=SessionNote(str(restored.folder), len(restored.history.present.clicks), restored.note),
             version=version(),
         )
+
+
+def _radar_sensor(recording: Recording) -> SensorNote:
+    """Describe how the radar is read, and why this one."""
+    note = _sensor("radar", recording.radar_topic, recording.topics)
+    if not recording.radar_choice:
+        return note
+    return replace(note, topic=" + ".join(recording.radar_topics), about=(recording.radar_choice, *note.about))
 
 
 def _sensor(name: str, chosen: str | None, topics: Sequence[TopicSummary]) -> SensorNote:

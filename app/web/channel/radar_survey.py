@@ -14,7 +14,7 @@ from calib_core.association.placements import Placement, find_placements
 from calib_core.measurements import NS_PER_S, RadarScans
 from calib_core.options import GatingOptions
 from calib_core.radar import polar_from_cartesian
-from calib_core.recordings.radar.scan_stream import join_scans
+from calib_core.recordings.radar.scan_blocks import join_scans
 
 __all__ = ["Activity", "Survey", "placements_at", "survey_of"]
 
