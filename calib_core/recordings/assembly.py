@@ -17,13 +17,16 @@ from calib_core.recordings.camera.images import ImageLayout
 from calib_core.recordings.camera.recorded_intrinsics import recorded_camera
 from calib_core.recordings.camera.video_stream import about_video, image_stream
 from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap
+from calib_core.recordings.column_map import parse_column_map
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.messages.decoding import Message
+from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.radar.checks import about_claims
+from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.layouts import layouts_of_parts
-from calib_core.recordings.radar.list_messages import PointLayout
 from calib_core.recordings.radar.scan_stream import RadarStream
+from calib_core.recordings.radar.single_returns import PointLayout
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.stamping import StampedTopic, read_stamps
 from calib_core.recordings.time.clock_choice import ClockChoice, Stamps, choose_clock, choose_clocks
@@ -50,6 +53,8 @@ class Assembly:
     camera: Camera | None
     warnings: tuple[DataWarning, ...]
     assumptions: tuple[Assumption, ...]
+    confirmed: bool
+    column_map: tuple[str, ...]
 
 
 def assemble(
@@ -74,7 +79,9 @@ def assemble(
             f"{name}: contains no messages; check that the recorder was set to record the right topics"
         )
     axes = None if options.radar_axes is None else parse_radar_axes(options.radar_axes)
-    inventory = Inventory(name, topics, {topic.name: usage_of(topic).read_as(axes) for topic in topics})
+    stated = StatedReading(parse_column_map(options.map), axes)
+    usages = {topic.name: _usage(topic, stated) for topic in topics}
+    inventory = Inventory(name, topics, usages)
     selection = select(inventory, options, require)
     selection, stamped, lost = _stamped(selection, inventory)
     clocks, stamps, about_choice = _clocks(stamped, options)
@@ -89,8 +96,9 @@ def assemble(
     warnings.extend(
         [*about_camera, *about_radar(radar), *about_claims(radar), *about_images(images), *about_video(images)]
     )
-    assumptions = _unconfirmed(sources, selection, options)
-    warnings.extend(about_assumptions(assumptions))
+    assumptions = _assumptions(sources, selection, radar)
+    unconfirmed = () if options.confirm_assumptions else assumptions
+    warnings.extend(about_assumptions(unconfirmed))
     return Assembly(
         topics=tuple(_summary(topic, inventory, selection, stamps, diagnoses.get(topic.name)) for topic in topics),
         radar_topic=selection.radar.name if selection.radar else None,
@@ -103,15 +111,23 @@ def assemble(
         camera=camera,
         warnings=tuple(warnings),
         assumptions=assumptions,
+        confirmed=options.confirm_assumptions,
+        column_map=tuple(one.words for one in stated.column_map),
     )
 
 
-def _unconfirmed(sources: Sequence[Source], selection: Selection, options: RecordingOptions) -> tuple[Assumption, ...]:
-    """Return what the files of the topics in use do not state and the user has not confirmed."""
-    if options.confirm_assumptions:
-        return ()
+def _usage(topic: Topic, stated: StatedReading) -> Usage:
+    """Determine what a topic can be used for; the readers of plain files apply the user's --map themselves."""
+    plain = any(isinstance(source, PlainSource) for source, _ in topic.parts)
+    return usage_of(topic, replace(stated, column_map=()) if plain else stated)
+
+
+def _assumptions(sources: Sequence[Source], selection: Selection, radar: RadarStream | None) -> tuple[Assumption, ...]:
+    """Return what the files of the topics in use and the radar's messages do not state."""
     used = {topic.name for topic in (selection.radar, selection.image) if topic is not None}
-    return tuple(one for source in sources for one in source.assumptions if one.topic in used)
+    stated = [one for source in sources for one in source.assumptions if one.topic in used]
+    open_ones = radar.layout.plan.assumptions if radar else ()
+    return (*stated, *(replace(one.assumption, topic=radar.topic.name) for one in open_ones if radar))
 
 
 def _stamped(

@@ -20,6 +20,8 @@ from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.plain_files.opening import files_behind, open_plain_sources
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
+from calib_core.recordings.radar.column_plan import ColumnReading
+from calib_core.recordings.radar.column_plans import column_readings
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.topics import TopicSummary
 from calib_core.results import DataWarning, InputFile
@@ -115,7 +117,22 @@ class Recording:
     @property
     def assumptions(self) -> tuple[Assumption, ...]:
         """What the files do not state, reading takes for granted, and the user has not confirmed."""
-        return self._assembly.assumptions
+        return () if self._assembly.confirmed else self._assembly.assumptions
+
+    @property
+    def confirmed_assumptions(self) -> tuple[Assumption, ...]:
+        """What the files do not state and the user has confirmed with --confirm-assumptions."""
+        return self._assembly.assumptions if self._assembly.confirmed else ()
+
+    @property
+    def column_map(self) -> tuple[str, ...]:
+        """The user's --map of the radar's columns."""
+        return self._assembly.column_map
+
+    @property
+    def radar_columns(self) -> tuple[ColumnReading, ...]:
+        """What was taken for what in the radar's messages; empty without a radar."""
+        return column_readings(self._assembly.radar.layout.plan) if self._assembly.radar else ()
 
     @property
     def warnings(self) -> tuple[DataWarning, ...]:

@@ -10,15 +10,19 @@ from numpy.lib.stride_tricks import as_strided
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.decoding import Message, decode, payload_byte_order
 from calib_core.recordings.messages.definitions import Definition
-from calib_core.recordings.radar.column_plans import plan_for, plan_like
+from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_plans import plan_described, plan_for, plan_like
 from calib_core.recordings.radar.columns import ColumnPlan, Returns, no_returns, returns_from
+from calib_core.recordings.radar.samples import Samples
+from calib_core.recordings.radar.self_describing.candidates import DescribedColumn
 
-__all__ = ["ChannelCloudLayout", "CloudLayout", "is_channel_cloud", "is_cloud"]
+__all__ = ["ChannelCloudLayout", "CloudLayout", "cloud_columns", "is_channel_cloud", "is_cloud"]
 
 _CLOUD_NAMES = frozenset({"height", "width", "fields", "is_bigendian", "point_step", "row_step", "data"})
 _FORMATS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 _MAX_POINT_STEP = 1 << 16
 _LIDAR_POINTS = 5000
+_NOTHING = StatedReading()
 
 
 def is_cloud(definition: Definition) -> bool:
@@ -55,10 +59,18 @@ class CloudLayout:
     one_per_message = False
 
     @classmethod
-    def recognise(cls, definition: Definition, payload: bytes) -> "CloudLayout | None":
+    def recognise(cls, samples: Samples, stated: StatedReading = _NOTHING) -> "CloudLayout | None":
         """Recognise the layout from a first message; None if it contains no positions."""
+        definition, payload = samples.definition, samples.payload
         message = decode(definition, payload)
-        plan = plan_for("cloud", _point_dtype(message, payload_byte_order(payload, definition)).names or ())
+        dtype = _point_dtype(message, payload_byte_order(payload, definition))
+        within = stated.within("", dtype.names or ())
+        if within is None:
+            return None
+        plan = plan_for("cloud", dtype.names or ())
+        if plan is None or not plan.decoder:
+            plan = plan_described("cloud", _cloud_columns(samples, dtype))
+        plan = within.applied(plan)
         if plan is None:
             return None
         points = message.whole("height") * message.whole("width")
@@ -211,6 +223,35 @@ def _points(data: np.ndarray, dtype: np.dtype[Any], height: int, width: int, row
     return np.ascontiguousarray(rows).reshape(-1).view(dtype)
 
 
+def cloud_columns(samples: Samples) -> list[str]:
+    """Return the fields of a first cloud.
+
+    Raises:
+        MessageError: the message is inconsistent.
+    """
+    message = decode(samples.definition, samples.payload)
+    return list(_point_dtype(message, payload_byte_order(samples.payload, samples.definition)).names or ())
+
+
+def _cloud_columns(samples: Samples, dtype: np.dtype[Any]) -> list[DescribedColumn]:
+    """Describe the fields of a cloud with their values in a few messages of the same layout."""
+    scans = [np.zeros(0, dtype)]
+    for payload in samples.payloads():
+        try:
+            message = decode(samples.definition, payload)
+            if _point_dtype(message, payload_byte_order(payload, samples.definition)) == dtype:
+                size = (message.whole(name) for name in ("height", "width", "row_step"))
+                scans.append(_points(message.octets("data"), dtype, *size))
+        except MessageError:
+            continue
+    points = np.concatenate(scans)
+    with np.errstate(invalid="ignore"):
+        return [
+            DescribedColumn(name, dtype[name].kind != "f", "", points[name].astype(np.float64))
+            for name in dtype.names or ()
+        ]
+
+
 def _returns(points: np.ndarray, plan: ColumnPlan) -> Returns:
     if not points.size:
         return no_returns()
@@ -228,10 +269,15 @@ class ChannelCloudLayout:
     one_per_message = False
 
     @classmethod
-    def recognise(cls, definition: Definition, payload: bytes) -> "ChannelCloudLayout | None":
+    def recognise(cls, samples: Samples, stated: StatedReading = _NOTHING) -> "ChannelCloudLayout | None":
         """Recognise the layout from a first message."""
-        columns = _channel_columns(decode(definition, payload))
-        plan = plan_for("channels", columns)
+        definition = samples.definition
+        columns = _channel_columns(decode(definition, samples.payload))
+        within = stated.within("", list(columns))
+        if within is None:
+            return None
+        plan = plan_described("channels", [DescribedColumn(name, False, "", v) for name, v in columns.items()])
+        plan = within.applied(plan)
         if plan is None:
             return None
         return cls(definition, plan, len(columns["x"]) > _LIDAR_POINTS or not plan.looks_like_radar)
