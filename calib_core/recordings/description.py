@@ -38,6 +38,8 @@ def summary_text(summary: RecordingSummary) -> str:
         *_labelled("radar", _radar(summary.radar)),
         *_labelled("camera", _camera(summary.camera)),
     ]
+    confirmed = [one.assumption.text for one in summary.assumptions if one.confirmed]
+    lines.extend(_labelled("confirmed", [f"{text}." for text in confirmed]))
     if summary.warnings:
         lines.append("")
         for warning in summary.warnings:
@@ -135,7 +137,18 @@ def _radar(radar: RadarSummary | None) -> list[str]:
         f"{radar.topic}, frame '{radar.frame}': {_counted(radar.scans, 'scan')}{rate}{gap}",
         f"returns per scan: {middle:.0f} ({low} to {high}{sample})",
         radar.layout,
+        *_readings(radar),
+        *(f"{note}." for note in radar.notes),
     ]
+
+
+def _readings(radar: RadarSummary) -> list[str]:
+    """List what was taken for what, unless it is all as ROS or the registry defines it."""
+    if not any(one.why.startswith(("unit:", "--map", "only")) or one.unit == "not stated" for one in radar.columns):
+        return []
+    rows = [("quantity", "read from", "unit", "grows", "known by")]
+    rows += [(one.quantity, one.column, one.unit, one.sign, one.why) for one in radar.columns]
+    return list(_columns(rows))
 
 
 def _camera(camera: CameraSummary | None) -> list[str]:

@@ -14,7 +14,7 @@ from calib_core.camera import Camera
 from calib_core.errors import RecordingError
 from calib_core.measurements import RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
-from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.assumptions import Assumption, StatedAssumption
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.containers.sources import Source
@@ -120,9 +120,9 @@ class Recording:
         return () if self._assembly.confirmed else self._assembly.assumptions
 
     @property
-    def confirmed_assumptions(self) -> tuple[Assumption, ...]:
-        """What the files do not state and the user has confirmed with --confirm-assumptions."""
-        return self._assembly.assumptions if self._assembly.confirmed else ()
+    def stated_assumptions(self) -> tuple[StatedAssumption, ...]:
+        """Every assumption, with whether the user has confirmed it."""
+        return tuple(StatedAssumption(one, self._assembly.confirmed) for one in self._assembly.assumptions)
 
     @property
     def column_map(self) -> tuple[str, ...]:
@@ -133,6 +133,11 @@ class Recording:
     def radar_columns(self) -> tuple[ColumnReading, ...]:
         """What was taken for what in the radar's messages; empty without a radar."""
         return column_readings(self._assembly.radar.layout.plan) if self._assembly.radar else ()
+
+    @property
+    def radar_notes(self) -> tuple[str, ...]:
+        """What else the user should know about the radar's messages, as sentences without their final periods."""
+        return self._assembly.radar.layout.plan.notes if self._assembly.radar else ()
 
     @property
     def warnings(self) -> tuple[DataWarning, ...]:

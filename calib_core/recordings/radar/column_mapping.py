@@ -70,10 +70,6 @@ class StatedReading:
             MessageError: one is missing; the nearest names are given.
         """
         for one in self.column_map:
-            if one.quantity == "time":
-                raise OptionError(
-                    f"--map {one.words}: messages carry their time in their headers; choose the clock with --clock"
-                )
             if one.column not in names:
                 near = difflib.get_close_matches(one.column, names, 3, 0.3) or sorted(names)[:8]
                 raise MessageError(
@@ -89,9 +85,13 @@ def map_columns(plan: ColumnPlan | None, column_map: Sequence[MappedColumn]) -> 
         column_map: columns that exist.
 
     Raises:
-        OptionError: the position is incomplete.
+        OptionError: the position is incomplete, or a time is mapped.
     """
     given = {one.quantity: one for one in column_map}
+    if "time" in given:
+        raise OptionError(
+            f"--map {given['time'].words}: messages carry their time in their headers; choose the clock with --clock"
+        )
     start = plan or ColumnPlan(position=(), polar=True, described=True)
     assumed: list[ColumnAssumption] = []
     made = _position(start, given, assumed)
@@ -99,7 +99,7 @@ def map_columns(plan: ColumnPlan | None, column_map: Sequence[MappedColumn]) -> 
     if "amplitude" in given:
         made = replace(made, amplitude=given["amplitude"].column, amplitude_scale=given["amplitude"].scale)
     made = _sigma(made, given)
-    kept = tuple(one for one in start.assumptions if not _settled(one, given))
+    kept = tuple(one for one in start.assumptions if not _settled(one, given, made))
     readings = tuple(one for one in start.readings if one.quantity not in given and not _replaced(one, made))
     return replace(
         made,
@@ -114,10 +114,10 @@ def _replaced(reading: ColumnReading, made: ColumnPlan) -> bool:
     return reading.quantity in gone or (reading.quantity == "velocity" and not made.velocity)
 
 
-def _settled(one: ColumnAssumption, given: Mapping[str, MappedColumn]) -> bool:
+def _settled(one: ColumnAssumption, given: Mapping[str, MappedColumn], made: ColumnPlan) -> bool:
     unit = one.assumption.key.endswith("-unit")
-    if {"x", "y"} <= given.keys() and set(one.quantities) & set(_POLAR):
-        return True
+    if set(one.quantities) & set(_CARTESIAN if made.polar else _POLAR):
+        return True  # about columns that are no longer read
     return bool(one.quantities) and all(q in given and (given[q].unit or not unit) for q in one.quantities)
 
 

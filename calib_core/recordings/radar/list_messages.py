@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.assumptions import CONFIRM_ALL, Assumption
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
@@ -59,10 +59,9 @@ class ListLayout:
         spare = [one.place.name for one in found if one is not best]
         if not spare:
             return best
-        first = best.plan.position[0]
         note = (
             f"only the list '{best.place.name}' is read; the message also has {', '.join(spare)}, "
-            f"which --map {'range' if best.plan.polar else 'x'}=LIST.{first} would choose"
+            f"which can be chosen by naming columns with --map, such as --map x={spare[0]}.FIELD"
         )
         return best.with_plan(replace(best.plan, notes=(*best.plan.notes, note)))
 
@@ -155,7 +154,16 @@ def _list_at(
     if plan is not None and not plan.looks_like_radar and not within.column_map:
         return None
     plan = within.applied(plan)
-    return None if plan is None else ListLayout(definition, place, _about_place(plan, place, parents, counter), counter)
+    return (
+        None
+        if plan is None
+        else ListLayout(
+            definition,
+            place,
+            _about_place(plan, place, parents, counter, len(samples.messages) if parents and samples else 0),
+            counter,
+        )
+    )
 
 
 def _no_values(name: str) -> np.ndarray:
@@ -172,13 +180,23 @@ def _sampled(parents: Sequence[Message], last: str, name: str, counter: str | No
     return np.concatenate(columns) if columns else np.zeros(0)
 
 
-def _about_place(plan: ColumnPlan, place: ListPlace, parents: Sequence[Message], counter: str | None) -> ColumnPlan:
-    """Add to a plan what its list's place in the message leaves open."""
+def _about_place(
+    plan: ColumnPlan, place: ListPlace, parents: Sequence[Message], counter: str | None, messages: int
+) -> ColumnPlan:
+    """Add to a plan what its list's place in the message leaves open.
+
+    Args:
+        plan: of the list's elements.
+        place: of the list.
+        parents: what holds the list, in a sample of messages.
+        counter: the field that counts the used elements.
+        messages: number of sampled messages.
+    """
     assumptions, notes = list(plan.assumptions), list(plan.notes)
-    if place.several and len(parents) > 1:
+    if place.several and len(parents) > messages:
         outer = ".".join(place.path[:-1])
         text = f"the returns of all elements of '{outer}' are taken as one sensor's, in one frame"
-        assumptions.append(ColumnAssumption(Assumption("field-meaning", "", text, "--confirm-assumptions"), ()))
+        assumptions.append(ColumnAssumption(Assumption("field-meaning", "", text, CONFIRM_ALL), ()))
     if place.fixed and counter is None:
         notes.append(f"'{place.name}' has {place.fixed} elements and no count: those at position 0 are skipped")
     elif place.fixed:

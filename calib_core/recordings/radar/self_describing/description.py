@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from calib_core.recordings.assumptions import CONFIRM_ALL
 from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
 from calib_core.recordings.radar.self_describing.candidates import Chosen, DescribedColumn, choose
 from calib_core.recordings.radar.self_describing.names import words_of
@@ -11,6 +12,7 @@ from calib_core.recordings.radar.self_describing.speeds import speed_part
 
 __all__ = ["describe_columns", "fill_in"]
 
+_MOST_SENSORS = 8
 _INVALID_POSITION = ("invalid_distance", "invalid_range", "invalid_azimuth", "invalid_elevation")
 _INVALID_DOPPLER = ("invalid_range_rate", "invalid_doppler", "invalid_velocity")
 
@@ -102,18 +104,15 @@ def _flags(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> ColumnPlan:
 def _about_sensors(columns: Sequence[DescribedColumn]) -> list[ColumnAssumption]:
     found = []
     for column in columns:
-        words = set(words_of(column.name))
-        if (
-            words & {"sensor", "radar"}
-            and words & {"id", "idx", "index", "number"}
-            and len(set(column.values.tolist())) > 1
-        ):
-            ids = ", ".join(f"{value:g}" for value in sorted(set(column.values.tolist()))[:6])
+        words, values = set(words_of(column.name)), sorted(set(column.values.tolist()))
+        numbered = words & {"sensor", "radar"} and words & {"id", "idx", "index", "number"}
+        if numbered and 1 < len(values) <= _MOST_SENSORS:
+            ids = ", ".join(f"{value:g}" for value in values)
             found.append(
                 assume(
                     "field-meaning",
                     f"'{column.name}' has the values {ids}, and all their returns are taken as one sensor's, in one frame",
-                    "--confirm-assumptions",
+                    CONFIRM_ALL,
                     (),
                 )
             )

@@ -62,9 +62,9 @@ _TABLE = """
 range 0: range; rng; radial range; radial distance; radial dist; slant range; range rad
 range 1: distance; dist; r dist; r distance; r range
 range 2: r; radius; rho
-azimuth 0: azimuth; azi; azim; az; azimuth angle; azi angle; az angle; horizontal angle; hor angle; azimuth ang; az ang
+azimuth 0: azimuth; azi; azim; az; azimuth angle; azi angle; az angle; horizontal angle; hor angle; h angle; azimuth ang; az ang
 azimuth 1: bearing; bearing angle
-elevation 0: elevation; elev; ele; el; elevation angle; elev angle; el angle; vertical angle; ver angle; elevation ang
+elevation 0: elevation; elev; ele; el; elevation angle; elev angle; el angle; vertical angle; ver angle; angle v; elevation ang
 vague 3: phi; alpha; aoa; doa; phi angle; alpha angle
 vague 4: theta; beta; theta angle; beta angle
 vague 5: angle; ang

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.assumptions import CONFIRM_ALL, Assumption
 from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
 from calib_core.recordings.radar.self_describing.candidates import Chosen, Picked
 from calib_core.recordings.radar.self_describing.comments import Direction, axes_in, axis_side, positive_side
@@ -49,6 +49,10 @@ def _metre() -> Unit:
     return unit
 
 
+def _are(names: str) -> str:
+    return f"{names} {'are' if ',' in names else 'is'}"
+
+
 # -- lengths
 
 
@@ -65,7 +69,7 @@ def _length(
         why = stated.why if stated else _ROS
         if largest <= _FARTHEST_M:
             return units, why, None
-        text = f"{names} would reach {largest:.4g} m in {usual.name} ({why}), and are read so all the same"
+        text = f"{names} would reach {largest:.4g} m in {usual.name} ({why}), which is too far; the unit is taken all the same"
         return units, why, _about_length(text, group, usual, sides)
     found = proven or length_unit(
         farthest(*(one.column.values for one in group)), integer=any(one.column.integer for one in group)
@@ -73,7 +77,7 @@ def _length(
     units = [found.unit] * len(group)
     if found.certain:
         return units, found.why, None
-    text = f"{names} are taken as {found.unit.name} ({found.why}); the message does not state the unit"
+    text = f"{_are(names)} taken as {found.unit.name} ({found.why}); the message does not state the unit"
     return units, "assumed", _about_length(text, group, found.unit, sides)
 
 
@@ -85,7 +89,7 @@ def _about_length(text: str, group: tuple[Picked, ...], unit: Unit, sides: tuple
         f"--map {quantity}={minus}{one.column.name}{flag_unit(unit)}"
         for (quantity, minus), one in zip(targets, group, strict=True)
     )
-    return assume("length-unit", text, maps, quantities)
+    return assume("length-unit", text, maps if flag_unit(unit) else CONFIRM_ALL, quantities)
 
 
 # -- Cartesian
@@ -279,11 +283,11 @@ def _angle(angles: tuple[Picked, ...]) -> tuple[Unit, str, ColumnAssumption | No
         unit = stated.unit
         if not _implausible(angles[0], unit, found):
             return unit, stated.why, None
-        text = f"{names} are taken as {unit.name} ({stated.why}), although their values look like {found.unit.name}: {found.why}"
+        text = f"{_are(names)} taken as {unit.name} ({stated.why}), although the values look like {found.unit.name}: {found.why}"
         return unit, stated.why, _about_angle(text, angles, unit)
     if found.certain:
         return found.unit, found.why, None
-    text = f"{names} are taken as {found.unit.name} ({found.why}); the message does not state the unit"
+    text = f"{_are(names)} taken as {found.unit.name} ({found.why}); the message does not state the unit"
     return found.unit, "assumed", _about_angle(text, angles, found.unit)
 
 
@@ -296,6 +300,7 @@ def _implausible(angle: Picked, unit: Unit, found: Finding) -> bool:
 
 def _about_angle(text: str, angles: tuple[Picked, ...], unit: Unit) -> ColumnAssumption:
     maps = " ".join(f"--map {one.meaning.quantity}={one.column.name}{flag_unit(unit)}" for one in angles)
+    maps = maps if flag_unit(unit) else CONFIRM_ALL
     return assume("angle-unit", text, maps, tuple(one.meaning.quantity for one in angles), angle_unit=True)
 
 

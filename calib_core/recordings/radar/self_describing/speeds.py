@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from calib_core.recordings.assumptions import CONFIRM_ALL
 from calib_core.recordings.radar.column_plan import ColumnPlan, ColumnReading
 from calib_core.recordings.radar.self_describing.candidates import Chosen, Picked
 from calib_core.recordings.radar.self_describing.positions import assume, flag_unit
@@ -40,8 +41,8 @@ def _with_speed(plan: ColumnPlan, group: tuple[Picked, ...], quantity: str, in_r
         unit, why = found.unit, "assumed"
         confirm = (
             f"--map doppler={group[0].column.name}{flag_unit(unit)}"
-            if quantity == "doppler"
-            else "--confirm-assumptions"
+            if quantity == "doppler" and flag_unit(unit)
+            else CONFIRM_ALL
         )
         verb = "is" if len(group) == 1 else "are"
         text = f"{names} {verb} taken as {unit.name} ({found.why}); the message does not state the unit"

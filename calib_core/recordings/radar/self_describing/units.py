@@ -102,7 +102,8 @@ def unit_in(comment: str, dimension: Dimension, *, integer: bool = False) -> Uni
         integer: the field is an integer, whose resolution is its unit.
     """
     text = (_OF_INTEGERS if integer else _OF_FLOATS).sub("", comment).strip(" .,;")
-    matches = [_ALONE.fullmatch(text), *_BRACKETS.finditer(text), *_SAID.finditer(text)]
+    pieces = [_ALONE.fullmatch(piece.strip()) for piece in re.split("[,;]", text)]
+    matches = [*pieces, *_BRACKETS.finditer(text), *_SAID.finditer(text)]
     for match in matches:
         unit = _BY_WORD[match["unit"].lower()] if match else None
         if match and unit and unit.dimension == dimension:
