@@ -35,6 +35,11 @@ class PictureRecording:
     image_clock: str | None = "header"
     radar_axes: str | None = None
     video_start: str | None = None
+    assumptions: tuple[Any, ...] = ()
+    stated_assumptions: tuple[Any, ...] = ()
+    column_map: tuple[str, ...] = ()
+    radar_columns: tuple[Any, ...] = ()
+    radar_notes: tuple[str, ...] = ()
     radar_frame: str = "radar"
     camera_frame: str = "camera_optical"
     topics: tuple[Any, ...] = ()

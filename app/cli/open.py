@@ -22,6 +22,7 @@ from calib_core.recordings import Recording, RecordingOptions
 
 if TYPE_CHECKING:
     from app.web.port.serving import Service
+    from app.workspace import Workspace
 
 __all__ = ["Demo", "Open"]
 
@@ -151,7 +152,7 @@ def _serve(
     require_address(serving.host, serving.port)
     require_token(serving.token)
     _require_given(camera_file, calibration_file, clicks_file)
-    topics = topics or RecordingOptions()
+    topics = _with_remembered(topics or RecordingOptions(), session, fresh=fresh)
     with _service(paths, topics, serving, name) as service, ExitStack() as stack:
         recording = stack.enter_context(open_recording(paths, topics))
         camera = _camera(recording, camera_file, calibration_file)
@@ -160,6 +161,7 @@ def _serve(
             print(f"The previous session is kept in {kept}")
         workspace = open_workspace(recording, camera=camera, session_folder=session, name=name, reference=reference)
         stack.callback(workspace.close)
+        _remember(workspace, recording)
         for warning in workspace.restored.warnings:
             print(f"{sentence(warning.message)} {sentence(warning.hint)}")
         if options is not None and options != CalibrationOptions():
@@ -170,6 +172,28 @@ def _serve(
             print(f"Continuing the existing session; {clicks_file} was not imported (start over with --fresh)")
         service.serve(workspace, recording)
     return 0
+
+
+def _with_remembered(topics: RecordingOptions, session: Path, *, fresh: Switch) -> RecordingOptions:
+    """Return the options with the --map that the session was last opened with, unless the user gives another one."""
+    from app.session.file import remembered_map
+
+    if topics.map or fresh:
+        return topics
+    found = remembered_map(session)
+    if found:
+        print(f"Reading the radar as before in this session: {' '.join(f'--map {one}' for one in found)}")
+    return dataclasses.replace(topics, map=found)
+
+
+def _remember(workspace: "Workspace", recording: Recording) -> None:
+    """Keep in the session how the recording is read and what was confirmed about it."""
+    from app.session import AssumptionsConfirmed, ColumnsMapped
+
+    workspace.dispatch(ColumnsMapped(recording.column_map))
+    sure = tuple(one.assumption.words for one in recording.stated_assumptions if one.confirmed)
+    if sure:
+        workspace.dispatch(AssumptionsConfirmed(sure))
 
 
 def _service(paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str) -> "Service":

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from calib_core.results import DataWarning
 
-__all__ = ["CONFIRM_ALL", "Assumption", "StatedAssumption", "about_assumptions"]
+__all__ = ["CONFIRM_ALL", "Assumption", "StatedAssumption", "about_assumptions", "assumption_hint"]
 
 
 CONFIRM_ALL = "--confirm-assumptions"
@@ -29,6 +29,11 @@ class Assumption:
     text: str
     confirm: str
 
+    @property
+    def words(self) -> str:
+        """The text with its topic."""
+        return f"{self.topic}: {self.text}"
+
 
 @dataclass(frozen=True, slots=True)
 class StatedAssumption:
@@ -40,9 +45,10 @@ class StatedAssumption:
 
 def about_assumptions(assumptions: Sequence[Assumption]) -> list[DataWarning]:
     """Warn about each unconfirmed assumption."""
-    return [DataWarning("assumed", f"{one.topic}: {one.text}", _hint(one)) for one in assumptions]
+    return [DataWarning("assumed", one.words, assumption_hint(one.confirm)) for one in assumptions]
 
 
-def _hint(one: Assumption) -> str:
-    options = " or ".join(dict.fromkeys((one.confirm, CONFIRM_ALL)))
+def assumption_hint(confirm: str) -> str:
+    """Return what to do about an assumption, given the options that state it."""
+    options = " or ".join(dict.fromkeys((confirm, CONFIRM_ALL)))
     return f"if that is right, confirm it with {options}; otherwise state what is right"

@@ -6,6 +6,7 @@ A session is a folder, `NAME.cocalib-session/`, with `journal.jsonl` (one line p
 
 from app.session.file.errors import SessionFileError
 from app.session.file.folders import recording_session_folder, user_session_folder
+from app.session.file.remembered import remembered_map
 from app.session.file.session_file import Restored, SessionFile, open_session_file, set_aside
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "SessionFileError",
     "open_session_file",
     "recording_session_folder",
+    "remembered_map",
     "set_aside",
     "user_session_folder",
 ]

@@ -6,7 +6,15 @@ from typing import Any
 import msgspec
 
 from app.option_changes import options_from_tree
-from app.session import ClicksImported, OptionsChanged, RecordingFacts, Session, Step
+from app.session import (
+    AssumptionsConfirmed,
+    ClicksImported,
+    ColumnsMapped,
+    OptionsChanged,
+    RecordingFacts,
+    Session,
+    Step,
+)
 from app.session.file.errors import SessionFileError
 from app.session.file.identity import SCHEMA, RecordingForm, recording_form, require_same_recording
 from app.session.file.step_json import ClickForm, click_from_form, form_of_click
@@ -22,6 +30,8 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     steps: int
     options: dict[str, Any]
     clicks: tuple[ClickForm, ...]
+    column_map: tuple[str, ...] = ()
+    confirmed: tuple[str, ...] = ()
 
 
 def write_snapshot(path: Path, session: Session, *, facts: RecordingFacts, steps: int, cocalib: str) -> None:
@@ -37,6 +47,8 @@ def write_snapshot(path: Path, session: Session, *, facts: RecordingFacts, steps
         steps=steps,
         options=msgspec.to_builtins(session.options),
         clicks=tuple(form_of_click(click) for click in session.clicks),
+        column_map=session.column_map,
+        confirmed=session.confirmed,
     )
     write_whole(path, msgspec.json.format(msgspec.json.encode(snapshot), indent=1) + b"\n")
 
@@ -72,4 +84,6 @@ def read_snapshot(path: Path, facts: RecordingFacts) -> tuple[Step, ...]:
         )
     require_same_recording(snapshot.recording, facts, path.parent)
     clicks = ClicksImported(tuple(click_from_form(click) for click in snapshot.clicks))
-    return (OptionsChanged(options_from_tree(snapshot.options)), clicks)
+    reading: tuple[Step, ...] = (ColumnsMapped(snapshot.column_map),) if snapshot.column_map else ()
+    reading += (AssumptionsConfirmed(snapshot.confirmed),) if snapshot.confirmed else ()
+    return (*reading, OptionsChanged(options_from_tree(snapshot.options)), clicks)

@@ -260,6 +260,13 @@ class ClocksDocument(Struct, frozen=True):
     image: str | None = None
 
 
+class AssumptionDocument(Struct, frozen=True):
+    """A unit, sign, order or meaning that the files do not state."""
+
+    text: str
+    confirmed: bool = False
+
+
 class ProvenanceDocument(Struct, frozen=True):
     """Where the result comes from."""
 
@@ -269,6 +276,8 @@ class ProvenanceDocument(Struct, frozen=True):
     radar_axes: str | None = None
     video_start: str | None = None
     version: str | None = None
+    column_map: list[str] = []
+    assumptions: list[AssumptionDocument] = []
 
 
 class NoiseScaleDocument(Struct, frozen=True):

@@ -245,6 +245,7 @@ class BareRecording:
     radar_topic = image_topic = camera_info_topic = radar_clock = image_clock = None
     radar_axes: str | None = None
     video_start = None
+    assumptions = stated_assumptions = column_map = ()
     radar_frame, camera_frame = "radar", "camera"
     image_times = FACTS.image_times
 
