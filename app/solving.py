@@ -266,5 +266,7 @@ def calibration_text_of_pairs(calibration: Calibration, text: str, name: str) ->
     if names_schema(text, CALIBRATION_SCHEMA):
         file = read_calibration(text, name)
         provenance = dataclasses.replace(file.provenance, inputs=(origin,), version=version())
+        assumed = tuple(warning for warning in file.calibration.warnings if warning.code == "assumed")
+        calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *assumed))
         return interchange_text(calibration, file.frames, provenance)
     return interchange_text(calibration, provenance=Provenance(inputs=(origin,), version=version()))

@@ -174,16 +174,16 @@ def _position(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Points3:
 
 
 def _sigma(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Points3) -> Points3:
-    turn = np.eye(3) if plan.turn is None else plan.turn
+    turn = plan.turn
     if plan.covariance is not None:
         covariance = full_covariance(np.asarray(column(plan.covariance), dtype=np.float64))
-        return sigma_polar_from_covariance(position, turn @ covariance @ turn.T)
+        return sigma_polar_from_covariance(position, covariance if turn is None else turn @ covariance @ turn.T)
     if not any(plan.sigma):
         return unknown(len(position), 3)
     sigma = _columns(plan.sigma, column, len(position)) * plan.sigma_scales
     if plan.degrees:
         sigma[:, 1:] = np.radians(sigma[:, 1:])
-    if not turn[2, 2]:
+    if turn is not None and not turn[2, 2]:
         sigma[:, 1:] = np.nan  # the azimuth is then no longer measured about the upward axis
     return sigma
 

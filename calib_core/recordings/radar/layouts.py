@@ -7,15 +7,10 @@ from typing import TypeAlias
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.array_messages import ArrayLayout
+from calib_core.recordings.radar.channel_clouds import ChannelCloudLayout, is_channel_cloud
 from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.list_messages import ListLayout
-from calib_core.recordings.radar.point_clouds import (
-    ChannelCloudLayout,
-    CloudLayout,
-    cloud_columns,
-    is_channel_cloud,
-    is_cloud,
-)
+from calib_core.recordings.radar.point_clouds import CloudLayout, cloud_columns, is_cloud
 from calib_core.recordings.radar.samples import Samples, leaf_names
 from calib_core.recordings.radar.single_returns import PointLayout
 from calib_core.recordings.radar.struct_lists import struct_lists

@@ -96,12 +96,14 @@ class ListLayout:
         Raises:
             MessageError: the bytes do not fit the definition.
         """
-        last = self.place.path[-1]
-        lists = [
-            (parent, count)
-            for parent in self.place.parents(decode(self.definition, payload))
-            if (count := self._count(parent))
-        ]
+        last, message = self.place.path[-1], decode(self.definition, payload)
+        if len(self.place.path) == 1 and self.place.fixed is None:
+            return (
+                returns_from(self.plan, lambda name: message.column(last, name))
+                if message.count(last)
+                else no_returns()
+            )
+        lists = [(parent, count) for parent in self.place.parents(message) if (count := self._count(parent))]
         if not lists:
             return no_returns()
         found = returns_from(

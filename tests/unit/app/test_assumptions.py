@@ -9,7 +9,7 @@ import pytest
 
 from app.session import AssumptionsConfirmed, ColumnsMapped, RecordingFacts, Session
 from app.session.file import remembered_map
-from app.solving import calibration_text
+from app.solving import calibration_text, calibration_text_of_pairs, solve_pairs
 from app.workspace import Workspace, open_workspace
 from calib_core.interchange import read_calibration
 from calib_core.recordings import Recording, RecordingOptions, open_recording
@@ -54,6 +54,11 @@ def test_an_unconfirmed_assumption_is_in_the_view_the_status_and_the_file(
     file = read_calibration(calibration_text(calibration, recording, workspace.session.confirmed))
     assert [(one.text, one.confirmed) for one in file.provenance.assumptions] == [(text, False) for text in texts]
     assert [warning.code for warning in file.calibration.warnings].count("assumed") == 2
+    text = calibration_text(calibration, recording)
+    again = read_calibration(calibration_text_of_pairs(solve_pairs(text, "a.json"), text, "a.json"))
+    assert [warning.code for warning in again.calibration.warnings].count("assumed") == 2, (
+        "solving again confirms nothing"
+    )
     revision = workspace.session.revision
     workspace.dispatch(AssumptionsConfirmed(texts))
     assert workspace.view.assumptions == ()

@@ -1,98 +1,19 @@
-"""Units, signs and axes of a position, Cartesian or polar, with what states each."""
+"""A Cartesian position: its unit and its axes, with what states each."""
 
-import numpy as np
-
-from calib_core.recordings.assumptions import CONFIRM_ALL, Assumption
 from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
 from calib_core.recordings.radar.self_describing.candidates import Chosen, Picked
 from calib_core.recordings.radar.self_describing.comments import Direction, axes_in, axis_side, positive_side
+from calib_core.recordings.radar.self_describing.lengths import assume, length_unit_of
 from calib_core.recordings.radar.self_describing.units import Unit, unit_of_word
-from calib_core.recordings.radar.self_describing.values import (
-    Finding,
-    PolarAgreement,
-    agreement,
-    angle_unit,
-    farthest,
-    forward_axis,
-    length_unit,
-)
+from calib_core.recordings.radar.self_describing.values import Finding, PolarAgreement, agreement, forward_axis
 
-__all__ = ["assume", "cartesian_part", "flag_unit", "polar_part"]
+__all__ = ["cartesian_part"]
 
-_FARTHEST_M = 1000.0
 _COMMENT = "comment in the definition"
 _ROS = "ROS defines it (REP 103)"
 _AXES = {"x": "y", "y": "x"}
 _PLANES = {"forward": 0, "backward": 0, "left": 1, "right": 1, "up": 2, "down": 2}
-_AS_MAPPED = {
-    "forward": ("x", ""), "backward": ("x", "-"), "left": ("y", ""), "right": ("y", "-"), "up": ("z", ""), "down": ("z", "-"),
-}  # fmt: skip
 _OPPOSITE: dict[Direction, Direction] = {"left": "right", "right": "left", "forward": "backward", "backward": "forward"}
-
-
-def assume(
-    key: str, text: str, confirm: str, quantities: tuple[str, ...], *, axes: bool = False, angle_unit: bool = False
-) -> ColumnAssumption:
-    """Return an assumption whose topic is not known yet."""
-    return ColumnAssumption(Assumption(key, "", text, confirm), quantities, axes, angle_unit)
-
-
-def flag_unit(unit: Unit) -> str:
-    """Return how --map spells a unit; "" if it has no name there."""
-    name = unit.name.replace("/", "").lower()
-    return {"ms": ":mps", "kmh": ":kmh", "cms": ":cmps"}.get(name, f":{name}" if name.isalpha() else "")
-
-
-def _metre() -> Unit:
-    unit = unit_of_word("m")
-    assert unit is not None
-    return unit
-
-
-def _are(names: str) -> str:
-    return f"{names} {'are' if ',' in names else 'is'}"
-
-
-# -- lengths
-
-
-def _length(
-    group: tuple[Picked, ...], *, standard: bool, proven: Finding | None = None, sides: tuple[str, ...] = ()
-) -> tuple[list[Unit], str, ColumnAssumption | None]:
-    """Return the unit of each column of a position or range, what states it, and what is assumed."""
-    stated = next((one for one in group if one.unit), None)
-    usual = stated.unit if stated and stated.unit else _metre()
-    units = [one.unit or usual for one in group]
-    largest = farthest(*(one.column.values * unit.scale for one, unit in zip(group, units, strict=True)))
-    names = ", ".join(one.column.name for one in group)
-    if stated or standard:
-        why = stated.why if stated else _ROS
-        if largest <= _FARTHEST_M:
-            return units, why, None
-        text = f"{names} would reach {largest:.4g} m in {usual.name} ({why}), which is too far; the unit is taken all the same"
-        return units, why, _about_length(text, group, usual, sides)
-    found = proven or length_unit(
-        farthest(*(one.column.values for one in group)), integer=any(one.column.integer for one in group)
-    )
-    units = [found.unit] * len(group)
-    if found.certain:
-        return units, found.why, None
-    text = f"{_are(names)} taken as {found.unit.name} ({found.why}); the message does not state the unit"
-    return units, "assumed", _about_length(text, group, found.unit, sides)
-
-
-def _about_length(text: str, group: tuple[Picked, ...], unit: Unit, sides: tuple[str, ...]) -> ColumnAssumption:
-    """Return the assumption of a length's unit; for a position, confirmed in the radar's own axes."""
-    quantities = tuple(one.meaning.quantity for one in group)
-    targets = [_AS_MAPPED[side] for side in sides[: len(group)]] if sides else [(name, "") for name in quantities]
-    maps = " ".join(
-        f"--map {quantity}={minus}{one.column.name}{flag_unit(unit)}"
-        for (quantity, minus), one in zip(targets, group, strict=True)
-    )
-    return assume("length-unit", text, maps if flag_unit(unit) else CONFIRM_ALL, quantities)
-
-
-# -- Cartesian
 
 
 def cartesian_part(chosen: Chosen, remarks: str, *, in_ros_frame: bool) -> ColumnPlan:
@@ -101,7 +22,7 @@ def cartesian_part(chosen: Chosen, remarks: str, *, in_ros_frame: bool) -> Colum
     standard = in_ros_frame or all(one.column.standard for one in group)
     polar = _polar_of(chosen)
     directions, reasons, about_axes = _directions(group, remarks, polar, chosen, standard=standard)
-    units, why, about = _length(group, standard=standard, proven=_by_range(chosen, polar), sides=directions)
+    units, why, about = length_unit_of(group, standard=standard, proven=_by_range(chosen, polar), sides=directions)
     readings = [
         ColumnReading(one.meaning.quantity, one.column.name, unit.name, direction, f"unit: {why}; direction: {reason}")
         for one, unit, direction, reason in zip(group, units, directions, reasons, strict=False)
@@ -219,115 +140,3 @@ def _side(
             turn if polar.toward > 0 else _OPPOSITE[turn]
         ), f"{chosen.picked['azimuth'].column.name} grows to the {turn}"
     return ("left" if forward == "x" else "right"), ""
-
-
-# -- polar
-
-
-def polar_part(chosen: Chosen, remarks: str) -> ColumnPlan:
-    """Plan a position from range, azimuth and perhaps elevation."""
-    distance, azimuth, elevation = (chosen.picked.get(name) for name in ("range", "azimuth", "elevation"))
-    assert distance is not None
-    assert azimuth is not None
-    (unit,), why, about = _length((distance,), standard=False)
-    angles = tuple(one for one in (azimuth, elevation) if one is not None)
-    angle, why_angle, about_angle = _angle(angles)
-    sign, why_sign, about_sign = _azimuth_sign(azimuth, angle, remarks)
-    units = [one.unit or angle for one in angles]
-    degrees = "deg" in angle.name
-    base = unit_of_word("deg" if degrees else "rad")
-    assert base is not None
-    scales = [one.scale / base.scale for one in units]
-    side = "left" if sign > 0 else "right"
-    readings = [
-        ColumnReading("range", distance.column.name, unit.name, "", f"unit: {why}"),
-        ColumnReading(
-            "azimuth", azimuth.column.name, units[0].name, f"to the {side}", f"unit: {why_angle}; sign: {why_sign}"
-        ),
-    ]
-    if elevation is not None:
-        readings.append(
-            ColumnReading(
-                "elevation", elevation.column.name, units[-1].name, "upwards", f"unit: {why_angle}; sign: as usual"
-            )
-        )
-    sigma = [chosen.sigma.get(name) for name in ("range", "azimuth", "elevation")]
-    usual = (unit.scale, *(scale * base.scale for scale in (scales[0], scales[-1])))
-    own = [(one.unit.scale if one and one.unit else scale) for one, scale in zip(sigma, usual, strict=True)]
-    return ColumnPlan(
-        position=tuple(one.column.name for one in (distance, *angles)),
-        polar=True,
-        degrees=degrees,
-        azimuth_sign=float(sign),
-        scales=(unit.scale, scales[0], scales[1] if len(scales) > 1 else 1.0),
-        claimed=(distance.column.name, azimuth.column.name, elevation.column.name if elevation else None),
-        claimed_scales=(unit.scale, scales[0], scales[-1]),
-        sigma=(_name(sigma[0]), _name(sigma[1]), _name(sigma[2])),
-        sigma_scales=(own[0], own[1] / base.scale, own[2] / base.scale),
-        second_azimuth=chosen.second_azimuth.column.name if chosen.second_azimuth else None,
-        readings=tuple(readings),
-        assumptions=tuple(one for one in (about, about_angle, about_sign, _about_vague(chosen)) if one),
-    )
-
-
-def _name(one: Picked | None) -> str | None:
-    return one.column.name if one else None
-
-
-def _angle(angles: tuple[Picked, ...]) -> tuple[Unit, str, ColumnAssumption | None]:
-    """Return the unit of angles, what states it, and what is assumed."""
-    stated = next((one for one in angles if one.unit), None)
-    names = ", ".join(one.column.name for one in angles)
-    found = angle_unit(angles[0].column.values, integer=angles[0].column.integer)
-    if stated and stated.unit:
-        unit = stated.unit
-        if not _implausible(angles[0], unit, found):
-            return unit, stated.why, None
-        text = f"{_are(names)} taken as {unit.name} ({stated.why}), although the values look like {found.unit.name}: {found.why}"
-        return unit, stated.why, _about_angle(text, angles, unit)
-    if found.certain:
-        return found.unit, found.why, None
-    text = f"{_are(names)} taken as {found.unit.name} ({found.why}); the message does not state the unit"
-    return found.unit, "assumed", _about_angle(text, angles, found.unit)
-
-
-def _implausible(angle: Picked, unit: Unit, found: Finding) -> bool:
-    """Return whether an angle's values contradict its stated unit."""
-    values = angle.column.values[np.isfinite(angle.column.values)]
-    too_wide = float(np.abs(values).max(initial=0.0)) * unit.scale > 2 * np.pi + 0.01
-    return too_wide or (found.certain and unit.name in ("rad", "deg") and unit.name != found.unit.name)
-
-
-def _about_angle(text: str, angles: tuple[Picked, ...], unit: Unit) -> ColumnAssumption:
-    maps = " ".join(f"--map {one.meaning.quantity}={one.column.name}{flag_unit(unit)}" for one in angles)
-    maps = maps if flag_unit(unit) else CONFIRM_ALL
-    return assume("angle-unit", text, maps, tuple(one.meaning.quantity for one in angles), angle_unit=True)
-
-
-def _azimuth_sign(azimuth: Picked, angle: Unit, remarks: str) -> tuple[int, str, ColumnAssumption | None]:
-    side = positive_side(azimuth.column.comment)
-    if side not in ("left", "right") and "azimuth" in remarks.lower():
-        line = next(line for line in remarks.splitlines() if "azimuth" in line.lower())
-        side = positive_side(line)
-    if side in ("left", "right"):
-        return (1 if side == "left" else -1), _COMMENT, None
-    name = azimuth.column.name
-    return 1, "assumed", assume(
-        "azimuth-sign",
-        f"{name} is taken as growing to the left; the message does not state it",
-        f"--map azimuth={name}{flag_unit(angle)} (azimuth=-{name}{flag_unit(angle)} if it grows to the right)",
-        ("azimuth",),
-        axes=True,
-    )  # fmt: skip
-
-
-def _about_vague(chosen: Chosen) -> ColumnAssumption | None:
-    if not chosen.vague:
-        return None
-    first, second = (one.column.name for one in chosen.vague)
-    return assume(
-        "field-meaning",
-        f"{first} is taken as the azimuth and {second} as the elevation; the message does not state which is which",
-        f"--map azimuth={first} --map elevation={second}",
-        ("azimuth", "elevation"),
-    )
