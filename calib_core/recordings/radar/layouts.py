@@ -4,6 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
+import numpy as np
+
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.array_messages import ArrayLayout
@@ -44,7 +46,8 @@ def recognise(
         MessageError: its definition is a radar's, but the message is inconsistent, or it lacks a column that the user maps.
     """
     samples = Samples(definition, payload, more)
-    found = _recognise(samples, stated)
+    with np.errstate(all="ignore"):  # damaged bytes may hold signalling NaN, and numbers whose squares overflow
+        found = _recognise(samples, stated)
     if found is None and stated.column_map:
         stated.require(column_names(samples))
     return found

@@ -90,7 +90,8 @@ amplitude 2: rcs; radar cross section; cross section
 amplitude 3: power; pow; pwr; amplitude; ampl; amp; magnitude; mag; rssi; level; strength; signal strength; signal power
 """
 _SYNONYMS = {
-    "longitudinal": "long", "lon": "long", "lng": "long", "lateral": "lat", "vrel": "v", "vabs": "v",
+    "longitudinal": "long", "longitude": "long", "latitude": "lat", "lon": "long", "lng": "long", "lateral": "lat",
+    "vrel": "v", "vabs": "v",
     "ranges": "range", "azimuths": "azimuth", "elevations": "elevation", "angles": "angle", "velocities": "velocity",
     "speeds": "speed", "dopplers": "doppler", "distances": "distance", "intensities": "intensity", "amplitudes": "amplitude",
     "powers": "power", "xs": "x", "ys": "y", "zs": "z", "positions": "position", "snrs": "snr",

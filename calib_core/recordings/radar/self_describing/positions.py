@@ -1,5 +1,8 @@
 """A Cartesian position: its unit and its axes, with what states each."""
 
+import numpy as np
+
+from calib_core.recordings.radar.axes import RadarAxes
 from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
 from calib_core.recordings.radar.self_describing.candidates import Chosen, Picked
 from calib_core.recordings.radar.self_describing.comments import Direction, axes_in, axis_side, positive_side
@@ -84,7 +87,7 @@ def _directions(
     }
     whole = _whole(said)
     if whole:
-        return whole, [_COMMENT, _COMMENT, _COMMENT if "z" in said else "as usual"], None
+        return whole, [_COMMENT, _COMMENT, _COMMENT if "z" in said else "as usual"], _about_up(group, said, whole)
     if standard:
         return ("forward", "left", "up"), [_ROS] * 3, None
     forward, why = _forward(group, said, polar)
@@ -94,7 +97,7 @@ def _directions(
     reasons = {forward: why, lateral: why_side or "assumed"}
     directions = (sides["x"], sides["y"], "up")
     if why != "assumed" and why_side:
-        return directions, [reasons["x"], reasons["y"], "as usual"], None
+        return directions, [reasons["x"], reasons["y"], "as usual"], _about_up(group, said, directions)
     x, y = (one.column.name for one in group[:2])
     known = f" (forward: {why})" if why != "assumed" else ""
     text = (
@@ -111,6 +114,20 @@ def _whole(said: dict[str, Direction]) -> tuple[str, str, str] | None:
         return None
     found = (said["x"], said["y"], said.get("z", "up"))
     return found if len({_PLANES[side] for side in found}) == 3 else None
+
+
+def _about_up(
+    group: tuple[Picked, ...], said: dict[str, Direction], directions: tuple[str, str, str]
+) -> ColumnAssumption | None:
+    """Return the assumption that z points up, unless a comment says so or x and y make it so in a right-handed frame."""
+    if len(group) < 3 or "z" in said or np.linalg.det(RadarAxes(directions).matrix) > 0:
+        return None
+    name = group[2].column.name
+    text = (
+        f"{name} is taken as up; in a right-handed frame with x {directions[0]} and y {directions[1]} it would point down, "
+        "and the message does not state it"
+    )
+    return assume("axes", text, f"--radar-axes {','.join(directions)}", ("x", "y", "z"), axes=True)
 
 
 def _forward(group: tuple[Picked, ...], said: dict[str, Direction], polar: PolarAgreement | None) -> tuple[str, str]:

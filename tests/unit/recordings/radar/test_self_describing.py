@@ -1,6 +1,7 @@
 """Messages that no registry knows are read by what they say about themselves: right, or with a stated assumption."""
 
-import re
+import contextlib
+import random
 from typing import Any
 
 import numpy as np
@@ -8,8 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from calib_core.errors import MessageError
+from calib_core.measurements import TimeNs
 from calib_core.recordings import describe
-from tests.unit.recordings.radar.vendor_layouts import LAYOUTS, POLAR, RETURNS, SCANS, Truth, fields, listed
+from calib_core.recordings.messages.definitions import parse_definition
+from calib_core.recordings.plain_files.messages import header_bytes
+from calib_core.recordings.radar.layouts import recognise
+from tests.unit.recordings.radar.test_registry import damaged
+from tests.unit.recordings.radar.vendor_layouts import LAYOUTS, POLAR, RETURNS, SCANS, START_NS, Truth, fields, listed
 
 
 def truths(scans: int = SCANS) -> list[Truth]:
@@ -29,13 +36,7 @@ def test_a_vendors_layout_is_read_right_and_what_it_does_not_state_is_assumed(na
         text = describe(recording)
     assert sorted(assumed) == sorted(layout.assumed)
     np.testing.assert_array_equal(np.diff(scans.first_return), [RETURNS] * SCANS)
-    points = joined("points")
-    if (
-        "elevation" not in layout.definition.lower()
-        and "angle_v" not in layout.definition
-        and not has_height(layout.definition)
-    ):
-        points = flattened(points, joined("polar"))
+    points = np.concatenate([layout.positions(truth) for truth in truths()])
     np.testing.assert_allclose(scans.points_radar_m, points, atol=layout.tolerance_m)
     if layout.speed:
         np.testing.assert_allclose(scans.doppler_mps, joined("doppler"), atol=0.01)
@@ -48,25 +49,28 @@ def test_a_vendors_layout_is_read_right_and_what_it_does_not_state_is_assumed(na
         assert one.text in " ".join(text.split())
 
 
-def has_height(definition: str) -> bool:
-    return (
-        re.search(r"float32 (f_)?(pos)?_?z|f_PosZ|pz|height|dz", definition) is not None or "PointField" in definition
-    )
-
-
-def flattened(points: np.ndarray, polar: np.ndarray) -> np.ndarray:
-    """Return what a radar without elevation reports."""
-    flat = polar.copy()
-    flat[:, 2] = 0.0
-    return np.stack([flat[:, 0] * np.cos(flat[:, 1]), flat[:, 0] * np.sin(flat[:, 1]), 0 * flat[:, 0]], axis=1)
-
-
 @pytest.mark.parametrize("name", [name for name, layout in LAYOUTS.items() if layout.assumed])
 def test_confirmed_assumptions_are_no_longer_open_and_give_no_warning(name: str) -> None:
     with LAYOUTS[name].recording(confirm_assumptions=True) as recording:
         assert recording.assumptions == ()
         assert [one.confirmed for one in recording.stated_assumptions] == [True] * len(LAYOUTS[name].assumed)
         assert "assumed" not in [warning.code for warning in recording.warnings]
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_damaged_messages_of_vendors_give_values_or_one_clear_error(name: str) -> None:
+    layout = LAYOUTS[name]
+    definition = parse_definition(layout.kind, layout.definition, "ros1")
+    payloads = [header_bytes(TimeNs(START_NS), "radar") + layout.body(Truth.of(scan)) for scan in range(3)]
+    reader = recognise(definition, payloads[0], lambda count: payloads)
+    assert reader is not None
+    rng = random.Random(name)
+    for _ in range(40):
+        worse = damaged(payloads[0], rng)
+        with contextlib.suppress(MessageError):
+            recognise(definition, worse, lambda count, worse=worse: [worse, *payloads])  # type: ignore[misc]
+        with contextlib.suppress(MessageError):
+            reader.returns(worse)
 
 
 PREFIXES = ["", "f_", "m_", "s_", "det_", "target_", "f", "radar_", "obj_", "fl"]

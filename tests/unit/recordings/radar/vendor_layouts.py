@@ -4,7 +4,7 @@ import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -103,7 +103,7 @@ class Layout:
         kind: the message's type.
         tolerance_m: what the message's own resolution costs.
         speed: whether it has one.
-        amplitude: likewise.
+        height: what it says about heights: all, nothing beside a range, or nothing beside x and y.
     """
 
     definition: str
@@ -112,8 +112,13 @@ class Layout:
     kind: str = "vendor_msgs/Detections"
     tolerance_m: float = 1e-3
     speed: bool = True
-    amplitude: bool = True
+    height: Literal["measured", "in the range", "left out"] = "measured"
     notes: tuple[str, ...] = field(default=())
+
+    def positions(self, truth: Truth) -> np.ndarray:
+        """Return the positions that can be read."""
+        flat = truth.polar * [1, 1, 0] if self.height == "in the range" else truth.polar
+        return cartesian_from_polar(flat) * ([1, 1, 0] if self.height == "left out" else [1, 1, 1])
 
     def recording(self, scans: int = SCANS, **options: Any) -> Recording:
         """Open a recording of these messages."""
@@ -156,7 +161,7 @@ def fixed_list() -> Layout:
         rubbish = np.full((32 - RETURNS) * 4, 777.0, dtype="<f4").tobytes()
         return struct.pack("<B", RETURNS) + elements(rows, truth) + rubbish
 
-    return Layout(text + definition_of(rows), body)
+    return Layout(text + definition_of(rows), body, height="in the range")
 
 
 def arrays(nested: bool) -> Layout:
@@ -323,6 +328,7 @@ LAYOUTS: Mapping[str, Layout] = {
         int8 i8Rcs = a # dBsm
         """,
         tolerance_m=0.03,
+        height="in the range",
     ),
     "integers without comments": listed(
         """
@@ -332,6 +338,7 @@ LAYOUTS: Mapping[str, Layout] = {
         int8 i8Rcs = a
         """,
         "length-unit", "angle-unit", "azimuth-sign", "speed-unit", tolerance_m=0.03,
+        height="in the range",
     ),
     "x to the right, y forward": listed(
         """
@@ -363,6 +370,41 @@ LAYOUTS: Mapping[str, Layout] = {
         float32 rcs = a # dBsm
         """,
         speed=False,
+    ),
+    "y to the right and z unsaid": listed(
+        """
+        float32 x = x # [m] forward
+        float32 y = -y # [m] right
+        float32 z = z # [m]
+        float32 radial_velocity = v # [m/s]
+        float32 rcs = a # [dBsm]
+        """,
+        "axes",
+    ),
+    "two unnamed angles": listed(
+        """
+        float32 r = r # m
+        float32 phi = az
+        float32 theta = el
+        float32 v = v # m/s
+        float32 rcs = a
+        """,
+        "azimuth-sign",
+        "field-meaning",
+    ),
+    "longitude and latitude of a distance": listed(
+        """
+        uint8 id = id
+        float64 longitude_dist = x
+        float64 lateral_dist = y
+        float64 longitude_vel = vx
+        float64 lateral_vel = vy
+        float64 rcs = a
+        """,
+        "axes",
+        "speed-unit",
+        speed=False,
+        height="left out",
     ),
     "lateral without a sign": listed(
         """
