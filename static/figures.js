@@ -127,7 +127,7 @@ function assumptionBox(rows) {
   };
   const title = rows.length === 1 ? "One assumption about the recording is unconfirmed" : `${rows.length} assumptions about the recording are unconfirmed`;
   const items = rows.map((row) => make("li", "", [row.words, make("div", "hint", row.hint)]));
-  const box = make("details", "warning", [make("summary", "", [icon("warning"), make("span", "", title)]), make("ul", "", items), confirm]);
+  const box = make("details", "warning", [make("summary", "", [icon("warning"), make("span", "", title)]), confirm, make("ul", "", items)]);
   box.dataset.code = "assumed";
   box.open = openCodes.has("assumed");
   box.ontoggle = () => (box.open ? openCodes.add("assumed") : openCodes.delete("assumed"));

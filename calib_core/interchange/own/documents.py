@@ -6,7 +6,7 @@ Inputs and settings refuse unknown keys; results may contain more.
 from typing import Annotated, Final, Literal
 
 import msgspec
-from msgspec import Meta, Struct, field
+from msgspec import UNSET, Meta, Struct, UnsetType, field
 
 from calib_core.camera import CameraModel
 from calib_core.options import CalibrationOptions
@@ -276,8 +276,8 @@ class ProvenanceDocument(Struct, frozen=True):
     radar_axes: str | None = None
     video_start: str | None = None
     version: str | None = None
-    column_map: list[str] = []
-    assumptions: list[AssumptionDocument] = []
+    column_map: list[str] | UnsetType = UNSET
+    assumptions: list[AssumptionDocument] | UnsetType = UNSET
 
 
 class NoiseScaleDocument(Struct, frozen=True):

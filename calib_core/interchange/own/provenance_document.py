@@ -1,5 +1,7 @@
 """Convert the provenance of a calibration to and from its document in calibration-1."""
 
+from msgspec import UNSET
+
 from calib_core.interchange.calibration_file import AssumptionNote, Provenance
 from calib_core.interchange.own import documents
 from calib_core.results import InputFile
@@ -16,8 +18,8 @@ def provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
         radar_axes=provenance.radar_axes,
         video_start=provenance.video_start,
         version=provenance.version,
-        column_map=list(provenance.column_map),
-        assumptions=[documents.AssumptionDocument(one.text, one.confirmed) for one in provenance.assumptions],
+        column_map=list(provenance.column_map) or UNSET,
+        assumptions=[documents.AssumptionDocument(one.text, one.confirmed) for one in provenance.assumptions] or UNSET,
     )
 
 
@@ -33,6 +35,6 @@ def provenance_of(document: documents.ProvenanceDocument) -> Provenance:
         radar_axes=document.radar_axes,
         video_start=document.video_start,
         version=document.version,
-        column_map=tuple(document.column_map),
-        assumptions=tuple(AssumptionNote(one.text, one.confirmed) for one in document.assumptions),
+        column_map=tuple(document.column_map or ()),
+        assumptions=tuple(AssumptionNote(one.text, one.confirmed) for one in document.assumptions or ()),
     )
