@@ -24,8 +24,11 @@ def remembered_map(folder: Path) -> tuple[str, ...]:
     Args:
         folder: of the session. Opening the session afterwards reports whatever is wrong with it.
     """
+    path = folder / _JOURNAL
+    if path.is_symlink() or not path.is_file():  # opening the session says what is wrong with it
+        return ()
     try:
-        lines = (folder / _JOURNAL).read_bytes().split(b"\n")
+        lines = path.read_bytes().split(b"\n")
     except OSError:
         return ()
     found: tuple[str, ...] = ()

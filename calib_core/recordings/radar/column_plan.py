@@ -99,7 +99,7 @@ class ColumnPlan:
         directions: where the message's own x, y and z point, if the user does not give axes.
         described: the columns were recognised by what the message says about itself, not by the registry.
         mapped: the quantities whose columns the user gave.
-        second_azimuth: a column with a second hypothesis of the azimuth, which is not read.
+        other_azimuths: columns that may hold further azimuths of the same returns, which are not read.
         readings: what was taken for what, and why.
         assumptions: what the message does not state.
         notes: what else the user should know about the message, as sentences without their final periods.
@@ -130,7 +130,7 @@ class ColumnPlan:
     directions: tuple[str, str, str] = ("forward", "left", "up")
     described: bool = False
     mapped: tuple[str, ...] = ()
-    second_azimuth: str | None = None
+    other_azimuths: tuple[str, ...] = ()
     readings: tuple[ColumnReading, ...] = ()
     assumptions: tuple[ColumnAssumption, ...] = ()
     notes: tuple[str, ...] = ()

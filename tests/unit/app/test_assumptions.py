@@ -1,6 +1,7 @@
 """Assumptions about a recording: shown until they are confirmed, remembered in the session, written into the file."""
 
 import json
+import os
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -108,6 +109,16 @@ def test_a_session_of_a_damaged_journal_remembers_nothing_and_raises_nothing(tmp
         b'\xff\xfe\n{"step": 3}\n[]\n{"step": {"type": "columns_mapped", "column_map": 3}}\n'
     )
     assert remembered_map(tmp_path) == ()
+
+
+def test_a_journal_that_is_a_pipe_or_a_link_is_not_opened_for_its_map(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "journal.jsonl")
+    assert remembered_map(tmp_path) == ()
+    (tmp_path / "other").mkdir()
+    step = {"n": 1, "step": {"type": "columns_mapped", "column_map": list(STATED)}}
+    (tmp_path / "elsewhere").write_text(json.dumps(step) + "\n")
+    (tmp_path / "other" / "journal.jsonl").symlink_to(tmp_path / "elsewhere")
+    assert remembered_map(tmp_path / "other") == ()
 
 
 def test_facts_without_assumptions_have_none_unconfirmed(recording: Recording) -> None:

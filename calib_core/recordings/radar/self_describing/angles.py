@@ -55,7 +55,7 @@ def polar_part(chosen: Chosen, remarks: str) -> ColumnPlan:
         claimed_scales=(unit.scale, scales[0], scales[-1]),
         sigma=(_name(sigma[0]), _name(sigma[1]), _name(sigma[2])),
         sigma_scales=(own[0], own[1] / base.scale, own[2] / base.scale),
-        second_azimuth=chosen.second_azimuth.column.name if chosen.second_azimuth else None,
+        other_azimuths=chosen.other_azimuths,
         readings=tuple(readings),
         assumptions=tuple(one for one in (about, about_angle, about_sign, _about_vague(chosen)) if one),
     )

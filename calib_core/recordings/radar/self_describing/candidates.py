@@ -84,13 +84,13 @@ class Chosen:
         picked: by quantity.
         sigma: standard deviations by quantity.
         vague: angles whose names fit azimuth and elevation alike, if they had to be told apart.
-        second_azimuth: a second hypothesis.
+        other_azimuths: columns with further hypotheses.
     """
 
     picked: dict[str, Picked]
     sigma: dict[str, Picked]
     vague: tuple[Picked, ...] = ()
-    second_azimuth: Picked | None = None
+    other_azimuths: tuple[str, ...] = ()
 
 
 def choose(columns: Sequence[DescribedColumn]) -> Chosen:
@@ -110,9 +110,12 @@ def choose(columns: Sequence[DescribedColumn]) -> Chosen:
             picked.setdefault(one.meaning.quantity, one)
     first = [one for one in found if not one.meaning.sigma and not one.meaning.second]
     picked |= _together(first, ("x", "y", "z")) | _together(first, ("vx", "vy", "vz"))
-    second = [one for one in found if one.meaning.second and one.meaning.quantity == "azimuth"]
+    second = (
+        one for one in found if one.meaning.second and one.meaning.quantity == "azimuth" and not one.meaning.sigma
+    )
+    others = tuple(one.column.name for one in second) if "azimuth" in picked else ()
     vague = _told_apart([one for one in first if one.meaning.vague], picked)
-    return Chosen(picked, sigma, vague, second[0] if second and "azimuth" in picked else None)
+    return Chosen(picked, sigma, vague, others)
 
 
 def _stripped(columns: Sequence[DescribedColumn]) -> list[tuple[DescribedColumn, str]]:

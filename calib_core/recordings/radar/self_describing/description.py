@@ -66,8 +66,7 @@ def fill_in(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> ColumnPlan:
     level = chosen.picked.get("amplitude")
     if plan.amplitude is None and level is not None:
         plan = replace(plan, amplitude=level.column.name, amplitude_scale=level.unit.scale if level.unit else 1.0)
-    second = chosen.second_azimuth
-    return replace(plan, second_azimuth=second.column.name if second else None)
+    return replace(plan, other_azimuths=chosen.other_azimuths)
 
 
 def _amplitude(plan: ColumnPlan, chosen: Chosen) -> ColumnPlan:
@@ -90,8 +89,7 @@ def _flags(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> ColumnPlan:
     flags = [column for column in columns if column.name.lower().rpartition(".")[2] in ("valid", "is_valid", "b_valid")]
     needed = [flag for flag in flags if len(flag.values) and set(flag.values.tolist()) in ({0.0, 1.0}, {1.0})]
     readings = [ColumnReading("valid", flag.name, "", "", "returns where it is 0 are skipped") for flag in needed]
-    if plan.second_azimuth:
-        readings.append(ColumnReading("second azimuth", plan.second_azimuth, "", "", "not used"))
+    readings += [ColumnReading("other azimuth", name, "", "", "not used") for name in plan.other_azimuths]
     return replace(
         plan,
         needed=tuple(flag.name for flag in needed),

@@ -39,7 +39,7 @@ def cartesian_part(chosen: Chosen, remarks: str, *, in_ros_frame: bool) -> Colum
         directions=directions,
         claimed=(distance.column.name if distance else None, angle.column.name if angle else None, None),
         claimed_scales=(_claimed_range(chosen, units[0]), polar.angle.scale if polar else 1.0, 1.0),
-        second_azimuth=chosen.second_azimuth.column.name if chosen.second_azimuth else None,
+        other_azimuths=chosen.other_azimuths,
         readings=tuple(readings),
         assumptions=tuple(one for one in (about, about_axes) if one),
     )

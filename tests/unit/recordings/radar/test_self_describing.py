@@ -73,6 +73,14 @@ def test_damaged_messages_of_vendors_give_values_or_one_clear_error(name: str) -
             reader.returns(worse)
 
 
+def test_a_second_azimuth_is_named_and_not_read() -> None:
+    with listed(POLAR + "\nfloat32 azimuth_2 = half # rad").recording(scans=2) as recording:
+        (other,) = [one.column for one in recording.radar_columns if one.quantity == "other azimuth"]
+        points = recording.radar_scans().points_radar_m
+    assert other == "azimuth_2"
+    np.testing.assert_allclose(points, np.concatenate([truth.points for truth in truths(2)]), atol=1e-3)
+
+
 PREFIXES = ["", "f_", "m_", "s_", "det_", "target_", "f", "radar_", "obj_", "fl"]
 
 
