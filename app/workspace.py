@@ -6,7 +6,19 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
-from app.session import ClicksImported, History, RecordingFacts, Redo, Session, Solved, Step, Undo, advance, settled
+from app.session import (
+    AssumedReading,
+    ClicksImported,
+    History,
+    RecordingFacts,
+    Redo,
+    Session,
+    Solved,
+    Step,
+    Undo,
+    advance,
+    settled,
+)
 from app.session.file import Closed, Restored, open_session_file
 from app.solver_worker import SolverWorker
 from app.view import Reference, View, view
@@ -15,7 +27,7 @@ from calib_core.errors import InputError
 from calib_core.interchange import read_clicks, write_clicks
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
-from calib_core.recordings import Recording
+from calib_core.recordings import Recording, assumption_hint
 from calib_core.results import DataWarning
 
 __all__ = ["Journal", "Solver", "Subscriber", "Workspace", "open_workspace", "recording_facts"]
@@ -223,6 +235,7 @@ def recording_facts(recording: Recording, name: str) -> RecordingFacts:
         recording.radar_axes,
         recording.radar_times,
         recording.radar_topics,
+        tuple(AssumedReading(one.words, assumption_hint(one.confirm)) for one in recording.assumptions),
     )
 
 
