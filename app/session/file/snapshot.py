@@ -16,7 +16,7 @@ from app.session.file.checksums import line_bytes, sealed, taken_apart
 from app.session.file.errors import SessionFileError
 from app.session.file.guarded_folder import GuardedFolder
 from app.session.file.identity import RecordingForm
-from app.session.file.journal import SCHEMA, SCHEMA_1
+from app.session.file.journal_reading import SCHEMA, SCHEMA_1
 from app.session.file.step_json import ClickForm, click_from_form, form_of_click
 from calib_core.errors import CalibrationError
 from calib_core.measurements import ReflectorClick
