@@ -189,7 +189,7 @@ def _serve(
         service.serve(workspace, recording)
         closed = workspace.close()
     with contextlib.suppress(OSError):  # the terminal may be gone
-        print(f"\nStopped; {closed.note}.")
+        print(f"\nStopped; {closed.note}." if workspace.facts.has_pictures else "\nStopped.")
     return 0
 
 

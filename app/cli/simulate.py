@@ -18,6 +18,7 @@ __all__ = ["Simulate"]
 class DefectFlags(RadarDefects):
     """RadarDefects with a name for a value in the help; the texts are defined there."""
 
+    cloud_topic: Annotated[str, tyro.conf.arg(metavar="TOPIC")] = same(RadarDefects, "cloud_topic")
     range_bin_m: Annotated[float | None, called("FLOAT")] = same(RadarDefects, "range_bin_m")
     azimuth_bins: Annotated[int | None, called("INT")] = same(RadarDefects, "azimuth_bins")
     scatter_range_m: Annotated[float | None, called("FLOAT")] = same(RadarDefects, "scatter_range_m")

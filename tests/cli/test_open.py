@@ -40,7 +40,7 @@ def test_a_radar_alone_is_opened_without_intrinsics_and_stores_nothing(
     assert run(["open", str(radar), "--no-browser"]) == 0
     assert (
         capsys.readouterr().out == "radar.bag: no pictures: showing the radar only. "
-        "To calibrate, give the camera's recording as well.\n"
+        "To calibrate, give the camera's recording as well.\n\nStopped.\n"
     )
     assert not served[0].facts.has_pictures
     assert [path.name for path in radar.parent.iterdir() if path.name != "state"] == ["radar.bag"]

@@ -11,6 +11,7 @@ from app.session.file import SessionFileError, open_session_file
 from app.view import view
 from app.web.messages.incoming import CursorMoved, FrameWanted, Hello, ImportWanted, ViewpointWanted, parse
 from app.web.port import guard
+from app.web.port.admissions import Admissions
 from calib_core.errors import CalibrationError
 from calib_core.interchange import (
     FORMATS,
@@ -208,7 +209,7 @@ def _request(data: bytes, _folder: Path) -> None:
     for line in lines:
         name, _, value = line.partition(": ")
         headers.setdefault(name.lower(), []).append(value)
-    doorkeeper = guard.Guard(host="127.0.0.1", key=b"k" * 32, token="t" * 32)
+    doorkeeper = guard.Guard(Admissions("a"), host="127.0.0.1", token="t" * 32)
     verdict = doorkeeper.check(guard.Request(path, headers))
     assert not isinstance(verdict, guard.Allowed), "a request without the cookie was allowed"
 

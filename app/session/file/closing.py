@@ -39,7 +39,7 @@ class Closed:
     def note(self) -> str:
         """What to tell the user, without a full stop at the end."""
         if not self.fault:
-            return "all clicks are saved"
+            return f"all clicks are saved in {self.folder}"
         if not self.clicks:
             return f"there were no clicks to save, but {self.fault}"
         if self.kept_in is None:

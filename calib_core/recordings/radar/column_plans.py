@@ -130,6 +130,6 @@ def column_readings(plan: ColumnPlan) -> tuple[ColumnReading, ...]:
     rows += [ColumnReading("amplitude", plan.amplitude, "dB", "", why)] if plan.amplitude else []
     noise = plan.covariance or ", ".join(name for name in plan.sigma if name)
     rows += [ColumnReading("noise", noise, "", "", why)] if noise else []
-    rows += [ColumnReading("other azimuth", name, "", "", "not used") for name in plan.other_azimuths]
+    rows += [ColumnReading("other azimuth", name, "", "", "alternative") for name in plan.other_azimuths]
     mapped = {row.quantity for row in plan.readings}
     return (*(row for row in rows if row.quantity not in mapped), *plan.readings)

@@ -33,6 +33,7 @@ _TIGHT = 0.1  # spreads: the azimuths of one detection share its range
 _AGREE, _CONTRADICT = 0.25, 0.1  # share of the returns in the common region, beyond chance
 _FARTHER = 1.5  # times: near and far scans differ in how far they reach
 _STATIC_MPS = 0.1
+_LEAST_SPREAD = 0.02  # of the sines of azimuths in a scene
 _AHEAD_RAD = np.deg2rad(60.0)
 _RANGE_WORDS = ("near", "far", "short", "long", "mid", "medium", "close", "srr", "mrr", "lrr")
 _PLACE_WORDS = ("left", "right", "front", "rear", "back", "side", "corner")
@@ -236,9 +237,16 @@ def other_azimuths(stream: RadarStream) -> tuple[RadarStream, ...]:
     found = []
     for column in stream.layout.plan.other_azimuths:
         other = stream.at_azimuth(column)
-        if relation(Examined.of(stream), Examined.of(other)) == "alternatives":
+        if _varies(other) and relation(Examined.of(stream), Examined.of(other)) == "alternatives":
             found.append(other)
     return tuple(found)
+
+
+def _varies(stream: RadarStream) -> bool:
+    """Return whether the azimuths of a sample differ as those of a scene do: a constant column holds something else."""
+    points = stream.sample(_SAMPLED_SCANS).points_radar_m
+    points = points[np.isfinite(points).all(axis=1)]
+    return len(points) > 1 and float(np.std(direction_cosines(points)[:, 1])) > _LEAST_SPREAD
 
 
 def _common_moments(one: RadarStream, other: RadarStream) -> tuple[RadarScans, RadarScans] | None:

@@ -89,7 +89,7 @@ def _flags(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> ColumnPlan:
     flags = [column for column in columns if column.name.lower().rpartition(".")[2] in ("valid", "is_valid", "b_valid")]
     needed = [flag for flag in flags if len(flag.values) and set(flag.values.tolist()) in ({0.0, 1.0}, {1.0})]
     readings = [ColumnReading("valid", flag.name, "", "", "returns where it is 0 are skipped") for flag in needed]
-    readings += [ColumnReading("other azimuth", name, "", "", "not used") for name in plan.other_azimuths]
+    readings += [ColumnReading("other azimuth", name, "", "", "alternative") for name in plan.other_azimuths]
     return replace(
         plan,
         needed=tuple(flag.name for flag in needed),

@@ -207,7 +207,7 @@ def test_a_recording_that_opens_at_once_is_served_without_an_opening_message(
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows does not delete open files")
 def test_the_end_says_where_the_clicks_are_if_the_session_folder_was_deleted(
-    workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def click_delete_and_stop(*_: Any) -> None:
         workspace.dispatch(ClickPlaced(TimeNs(int(RECORDING.image_times[1])), 1.0, 1.0))
@@ -217,10 +217,10 @@ def test_the_end_says_where_the_clicks_are_if_the_session_folder_was_deleted(
     monkeypatch.setattr(RunningServer, "admit", click_delete_and_stop)
     with service(let_in_after_s=LONG_S) as opening:
         opening.serve(workspace, RECORDING)
-    printed = capsys.readouterr().out
+    note = workspace.close().note
     rescued = tmp_path / "state" / "cocalib" / "sessions" / "three_greys-rescued-1.cocalib-session"
-    assert "all clicks are saved" not in printed
-    assert f"All clicks (1) are saved in {rescued}" in printed
+    assert "all clicks are saved" not in note
+    assert f"All clicks (1) are saved in {rescued}" in note
     assert (rescued / "session.json").is_file()
 
 
@@ -358,7 +358,7 @@ close = SessionFile.close
 def close_slowly(session):
     sys.stdout.write("closing\\n")
     sys.stdin.readline()
-    close(session)
+    return close(session)
 SessionFile.close = close_slowly
 """
 
