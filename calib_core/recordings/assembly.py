@@ -51,9 +51,23 @@ class Assembly:
     warnings: tuple[DataWarning, ...]
     assumptions: tuple[Assumption, ...]
 
+    @property
+    def used(self) -> frozenset[str]:
+        """The topics whose messages are read."""
+        return frozenset(name for name in (self.radar_topic, self.image_topic) if name is not None)
+
+    @property
+    def clocks(self) -> Mapping[str, Literal["header", "receive"]]:
+        """The clock of each of these topics."""
+        return {topic.name: topic.clock for topic in self.topics if topic.name in self.used}
+
 
 def assemble(
-    paths: Sequence[Path], sources: tuple[Source, ...], options: RecordingOptions, require: Sequence[Need]
+    paths: Sequence[Path],
+    sources: tuple[Source, ...],
+    options: RecordingOptions,
+    require: Sequence[Need],
+    before: Assembly | None = None,
 ) -> Assembly:
     """Choose topics and clocks and build the streams.
 
@@ -62,12 +76,13 @@ def assemble(
         sources: the open files.
         options: topics and clock asked for.
         require: what the recording must have; if both, they must also overlap in time.
+        before: of the same recording when its files were shorter: its choices stay, and only the streams are built again.
 
     Raises:
         RecordingError: the recording lacks what the options ask for.
     """
     name = " + ".join(str(path) for path in paths)
-    topics, repeated = join_topics(sources)
+    topics, repeated = join_topics(sources, before.used if before else None)
     warnings = [warning for source in sources for warning in source.warnings] + list(repeated)
     if not any(len(topic) for topic in topics) and require:
         raise RecordingError(
@@ -77,11 +92,13 @@ def assemble(
     inventory = Inventory(name, topics, {topic.name: usage_of(topic).read_as(axes) for topic in topics})
     selection = select(inventory, options, require)
     selection, stamped, lost = _stamped(selection, inventory)
-    clocks, stamps, about_choice = _clocks(stamped, options)
+    clocks, stamps, about_choice = _clocks(stamped, options, before)
     warnings.extend([*lost, *about_choice])
     heads = {name: both.heads for name, both in stamped.items()}
     radar = _radar_stream(selection.radar, inventory, stamps, heads)
     images = _image_stream(selection.image, inventory, stamps)
+    if before is not None:
+        return replace(before, radar=radar, images=images)
     warnings.extend(check_overlap(name, radar, images, required=len(require) == 2))
     diagnoses = _diagnoses(stamped, (radar, images), clocks, options)
     warnings.extend(about_clocks(list(diagnoses.values())))
@@ -132,7 +149,7 @@ def _head_bytes(usage: Usage) -> int:
 
 
 def _clocks(
-    stamped: Mapping[str, StampedTopic], options: RecordingOptions
+    stamped: Mapping[str, StampedTopic], options: RecordingOptions, before: Assembly | None
 ) -> tuple[Mapping[str, Literal["header", "receive"]], Mapping[str, TimesNs], tuple[DataWarning, ...]]:
     """Choose the clock of each topic in use, the radar first; return clocks and times by topic, and warnings."""
     read = [Stamps(name, both.topic.receive_ns, both.header_ns) for name, both in stamped.items()]
@@ -140,7 +157,9 @@ def _clocks(
         for both in read:
             if both.header_ns is None:
                 raise RecordingError(f"topic {both.topic} has no stamps; use the receive times: --clock receive")
-    if len(read) == 2:
+    if before is not None:
+        choice = ClockChoice(tuple(before.clocks[name] for name in stamped), ())
+    elif len(read) == 2:
         choice = choose_clocks(read[0], read[1], options.clock)
     else:
         choice = choose_clock(read[0], options.clock) if read else ClockChoice((), ())

@@ -25,12 +25,13 @@ from calib_core.recordings.containers.mcap.records import (
 )
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
 
-__all__ = ["FoundInMcap", "scan_mcap"]
+__all__ = ["FoundInMcap", "scan_further", "scan_mcap"]
 
 _CANDIDATE = re.compile(rb"[\x03-\x06][\x00-\xff]{4}\x00\x00\x00\x00")
 _COMPRESSIONS = ("", "lz4", "zstd")
 _MAX_TRIES = 20_000
 _LAST_KIND, _PRIVATE = 15, 0x80
+_MOST_RECORD_BYTES = 1 << 36
 
 
 @dataclass(slots=True)
@@ -86,6 +87,38 @@ def scan_mcap(file: FileBytes) -> FoundInMcap:
     if not found.ended:
         found.lost_bytes += stretch.size - min(place, stretch.size)
     return found
+
+
+def scan_further(file: FileBytes, place: int, found: FoundInMcap) -> int:
+    """Scan the complete records of a file that is being written; return the position of the first incomplete one.
+
+    Args:
+        file: the file.
+        place: position of the first record to read.
+        found: receives what is found.
+
+    Raises:
+        RecordingError: there is no record at a position.
+    """
+    found.chunks[0] = Chunk(0, file.size_bytes, file.size_bytes, "")
+    stretch = FileStretch(file, 0, file.size_bytes)
+    while place + RECORD.size <= stretch.size and not found.ended:
+        kind, size = RECORD.unpack(stretch.up_to(place, RECORD.size))
+        start = place + RECORD.size
+        if kind == size == 0:
+            break  # space that the system has allocated but the writer has not filled yet
+        if not _possible(kind) or size > _MOST_RECORD_BYTES:
+            raise RecordingError(f"{file.path}: no record at byte {place}, where the next one should begin")
+        if size > stretch.size - start:
+            break
+        head = chunk_head(stretch.up_to(start, 64)) if kind == CHUNK else None
+        if head is not None and _sound(head):
+            _scan_chunk(file, start + head.size, min(head.stored_bytes, size - head.size), head, found)
+        elif kind != CHUNK and not (kind == MESSAGE and size > MAX_RECORD_BYTES):
+            found.ended = kind in (DATA_END, FOOTER)
+            _note(stretch, kind, start, size, found)
+        place = start + size
+    return place
 
 
 def _possible(kind: int) -> bool:
