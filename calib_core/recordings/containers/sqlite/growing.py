@@ -35,7 +35,7 @@ class GrowingDatabase(SqliteSource):
         if self._file.up_to(0, 20)[_VERSIONS] != _LOGGED:
             raise RecordingError(
                 f"{self.path}: is written without a write-ahead log, so reading it now could make the recorder lose messages; "
-                "open it without --follow once it is complete, or record with the storage preset "resilient", or as MCAP"
+                "open it without --follow once it is complete, or record with the storage preset resilient, or as MCAP"
             )
         self._kept = None
         self._indexes = {}
