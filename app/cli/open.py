@@ -2,6 +2,7 @@
 
 import dataclasses
 import hashlib
+import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -18,7 +19,7 @@ from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Rec
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.options import CalibrationOptions
-from calib_core.recordings import Recording, RecordingOptions
+from calib_core.recordings import AwaitedRecording, Recording, RecordingOptions
 
 if TYPE_CHECKING:
     from app.web.port.serving import Service
@@ -28,6 +29,7 @@ __all__ = ["Demo", "Open"]
 _RECORDING_SUFFIXES = (".bag", ".mcap", ".db3")
 _LARGE_BYTES = 1_000_000_000
 """If the files are this large in total, the page is served before they are opened."""
+_LOOK_EVERY_S = 0.2
 _SOON_S = 0.2
 """Smaller files are usually open within this time, and the page then shows no waiting screen [s]."""
 
@@ -96,6 +98,8 @@ class Open:
     """Session folder; by default, next to the recording if that is writable, else in your user folder."""
     fresh: Switch = False
     """Start without the previous clicks (a backup is kept)."""
+    follow: Switch = False
+    """Open a recording that is still being written (.bag, .mcap, .db3, folders): frames and placements appear as they come."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
@@ -106,7 +110,7 @@ class Open:
         from app.session.file import recording_session_folder
         from calib_core.recordings import require_files
 
-        paths = require_files(self.recording)
+        paths = self.recording if self.follow and self.recording else require_files(self.recording)
         return _serve(
             paths,
             session=self.session or recording_session_folder(paths),
@@ -118,6 +122,7 @@ class Open:
             calibration_file=self.calibration,
             topics=self.topics,
             options=self.measured.over(self.options),
+            follow=self.follow,
         )
 
 
@@ -133,6 +138,7 @@ def _serve(
     calibration_file: Path | None = None,
     topics: RecordingOptions | None = None,
     options: CalibrationOptions | None = None,
+    follow: bool = False,
 ) -> int:
     """Open everything, serve until Ctrl+C or SIGTERM, close everything.
 
@@ -152,8 +158,10 @@ def _serve(
     require_token(serving.token)
     _require_given(camera_file, calibration_file, clicks_file)
     topics = topics or RecordingOptions()
-    with _service(paths, topics, serving, name) as service, ExitStack() as stack:
-        recording = stack.enter_context(open_recording(paths, topics))
+    awaited = AwaitedRecording(paths, topics) if follow else None
+    with _service(paths, topics, serving, name, follow=follow) as service, ExitStack() as stack:
+        opened = _awaited(awaited, service, name) if awaited is not None else open_recording(paths, topics)
+        recording = stack.enter_context(opened)
         camera = _camera(recording, camera_file, calibration_file)
         reference = reference_from(calibration_file, camera) if calibration_file else None
         if fresh and (kept := set_aside(session)) is not None:
@@ -172,7 +180,28 @@ def _serve(
     return 0
 
 
-def _service(paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str) -> "Service":
+def _awaited(awaited: AwaitedRecording, service: "Service", name: str) -> Recording:
+    """Wait until there is enough of a recording that is being written, telling the terminal and the pages what is missing.
+
+    Raises:
+        RecordingError: the recording cannot be followed.
+    """
+    told = ""
+    try:
+        while (recording := awaited.look()) is None:
+            if awaited.missing != told:
+                told = awaited.missing
+                service.tell(f"Waiting for {name}: {told}…")
+            time.sleep(_LOOK_EVERY_S)
+    except BaseException:
+        awaited.close()
+        raise
+    return recording
+
+
+def _service(
+    paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str, *, follow: bool
+) -> "Service":
     """Return the service; it serves the page of a large recording before the recording is open."""
     from app.web.messages import Opening
     from app.web.port.server import ServerOptions
@@ -183,9 +212,9 @@ def _service(paths: Sequence[Path], topics: RecordingOptions, serving: ServingFl
     size = f" ({size_bytes / 1e9:.1f} GB)" if size_bytes >= _LARGE_BYTES / 10 else ""
     return Service(
         ServerOptions(**dataclasses.asdict(serving)),
-        Opening(name, f"Opening {name}{size}: reading its index and times…"),
-        partial(first_picture, paths, topics),
-        let_in_after_s=0.0 if size_bytes >= _LARGE_BYTES else _SOON_S,
+        Opening(name, f"Waiting for {name}…" if follow else f"Opening {name}{size}: reading its index and times…"),
+        partial(first_picture, () if follow else paths, topics),
+        let_in_after_s=0.0 if follow or size_bytes >= _LARGE_BYTES else _SOON_S,
     )
 
 

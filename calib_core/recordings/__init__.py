@@ -3,6 +3,7 @@
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.description import clock_lines, describe
 from calib_core.recordings.first_picture import first_picture
+from calib_core.recordings.following import AwaitedRecording, FollowedRecording, Growth
 from calib_core.recordings.recording import Recording, inspect_recording, open_recording, require_files
 from calib_core.recordings.selection import RecordingOptions
 from calib_core.recordings.summary import RecordingSummary, recording_summary
@@ -11,8 +12,11 @@ from calib_core.recordings.topics import TopicSummary
 from calib_core.recordings.video_writing import WrittenVideo, write_video
 
 __all__ = [
+    "AwaitedRecording",
     "ClockDiagnosis",
     "EncodedImage",
+    "FollowedRecording",
+    "Growth",
     "Recording",
     "RecordingOptions",
     "RecordingSummary",

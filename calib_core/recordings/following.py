@@ -12,6 +12,7 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import RecordingError
+from calib_core.measurements import NS_PER_S
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.containers.following import FollowedFiles
@@ -21,8 +22,8 @@ from calib_core.results import DataWarning
 
 __all__ = ["AwaitedRecording", "FollowedRecording", "Growth"]
 
-_ENOUGH_MESSAGES = 20
-"""With so many messages of each sensor, the clocks can be chosen."""
+_ENOUGH_MESSAGES, _ENOUGH_S = 20, 3.0
+"""With so many messages of each sensor, or messages over so many seconds, the clocks can be chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,8 +102,8 @@ def _missing(assembly: Assembly) -> str:
         if stream is None:
             there = ", ".join(f"{topic.name} ({topic.type})" for topic in assembly.topics) or "none"
             return f"no {what} messages yet; topics so far: {there}"
-        if len(stream.topic) < _ENOUGH_MESSAGES:
-            return f"{len(stream.topic)} messages of the {what} so far, {_ENOUGH_MESSAGES} are needed"
+        if len(stream.topic) < _ENOUGH_MESSAGES and np.ptp(stream.times_ns) < _ENOUGH_S * NS_PER_S:
+            return f"less than {_ENOUGH_S:.0f} s of the {what} so far"
     assert assembly.radar is not None
     assert assembly.images is not None
     radar, images = assembly.radar.times_ns, assembly.images.times_ns

@@ -1,6 +1,7 @@
 """Which recording a session belongs to: the one with exactly these frames, whatever its file is called now."""
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -58,6 +59,8 @@ def require_same_recording(kept: RecordingForm, facts: RecordingFacts, folder: P
         SessionFileError: frames, stamps or image size differ.
     """
     opened = recording_form(facts)
+    if 0 < kept.frames < opened.frames:  # the recording may have grown since
+        opened = recording_form(replace(facts, image_times=facts.image_times[: kept.frames]))
     if msgspec.structs.replace(kept, name=opened.name, radar_axes=opened.radar_axes) == opened:
         return
     raise SessionFileError(

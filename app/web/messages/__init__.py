@@ -19,7 +19,9 @@ from app.web.messages.incoming import (
 )
 from app.web.messages.outgoing import (
     Done,
+    FollowNote,
     FrameHeader,
+    FramesAdded,
     Opening,
     Outgoing,
     Overlay,
@@ -41,8 +43,10 @@ __all__ = [
     "Command",
     "CursorMoved",
     "Done",
+    "FollowNote",
     "FrameHeader",
     "FrameWanted",
+    "FramesAdded",
     "Hello",
     "ImportWanted",
     "Incoming",

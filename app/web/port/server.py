@@ -18,6 +18,7 @@ from websockets.http11 import Request, Response
 from app.resources import state_folder, static_folder
 from app.web.channel.channel import Channel, Socket
 from app.web.channel.hub import Hub
+from app.web.messages import Opening
 from app.web.port import guard
 from app.web.port.routes import Reply, Routes, refusal
 from app.web.port.viser_hook import path_of_client, start_viser, stop_viser
@@ -96,6 +97,10 @@ class RunningServer:
             RuntimeError: the server has stopped.
         """
         self._viser.get_event_loop().call_soon_threadsafe(self._room.show, picture)
+
+    def tell(self, opening: Opening) -> None:
+        """Tell the pages that are waiting what is being done."""
+        self._viser.get_event_loop().call_soon_threadsafe(self._room.tell, opening)
 
     def refuse(self, problem: str) -> None:
         """Tell the waiting pages why the recording cannot be opened; do nothing if it was admitted or the server is closed."""
