@@ -72,15 +72,16 @@ class SampleWriter:
     def write_until(self, seconds: float) -> None:
         """Write the messages up to a time of the sample as one chunk."""
         end_ns = self.start_ns + round(seconds * _NS)
-        body = b"" if self._written else self._declarations()
+        records = [] if self._written else [self._declarations()]
         times = []
         while self._written < len(self._messages) and self._messages[self._written].receive_ns <= end_ns:
             message = self._messages[self._written]
             times.append(message.receive_ns + self._shift_ns)
             head = struct.pack("<HIQQ", message.channel, self._written, times[-1], times[-1])
-            body += _record(5, head + self._shifted(message.data))
+            records.append(_record(5, head + self._shifted(message.data)))
             self._written += 1
         if times:
+            body = b"".join(records)
             packed = lz4.frame.compress(body) if self._compression else body
             head = struct.pack("<QQQI", times[0], times[-1], len(body), zlib.crc32(body)) + _text(self._compression)
             self._file.write(_record(6, head + struct.pack("<Q", len(packed)) + packed))

@@ -1,6 +1,6 @@
 """The page beside a writer: frames and placements appear, a frame can be clicked, and the session goes on afterwards."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
