@@ -10,6 +10,7 @@ const button = /** @type {HTMLButtonElement} */ (document.getElementById("live")
 const PATIENCE = 1500;
 let moving = false;
 let askedAt = 0;
+let seen = -1;
 
 export function startLive() {
   button.onclick = goLive;
@@ -18,7 +19,9 @@ export function startLive() {
     if (state.live && state.cursor < state.seconds.length - 1) goLive();
   });
   on(["cursor"], () => {
-    if (!moving && follows()) state.live = !state.playing && state.cursor === state.seconds.length - 1;
+    const moved = state.cursor !== seen;
+    seen = state.cursor;
+    if (moved && !moving && follows()) state.live = !state.playing && state.cursor === state.seconds.length - 1;
   });
 }
 

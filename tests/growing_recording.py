@@ -1,6 +1,7 @@
 """The sample recording, written again as an MCAP file that grows: chunk by chunk, on demand or at recorded rate.
 
-As a program: python -m tests.growing_recording OUT.mcap RATE CHUNK_S, with stamps of the present time.
+As a program: python -m tests.growing_recording OUT.mcap RATE CHUNK_S, with stamps of the present time at the beginning. It prints
+the number of frames and the time after each chunk.
 """
 
 import struct
@@ -87,6 +88,12 @@ class SampleWriter:
             self._file.write(_record(6, head + struct.pack("<Q", len(packed)) + packed))
             self._file.flush()
 
+    @property
+    def frames(self) -> int:
+        """The number of frames written so far."""
+        camera = next(n for n, channel in enumerate(self._channels, 1) if channel.type.endswith("Image"))
+        return sum(message.channel == camera for message in self._messages[: self._written])
+
     def finish(self) -> None:
         """Write the rest, and end the file as a recorder does, without a summary."""
         self.write_until(self.length_s + 1)
@@ -121,6 +128,7 @@ def main(path: Path, rate: float, chunk_s: float) -> None:
         seconds += chunk_s
         time.sleep(max(0.0, began + seconds / rate - time.monotonic()))
         writer.write_until(seconds)
+        print(writer.frames, time.time(), flush=True)
     writer.finish()
 
 

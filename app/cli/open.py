@@ -2,12 +2,12 @@
 
 import dataclasses
 import hashlib
-import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from time import sleep
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -192,7 +192,7 @@ def _awaited(awaited: AwaitedRecording, service: "Service", name: str) -> Record
             if awaited.missing != told:
                 told = awaited.missing
                 service.tell(f"Waiting for {name}: {told}…")
-            time.sleep(_LOOK_EVERY_S)
+            sleep(_LOOK_EVERY_S)
     except BaseException:
         awaited.close()
         raise

@@ -58,6 +58,7 @@ class AwaitedRecording:
         self._paths = tuple(paths)
         self._options = options or RecordingOptions()
         self._files = FollowedFiles(self._paths)
+        self._begun = 0
         self.missing = ""
         """What is being waited for, as a phrase."""
 
@@ -71,9 +72,10 @@ class AwaitedRecording:
         if not self._files.sources:
             self.missing = f"{self._paths[0].name} has not been begun"
             return None
-        complete = self._files.is_complete
-        if not (new or complete or not self.missing):
+        complete, begun = self._files.is_complete, len(self._files.sources)
+        if not (new or complete or begun > self._begun):
             return None
+        self._begun = begun
         assembly = self._assembly(complete=complete)
         if assembly is None:
             return None

@@ -95,6 +95,7 @@ def test_a_click_made_while_following_belongs_to_its_frame_and_stays(page, write
 
 
 def test_a_truncated_recording_is_refused_in_words_and_keeps_the_clicks(page, writer, workspace, tmp_path):
+    page.until("__cocalib.state.live")
     page.value("__cocalib.goTo(0)")
     page.until("__cocalib.state.shown.index === 0")
     page.click(480.0, 300.0)
