@@ -10,13 +10,15 @@ const button = /** @type {HTMLButtonElement} */ (document.getElementById("live")
 const PATIENCE = 1500;
 let moving = false;
 let askedAt = 0;
+/** The cursor at its last event. */
 let seen = -1;
 
 export function startLive() {
   button.onclick = goLive;
   on(["following", "cursor", "recording"], drawButton);
   on(["shown"], () => {
-    if (state.live && state.cursor < state.seconds.length - 1) goLive();
+    const here = state.cursor === seen; // else the user is about to leave: the cursor's event follows
+    if (state.live && here && state.cursor < state.seconds.length - 1) goLive();
   });
   on(["cursor"], () => {
     const moved = state.cursor !== seen;

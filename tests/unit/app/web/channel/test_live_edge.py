@@ -14,9 +14,10 @@ from app.web.channel.live_edge import LiveEdge
 from app.web.channel.radar_survey import GrowingSurvey, Survey, survey_of
 from app.web.messages import FollowNote, FramesAdded, Outgoing
 from app.workspace import Workspace
-from calib_core.measurements import TimeNs
+from calib_core.association.placements import Placement
+from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.options import GatingOptions
-from calib_core.recordings import AwaitedRecording, FollowedRecording
+from calib_core.recordings import AwaitedRecording, FollowedRecording, open_recording
 from tests.growing_recording import SampleWriter
 
 DEADLINE_S = 60.0
@@ -153,3 +154,26 @@ def test_a_writer_that_stops_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_a_growing_survey_without_scans_is_empty() -> None:
     survey = GrowingSurvey(GatingOptions()).survey(np.array([0, 10**9]))
     assert survey.rows == ()
+
+
+def test_placements_are_found_while_the_reflector_still_stands(project_root: Path) -> None:
+    """In steps of half a second; the first is there for more than half of the recording so far, and is found later."""
+    folder = project_root / "sample_data" / "rooftop"
+    found: dict[int, float] = {}
+    with open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording:
+        whole = survey_of(recording.radar_windows(), recording.image_times, GatingOptions()).placements
+        growing = GrowingSurvey(GatingOptions())
+        for now in range(int(recording.radar_times[40]), int(recording.radar_times[-1]), 500_000_000):
+            growing.note(recording.radar_scans(TimeNs((growing.until or 0) + 1), TimeNs(now)))
+            survey = growing.survey(recording.image_times[recording.image_times <= now])
+            for number, placement in enumerate(whole):
+                if any(_is_same(placement, other) for other in survey.placements):
+                    found.setdefault(number, (now - placement.end) / NS_PER_S)
+    assert len(found) == len(whole) == 20
+    assert found[0] < 4.0
+    assert max(found[number] for number in range(1, 20)) < 0.0
+
+
+def _is_same(one: Placement, other: Placement) -> bool:
+    together = min(one.end, other.end) - max(one.start, other.start)
+    return together > 0 and float(np.linalg.norm(one.position_radar_m - other.position_radar_m)) < 0.5
