@@ -157,21 +157,23 @@ def test_a_growing_survey_without_scans_is_empty() -> None:
 
 
 def test_placements_are_found_while_the_reflector_still_stands(project_root: Path) -> None:
-    """In steps of half a second; the first is there for more than half of the recording so far, and is found later."""
+    """In steps of two seconds; the first is there for more than half of the recording so far, and is found later."""
     folder = project_root / "sample_data" / "rooftop"
     found: dict[int, float] = {}
     with open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording:
-        whole = survey_of(recording.radar_windows(), recording.image_times, GatingOptions()).placements
+        end_ns = int(recording.radar_times[0]) + 70 * NS_PER_S
+        survey = survey_of(recording.radar_windows(), recording.image_times, GatingOptions())
+        whole = [placement for placement in survey.placements if placement.end < end_ns]
         growing = GrowingSurvey(GatingOptions())
-        for now in range(int(recording.radar_times[40]), int(recording.radar_times[-1]), 500_000_000):
+        for now in range(int(recording.radar_times[40]), end_ns, 2 * NS_PER_S):
             growing.note(recording.radar_scans(TimeNs((growing.until or 0) + 1), TimeNs(now)))
             survey = growing.survey(recording.image_times[recording.image_times <= now])
             for number, placement in enumerate(whole):
                 if any(_is_same(placement, other) for other in survey.placements):
                     found.setdefault(number, (now - placement.end) / NS_PER_S)
-    assert len(found) == len(whole) == 20
+    assert len(found) == len(whole) > 5
     assert found[0] < 4.0
-    assert max(found[number] for number in range(1, 20)) < 0.0
+    assert max(found[number] for number in range(1, len(whole))) < 0.0
 
 
 def _is_same(one: Placement, other: Placement) -> bool:
