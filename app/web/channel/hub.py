@@ -76,6 +76,7 @@ class Hub:
         self._end_subscription()
         if self._searching is not None:
             self._searching.cancel()
+            await asyncio.gather(self._searching, return_exceptions=True)
         await self.frames.close()
 
     @property
@@ -97,6 +98,10 @@ class Hub:
     def grown(self, count: int) -> None:
         """Take note of the number of frames of a recording that is still being written."""
         self.frames.extend(count)
+
+    def concluded(self) -> None:
+        """Show what is known of the recording now that it is complete: its warnings, and how its sensors are read."""
+        self.broadcast(self._recording_note(), "recording")
 
     def surveyed(self, survey: Survey) -> None:
         """Show what the radar alone says, as far as it is known."""

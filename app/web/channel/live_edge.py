@@ -51,6 +51,9 @@ class Pages(Protocol):
     def surveyed(self, survey: Survey) -> None:
         """Show what the radar alone says."""
 
+    def concluded(self) -> None:
+        """Show what is known of the recording now that it is complete."""
+
 
 class LiveEdge:
     """Follows a recording. Runs on the event loop; files are read in threads of its own."""
@@ -81,12 +84,12 @@ class LiveEdge:
         finally:
             if self._searching is not None:
                 self._searching.cancel()
-            self._thread.shutdown(wait=False, cancel_futures=True)
+            self._thread.shutdown(wait=True, cancel_futures=True)
 
     async def _look(self) -> None:
         try:
             growth = await self._in_thread(self._grow)
-        except CalibrationError as error:
+        except (CalibrationError, OSError) as error:
             self._problem = f"{sentence(str(error))} All clicks are kept."
             self._state = "ended"
             self._tell()
@@ -125,6 +128,8 @@ class LiveEdge:
             self._pages.grown(len(times_ns))
             first = len(times_ns) - growth.frames
             self._pages.broadcast(FramesAdded(first, StampColumns.of(times_ns[first:])), f"frames from {first}")
+        if growth.completed:
+            self._pages.concluded()
 
     async def _look_for_placements(self) -> None:
         started = time.monotonic()

@@ -28,6 +28,7 @@ class ToldPages:
         self.messages: list[Outgoing] = []
         self.frames = 0
         self.survey: Survey | None = None
+        self.conclusions = 0
 
     def broadcast(self, message: Outgoing, kind: str) -> None:
         self.messages.append(message)
@@ -37,6 +38,9 @@ class ToldPages:
 
     def surveyed(self, survey: Survey) -> None:
         self.survey = survey
+
+    def concluded(self) -> None:
+        self.conclusions += 1
 
     @property
     def note(self) -> FollowNote:
@@ -92,6 +96,7 @@ def test_every_frame_is_told_once_and_in_order(tmp_path: Path) -> None:
             await until(lambda: pages.frames == len(recording.image_times) > known)
         writer.finish()
         await until(lambda: pages.note.state == "complete")
+        assert pages.conclusions == 1
         told = known
         for message in pages.messages:
             if isinstance(message, FramesAdded):
