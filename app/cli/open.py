@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from time import sleep
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -20,7 +21,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.options import CalibrationOptions
-from calib_core.recordings import Recording, RecordingOptions
+from calib_core.recordings import AwaitedRecording, Recording, RecordingOptions
 
 if TYPE_CHECKING:
     from app.session.file import FoundFolder
@@ -31,6 +32,7 @@ __all__ = ["Demo", "Open"]
 _RECORDING_SUFFIXES = (".bag", ".mcap", ".db3")
 _LARGE_BYTES = 1_000_000_000
 """If the files are this large in total, the page is served before they are opened."""
+_LOOK_EVERY_S = 0.2
 _SOON_S = 0.2
 """Smaller files are usually open within this time, and the page then shows no waiting screen [s]."""
 
@@ -101,6 +103,8 @@ class Open:
     """Session folder; by default the one with this recording's frames, next to it or in your user folder, else a new one."""
     fresh: Switch = False
     """Start without the previous clicks (a backup is kept)."""
+    follow: Switch = False
+    """Open a recording that is still being written (.bag, .mcap, .db3, folders): frames and placements appear as they come."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
@@ -110,7 +114,7 @@ class Open:
         """Serve until Ctrl+C, SIGTERM or SIGHUP; return the exit code."""
         from calib_core.recordings import require_files
 
-        paths = require_files(self.recording)
+        paths = self.recording if self.follow and self.recording else require_files(self.recording)
         return _serve(
             paths,
             session=self.session,
@@ -122,6 +126,7 @@ class Open:
             calibration_file=self.calibration,
             topics=self.topics,
             options=self.measured.over(self.options),
+            follow=self.follow,
         )
 
 
@@ -137,6 +142,7 @@ def _serve(
     calibration_file: Path | None = None,
     topics: RecordingOptions | None = None,
     options: CalibrationOptions | None = None,
+    follow: bool = False,
 ) -> int:
     """Open everything, serve until Ctrl+C, SIGTERM or SIGHUP, close everything.
 
@@ -160,8 +166,10 @@ def _serve(
     _require_given(camera_file, calibration_file, clicks_file)
     topics = topics or RecordingOptions()
     admissions = session or recording_session_folder(paths)
-    with _service(paths, topics, serving, name, admissions) as service, ExitStack() as stack:
-        recording = stack.enter_context(open_recording(paths, topics))
+    awaited = AwaitedRecording(paths, topics) if follow else None
+    with _service(paths, topics, serving, name, admissions, follow=follow) as service, ExitStack() as stack:
+        opened = _awaited(awaited, service, name) if awaited is not None else open_recording(paths, topics)
+        recording = stack.enter_context(opened)
         camera = _camera(recording, camera_file, calibration_file)
         reference = reference_from(calibration_file, camera) if calibration_file else None
         found = _session_folder(session, paths, recording, name, fresh=fresh)
@@ -185,6 +193,25 @@ def _serve(
     return 0
 
 
+def _awaited(awaited: AwaitedRecording, service: "Service", name: str) -> Recording:
+    """Wait until there is enough of a recording that is being written, telling the terminal and the pages what is missing.
+
+    Raises:
+        RecordingError: the recording cannot be followed.
+    """
+    told = ""
+    try:
+        while (recording := awaited.look()) is None:
+            if awaited.missing != told:
+                told = awaited.missing
+                service.tell(f"Waiting for {name}: {told}…")
+            sleep(_LOOK_EVERY_S)
+    except BaseException:
+        awaited.close()
+        raise
+    return recording
+
+
 def _session_folder(
     session: Path | None, paths: Sequence[Path], recording: Recording, name: str, *, fresh: bool
 ) -> "FoundFolder":
@@ -201,7 +228,7 @@ def _session_folder(
 
 
 def _service(
-    paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str, session: Path
+    paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str, session: Path, *, follow: bool
 ) -> "Service":
     """Return the service; it serves the page of a large recording before the recording is open."""
     from app.web.messages import Opening
@@ -213,9 +240,9 @@ def _service(
     size = f" ({size_bytes / 1e9:.1f} GB)" if size_bytes >= _LARGE_BYTES / 10 else ""
     return Service(
         ServerOptions(**dataclasses.asdict(serving), session=str(session.absolute())),
-        Opening(name, f"Opening {name}{size}: reading its index and times…"),
-        partial(first_picture, paths, topics),
-        let_in_after_s=0.0 if size_bytes >= _LARGE_BYTES else _SOON_S,
+        Opening(name, f"Waiting for {name}…" if follow else f"Opening {name}{size}: reading its index and times…"),
+        partial(first_picture, () if follow else paths, topics),
+        let_in_after_s=0.0 if follow or size_bytes >= _LARGE_BYTES else _SOON_S,
     )
 
 

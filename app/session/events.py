@@ -20,6 +20,7 @@ __all__ = [
     "OptionsChanged",
     "OptionsEdited",
     "Redo",
+    "ScansAdded",
     "Solved",
     "Step",
     "Undo",
@@ -95,6 +96,11 @@ class Solved:
 
 
 @dataclass(frozen=True, slots=True)
+class ScansAdded:
+    """Scans have been written that belong to the window of a click: the clicks are solved again. It is not journalled."""
+
+
+@dataclass(frozen=True, slots=True)
 class Undo:
     """Undo the last change."""
 
@@ -113,6 +119,7 @@ Event: TypeAlias = (
     | OptionsEdited
     | Cleared
     | ClicksImported
+    | ScansAdded
     | Solved
 )
 Step: TypeAlias = Event | Undo | Redo

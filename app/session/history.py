@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 from app.option_changes import changed_options
 from app.session.applying import apply
-from app.session.events import OptionsChanged, OptionsEdited, Redo, Solved, Step, Undo
+from app.session.events import OptionsChanged, OptionsEdited, Redo, ScansAdded, Solved, Step, Undo
 from app.session.state import RecordingFacts, Session
 
 __all__ = ["History", "advance", "settled"]
@@ -33,7 +33,7 @@ def advance(history: History, step: Step, facts: RecordingFacts) -> History:
     present = apply(history.present, step, facts)
     if present is history.present:
         return history
-    if isinstance(step, Solved):
+    if isinstance(step, Solved | ScansAdded):
         return replace(history, present=present)
     return History(present, (*history.past, history.present))
 

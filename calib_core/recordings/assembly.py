@@ -55,9 +55,23 @@ class Assembly:
     warnings: tuple[DataWarning, ...]
     assumptions: tuple[Assumption, ...]
 
+    @property
+    def used(self) -> frozenset[str]:
+        """The topics whose messages are read."""
+        return frozenset(name for name in (self.radar_topic, self.image_topic) if name is not None)
+
+    @property
+    def clocks(self) -> Mapping[str, Literal["header", "receive"]]:
+        """The clock of each of these topics."""
+        return {topic.name: topic.clock for topic in self.topics if topic.name in self.used}
+
 
 def assemble(
-    paths: Sequence[Path], sources: tuple[Source, ...], options: RecordingOptions, require: Sequence[Need]
+    paths: Sequence[Path],
+    sources: tuple[Source, ...],
+    options: RecordingOptions,
+    require: Sequence[Need],
+    before: Assembly | None = None,
 ) -> Assembly:
     """Choose topics and clocks and build the streams.
 
@@ -66,12 +80,13 @@ def assemble(
         sources: the open files.
         options: topics and clock asked for.
         require: what the recording must have; if both, they must also overlap in time.
+        before: of the same recording when its files were shorter: its choices stay, and only the streams are built again.
 
     Raises:
         RecordingError: the recording lacks what the options ask for.
     """
     name = " + ".join(str(path) for path in paths)
-    topics, repeated = join_topics(sources)
+    topics, repeated = join_topics(sources, before.used if before else None)
     warnings = [warning for source in sources for warning in source.warnings] + list(repeated)
     if not any(len(topic) for topic in topics) and require:
         raise RecordingError(
@@ -81,11 +96,13 @@ def assemble(
     inventory = Inventory(name, topics, {topic.name: usage_of(topic).read_as(axes) for topic in topics})
     selection = select(inventory, options, require)
     selection, stamped, lost = _stamped(selection, inventory)
-    clocks, stamps, about_choice = _clocks(stamped, inventory, options)
+    clocks, stamps, about_choice = _clocks(stamped, inventory, options, before)
     warnings.extend([*lost, *about_choice])
     heads = {name: both.heads for name, both in stamped.items()}
     radar = _radar_stream(selection.radar, inventory, stamps, heads)
     images, about_pictures = frames_of_one_size(_image_stream(selection.image, inventory, stamps))
+    if before is not None:
+        return replace(before, radar=radar, images=images)
     warnings.extend(about_pictures)
     zoneless = {s.channel.topic for s in sources if isinstance(s, PlainSource) and s.zoneless}
     warnings.extend(check_overlap(name, radar, images, required=len(require) == 2, zoneless=zoneless))
@@ -154,7 +171,7 @@ def _both_clocks(both: StampedTopic, inventory: Inventory) -> Stamps:
 
 
 def _clocks(
-    stamped: Mapping[str, StampedTopic], inventory: Inventory, options: RecordingOptions
+    stamped: Mapping[str, StampedTopic], inventory: Inventory, options: RecordingOptions, before: Assembly | None
 ) -> tuple[Mapping[str, Literal["header", "receive"]], Mapping[str, TimesNs], tuple[DataWarning, ...]]:
     """Choose the clock of each topic in use, the radar first; return clocks and times by topic, and warnings."""
     read = [_both_clocks(both, inventory) for both in stamped.values()]
@@ -162,7 +179,9 @@ def _clocks(
         for both in read:
             if both.header_ns is None:
                 raise RecordingError(f"topic {both.topic} has no stamps; use the receive times: --clock receive")
-    if len(read) == 2:
+    if before is not None:
+        choice = ClockChoice(tuple(before.clocks[name] for name in stamped), ())
+    elif len(read) == 2:
         choice = choose_clocks(read[0], read[1], options.clock)
     else:
         choice = choose_clock(read[0], options.clock) if read else ClockChoice((), ())

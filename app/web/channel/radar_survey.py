@@ -9,11 +9,11 @@ from app.web.messages import PlacementRow
 from calib_core.arrays import TimesNs
 from calib_core.association.gating import static_returns
 from calib_core.association.placements import Placement, find_placements
-from calib_core.measurements import NS_PER_S, RadarScans
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.recordings.radar.scan_stream import join_scans
 
-__all__ = ["Activity", "Survey", "placements_at", "survey_of"]
+__all__ = ["Activity", "GrowingSurvey", "Survey", "placements_at", "survey_of"]
 
 _MOST_SLICES = 800
 _MOST_STATIC_RETURNS = 1_000_000
@@ -69,6 +69,52 @@ def survey_of(windows: Iterable[RadarScans], image_times: TimesNs, options: Gati
     return Survey(tuple(pair[0] for pair in seen), tuple(pair[1] for pair in seen), activity.total())
 
 
+class GrowingSurvey:
+    """Surveys a recording that is still being written: each scan is read once, and the placements are searched for again.
+
+    Memory is bounded as in `survey_of`: the placements of a full stretch stay as they are.
+
+    Args:
+        options: which returns can be the reflector.
+    """
+
+    def __init__(self, options: GatingOptions) -> None:
+        self._options = options
+        self._static = RadarScans()
+        self._settled: tuple[Placement, ...] = ()
+        self._times: list[TimesNs] = []
+        self._counts: list[np.ndarray] = []
+
+    @property
+    def until(self) -> TimeNs | None:
+        """The stamp of the last scan noted; None before the first."""
+        return TimeNs(int(self._times[-1][-1])) if self._times else None
+
+    def note(self, scans: RadarScans) -> None:
+        """Add scans that are later than all before."""
+        if not len(scans):
+            return
+        if len(self._static.points_radar_m) > _MOST_STATIC_RETURNS:
+            self._settled = (*self._settled, *find_placements(self._static, self._options))
+            self._static = RadarScans()
+        self._static = join_scans([self._static, static_returns(scans, self._options)])
+        self._times.append(scans.times_ns)
+        self._counts.append(np.diff(scans.first_return))
+
+    def survey(self, image_times: TimesNs) -> Survey:
+        """Return what is known now.
+
+        Args:
+            image_times: (m,) stamps of the frames [ns], ascending.
+        """
+        found = (*self._settled, *find_placements(self._static, self._options))
+        seen = [(one, row) for one in found if (row := _row(one, image_times)) is not None]
+        activity = _ActivitySum(image_times)
+        if self._times:
+            activity.count(np.concatenate(self._times), np.concatenate(self._counts))
+        return Survey(tuple(pair[0] for pair in seen), tuple(pair[1] for pair in seen), activity.total())
+
+
 def _stretches(windows: Iterable[RadarScans], options: GatingOptions) -> Iterator[RadarScans]:
     """Yield the static returns of a recording; in several pieces if there are too many."""
     pieces: list[RadarScans] = []
@@ -113,12 +159,15 @@ class _ActivitySum:
 
     def note(self, scans: RadarScans) -> RadarScans:
         """Count some scans; return them."""
-        place = ((scans.times_ns - self._origin) / NS_PER_S // self._step_s).astype(np.int64)
-        inside = (place >= 0) & (place < self._slices)
-        counts = np.diff(scans.first_return)[inside]
-        self._returns += np.bincount(place[inside], weights=counts, minlength=self._slices)
-        self._scans += np.bincount(place[inside], minlength=self._slices)
+        self.count(scans.times_ns, np.diff(scans.first_return))
         return scans
+
+    def count(self, times_ns: TimesNs, counts: np.ndarray) -> None:
+        """Count scans by their stamps [ns] and numbers of returns."""
+        place = ((times_ns - self._origin) / NS_PER_S // self._step_s).astype(np.int64)
+        inside = (place >= 0) & (place < self._slices)
+        self._returns += np.bincount(place[inside], weights=counts[inside], minlength=self._slices)
+        self._scans += np.bincount(place[inside], minlength=self._slices)
 
     def total(self) -> Activity:
         """Return the mean number of returns per scan in each slice."""

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import msgspec
 
 from app.option_changes import OptionGroup, option_groups
-from app.view import View
+from app.view import FollowState, View
 from app.web.messages.view_changes import ViewChange
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, Stamp
@@ -17,7 +17,9 @@ from calib_core.results import DataWarning
 __all__ = [
     "TYPES",
     "Done",
+    "FollowNote",
     "FrameHeader",
+    "FramesAdded",
     "Opening",
     "Outgoing",
     "Overlay",
@@ -136,6 +138,35 @@ class RecordingNote:
 
 
 @dataclass(frozen=True, slots=True)
+class FramesAdded:
+    """Frames have been written since; they follow those that a page knows.
+
+    Attributes:
+        first: index of the first of them; a page that does not have all before greets again.
+        frame_times: the stamp of each.
+    """
+
+    first: int
+    frame_times: StampColumns
+
+
+@dataclass(frozen=True, slots=True)
+class FollowNote:
+    """How a recording that is still being written goes on.
+
+    Attributes:
+        state: "live" while it grows, "quiet" when nothing has been written for a while, "complete" once it has been closed,
+            "ended" if it can no longer be followed.
+        words: the same in one or two sentences, with the delay.
+        advice: how many placements there are, and where the next one pays; "" while that is unknown.
+    """
+
+    state: FollowState
+    words: str
+    advice: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class PlacementRow:
     """A placement found in the radar data.
 
@@ -250,13 +281,27 @@ class FrameHeader:
     format: Literal["jpeg", "png"]
 
 
-Outgoing: TypeAlias = View | ViewChange | Opening | RecordingNote | Placements | Overlay | Progress | Problem | Done
+Outgoing: TypeAlias = (
+    View
+    | ViewChange
+    | Opening
+    | RecordingNote
+    | FramesAdded
+    | FollowNote
+    | Placements
+    | Overlay
+    | Progress
+    | Problem
+    | Done
+)
 
 TYPES: Mapping[type, str] = {
     View: "view",
     ViewChange: "view_change",
     Opening: "opening",
     RecordingNote: "recording",
+    FramesAdded: "frames_added",
+    FollowNote: "following",
     Placements: "placements",
     Overlay: "overlay",
     Progress: "progress",
