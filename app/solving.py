@@ -215,6 +215,8 @@ def calibration_text(calibration: Calibration, recording: Recording) -> str:
     provenance = Provenance(
         inputs=recording.fingerprint(),
         radar_topic=recording.radar_topic,
+        radar_topics=recording.radar_topics,
+        radar_choice=recording.radar_choice,
         image_topic=recording.image_topic,
         camera_info_topic=recording.camera_info_topic,
         radar_clock=recording.radar_clock,

@@ -47,6 +47,20 @@ class Journal(Protocol):
         """Close the file; return whether everything is in it, also when called again."""
 
 
+class _Unstored:
+    """Stores nothing: changes of options while looking at a recording without pictures are not kept."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def append(self, step: Step, history: History) -> None:
+        """Forget the step."""
+
+    def close(self) -> Closed:
+        """Return that there was nothing to store."""
+        return Closed(self._folder, clicks=0)
+
+
 class Solver(Protocol):
     """Solves revisions: app.solver_worker.SolverWorker, or a fake in a test."""
 
@@ -172,7 +186,7 @@ class Workspace:
 
     def clicks_text(self) -> str:
         """Return the clicks as a clicks-1 file."""
-        return write_clicks(self.session.clicks)
+        return write_clicks(self.session.clicks, radar_topics=self.facts.radar_topics)
 
     def import_clicks(self, text: str, source: str) -> None:
         """Add the clicks of a clicks-1 file to the session.
@@ -225,15 +239,19 @@ def recording_facts(recording: Recording, name: str) -> RecordingFacts:
         name: what to call it.
 
     Raises:
-        InputError: it has no frames to click in.
+        InputError: it has neither frames nor radar scans.
     """
-    if not len(recording.image_times):
-        raise InputError(
-            f"{name}: has no frames to click in; give the camera's recording as well, or another --image-topic"
-        )
-    picture = recording.image_bytes(0)
+    if not len(recording.image_times) and not len(recording.radar_times):
+        raise InputError(f"{name}: has neither pictures nor radar scans; give the files of the radar and of the camera")
+    picture = recording.image_bytes(0) if len(recording.image_times) else None
     return RecordingFacts(
-        name, recording.image_times, picture.width_px, picture.height_px, recording.radar_axes, recording.radar_times
+        name,
+        recording.image_times,
+        picture.width_px if picture else 0,
+        picture.height_px if picture else 0,
+        recording.radar_axes,
+        recording.radar_times,
+        recording.radar_topics,
     )
 
 
@@ -256,11 +274,16 @@ def open_workspace(
         reference: a calibration to review and to compare with; None if there is none.
         warnings: what is known about the choice of the session folder.
 
+    Without pictures there is nothing to click and nothing to store: the session folder is not touched.
+
     Raises:
-        InputError: the recording has no frames.
+        InputError: the recording has neither frames nor radar scans.
         SessionFileError: the session cannot be opened.
     """
     facts = recording_facts(recording, name)
+    if not facts.has_pictures:
+        nothing = _Unstored(session_folder)
+        return Workspace(facts, Restored(session_folder, History()), nothing, SolverWorker(recording, None))
     session_file = open_session_file(session_folder, facts, warnings)
     solver = SolverWorker(recording, camera, reference.calibration if reference else None)
     return Workspace(facts, session_file.restored, session_file, solver, reference)

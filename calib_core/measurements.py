@@ -1,5 +1,6 @@
 """Measurements: radar scans, clicks, and the pairs made from them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NewType, NoReturn
 
@@ -20,6 +21,7 @@ __all__ = [
     "TimeNs",
     "Unpaired",
     "Unsolvable",
+    "joined_alternatives",
     "time_from_parts",
     "time_parts",
 ]
@@ -92,6 +94,8 @@ class RadarScan:
         doppler_mps: (n,) radial velocity, positive moving away; NaN where the message has none.
         snr_db: (n,) signal-to-noise ratio or another amplitude in dB; NaN where the message has none.
         sigma_polar: (n, 3) standard deviations of range [m], azimuth and elevation [rad]; NaN where the message has none.
+        alternative_of: (n,) equal numbers are alternative positions of one return, of which at most one is true; -1 for a
+            return without alternatives. None if there are none at all.
     """
 
     time: TimeNs
@@ -99,6 +103,7 @@ class RadarScan:
     doppler_mps: Values
     snr_db: Values
     sigma_polar: Points3
+    alternative_of: Indices | None = None
 
     def __post_init__(self) -> None:
         n = len(self.points_radar_m)
@@ -109,9 +114,14 @@ class RadarScan:
             ("sigma_polar", (n, 3)),
         ):
             object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
+        object.__setattr__(self, "alternative_of", _frozen_alternatives(self.alternative_of, n))
 
     def __len__(self) -> int:
         return len(self.points_radar_m)
+
+
+def _frozen_alternatives(alternative_of: Indices | None, n: int) -> Indices | None:
+    return None if alternative_of is None else frozen_array(alternative_of, (n,), dtype=np.int64)
 
 
 def _no_first_return() -> Indices:
@@ -129,6 +139,7 @@ class RadarScans:
         doppler_mps: (n,).
         snr_db: (n,).
         sigma_polar: (n, 3).
+        alternative_of: (n,) as in RadarScan, each scan with numbers of its own; None if no return has alternatives.
     """
 
     times_ns: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -137,6 +148,7 @@ class RadarScans:
     doppler_mps: Values = field(default_factory=lambda: np.zeros(0))
     snr_db: Values = field(default_factory=lambda: np.zeros(0))
     sigma_polar: Points3 = field(default_factory=lambda: np.zeros((0, 3)))
+    alternative_of: Indices | None = None
 
     def __post_init__(self) -> None:
         n, m = len(self.points_radar_m), len(self.times_ns)
@@ -149,6 +161,7 @@ class RadarScans:
             object.__setattr__(self, name, frozen_array(getattr(self, name), shape))
         for name, shape in (("times_ns", (m,)), ("first_return", (m + 1,))):
             object.__setattr__(self, name, frozen_array(getattr(self, name), shape, dtype=np.int64))
+        object.__setattr__(self, "alternative_of", _frozen_alternatives(self.alternative_of, n))
         if np.any(np.diff(self.times_ns) < 0):
             raise ValueError("scans must be in ascending order of time")
         if self.first_return[0] != 0 or self.first_return[-1] != n or np.any(np.diff(self.first_return) < 0):
@@ -170,6 +183,7 @@ class RadarScans:
             doppler_mps=np.concatenate([scan.doppler_mps for scan in ordered]),
             snr_db=np.concatenate([scan.snr_db for scan in ordered]),
             sigma_polar=np.concatenate([scan.sigma_polar for scan in ordered]),
+            alternative_of=joined_alternatives(ordered),
         )
 
     def scan(self, index: int) -> RadarScan:
@@ -181,6 +195,7 @@ class RadarScans:
             doppler_mps=self.doppler_mps[rows],
             snr_db=self.snr_db[rows],
             sigma_polar=self.sigma_polar[rows],
+            alternative_of=None if self.alternative_of is None else self.alternative_of[rows],
         )
 
     def nearest(self, time: TimeNs) -> int:
@@ -208,11 +223,33 @@ class RadarScans:
             doppler_mps=self.doppler_mps[low:high],
             snr_db=self.snr_db[low:high],
             sigma_polar=self.sigma_polar[low:high],
+            alternative_of=None if self.alternative_of is None else self.alternative_of[low:high],
+        )
+
+    def take(self, rows: Indices) -> "RadarScans":
+        """Keep the returns of the given rows, ascending; every scan is kept, even if it becomes empty."""
+        return RadarScans(
+            times_ns=self.times_ns,
+            first_return=np.searchsorted(rows, self.first_return),
+            points_radar_m=self.points_radar_m[rows],
+            doppler_mps=self.doppler_mps[rows],
+            snr_db=self.snr_db[rows],
+            sigma_polar=self.sigma_polar[rows],
+            alternative_of=None if self.alternative_of is None else self.alternative_of[rows],
         )
 
     def scan_of_return(self) -> Indices:
         """Return, for each row, the index of the scan that owns it: (n,)."""
         return np.repeat(np.arange(len(self), dtype=np.int64), np.diff(self.first_return))
+
+
+def joined_alternatives(pieces: "Sequence[RadarScan | RadarScans]") -> Indices | None:
+    """Concatenate the alternatives of scans; None if no return has any."""
+    given = [piece.alternative_of for piece in pieces]
+    if all(own is None for own in given):
+        return None
+    counts = [len(piece.points_radar_m) for piece in pieces]
+    return np.concatenate([np.full(n, -1) if own is None else own for own, n in zip(given, counts, strict=True)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -227,6 +264,8 @@ class Candidate:
         returns: number of returns averaged.
         scans: number of scans they come from.
         snr_db: their mean SNR; NaN if the radar reports none.
+        alternative_of: candidates of one pair with equal numbers are alternative positions of one return; -1 has no
+            alternative.
     """
 
     position_radar_m: Vector3
@@ -236,6 +275,7 @@ class Candidate:
     returns: int = 1
     scans: int = 1
     snr_db: float = float("nan")
+    alternative_of: int = -1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position_radar_m", frozen_array(self.position_radar_m, (3,)))

@@ -17,7 +17,7 @@ const EMPTY = [
   ["inliers", "pairs that agree"],
 ];
 /** Warnings that the user has opened stay open. @type {Set<string>} */
-const openCodes = new Set(["unsolvable"]);
+const openCodes = new Set(["unsolvable", "no-camera"]);
 export const poseTable = make("table", "", []);
 const poseHead = make("div", "pose-head", "");
 const apartTable = make("table", "", []);
@@ -38,13 +38,17 @@ export function startFigures() {
   const head = make("tr", "", heads.map(([name, hint]) => hinted(make("th", "", name), hint)));
   systematic.append(make("div", "pose-head", "Errors that all pairs share"), systematicWords, make("table", "", [make("thead", "", [head]), systematicTable]), systematicNote);
   posePage.append(poseHead, apart, pose, systematic);
-  on(["view", "recording"], draw);
+  on(["view", "recording", "placements"], draw);
 }
 
 function draw() {
   const view = state.view;
   if (!view) return;
   figures.classList.toggle("stale", view.solving && !view.checking && view.has_calibration);
+  if (state.looking) {
+    figures.replaceChildren(...state.placementFigures.map(cell));
+    return drawWarnings([{ code: "no-camera", message: view.status, hint: view.hint }, ...(state.recording?.warnings ?? [])]);
+  }
   const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Available after the first calibration.", level: "none" }));
   figures.replaceChildren(...shown.map(cell));
   poseTable.replaceChildren(...(view.pose.length ? view.pose.map(row) : [make("tr", "", [make("td", "", "Available after the first calibration.")])]));

@@ -2,6 +2,7 @@
 /** Keyboard shortcuts; they also work while the 3D view has the focus. */
 
 import { comeTo } from "./arriving.js";
+import { fitEye, zoomEye } from "./birdseye.js";
 import { flushNudge, nudgeBy, placeByKey, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
 import { openExport } from "./exporting.js";
 import { toggleHelp } from "./help.js";
@@ -55,6 +56,19 @@ const PLAIN = {
   Home: () => goTo(0),
   End: () => goTo(state.seconds.length - 1),
 };
+/** The same for a recording without pictures. @type {Record<string, () => unknown>} */
+const LOOKING = {
+  " ": PLAIN[" "],
+  n: PLAIN.n,
+  p: PLAIN.p,
+  f: fitEye,
+  "+": () => zoomEye(1.25),
+  "=": () => zoomEye(1.25),
+  "-": () => zoomEye(0.8),
+  "?": toggleHelp,
+  Home: PLAIN.Home,
+  End: PLAIN.End,
+};
 /** @type {Record<string, [number, number]>} */
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
@@ -87,10 +101,10 @@ function typing(event) {
 /** @param {KeyboardEvent} event @returns {(() => unknown)|undefined} */
 function actionOf(event) {
   const command = event.ctrlKey || event.metaKey;
-  if (command) return commandOf(event);
+  if (command) return state.looking ? undefined : commandOf(event);
   if (event.key in ARROWS) return arrow(event);
   if (event.altKey) return undefined;
-  return PLAIN[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+  return (state.looking ? LOOKING : PLAIN)[event.key.length === 1 ? event.key.toLowerCase() : event.key];
 }
 
 /** @param {KeyboardEvent} event */

@@ -62,6 +62,12 @@ function drawPlacements(pen, base, toX) {
     pen.globalAlpha = clicked ? 1 : 0.45;
     pen.fill();
     pen.globalAlpha = 1;
+    if (state.looking && right - left > 14) {
+      pen.font = `600 11px ${getComputedStyle(document.body).fontFamily}`;
+      pen.textAlign = "center";
+      pen.fillStyle = themeColour(placement.note ? "attention" : "accent");
+      pen.fillText(String(state.placements.indexOf(placement) + 1), (left + right) / 2, (base + lanes.ruler) / 2);
+    }
     if (!clicked) {
       pen.setLineDash([3, 3]);
       pen.strokeStyle = placement.start_s <= here && here <= placement.end_s ? themeColour("ink") : themeColour("accent");

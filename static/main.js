@@ -12,6 +12,7 @@ import { activity } from "./lanes.js";
 import { startLayers } from "./layers.js";
 import { startLayout } from "./layout.js";
 import { startLive, takeFollowing, takeFrames } from "./live.js";
+import { startLooking } from "./looking.js";
 import { startLoupe } from "./loupe.js";
 import { setBanner, startTips, toast } from "./notices.js";
 import { startOptions } from "./options.js";
@@ -49,6 +50,8 @@ const readers = {
   following: takeFollowing,
   placements(message) {
     state.placements = message.placements;
+    state.placementSummary = message.summary;
+    state.placementFigures = message.figures;
     state.placementsKnown = true;
     emit("placements");
     loadActivity();
@@ -56,6 +59,14 @@ const readers = {
   overlay(message) {
     state.overlay = message;
     emit("overlay");
+  },
+  radar_look(message) {
+    state.look = message;
+    emit("look");
+  },
+  radar_map(message) {
+    state.radarMap = message;
+    emit("radar_map");
   },
   progress(message) {
     state.progress = message;
@@ -80,6 +91,7 @@ function takeRecording(message) {
   const same = state.recording !== null;
   state.recording = message;
   state.opening = null;
+  state.looking = !message.has_pictures;
   const { sec, nanosec } = message.frame_times;
   state.seconds = Float64Array.from(sec, (value, index) => value - sec[0] + (nanosec[index] - nanosec[0]) * 1e-9);
   document.title = `${message.name} · cocalib`;
@@ -130,6 +142,7 @@ startOptions();
 startExporting();
 startGuide();
 startArriving();
+startLooking();
 listen(window);
 press("undo", () => turnBack("undo"));
 press("redo", () => turnBack("redo"));

@@ -270,6 +270,7 @@ export interface RecordingNote {
   image_topic: string;
   width_px: number;
   height_px: number;
+  has_pictures: boolean;
   frame_times: StampColumns;
   start: Stamp;
   radar: StampColumns;
@@ -302,12 +303,42 @@ export interface PlacementRow {
   frame: number;
   range_m: number;
   score: number;
+  position_radar_m: [number, number, number];
+  azimuth_deg: number;
+  snr_db: number | null;
+  stands_out_db: number | null;
+  note: string;
 }
 
 /** The placements found from the radar alone. */
 export interface Placements {
   type: "placements";
   placements: PlacementRow[];
+  summary: string;
+  figures: Figure[];
+}
+
+/** One radar return seen from above; written as an array, since there are many. */
+export type RadarReturn = [x_m: number, y_m: number, z_m: number, doppler_mps: number | null, snr_db: number | null, static: boolean, age_s: number];
+
+/** The returns of the last seconds, for a recording without pictures. */
+export interface RadarLook {
+  type: "radar_look";
+  index: number;
+  returns: RadarReturn[];
+}
+
+/** Where the radar saw static returns during the whole recording: square cells seen from above, as columns. */
+export interface RadarMap {
+  type: "radar_map";
+  cell_m: number;
+  x_m: number[];
+  y_m: number[];
+  z_m: number[];
+  share: number[];
+  snr_db: number[];
+  low_db: number | null;
+  high_db: number | null;
 }
 
 /** One radar return on the picture; written as an array, since there are many. */
@@ -460,6 +491,9 @@ export interface CursorForm {
   playing?: boolean;
   selected?: string | null;
   light?: boolean;
+  trail_s?: number;
+  colour?: "speed" | "amplitude";
+  whole?: boolean;
   request?: number;
 }
 
@@ -486,6 +520,8 @@ export type FromServer =
   | FramesAdded
   | FollowNote
   | Placements
+  | RadarLook
+  | RadarMap
   | Overlay
   | Progress
   | Problem

@@ -56,6 +56,7 @@ export function nextWorst() {
 }
 
 function draw() {
+  if (state.looking) return; // looking.js shows the placements
   const rows = sorted();
   count.textContent = rows.length ? String(rows.length) : "";
   const steps = !rows.length || !state.view?.has_calibration;

@@ -23,7 +23,7 @@ export function goTo(index) {
   state.cursor = Math.min(last, Math.max(0, Math.round(index)));
   const ready = kept.get(state.cursor);
   if (ready && (ready.scale === 1 || state.playing)) show(ready);
-  else request(state.cursor);
+  else if (!state.looking) request(state.cursor);
   emit("cursor");
   tellCursor();
 }
@@ -68,6 +68,7 @@ function tick() {
   if (!state.playing) return;
   const time = startedFrom + (performance.now() - startedAt) / 1000;
   const due = indexAt(time);
+  if (state.looking) return tickWithoutPictures(due);
   if (due > asked && coming.length < CREDIT) {
     asked = due;
     const ready = kept.get(due);
@@ -75,6 +76,16 @@ function tick() {
     else request(due);
   }
   if (due >= state.seconds.length - 1 && state.shown?.index === due) return pause();
+  requestAnimationFrame(tick);
+}
+
+/** The next moment comes once the server has answered for the one before. @param {number} due */
+function tickWithoutPictures(due) {
+  if (due > state.cursor && (state.look?.index ?? -1) >= asked) {
+    asked = due;
+    goTo(due);
+  }
+  if (due >= state.seconds.length - 1) return pause();
   requestAnimationFrame(tick);
 }
 
@@ -108,7 +119,7 @@ export function requestAgain() {
   coming = [];
   kept.clear();
   if (state.playing) restart();
-  request(state.cursor);
+  if (!state.looking) request(state.cursor);
   tellCursor();
 }
 
@@ -179,5 +190,7 @@ function selectHere(index) {
 
 /** Tell the server which frame this tab shows; it answers with the overlay and updates the 3D view. */
 export function tellCursor() {
-  tell({ type: "cursor", index: state.cursor, playing: state.playing, selected: state.selected, light: document.documentElement.dataset.theme === "light" });
+  const cursor = { type: "cursor", index: state.cursor, playing: state.playing, selected: state.selected, light: document.documentElement.dataset.theme === "light" };
+  const { trail_s, colour, whole } = state.lookOptions;
+  tell(state.looking ? { ...cursor, trail_s, colour, whole } : cursor);
 }

@@ -30,6 +30,7 @@ export function startSpace() {
   for (const [viewpoint, label, hint] of VIEWPOINTS) {
     const chip = make("button", "chip", label);
     chip.dataset.hint = hint;
+    chip.dataset.viewpoint = viewpoint;
     chip.onclick = () => tell({ type: "viewpoint", viewpoint });
     group.append(chip);
   }

@@ -4,7 +4,7 @@
 /** @typedef {import("./messages.js").View} View */
 /** @typedef {import("./messages.js").ClickRow} Click */
 /** A decoded frame. @typedef {{index: number, bitmap: ImageBitmap, scale: number, width: number, height: number}} Shown */
-/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"} Topic */
+/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"} Topic */
 
 export const state = {
   /** While the recording is being opened. @type {import("./messages.js").Opening|null} */ opening: null,
@@ -14,6 +14,13 @@ export const state = {
   /** @type {import("./messages.js").PlacementRow[]} */ placements: [],
   placementsKnown: false,
   /** @type {import("./messages.js").Overlay|null} */ overlay: null,
+  /** Whether the recording has no pictures: it can be looked at from above, but not clicked in. */ looking: false,
+  /** The returns of the last seconds. @type {import("./messages.js").RadarLook|null} */ look: null,
+  /** @type {import("./messages.js").RadarMap|null} */ radarMap: null,
+  /** What is shown without pictures. @type {{trail_s: number, colour: "speed"|"amplitude", map: boolean, whole: boolean}} */
+  lookOptions: { trail_s: 2, colour: "amplitude", map: true, whole: true },
+  placementSummary: "",
+  /** @type {import("./messages.js").Figure[]} */ placementFigures: [],
   /** @type {Shown|null} */ shown: null,
   /** The frame asked for; the one on screen is `shown`. */ cursor: 0,
   /** @type {string|null} */ selected: null,

@@ -38,9 +38,10 @@ function drawRecording() {
   if (!recording) return;
   get("recording-name").textContent = recording.name;
   const picture = `${recording.width_px} × ${recording.height_px} px`;
-  get("recording-topics").replaceChildren(...recording.sensors.map(sensorFact), fact("picture", picture, `Size of every frame: ${picture}`));
+  const size = recording.has_pictures ? [fact("picture", picture, `Size of every frame: ${picture}`)] : [];
+  get("recording-topics").replaceChildren(...recording.sensors.map(sensorFact), ...size);
   get("status-right").textContent = `cocalib ${recording.version}`;
-  get("status-right").dataset.hint = `Every click is saved immediately in\n${recording.session.folder}`;
+  get("status-right").dataset.hint = recording.has_pictures ? `Every click is saved immediately in\n${recording.session.folder}` : "Nothing is saved: there are no pictures to click in.";
 }
 
 /** @param {string} name @param {string} value @param {string} hint */
@@ -60,16 +61,17 @@ function sensorFact(sensor) {
 function drawStatus() {
   const view = state.view;
   get("connection").classList.toggle("off", !state.connected);
-  get("connection").dataset.hint = state.connected ? "Connected. Every click is saved to disk immediately." : "Not connected.";
+  get("connection").dataset.hint = state.connected ? "Connected." + (state.looking ? "" : " Every click is saved to disk immediately.") : "Not connected.";
   get("connection").dataset.stage = view?.stage ?? "collecting";
   const opening = state.opening;
-  const words = opening || !view ? [opening?.problem || opening?.doing || "Opening the recording…"] : [...followWords(), view.status, nextWords()].filter(Boolean);
+  const found = state.looking ? [state.placementSummary, view?.status ?? ""].filter(Boolean) : null;
+  const words = found?.length ? found : opening || !view ? [opening?.problem || opening?.doing || "Opening the recording…"] : [...followWords(), view.status, nextWords()].filter(Boolean);
   get("status-text").textContent = words.join("  ·  ");
   get("status-text").dataset.hint = [...words, view?.stage === "unsolvable" ? view.hint : ""].filter(Boolean).join("\n");
   const undo = /** @type {HTMLButtonElement} */ (get("undo"));
   const redo = /** @type {HTMLButtonElement} */ (get("redo"));
-  undo.disabled = !view?.can_undo;
-  redo.disabled = !view?.can_redo;
+  undo.disabled = state.looking || !view?.can_undo;
+  redo.disabled = state.looking || !view?.can_redo;
   const progress = state.progress;
   const running = progress !== null && progress.done < progress.total;
   const reading = opening !== null && !opening.problem;

@@ -43,6 +43,7 @@ export function drawSteps() {
 const key = (name) => make("span", "key", name);
 
 function drawGuide() {
+  if (state.looking) return; // looking.js says what is there
   const words = state.shown ? (state.playing ? null : advice(state.shown.index)) : opening();
   guide.hidden = !words;
   if (!words) return;

@@ -88,7 +88,8 @@ function explain(event) {
   const lines = [`${seconds.toFixed(2)} s`];
   if (click) lines.push(`${click.id} · ${click.residual_px === null ? click.state : `${click.residual_px.toFixed(1)} px`}`);
   if (number >= 0) {
-    const { range_m, start_s, end_s } = state.placements[number];
+    const { range_m, start_s, end_s, note } = state.placements[number];
+    if (note) lines.push(note);
     lines.push(`placement ${number + 1}: ${range_m.toFixed(1)} m away, ${(end_s - start_s).toFixed(1)} s long`);
   }
   showTip(lines.join("\n"), event.clientX, event.clientY - 10);

@@ -35,6 +35,8 @@ class PictureRecording:
     image_clock: str | None = "header"
     radar_axes: str | None = None
     video_start: str | None = None
+    radar_topics: tuple[str, ...] = ("/radar",)
+    radar_choice: str = ""
     radar_frame: str = "radar"
     camera_frame: str = "camera_optical"
     topics: tuple[Any, ...] = ()

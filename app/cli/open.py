@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import hashlib
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -26,6 +27,7 @@ from calib_core.recordings import AwaitedRecording, Recording, RecordingOptions
 if TYPE_CHECKING:
     from app.session.file import FoundFolder
     from app.web.port.serving import Service
+    from app.workspace import Workspace
 
 __all__ = ["Demo", "Open"]
 
@@ -168,15 +170,23 @@ def _serve(
     admissions = session or recording_session_folder(paths)
     awaited = AwaitedRecording(paths, topics) if follow else None
     with _service(paths, topics, serving, name, admissions, follow=follow) as service, ExitStack() as stack:
-        opened = _awaited(awaited, service, name) if awaited is not None else open_recording(paths, topics)
+        opened = (
+            _awaited(awaited, service, name)
+            if awaited is not None
+            else open_recording(paths, topics, require=("radar",))
+        )
         recording = stack.enter_context(opened)
+        if not len(recording.image_times):
+            _require_nothing_to_calibrate(recording, camera_file, calibration_file, clicks_file)
+        if recording.radar_choice:
+            print(f"radar: {recording.radar_choice}")
         camera = _camera(recording, camera_file, calibration_file)
-        reference = reference_from(calibration_file, camera) if calibration_file else None
+        reference = reference_from(calibration_file, camera) if calibration_file and camera else None
         found = _session_folder(session, paths, recording, name, fresh=fresh)
         workspace = open_workspace(
             recording, camera=camera, session_folder=found.path, name=name, reference=reference, warnings=found.warnings
         )
-        stack.callback(workspace.close)
+        stack.push(partial(_close, workspace))
         for warning in workspace.restored.warnings:
             print(f"{sentence(warning.message)} {sentence(warning.hint)}")
         if options is not None and options != CalibrationOptions():
@@ -227,6 +237,13 @@ def _session_folder(
     return FoundFolder(folder)
 
 
+def _close(workspace: "Workspace", kind: type[BaseException] | None, *_: object) -> None:
+    """Close the workspace; if an error ends the program, print whether the clicks are where they should be."""
+    closed = workspace.close()
+    if kind is not None and closed.fault:
+        print(f"cocalib: {closed.note}", file=sys.stderr)
+
+
 def _service(
     paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str, session: Path, *, follow: bool
 ) -> "Service":
@@ -267,12 +284,37 @@ def _require_given(*files: Path | None) -> None:
             raise InputError(f"{path}: no such file; check the path")
 
 
-def _camera(recording: Recording, camera_file: Path | None, calibration_file: Path | None) -> Camera:
-    """Return the intrinsics: from the file, else from the recording, else from the calibration to show.
+def _require_nothing_to_calibrate(recording: Recording, *files: Path | None) -> None:
+    """Say that there is no camera; refuse files that need one.
+
+    Raises:
+        InputError: a file of intrinsics, of a calibration or of clicks was given.
+    """
+    name, found = recording.paths[0].name, _unusable_pictures(recording)
+    needless = [path for path in files if path is not None]
+    if needless:
+        raise InputError(
+            f"{name}: no pictures{found}, so {needless[0]} cannot be used; give the camera's recording as well"
+        )
+    print(f"{name}: no pictures{found}: showing the radar only. To calibrate, give the camera's recording as well.")
+
+
+def _unusable_pictures(recording: Recording) -> str:
+    """Return which image topics cannot be used and why, in brackets; "" if there are none."""
+    problems = [
+        f"{topic.name}: {topic.problem or 'has no messages'}" for topic in recording.topics if topic.kind == "image"
+    ]
+    return f" ({'; '.join(problems)})" if problems else ""
+
+
+def _camera(recording: Recording, camera_file: Path | None, calibration_file: Path | None) -> Camera | None:
+    """Return the intrinsics: from the file, else from the recording, else from the calibration to show; None without pictures.
 
     Raises:
         InputError: there are none.
     """
+    if not len(recording.image_times):
+        return None
     if camera_file is None and calibration_file is not None and recording.camera() is None:
         picture = recording.image_bytes(0)
         found = camera_in(calibration_file, picture.width_px, picture.height_px)

@@ -30,6 +30,7 @@ class TopicFlags(RecordingOptions):
     confirm_assumptions: Annotated[bool, called()] = same(RecordingOptions, "confirm_assumptions")
     video_start: Annotated[str | None, called("TIME")] = same(RecordingOptions, "video_start")
     time_zone: Annotated[str | None, called("OFFSET")] = same(RecordingOptions, "time_zone")
+    radar_start: Annotated[str | None, called("TIME[,SECONDS]")] = same(RecordingOptions, "radar_start")
 
 
 Topics: TypeAlias = Annotated[TopicFlags, tyro.conf.arg(name="")]

@@ -1,6 +1,7 @@
 """`cocalib solve`: calibrate without a browser."""
 
 import dataclasses
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -96,6 +97,8 @@ class Solve:
         clicks = read_clicks(read_text(clicks_path), source=str(clicks_path))
         with open_recording(self.recording, self.topics) as recording:
             _require_confirmed(recording)
+            if recording.radar_choice:
+                print(f"radar: {recording.radar_choice}", file=sys.stderr)
             camera = required_camera(recording, self.camera)
             _require_inside(clicks, recording, camera, source=clicks_path)
             clicks = told_clicks_at_frames(clicks, recording, source=str(clicks_path))

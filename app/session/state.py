@@ -26,6 +26,7 @@ class RecordingFacts:
         height_px: rows of a frame.
         radar_axes: what the user specified about the radar's axes and units; None if nothing.
         radar_times: (k,) stamps of the radar's scans [ns], ascending; they identify a recording without frames.
+        radar_topics: all topics of the radar.
     """
 
     name: str
@@ -34,10 +35,21 @@ class RecordingFacts:
     height_px: int
     radar_axes: str | None = None
     radar_times: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    radar_topics: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("image_times", "radar_times"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), (None,), dtype=np.int64))
+
+    @property
+    def has_pictures(self) -> bool:
+        """Whether there are frames to click in."""
+        return len(self.image_times) > 0
+
+    @property
+    def moments(self) -> TimesNs:
+        """The stamps (m,) that can be looked at [ns]: of the frames, or of the radar scans if there are no frames."""
+        return self.image_times if self.has_pictures else self.radar_times
 
     def frame_at(self, time: TimeNs) -> int | None:
         """Return the index of the frame with exactly this stamp; None when no frame has it."""

@@ -13,6 +13,11 @@ from calib_core.results import Calibration, DataWarning
 
 __all__ = ["view"]
 
+_WITHOUT_PICTURES = (
+    "No camera in this recording: nothing can be clicked",
+    "Add the camera's file to calibrate: cocalib open RADAR CAMERA.",
+)
+
 
 def view(history: History, facts: RecordingFacts, reference: Reference | None = None) -> View:
     """Return everything there is to draw about the current session.
@@ -27,7 +32,7 @@ def view(history: History, facts: RecordingFacts, reference: Reference | None = 
     calibration = outcome if isinstance(outcome, Calibration) else None
     shown = shown_calibration(session, reference)
     stage = _stage(session)
-    status, hint = _words(session, stage, reference)
+    status, hint = _words(session, stage, reference) if facts.has_pictures else _WITHOUT_PICTURES
     return View(
         revision=session.revision,
         stage=stage,

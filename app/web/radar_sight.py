@@ -8,17 +8,20 @@ import numpy as np
 from app.session import Session
 from app.solving import RadarSource
 from app.view import Reference, shown_calibration
-from app.web.messages import Overlay, OverlayReturn
-from calib_core.arrays import Flags, Points3
+from app.web.messages import Overlay, OverlayReturn, RadarLook, RadarReturn
+from calib_core.arrays import Flags, Indices, Points3
 from calib_core.association.gating import static_returns
 from calib_core.association.placements import Placement
-from calib_core.measurements import RadarScan, TimeNs
+from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import CalibrationOptions, GatingOptions
 from calib_core.results import Calibration
 
-__all__ = ["RadarSight", "overlay_of", "still_returns"]
+__all__ = ["RadarSight", "look_of", "overlay_of", "shown_rows", "still_returns"]
 
 _NEAREST_WITHIN_S = 0.3
+_MOST_RETURNS = 4000
+"""So many returns are shown from above at most; of more, every other or every tenth and so on."""
+_MARGIN_S = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +35,13 @@ class RadarSight:
         scans = self.recording.radar_scans_around([time], _NEAREST_WITHIN_S)
         return _finite(scans.scan(scans.nearest(time))) if len(scans) else None
 
+    def trail(self, time: TimeNs, length_s: float) -> RadarScans:
+        """Return the scans of the last seconds before a time, the scan at that time included."""
+        half_s = length_s / 2.0
+        middle = TimeNs(time - round(half_s * NS_PER_S))
+        around = self.recording.radar_scans_around([middle], half_s + _MARGIN_S)
+        return around.between(TimeNs(time - round(length_s * NS_PER_S)), time)
+
     def window(self, time: TimeNs, options: CalibrationOptions) -> Points3:
         """Return the static returns (n, 3) [m] of the window around a click."""
         scans = self.recording.radar_scans_around([time], options.locating.window_s / 2)
@@ -41,6 +51,41 @@ class RadarSight:
 def still_returns(scan: RadarScan, options: GatingOptions) -> Flags:
     """Return which returns are slow enough to be the reflector; without Doppler, all of them are."""
     return ~(np.abs(scan.doppler_mps) > options.max_speed_mps)
+
+
+def shown_rows(scans: RadarScans, most: int) -> Indices:
+    """Return the rows of the returns that have a position; evenly spaced ones if there are too many."""
+    rows = np.flatnonzero(np.isfinite(scans.points_radar_m).all(axis=1))
+    return rows[:: -(-len(rows) // most)] if len(rows) > most else rows
+
+
+def look_of(index: int, time: TimeNs, trail: RadarScans, options: GatingOptions) -> RadarLook:
+    """Return the returns of the last seconds, seen from above.
+
+    Args:
+        index: of the scan that is shown.
+        time: its stamp.
+        trail: the scans of these seconds.
+        options: which returns can be the reflector.
+    """
+    ages_s = (time - trail.times_ns[trail.scan_of_return()]) / NS_PER_S
+    rows = shown_rows(trail, _MOST_RETURNS)
+    still = ~(np.abs(trail.doppler_mps) > options.max_speed_mps)
+    return RadarLook(
+        index,
+        tuple(
+            RadarReturn(
+                x_m=round(float(trail.points_radar_m[row, 0]), 3),
+                y_m=round(float(trail.points_radar_m[row, 1]), 3),
+                z_m=round(float(trail.points_radar_m[row, 2]), 3),
+                doppler_mps=_number(trail.doppler_mps[row]),
+                snr_db=_number(trail.snr_db[row]),
+                static=bool(still[row]),
+                age_s=round(float(ages_s[row]), 3),
+            )
+            for row in rows
+        ),
+    )
 
 
 def overlay_of(

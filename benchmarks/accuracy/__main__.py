@@ -12,6 +12,7 @@ from benchmarks.accuracy.defects import (
     dragging,
     flat_radars,
     handedness,
+    several_topics,
     shared_errors,
     two_reflectors,
 )
@@ -29,6 +30,7 @@ TABLES: dict[str, tuple[Row, ...]] = {
     "handedness": handedness.ROWS,
     "drag": dragging.ROWS,
     "placements": two_reflectors.ROWS,
+    "topics": several_topics.ROWS,
     "wolf": crying_wolf.ROWS,
     "shared": shared_errors.ROWS,
     "clean": shared_errors.CLEAN_ROWS,
@@ -57,6 +59,7 @@ def sections(kept: Kept) -> tuple[Section, ...]:
         handedness.section(kept),
         dragging.section(kept),
         two_reflectors.section(kept),
+        several_topics.section(kept),
         efficiency.section(kept),
         efficiency.peer_section(kept),
         coverage.section(kept),

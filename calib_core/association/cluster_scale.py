@@ -14,7 +14,7 @@ from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.measurements import RadarScans
 from calib_core.radar import direction_cosines
 
-__all__ = ["cluster_scale"]
+__all__ = ["cluster_scale", "report_spread"]
 
 _LARGEST = 5.0  # times CLUSTER_SCALE
 _STEPS_PER_SIGMA = 1.75  # a cluster reaches two steps, so three and a half standard deviations
@@ -43,6 +43,22 @@ def cluster_scale(windows: Sequence[RadarScans]) -> Vector3:
     bins = np.array([_bin_width(axis) for axis in differences.T])
     steps = np.maximum(_STEPS_PER_SIGMA * scatter, _STEPS_PER_BIN * bins)
     return np.asarray(CLUSTER_SCALE * np.clip(steps, 1.0, _LARGEST))
+
+
+def report_spread(scans: RadarScans) -> Vector3 | None:
+    """Return how far apart two reports of one return can lie (3,) in range [m], u and w; None if the scans do not show it.
+
+    That is three and a half standard deviations of a single report, or a bin where positions lie on bins.
+
+    Args:
+        scans: consecutive ones; what moves between them does not count.
+    """
+    differences = _differences(scans, _MOST_SCANS)
+    if len(differences) < _LEAST_DIFFERENCES:
+        return None
+    scatter = np.median(differences, axis=0) / _MEDIAN_OF_DIFFERENCE
+    bins = np.array([_bin_width(axis) for axis in differences.T])
+    return np.asarray(CLUSTER_SCALE * np.maximum(2.0 * _STEPS_PER_SIGMA * scatter, bins))
 
 
 def _differences(static: RadarScans, most: int) -> Points3:

@@ -6,12 +6,14 @@ Averaging within a cluster does not reduce the errors of angle bins, clutter and
 """
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
 from calib_core.arrays import Flags, Points3, Values, Vector3, frozen_array
+from calib_core.association.alternatives import cluster_alternatives
 from calib_core.measurements import NS_PER_S, Candidate, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
 from calib_core.radar import covariance_from_sigma_polar, direction_cosines
@@ -47,6 +49,8 @@ class Cluster:
         returns: number of members.
         scans: number of scans they lie in.
         persistence: share of the window's scans they lie in, 0 to 1.
+        alternative_of: clusters of one window with equal numbers hold alternative positions of the same returns; -1 has no
+            alternative.
     """
 
     centre: Vector3
@@ -58,6 +62,7 @@ class Cluster:
     returns: int
     scans: int
     persistence: float
+    alternative_of: int = -1
 
     def __post_init__(self) -> None:
         for name in ("centre", "scatter", "message_sigma"):
@@ -98,8 +103,17 @@ def clusters_of(window: RadarScans, *, most: int, scale: Vector3 = CLUSTER_SCALE
     if not len(window.points_radar_m):
         return ()
     content = hashlib.blake2b()
-    for column in (window.first_return, window.points_radar_m, window.snr_db, window.sigma_polar, scale):
-        content.update(np.ascontiguousarray(column).data)
+    columns = (
+        window.first_return,
+        window.points_radar_m,
+        window.snr_db,
+        window.sigma_polar,
+        window.alternative_of,
+        scale,
+    )
+    for column in columns:
+        if column is not None:
+            content.update(np.ascontiguousarray(column).data)
     return _found_clusters(_WindowKey(window, content.digest()), most, tuple(scale.tolist()))
 
 
@@ -112,6 +126,7 @@ def _found_clusters(key: _WindowKey, most: int, scale: tuple[float, ...]) -> tup
     cells, mass = _cells(steps, amplitude)
     neighbours = ((cells[:, None] - cells[None]) ** 2).sum(axis=2) <= _NEIGHBOURS**2
     clusters: list[Cluster] = []
+    cluster_of = np.full(len(steps), -1)
     while len(clusters) < most and mass.any():
         densest = int(np.argmax(np.where(mass > 0, neighbours @ mass, 0.0)))
         around = neighbours[densest] * mass
@@ -121,8 +136,10 @@ def _found_clusters(key: _WindowKey, most: int, scale: tuple[float, ...]) -> tup
         mass[densest] = 0.0
         if members.any():
             free &= ~members
+            cluster_of[members] = len(clusters)
             clusters.append(_cluster(window, steps, amplitude, members, step))
-    return tuple(clusters)
+    alternatives = cluster_alternatives(window, cluster_of, len(clusters))
+    return tuple(replace(own, alternative_of=of) for own, of in zip(clusters, alternatives.tolist(), strict=True))
 
 
 def _amplitudes(snr_db: Values) -> Values:
@@ -198,14 +215,16 @@ def candidates_of(
             returns=clusters[k].returns,
             scans=clusters[k].scans,
             snr_db=clusters[k].snr_db,
+            alternative_of=clusters[k].alternative_of,
         )
         for k, position, sigma_polar, covariance in zip(chosen, positions, sigmas, covariances, strict=True)
     )
 
 
-def clusters_wanted(options: LocatingOptions) -> int:
-    """Return how many clusters to look for, so that novelty can still reorder them."""
-    return _CLUSTERS_PER_CANDIDATE * options.max_candidates
+def clusters_wanted(options: LocatingOptions, windows: Sequence[RadarScans]) -> int:
+    """Return how many clusters to look for, so that novelty can still reorder them; alternatives count once."""
+    alternatives = any(window.alternative_of is not None for window in windows)
+    return _CLUSTERS_PER_CANDIDATE * options.max_candidates * (2 if alternatives else 1)
 
 
 def _position(cluster: Cluster) -> Vector3:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Indices, frozen_array
+from calib_core.association.alternatives import alternative_rows
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.measurements import Candidate, Pair
 from calib_core.radar import direction_cosines
@@ -110,7 +111,11 @@ def balanced_pairs(pairs: Sequence[Pair]) -> tuple[Pair, ...]:
 
 
 def _balanced(candidates: tuple[Candidate, ...], near: int, far: int) -> tuple[Candidate, ...]:
-    both = candidates[near].score + candidates[far].score
-    scores = {near: both * _NEARER / (1.0 + _NEARER), far: both / (1.0 + _NEARER)}
+    """Divide the scores of two candidates between them; the alternatives of each share what it gets."""
+    alternatives = alternative_rows([one.alternative_of for one in candidates])
+    both = sum(candidates[k].score for k in {*alternatives[near].tolist(), *alternatives[far].tolist()})
+    scores: dict[int, float] = {}
+    for k, share in ((far, 1.0 / (1.0 + _NEARER)), (near, _NEARER / (1.0 + _NEARER))):
+        scores |= dict.fromkeys(alternatives[k].tolist(), both * share / len(alternatives[k]))
     balanced = [replace(one, score=scores.get(k, one.score)) for k, one in enumerate(candidates)]
     return tuple(sorted(balanced, key=lambda one: -one.score))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points3, TimesNs, Values, Vector3
+from calib_core.association.alternatives import first_rows, return_keys
 from calib_core.association.cluster_scale import cluster_scale
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.association.gating import static_returns
@@ -35,6 +36,7 @@ _MOST_OF_RECORDING = 0.5  # what stays longer is part of the scene
 _MARGIN_S = 1.0  # around a dwell, where the reflector is being put down or picked up
 _BEFORE_S = (0.5, 1.5)  # before a dwell's start, or after its end: scans there show that it had not begun
 _MOST_SEEDS = 4000
+_LEAST_COMMON = 0.25  # of the returns of two dwells that are alternatives
 
 
 def find_dwells(scans: RadarScans, options: GatingOptions, *, min_dwell_s: float) -> list["Dwell"]:
@@ -64,6 +66,8 @@ class _Grid:
         cosines: (n, 3) range [m], u, w.
         points_radar_m: (n, 3).
         snr_db: (n,) NaN where unknown.
+        key: (n,) as of `return_keys`.
+        listed_first: (n,) as of `first_rows`.
         cell: (3,) size of a cell.
         reach: (3,) of a dwell's returns about their median.
     """
@@ -77,6 +81,8 @@ class _Grid:
     cosines: Points3
     points_radar_m: Points3
     snr_db: Values
+    key: Indices
+    listed_first: Flags
     cell: Vector3
     reach: Vector3
 
@@ -86,6 +92,7 @@ class _Grid:
         cosines = direction_cosines(static.points_radar_m)
         cells = np.floor(cosines / (CELL * growth)).astype(np.int64)
         keys = _keys(cells)
+        keys_of_returns = return_keys(static)
         order = np.argsort(keys, kind="stable")
         unique, first = np.unique(keys[order], return_index=True)
         start_ns = static.times_ns[0] if len(static) else 0
@@ -99,6 +106,8 @@ class _Grid:
             cosines=cosines[order],
             points_radar_m=static.points_radar_m[order],
             snr_db=static.snr_db[order],
+            key=keys_of_returns[order],
+            listed_first=first_rows(keys_of_returns)[order],
             cell=CELL * growth,
             reach=_REACH * growth,
         )
@@ -164,6 +173,8 @@ class Dwell:
         reach: (3,) of its returns about their median in range [m], u and w.
         begins: the scans show that it was not there before its start.
         ends: the same after its end.
+        keys: (k,) numbers of those returns that have alternatives, which these share; ascending.
+        listed_first: share of its returns that the radar lists first among their alternatives.
     """
 
     start: TimeNs
@@ -176,6 +187,13 @@ class Dwell:
     reach: Vector3
     begins: bool
     ends: bool
+    keys: Indices
+    listed_first: float
+
+    def is_alternative_of(self, other: "Dwell") -> bool:
+        """Return whether both are the same returns, at positions of which at most one is true."""
+        common = len(np.intersect1d(self.keys, other.keys, assume_unique=True))
+        return common > _LEAST_COMMON * min(len(self.keys), len(other.keys))
 
     @property
     def weight(self) -> float:
@@ -244,6 +262,8 @@ def _checked_dwell(grid: _Grid, members: Indices, span: tuple[int, int]) -> Dwel
         reach=grid.reach,
         begins=_any_within(grid.times_s, start_s - _BEFORE_S[1], start_s - _BEFORE_S[0]),
         ends=_any_within(grid.times_s, end_s + _BEFORE_S[0], end_s + _BEFORE_S[1]),
+        keys=np.unique(grid.key[mine][grid.key[mine] >= 0]),
+        listed_first=float(grid.listed_first[mine].mean()),
     )
 
 

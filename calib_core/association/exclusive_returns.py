@@ -22,6 +22,8 @@ _MOST_EXACT = 4  # pairs in one moment; of more, the cheapest choose first
 def shared_returns(pairs: Sequence[Pair], *, window_s: float) -> Indices:
     """Label the candidates of all pairs (m,): equal labels are one return in one moment; -1 is shared with no other pair.
 
+    The alternatives of a shared return are that return too.
+
     Args:
         pairs: one per placement; candidate rows follow each other in this order.
         window_s: images closer in time than this show the same moment to the radar [s].
@@ -36,6 +38,7 @@ def shared_returns(pairs: Sequence[Pair], *, window_s: float) -> Indices:
             if (pairs[j].image_time or 0) - (pairs[i].image_time or 0) > window_s * NS_PER_S:
                 break
             _label_common(labels, pairs, first, i, j)
+    _label_alternatives(labels, pairs, owner)
     return labels
 
 
@@ -56,6 +59,16 @@ def _label_common(labels: Indices, pairs: Sequence[Pair], first: Indices, i: int
         for old in known:
             labels[labels == old] = label
         labels[[row, other]] = label
+
+
+def _label_alternatives(labels: Indices, pairs: Sequence[Pair], owner: Indices) -> None:
+    """Give the alternatives of each labelled candidate its label."""
+    of = np.array([one.alternative_of for pair in pairs for one in pair.candidates], dtype=np.int64)
+    for row in np.flatnonzero((labels >= 0) & (of >= 0)).tolist():
+        same = (owner == owner[row]) & (of == of[row])
+        for old in set(labels[same].tolist()) - {-1, int(labels[row])}:
+            labels[labels == old] = labels[row]
+        labels[same] = labels[row]
 
 
 def exclusive_rows(cost: Values, first: Indices, labels: Indices) -> Indices:

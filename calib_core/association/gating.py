@@ -19,7 +19,7 @@ def static_returns(scans: RadarScans, options: GatingOptions) -> RadarScans:
         scans: as the radar reported them.
         options: largest speed [m/s], smallest and largest range [m].
     """
-    return _keep(scans, _can_be_the_reflector(scans, options))
+    return scans.take(np.flatnonzero(_can_be_the_reflector(scans, options)))
 
 
 def _can_be_the_reflector(scans: RadarScans, options: GatingOptions) -> Flags:
@@ -28,15 +28,3 @@ def _can_be_the_reflector(scans: RadarScans, options: GatingOptions) -> Flags:
         moving = np.abs(scans.doppler_mps) > options.max_speed_mps  # False for NaN
         within = (range_m >= options.min_range_m) & (range_m <= options.max_range_m)  # False for NaN
     return within & ~moving
-
-
-def _keep(scans: RadarScans, kept: Flags) -> RadarScans:
-    kept_before = np.concatenate([[0], np.cumsum(kept)])
-    return RadarScans(
-        times_ns=scans.times_ns,
-        first_return=kept_before[scans.first_return],
-        points_radar_m=scans.points_radar_m[kept],
-        doppler_mps=scans.doppler_mps[kept],
-        snr_db=scans.snr_db[kept],
-        sigma_polar=scans.sigma_polar[kept],
-    )

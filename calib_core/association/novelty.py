@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points3, Values, Vector3
+from calib_core.association.alternatives import alternative_rows
 from calib_core.association.clustering import CLUSTER_SCALE, Cluster
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 
@@ -55,7 +56,7 @@ def scores_of(
     """Score every cluster of every window: amplitude x persistence x novelty, (k,) per window, each summing to 1.
 
     Novelty is the share of the other windows in which the place is empty. Windows that overlap show the same placement and
-    are not compared.
+    are not compared. What has alternatives was there before only if all of them were, and they share its score.
 
     Args:
         windows: those of the clicks.
@@ -73,12 +74,21 @@ def scores_of(
         others = np.ones(len(everything), dtype=np.bool_)
         others[: len(windows)] = (spans[:, 0] > spans[i, 1]) | (spans[:, 1] < spans[i, 0])
         plain = np.array([cluster.amplitude * cluster.persistence**2 for cluster in own])
-        score = plain * _novelty(places[first[i] : first[i + 1]], places, persistence, first, others)
+        alternatives = alternative_rows([cluster.alternative_of for cluster in own])
+        score = plain * _novelty(places[first[i] : first[i + 1]], places, persistence, first, others, alternatives)
+        score /= np.array([len(rows) for rows in alternatives])
         scores.append(score / score.sum() if len(score) else score)
     return tuple(scores)
 
 
-def _novelty(own: Points3, places: Points3, persistence: Values, first: Indices, others: Flags) -> Values:
+def _novelty(
+    own: Points3,
+    places: Points3,
+    persistence: Values,
+    first: Indices,
+    others: Flags,
+    alternatives: Sequence[Indices],
+) -> Values:
     """Return the novelty (k,) of each place of one window, 1 if no other window shows it.
 
     Args:
@@ -87,6 +97,7 @@ def _novelty(own: Points3, places: Points3, persistence: Values, first: Indices,
         persistence: (n,).
         first: (m + 1,) window j owns the rows first[j] to first[j + 1].
         others: (m,) the windows to compare with.
+        alternatives: for each of the k places, the rows of its alternatives, its own included.
     """
     if not len(own) or not others.any():
         return np.ones(len(own))
@@ -95,6 +106,8 @@ def _novelty(own: Points3, places: Points3, persistence: Values, first: Indices,
         ((mine[:, None] - theirs) ** 2 for mine, theirs in zip(own.T, places.T, strict=True)), start=np.zeros(1)
     )
     seen = np.maximum.reduceat((squared <= _SAME_PLACE**2) * persistence, first[filled], axis=1)
+    if any(len(rows) > 1 for rows in alternatives):
+        seen = np.array([seen[rows].min(axis=0) for rows in alternatives])
     empty = others.sum() - seen[:, others[filled]].sum(axis=1)
     share = (np.maximum(empty, 0.0) + _PSEUDO_EMPTY) / (others.sum() + _PSEUDO_EMPTY)
     return np.asarray(np.maximum(share**4, _FLOOR))

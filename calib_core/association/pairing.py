@@ -84,7 +84,7 @@ def _paired(
 ) -> tuple[list[Pair], list[tuple[ReflectorClick, RadarScans]]]:
     """Make the pairs of clicks and their windows; also return the clicks whose window is empty."""
     distinct = list({id(window): window for window in windows}.values())  # clicks of one placement share a window
-    most, scale = clusters_wanted(options.locating), cluster_scale(distinct)
+    most, scale = clusters_wanted(options.locating, distinct), cluster_scale(distinct)
     clusters, background = (
         [clusters_of(window, most=most, scale=scale) for window in some] for some in (distinct, elsewhere)
     )

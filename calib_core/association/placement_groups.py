@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Points2, Points3, Values
+from calib_core.association.alternatives import joined_labels
 from calib_core.association.clustering import CLUSTER_SCALE
 from calib_core.measurements import NS_PER_S, Candidate, Pair
 from calib_core.options import CalibrationOptions
@@ -228,7 +229,7 @@ def _pooled_candidates(clicks: Sequence[Pair]) -> tuple[Candidate, ...]:
     if all(_equal(click.candidates, clicks[0].candidates) for click in clicks):
         return clicks[0].candidates
     kept: list[list[Candidate]] = []
-    for click in clicks:
+    for click in _numbered_apart(clicks):
         known = _steps([group[0] for group in kept]) if kept else np.zeros((0, 3))
         for one, place in zip(click.candidates, _steps(click.candidates), strict=True):
             apart = ((known - place) ** 2).sum(axis=1)
@@ -236,8 +237,31 @@ def _pooled_candidates(clicks: Sequence[Pair]) -> tuple[Candidate, ...]:
                 kept[int(apart.argmin())].append(one)
             else:
                 kept.append([one])
-    pooled = [_averaged(group, len(clicks)) for group in kept]
+    labels = _pooled_alternatives(kept)
+    pooled = [replace(_averaged(group, len(clicks)), alternative_of=of) for group, of in zip(kept, labels, strict=True)]
     return tuple(sorted(pooled, key=lambda one: -one.score))
+
+
+def _numbered_apart(clicks: Sequence[Pair]) -> list[Pair]:
+    """Give the alternatives of different clicks different numbers."""
+    apart, taken = [], 0
+    for click in clicks:
+        of = [one.alternative_of for one in click.candidates]
+        candidates = [
+            replace(one, alternative_of=one.alternative_of + taken) if one.alternative_of >= 0 else one
+            for one in click.candidates
+        ]
+        apart.append(replace(click, candidates=tuple(candidates)))
+        taken += max(of) + 1
+    return apart
+
+
+def _pooled_alternatives(pooled: Sequence[Sequence[Candidate]]) -> list[int]:
+    """Number sets of copies of one return: equal numbers are alternatives according to at least one click."""
+    numbers = [{one.alternative_of for one in copies} - {-1} for copies in pooled]
+    linked = np.array([[bool(own & other) for other in numbers] for own in numbers])
+    np.fill_diagonal(linked, val=False)
+    return joined_labels(linked).tolist()
 
 
 def _equal(some: Sequence[Candidate], others: Sequence[Candidate]) -> bool:

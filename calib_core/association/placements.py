@@ -67,7 +67,8 @@ def find_placements(scans: RadarScans, options: GatingOptions, *, min_dwell_s: f
     alone = _one_at_a_time(dwells)
     typical_db = float(np.median([dwell.strength_db for dwell in alone])) if alone else 0.0
     strong = [dwell for dwell in alone if not dwell.strength_db < typical_db - _WEAKER_DB]
-    all_of_them = _without_breaks([*strong, *_at_once(dwells, strong, typical_db)])
+    kept = [_likeliest(dwell, dwells) for dwell in (*strong, *_at_once(dwells, strong, typical_db))]
+    all_of_them = _without_breaks(kept)
     return _good([_placement(dwell, typical_db) for dwell in sorted(all_of_them, key=lambda dwell: dwell.start)])
 
 
@@ -91,6 +92,14 @@ def _at_once(dwells: Sequence[Dwell], kept: Sequence[Dwell], typical_db: float) 
     return found[len(kept) :]
 
 
+def _likeliest(dwell: Dwell, dwells: Sequence[Dwell]) -> Dwell:
+    """Return the alternative of a dwell that the radar lists first in most scans; most dwells have none."""
+    if not len(dwell.keys):
+        return dwell
+    alternatives = [other for other in dwells if _overlap_s(dwell, other) > 0.0 and dwell.is_alternative_of(other)]
+    return max([dwell, *alternatives], key=lambda one: (round(one.listed_first), one.weight))
+
+
 def _heaviest_first(dwells: Sequence[Dwell]) -> list[Dwell]:
     return sorted(dwells, key=lambda dwell: (-dwell.weight, dwell.start, dwell.end))
 
@@ -109,7 +118,8 @@ def _belong_together(one: Dwell, other: Dwell) -> bool:
         )
         if shown
     ]
-    return _near(one, other, _SAME_RETURN) or (bool(together) and all(together))
+    one_return = _near(one, other, _SAME_RETURN) or one.is_alternative_of(other)
+    return one_return or (bool(together) and all(together))
 
 
 def _near(one: Dwell, other: Dwell, reaches: float) -> bool:

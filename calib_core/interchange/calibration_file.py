@@ -59,6 +59,10 @@ def _checked_name(name: str, role: str) -> str:
         raise InputError(
             f"the {role} frame is called {name!r}; use a name without control characters, quotes or any of $ ` \\ < > &"
         )
+    if {".", ".."} & set(shown.split("/")):
+        raise InputError(
+            f"the {role} frame is called {name!r}, which is a path; use a name without . and .. between slashes"
+        )
     if len(shown) > 200:
         raise InputError(f"the {role} frame's name has {len(shown)} characters; use at most 200")
     return shown
@@ -70,7 +74,9 @@ class Provenance:
 
     Attributes:
         inputs: the files it was made from.
-        radar_topic: the topic of the radar returns.
+        radar_topic: the topic of the radar returns; of several the one with the most.
+        radar_topics: all of them.
+        radar_choice: which radar was used and why, if there was a choice or it has several topics; else "".
         image_topic: the topic of the images.
         camera_info_topic: the topic of the intrinsics.
         radar_clock: which stamps the radar scans use: "header" or "receive".
@@ -89,6 +95,8 @@ class Provenance:
     radar_axes: str | None = None
     video_start: str | None = None
     version: str | None = None
+    radar_topics: tuple[str, ...] = ()
+    radar_choice: str = ""
 
 
 @dataclass(frozen=True, slots=True)

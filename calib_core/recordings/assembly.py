@@ -26,7 +26,10 @@ from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.radar.checks import about_claims
 from calib_core.recordings.radar.layouts import layouts_of_parts
 from calib_core.recordings.radar.list_messages import PointLayout
+from calib_core.recordings.radar.merged_stream import MergedStream
 from calib_core.recordings.radar.scan_stream import RadarStream
+from calib_core.recordings.radar.sensors import RadarSensor, other_azimuths
+from calib_core.recordings.radar_choice import RadarChoice, choose_radar
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.stamping import StampedTopic, read_stamps
 from calib_core.recordings.time.clock_choice import ClockChoice, choose_clock, choose_clocks
@@ -44,12 +47,14 @@ class Assembly:
     """Everything a Recording provides, under the same attribute names."""
 
     topics: tuple[TopicSummary, ...]
-    radar_topic: str | None
+    radar_topics: tuple[str, ...]
+    radar_sensors: tuple[RadarSensor, ...]
+    radar_choice: str
     image_topic: str | None
     camera_info_topic: str | None
     radar_frame: str
     camera_frame: str
-    radar: RadarStream | None
+    radar: RadarStream | MergedStream | None
     images: ImageStream | None
     camera: Camera | None
     warnings: tuple[DataWarning, ...]
@@ -58,7 +63,7 @@ class Assembly:
     @property
     def used(self) -> frozenset[str]:
         """The topics whose messages are read."""
-        return frozenset(name for name in (self.radar_topic, self.image_topic) if name is not None)
+        return frozenset((*self.radar_topics, *((self.image_topic,) if self.image_topic is not None else ())))
 
     @property
     def clocks(self) -> Mapping[str, Literal["header", "receive"]]:
@@ -95,35 +100,40 @@ def assemble(
     axes = None if options.radar_axes is None else parse_radar_axes(options.radar_axes)
     inventory = Inventory(name, topics, {topic.name: usage_of(topic).read_as(axes) for topic in topics})
     selection = select(inventory, options, require)
-    selection, stamped, lost = _stamped(selection, inventory)
-    clocks, stamps, about_choice = _clocks(stamped, inventory, options, before)
-    warnings.extend([*lost, *about_choice])
-    heads = {name: both.heads for name, both in stamped.items()}
-    radar = _radar_stream(selection.radar, inventory, stamps, heads)
-    images, about_pictures = frames_of_one_size(_image_stream(selection.image, inventory, stamps))
+    stamped = _stamped(selection, inventory)
+    choice = _radar_choice(selection, stamped, inventory)
+    used = _used(selection, choice, stamped)
+    lost = [warning for topic in used.all for warning in about_lost(topic.name, len(topic), stamped[topic.name])]
+    used = used.readable(stamped)
+    clocks, stamps, about_choice = _clocks(used, stamped, inventory, options, before)
+    warnings.extend([*lost, *choice.warnings, *about_choice])
+    radar = _radar_stream(used, choice, inventory, stamps, stamped)
+    images, about_pictures = frames_of_one_size(_image_stream(used.image, inventory, stamps))
     if before is not None:
         return replace(before, radar=radar, images=images)
     warnings.extend(about_pictures)
     zoneless = {s.channel.topic for s in sources if isinstance(s, PlainSource) and s.zoneless}
     warnings.extend(check_overlap(name, radar, images, required=len(require) == 2, zoneless=zoneless))
-    diagnoses = _diagnoses(stamped, (radar, images), clocks, inventory, options)
+    diagnoses = _diagnoses(stamped, (*(radar.parts if radar else ()), images), clocks, inventory, options)
     warnings.extend(about_clocks(list(diagnoses.values())))
     camera, about_camera = recorded_camera(selection.camera_info, images)
     beside = _camera_beside(sources, selection)
     if beside is not None and images is not None:
         camera, about_camera = published_camera(beside, images)
     warnings.extend(
-        [*about_camera, *about_radar(radar), *about_claims(radar), *about_images(images), *about_video(images)]
+        [*about_camera, *about_radar(radar), *_about_claims(radar), *about_images(images), *about_video(images)]
     )
-    assumptions = _unconfirmed(sources, selection, options)
+    assumptions = _unconfirmed(sources, used, options)
     warnings.extend(about_assumptions(assumptions))
     return Assembly(
-        topics=tuple(_summary(topic, inventory, selection, stamps, diagnoses.get(topic.name)) for topic in topics),
-        radar_topic=selection.radar.name if selection.radar else None,
-        image_topic=selection.image.name if selection.image else None,
-        camera_info_topic=selection.camera_info.name if selection.camera_info else str(beside.file) if beside else None,
-        radar_frame=_frame(selection.radar),
-        camera_frame=_frame(selection.image) or _frame(selection.camera_info),
+        topics=tuple(_summary(topic, inventory, used, stamps, diagnoses.get(topic.name)) for topic in topics),
+        radar_topics=tuple(topic.name for topic in used.radars),
+        radar_sensors=choice.sensors,
+        radar_choice=choice.reason,
+        image_topic=used.image.name if used.image else None,
+        camera_info_topic=used.camera_info.name if used.camera_info else str(beside.file) if beside else None,
+        radar_frame=_frame(used.radars[0]) if used.radars else "",
+        camera_frame=_frame(used.image) or _frame(used.camera_info),
         radar=radar,
         images=images,
         camera=camera,
@@ -141,25 +151,60 @@ def _camera_beside(sources: Sequence[Source], selection: Selection) -> FolderCam
     return next((source.camera for source in mine), None)
 
 
-def _unconfirmed(sources: Sequence[Source], selection: Selection, options: RecordingOptions) -> tuple[Assumption, ...]:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Used:
+    """The topics in use: the radar's, the first one with the most returns, and the camera's."""
+
+    radars: tuple[Topic, ...]
+    image: Topic | None
+    camera_info: Topic | None
+
+    @property
+    def all(self) -> tuple[Topic, ...]:
+        """Those of the radar and the camera."""
+        return (*self.radars, *((self.image,) if self.image is not None else ()))
+
+    def readable(self, stamped: Mapping[str, StampedTopic]) -> "_Used":
+        """Leave out the unreadable messages."""
+        radars = tuple(stamped[topic.name].topic for topic in self.radars)
+        return replace(self, radars=radars, image=stamped[self.image.name].topic if self.image else None)
+
+
+def _used(selection: Selection, choice: RadarChoice, stamped: Mapping[str, StampedTopic]) -> _Used:
+    """Keep the topics of the chosen radar; without a choice, the only one."""
+    by_name = {topic.name: topic for topic in selection.radars}
+    names = choice.sensors[0].topics if choice.sensors else tuple(topic.name for topic in selection.radars[:1])
+    return _Used(tuple(by_name[name] for name in names), selection.image, selection.camera_info)
+
+
+def _unconfirmed(sources: Sequence[Source], used: _Used, options: RecordingOptions) -> tuple[Assumption, ...]:
     """Return what the files of the topics in use do not state and the user has not confirmed."""
     if options.confirm_assumptions:
         return ()
-    used = {topic.name for topic in (selection.radar, selection.image) if topic is not None}
-    return tuple(one for source in sources for one in source.assumptions if one.topic in used)
+    names = {topic.name for topic in used.all}
+    return tuple(one for source in sources for one in source.assumptions if one.topic in names)
 
 
-def _stamped(
-    selection: Selection, inventory: Inventory
-) -> tuple[Selection, Mapping[str, StampedTopic], list[DataWarning]]:
-    """Read the stamps of the topics in use; skip unreadable messages, with a warning."""
-    used = [topic for topic in (selection.radar, selection.image) if topic is not None]
-    stamped = read_stamps([(topic, _head_bytes(inventory.usages[topic.name])) for topic in used])
-    by_name = {topic.name: both for topic, both in zip(used, stamped, strict=True)}
-    lost = [warning for topic in used for warning in about_lost(topic.name, len(topic), by_name[topic.name])]
-    radar = by_name[selection.radar.name].topic if selection.radar else None
-    image = by_name[selection.image.name].topic if selection.image else None
-    return replace(selection, radar=radar, image=image), by_name, lost
+def _stamped(selection: Selection, inventory: Inventory) -> Mapping[str, StampedTopic]:
+    """Read the stamps of the topics to choose from, by name."""
+    wanted = [*selection.radars, *((selection.image,) if selection.image is not None else ())]
+    stamped = read_stamps([(topic, _head_bytes(inventory.usages[topic.name])) for topic in wanted])
+    return {topic.name: both for topic, both in zip(wanted, stamped, strict=True)}
+
+
+def _radar_choice(selection: Selection, stamped: Mapping[str, StampedTopic], inventory: Inventory) -> RadarChoice:
+    """Compare the radar topics, each by its own clock, and choose those of one radar."""
+    streams, frames = [], []
+    for topic in selection.radars if len(selection.radars) > 1 else ():
+        both = stamped[topic.name]
+        if selection.radar_named:
+            about_lost(topic.name, len(topic), both)  # what the user named must be readable
+        if len(both.topic):
+            stamps = Stamps(topic.name, both.topic.receive_ns, both.header_ns)
+            times_ns = _times(stamps, choose_clock(stamps).clocks[0])
+            streams.append(_topic_stream(both.topic, inventory, times_ns, both.heads))
+            frames.append(_frame(both.topic))
+    return choose_radar(streams, frames, inventory, selection)
 
 
 def _head_bytes(usage: Usage) -> int:
@@ -171,22 +216,29 @@ def _both_clocks(both: StampedTopic, inventory: Inventory) -> Stamps:
 
 
 def _clocks(
-    stamped: Mapping[str, StampedTopic], inventory: Inventory, options: RecordingOptions, before: Assembly | None
+    used: _Used,
+    stamped: Mapping[str, StampedTopic],
+    inventory: Inventory,
+    options: RecordingOptions,
+    before: Assembly | None,
 ) -> tuple[Mapping[str, Literal["header", "receive"]], Mapping[str, TimesNs], tuple[DataWarning, ...]]:
-    """Choose the clock of each topic in use, the radar first; return clocks and times by topic, and warnings."""
-    read = [_both_clocks(both, inventory) for both in stamped.values()]
+    """Choose the clock of the radar, all of whose topics share it, and of the camera; return clocks and times by topic."""
+    read = {topic.name: _both_clocks(stamped[topic.name], inventory) for topic in used.all}
     if options.clock == "header":
-        for both in read:
+        for both in read.values():
             if both.header_ns is None:
                 raise RecordingError(f"topic {both.topic} has no stamps; use the receive times: --clock receive")
+    sensors = [read[topic.name] for topic in (*used.radars[:1], *((used.image,) if used.image is not None else ()))]
     if before is not None:
-        choice = ClockChoice(tuple(before.clocks[name] for name in stamped), ())
-    elif len(read) == 2:
-        choice = choose_clocks(read[0], read[1], options.clock)
+        choice = ClockChoice(tuple(before.clocks[both.topic] for both in sensors), ())
+    elif len(sensors) == 2:
+        choice = choose_clocks(sensors[0], sensors[1], options.clock)
     else:
-        choice = choose_clock(read[0], options.clock) if read else ClockChoice((), ())
-    clocks = dict(zip(stamped, choice.clocks, strict=True))
-    stamps = {both.topic: _times(both, clock) for both, clock in zip(read, choice.clocks, strict=True)}
+        choice = choose_clock(sensors[0], options.clock) if sensors else ClockChoice((), ())
+    clocks = dict(zip((both.topic for both in sensors), choice.clocks, strict=True))
+    for topic in used.radars[1:]:
+        clocks[topic.name] = clocks[used.radars[0].name]
+    stamps = {name: _times(both, clocks[name]) for name, both in read.items()}
     return clocks, stamps, choice.warnings
 
 
@@ -224,13 +276,33 @@ def _times(both: Stamps, clock: str) -> TimesNs:
 
 
 def _radar_stream(
-    topic: Topic | None, inventory: Inventory, stamps: Mapping[str, TimesNs], heads: Mapping[str, np.ndarray]
-) -> RadarStream | None:
-    first = inventory.usages[topic.name].radar if topic is not None else None
-    if topic is None or first is None:
-        return None
+    used: _Used,
+    choice: RadarChoice,
+    inventory: Inventory,
+    stamps: Mapping[str, TimesNs],
+    stamped: Mapping[str, StampedTopic],
+) -> RadarStream | MergedStream | None:
+    """Build the stream of the radar in use, of one topic or of several."""
+    parts = [_topic_stream(topic, inventory, stamps[topic.name], stamped[topic.name].heads) for topic in used.radars]
+    repeats = list(choice.sensors[0].repeats) if choice.sensors else list(range(len(parts)))
+    for place, part in enumerate(tuple(parts)):
+        others = other_azimuths(part)
+        parts.extend(others)
+        repeats.extend([repeats[place]] * len(others))
+    if len(parts) < 2:
+        return parts[0] if parts else None
+    return MergedStream(parts, repeats)
+
+
+def _topic_stream(topic: Topic, inventory: Inventory, times_ns: TimesNs, heads: np.ndarray) -> RadarStream:
+    first = inventory.usages[topic.name].radar
+    assert first is not None, "a topic to choose from has a layout"
     layouts = layouts_of_parts(first, [topic.definition(number) for number in range(len(topic.parts))])
-    return RadarStream(topic, layouts, stamps[topic.name], heads[topic.name])
+    return RadarStream(topic, layouts, times_ns, heads)
+
+
+def _about_claims(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
+    return [warning for part in (radar.parts if radar else ()) for warning in about_claims(part)]
 
 
 def _image_stream(topic: Topic | None, inventory: Inventory, stamps: Mapping[str, TimesNs]) -> ImageStream | None:
@@ -256,7 +328,7 @@ def _frame(topic: Topic | None) -> str:
 def _summary(
     topic: Topic,
     inventory: Inventory,
-    selection: Selection,
+    used: _Used,
     stamps: Mapping[str, TimesNs],
     diagnosis: ClockDiagnosis | None,
 ) -> TopicSummary:
@@ -272,7 +344,7 @@ def _summary(
         end=Stamp.of(TimeNs(int(times.max()))) if len(times) else None,
         clock=diagnosis.chosen if diagnosis else "receive",
         problem=usage.problem,
-        chosen=any(t and t.name == topic.name for t in (selection.radar, selection.image, selection.camera_info)),
+        chosen=any(t and t.name == topic.name for t in (*used.all, used.camera_info)),
         layout=usage.radar.description if usage.radar else "",
         rate_hz=rhythm.rate_hz,
         longest_gap_s=rhythm.longest_gap_s,

@@ -8,6 +8,7 @@ from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.camera.image_stream import ImageStream
+from calib_core.recordings.radar.merged_stream import MergedStream
 from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.stamping import StampedTopic
 from calib_core.recordings.time.dates import utc
@@ -40,7 +41,7 @@ def about_lost(name: str, count: int, stamped: StampedTopic) -> list[DataWarning
 
 def check_overlap(
     name: str,
-    radar: RadarStream | None,
+    radar: RadarStream | MergedStream | None,
     images: ImageStream | None,
     *,
     required: bool,
@@ -94,7 +95,7 @@ def _interval(times_ns: TimesNs) -> str:
     return f"{utc(TimeNs(int(times_ns[0])))} to {utc(TimeNs(int(times_ns[-1])))}"
 
 
-def about_radar(radar: RadarStream | None) -> list[DataWarning]:
+def about_radar(radar: RadarStream | MergedStream | None) -> list[DataWarning]:
     """Warn if the radar looks like a lidar or measures no elevation, judging by a dozen scans."""
     if radar is None:
         return []

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from calib_core.measurements import Stamp
+from calib_core.recordings.radar.sensors import RadarSensor
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.summary import (
     CameraSummary,
@@ -37,6 +38,7 @@ def summary_text(summary: RecordingSummary) -> str:
         "",
         *_labelled("clocks", _clocks(summary.topics)),
         *_labelled("radar", _radar(summary.radar)),
+        *_labelled("radars", _sensors(summary)),
         *_labelled("camera", _camera(summary.camera)),
     ]
     if summary.warnings:
@@ -143,10 +145,39 @@ def _radar(radar: RadarSummary | None) -> list[str]:
     gap = "" if radar.longest_gap_s is None else f", longest gap {radar.longest_gap_s:.3f} s"
     sample = "" if radar.sampled_scans >= radar.scans else f", from {radar.sampled_scans} scans"
     return [
-        f"{radar.topic}, frame '{radar.frame}': {_counted(radar.scans, 'scan')}{rate}{gap}",
+        f"{' + '.join(radar.topics)}, frame '{radar.frame}': {_counted(radar.scans, 'scan')}{rate}{gap}",
         f"returns per scan: {middle:.0f} ({low} to {high}{sample})",
         radar.layout,
+        *([f"other azimuths of the same returns: {', '.join(radar.other_azimuths)}"] if radar.other_azimuths else []),
     ]
+
+
+def _sensors(summary: RecordingSummary) -> list[str]:
+    """List the radars and their figures if there are several or one has several topics, and why one is used."""
+    if summary.radar is None or not summary.radar.choice:
+        return []
+    rows = [("used", "radar", "frame", "returns a scan", "rate", "range", "static", "topics")]
+    for place, sensor in enumerate(summary.sensors):
+        figures = sensor.figures
+        rows.append(
+            (
+                "" if place else "yes",
+                sensor.name,
+                sensor.frame,
+                f"{figures.returns_per_scan:.0f}",
+                "" if figures.rate_hz is None else f"{figures.rate_hz:.1f} Hz",
+                f"{figures.nearest_m:.1f} to {figures.farthest_m:.1f} m",
+                "no Doppler" if figures.static_share is None else f"{100.0 * figures.static_share:.0f} %",
+                _topics_of(sensor),
+            )
+        )
+    return [*_columns(rows, right={3, 4, 5, 6}), summary.radar.choice]
+
+
+def _topics_of(sensor: RadarSensor) -> str:
+    second = [f"{name} (other azimuths)" for place, name in enumerate(sensor.topics) if sensor.repeats[place] != place]
+    own = [name for place, name in enumerate(sensor.topics) if sensor.repeats[place] == place]
+    return ", ".join([*own, *second, *(f"{name} (the same returns, not read)" for name in sensor.copies)])
 
 
 def _camera(camera: CameraSummary | None) -> list[str]:

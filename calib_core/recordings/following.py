@@ -129,7 +129,7 @@ class FollowedRecording(Recording):
         self._files = files
         self._options = replace(
             options,
-            radar_topic=assembly.radar_topic,
+            radar_topic=",".join(assembly.radar_topics),
             image_topic=assembly.image_topic,
             camera_info_topic=options.camera_info_topic,
         )

@@ -22,8 +22,11 @@ from calib_core.recordings.containers.opening import open_sources
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.plain_files.opening import files_behind, open_plain_sources
 from calib_core.recordings.plain_files.reading_options import PlainOptions
+from calib_core.recordings.plain_files.ti_uart import open_uart_streams
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 from calib_core.recordings.radar.axes import parse_radar_axes
+from calib_core.recordings.radar.merged_stream import MergedStream
+from calib_core.recordings.radar.sensors import RadarSensor, figures_of
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.time.written_dates import parse_zone
 from calib_core.recordings.topics import TopicSummary
@@ -44,7 +47,9 @@ class Recording:
         paths: as given.
         sources: the files behind them.
         topics: every topic; those in use are marked as chosen.
-        radar_topic: the radar topic in use, if any.
+        radar_topic: the radar topic in use, if any; of several the one with the most returns.
+        radar_topics: all topics of the radar in use.
+        radar_choice: which radar is used and why, if there was a choice or it has several topics; else "".
         image_topic: the image topic in use, if any.
         camera_info_topic: the camera-info topic in use, if any.
         radar_frame: frame_id of the radar, without a leading slash; "" if unknown.
@@ -63,7 +68,9 @@ class Recording:
         self._closed = threading.Event()
         self._fingerprint: tuple[InputFile, ...] = ()
         self.topics: tuple[TopicSummary, ...] = assembly.topics
-        self.radar_topic = assembly.radar_topic
+        self.radar_topics = assembly.radar_topics
+        self.radar_topic = assembly.radar_topics[0] if assembly.radar_topics else None
+        self.radar_choice = assembly.radar_choice
         self.image_topic = assembly.image_topic
         self.camera_info_topic = assembly.camera_info_topic
         self.radar_frame = assembly.radar_frame
@@ -126,16 +133,34 @@ class Recording:
     def warnings(self) -> tuple[DataWarning, ...]:
         """What the user must know, including unreadable messages and damage found so far."""
         found = (*self._assembly.warnings, *(late for source in self.sources for late in source.later_warnings))
+        return (*found, *self._unreadable())
+
+    def _unreadable(self) -> Iterator[DataWarning]:
+        """Warn about radar messages that could not be read so far."""
+        for part in self._assembly.radar.parts if self._assembly.radar else ():
+            if part.unreadable:
+                row, why = next(iter(sorted(part.unreadable.items())))
+                yield DataWarning(
+                    "unreadable-messages",
+                    f"{len(part.unreadable)} radar messages could not be read and count as empty; "
+                    f"the first is number {row}: {why}",
+                    "if there are many, copy the file again from its source",
+                )
+
+    @property
+    def other_azimuths(self) -> tuple[str, ...]:
+        """The topics or columns with other azimuths of the radar's returns, of which at most one is true."""
         radar = self._assembly.radar
-        if radar is None or not radar.unreadable:
-            return found
-        row, why = next(iter(sorted(radar.unreadable.items())))
-        unreadable = DataWarning(
-            "unreadable-messages",
-            f"{len(radar.unreadable)} radar messages could not be read and count as empty; the first is number {row}: {why}",
-            "if there are many, copy the file again from its source",
-        )
-        return (*found, unreadable)
+        return radar.other_azimuths if isinstance(radar, MergedStream) else ()
+
+    @property
+    def radar_sensors(self) -> tuple[RadarSensor, ...]:
+        """The radars that were compared, the one in use first, with their figures; reads a sample if there is only one."""
+        radar = self._assembly.radar
+        if self._assembly.radar_sensors or radar is None:
+            return self._assembly.radar_sensors
+        name = radar.topic.name
+        return (RadarSensor(name, (name,), (0,), (), self.radar_frame, figures_of(radar.parts[0])),)
 
     def image_bytes(self, index: int) -> EncodedImage:
         """Return a frame as an image file: the recorded JPEG or PNG, or raw pixels encoded as JPEG.
@@ -262,9 +287,11 @@ def open_recording(
     """
     chosen = (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
     options = options or RecordingOptions()
-    plain, others = open_plain_sources(require_files(chosen), _plain_options(options))
-    sources: tuple[Source, ...] = plain
+    streams, rest = open_uart_streams(require_files(chosen), options.radar_start)
+    sources: tuple[Source, ...] = streams
     try:
+        plain, others = open_plain_sources(rest, _plain_options(options)) if rest else ((), ())
+        sources = plain = (*streams, *plain)
         sources = (*(open_sources(others) if others else ()), *plain)
         return Recording(chosen, sources, _assembled(chosen, sources, options, require), options.video_start)
     except BaseException:

@@ -11,12 +11,24 @@ from calib_core.recordings.time.clock_choice import Clock
 from calib_core.recordings.topics import Topic, TopicKind
 from calib_core.recordings.usages import Usage
 
-__all__ = ["Inventory", "Need", "RecordingOptions", "Selection", "select", "select_image"]
+__all__ = [
+    "Inventory",
+    "Need",
+    "RecordingOptions",
+    "Selection",
+    "holds_objects",
+    "radar_rank",
+    "select",
+    "select_image",
+    "unknown_radar",
+]
 
 Need = Literal["radar", "image"]
 _WORDS = {"radar": "radar", "image": "camera image", "camera-info": "camera info"}
 _FLAGS = {"radar": "--radar-topic", "image": "--image-topic", "camera-info": "--camera-info-topic"}
 _RADAR_WORDS = ("radar", "mmwave", "ars4", "ars5", "srr", "umrr", "esr", "oculii")
+_OBJECT_WORDS = ("object", "track")
+_MOST_RADARS = 12  # that are compared
 _NOT_PICTURES = ("depth", "disparity", "mask", "infra", "debug")
 
 
@@ -24,7 +36,11 @@ _NOT_PICTURES = ("depth", "disparity", "mask", "infra", "debug")
 class RecordingOptions:
     """How to open a recording."""
 
-    radar_topic: str | None = option(None, "The radar's topic; chosen automatically if not given.")
+    radar_topic: str | None = option(
+        None,
+        "The radar's topic, several of one radar joined by commas, or a radar's name as printed by `cocalib info`; chosen "
+        "automatically if not given.",
+    )
     image_topic: str | None = option(None, "The camera's image topic; chosen automatically if not given.")
     camera_info_topic: str | None = option(
         None, "The topic with the camera's intrinsics; by default, the one next to the image topic."
@@ -47,6 +63,10 @@ class RecordingOptions:
     )
     time_zone: str | None = option(
         None, "Time zone of dates in file names and columns that state none, such as +02:00; UTC if not given."
+    )
+    radar_start: str | None = option(
+        None,
+        "Time of the first frame of a TI data-port stream, as --video-start; after a comma, the seconds between frames.",
     )
     clock: Clock = option(
         "auto",
@@ -86,9 +106,19 @@ class Inventory:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Selection:
-    """The topics in use, None for each that is missing."""
+    """The topics to choose from or in use, None for each that is missing.
 
-    radar: Topic | None
+    Attributes:
+        radars: those that may be used, the preferred ones first: what the user named, or all that can be read.
+        radar_named: whether the user named the topics, which are then one radar.
+        sensor: the name of a radar with several topics that the user asked for; None if not.
+        image: the camera's.
+        camera_info: with the intrinsics.
+    """
+
+    radars: tuple[Topic, ...]
+    radar_named: bool
+    sensor: str | None
     image: Topic | None
     camera_info: Topic | None
 
@@ -104,15 +134,40 @@ def select(inventory: Inventory, options: RecordingOptions, require: Sequence[Ne
     Raises:
         RecordingError: a requested topic does not exist or cannot be used, or a required one is missing.
     """
-    radar = _chosen(inventory, "radar", options.radar_topic) or _best(
-        inventory.of_kind("radar"), inventory, _radar_rank
-    )
+    named, sensor = _named_radars(inventory, options.radar_topic)
+    radars = named or _usable_radars(inventory)
     image = select_image(inventory, options.image_topic)
-    for kind, topic in (("radar", radar), ("image", image)):
-        if topic is None and kind in require:
+    for kind, found in (("radar", bool(radars)), ("image", image is not None)):
+        if not found and kind in require:
             raise _missing(inventory, "radar" if kind == "radar" else "image")
     info = _chosen(inventory, "camera-info", options.camera_info_topic)
-    return Selection(radar, image, info or _nearest_info(image, inventory))
+    return Selection(radars, bool(named), sensor, image, info or _nearest_info(image, inventory))
+
+
+def _named_radars(inventory: Inventory, requested: str | None) -> tuple[tuple[Topic, ...], str | None]:
+    """Return the radar topics the user named, or the name of what may be a radar with several topics."""
+    if requested is None:
+        return (), None
+    known = {topic.name for topic in inventory.topics}
+    names = [requested] if requested in known else [name.strip() for name in requested.split(",") if name.strip()]
+    if len(names) == 1 and names[0] not in known and len(inventory.of_kind("radar")) > 1:
+        return (), names[0]
+    found = [_chosen(inventory, "radar", name) for name in dict.fromkeys(names)]
+    return tuple(topic for topic in found if topic is not None), None
+
+
+def unknown_radar(inventory: Inventory, name: str, sensors: Sequence[str]) -> RecordingError:
+    """Return the error about a radar that does not exist."""
+    able = ", ".join(topic.name for topic in inventory.of_kind("radar")) or "none"
+    radars = f"; radars: {', '.join(sensors)}" if sensors else ""
+    return RecordingError(f"{inventory.name}: no topic {name}; radar topics: {able}{radars}")
+
+
+def _usable_radars(inventory: Inventory) -> tuple[Topic, ...]:
+    """Return the readable radars, the preferred one first; lidars only if there is nothing else."""
+    ranked = sorted(inventory.of_kind("radar"), key=lambda topic: radar_rank(topic, inventory), reverse=True)
+    radars = [topic for topic in ranked if radar_rank(topic, inventory)[0]]
+    return tuple(radars[:_MOST_RADARS] or ranked[:1])
 
 
 def select_image(inventory: Inventory, requested: str | None) -> Topic | None:
@@ -169,22 +224,26 @@ def _best(
     return max(topics, key=lambda topic: rank(topic, inventory), default=None)
 
 
-def _radar_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
+def radar_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:
     """Rank radars above lidars, then by speed, radar-like name, returns above objects, and number of messages."""
     layout = inventory.usages[topic.name].radar
     assert layout is not None
     name = f"{topic.name} {topic.type}".lower()
     named = any(word in name for word in _RADAR_WORDS)
-    objects = any(word in name for word in ("object", "track"))
     return (
         not layout.lidar_like or named,
         layout.plan.doppler is not None or bool(layout.plan.velocity),
         named,
-        not objects,
+        not holds_objects(topic),
         isinstance(layout, PointLayout),
         "front" in name,
         len(topic),
     )
+
+
+def holds_objects(topic: Topic) -> bool:
+    """Return whether a topic's name or type says that it holds tracked objects."""
+    return any(word in f"{topic.name} {topic.type}".lower() for word in _OBJECT_WORDS)
 
 
 def _image_rank(topic: Topic, inventory: Inventory) -> tuple[int, ...]:

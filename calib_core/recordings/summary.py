@@ -9,6 +9,7 @@ from calib_core.errors import RecordingError
 from calib_core.input_files import name_text
 from calib_core.measurements import NS_PER_S, Stamp, TimeNs
 from calib_core.recordings.other_clocks import other_clocks
+from calib_core.recordings.radar.sensors import RadarSensor
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.time.shared_time import SharedTime, shared_time
 from calib_core.recordings.topics import Rhythm, TopicSummary
@@ -42,6 +43,9 @@ class RadarSummary:
         topic: its topic.
         frame: its frame_id.
         layout: what is read from its messages.
+        topics: all topics of this radar.
+        other_azimuths: topics or columns with other azimuths of its returns, of which at most one is true.
+        choice: why it is used, with the figures of the others; "" if there was no choice.
         scans: number of scans.
         rate_hz: scans per second; None with fewer than two.
         longest_gap_s: longest time between scans [s].
@@ -52,6 +56,9 @@ class RadarSummary:
     topic: str
     frame: str
     layout: str
+    topics: tuple[str, ...]
+    other_azimuths: tuple[str, ...]
+    choice: str
     scans: int
     rate_hz: float | None
     longest_gap_s: float | None
@@ -104,6 +111,7 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
         overlap_stretches: number of stretches of that time; None if one is missing.
         topics: by name.
         radar: None if there is none.
+        sensors: the radars that were compared, the one in use first.
         camera: None if there is none.
         warnings: what the user must know.
     """
@@ -116,6 +124,7 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
     overlap_stretches: int | None
     topics: tuple[TopicSummary, ...]
     radar: RadarSummary | None
+    sensors: tuple[RadarSensor, ...]
     camera: CameraSummary | None
     warnings: tuple[DataWarning, ...]
 
@@ -137,6 +146,7 @@ def recording_summary(recording: Recording) -> RecordingSummary:
         overlap_stretches=shared.stretches if shared is not None else None,
         topics=tuple(replace(topic, clocks=topic.clocks or spare.get(topic.name)) for topic in recording.topics),
         radar=_radar(recording),
+        sensors=recording.radar_sensors,
         camera=_camera(recording),
         warnings=recording.warnings,
     )
@@ -161,6 +171,9 @@ def _radar(recording: Recording) -> RadarSummary | None:
         topic=topic.name,
         frame=recording.radar_frame,
         layout=topic.layout,
+        topics=recording.radar_topics,
+        other_azimuths=recording.other_azimuths,
+        choice=recording.radar_choice,
         scans=len(times),
         rate_hz=rhythm.rate_hz,
         longest_gap_s=rhythm.longest_gap_s,

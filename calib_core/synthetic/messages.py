@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.measurements import RadarScan, TimeNs
+from calib_core.measurements import RadarScan, RadarScans, TimeNs
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.containers.recorded_messages import (
     CameraInfoMessage,
@@ -18,9 +18,12 @@ from calib_core.recordings.containers.recorded_messages import (
     RecordedMessage,
     VendorScanMessage,
 )
+from calib_core.recordings.radar.merging import Spread, aligned, merged, moments_of
+from calib_core.synthetic.options import RadarDefects
 from calib_core.synthetic.radar.antennas import Antenna
 from calib_core.synthetic.radar.defects import second_azimuths
 from calib_core.synthetic.recording import SimulatedFrame, SimulatedRecording
+from calib_core.synthetic.scans import side_scans
 
 __all__ = [
     "CAMERA_FRAME",
@@ -32,6 +35,8 @@ __all__ = [
     "RAW_IMAGE_TOPIC",
     "SECOND_COLUMN",
     "SECOND_SUFFIX",
+    "SIDE_FRAME",
+    "SIDE_TOPIC",
     "VENDOR_TOPIC",
     "all_messages",
     "camera_messages",
@@ -39,7 +44,7 @@ __all__ = [
 ]
 
 RADAR_SCAN_TOPIC = "/ti_mmwave/radar_scan"
-CLOUD_TOPIC = "/ti_mmwave/radar_scan_pcl"
+CLOUD_TOPIC = RadarDefects().cloud_topic
 VENDOR_TOPIC = "/acme/packets"
 RAW_IMAGE_TOPIC = "/camera/image_raw"
 IMAGE_TOPIC = "/camera/image_raw/compressed"
@@ -49,8 +54,10 @@ SECOND_SUFFIX = "_second_azimuth"
 SECOND_COLUMN = "azimuth_2"
 """Or of the column with the second azimuth [rad]."""
 RADAR_FRAME = "ti_mmwave_0"
+SIDE_TOPIC, SIDE_FRAME = "/radar_left/points", "radar_left"
 CAMERA_FRAME = "camera_optical_frame"
 
+_TRANSFER_NS = 3_000_000
 _PARSE_NS = 6_000
 """The driver stamps each return as it parses it; parsing one takes about this long."""
 
@@ -85,7 +92,11 @@ def radar_messages(recording: SimulatedRecording, generation: Literal[1, 2]) -> 
         recording: the recording.
         generation: of ROS; 1 writes the messages of options.radar_message, 2 writes clouds or a vendor's scans.
     """
+    if recording.options.defects.ideal_topic:
+        return _ideal_messages(recording)
     streams = [_antenna_messages(recording, antenna, generation) for antenna in recording.stage.antennas]
+    if recording.options.defects.side_radar:
+        streams.append(_side_messages(recording))
     return heapq.merge(*streams, key=lambda message: message.receive_time)
 
 
@@ -96,7 +107,7 @@ def _antenna_messages(
     vendor = options.radar_message == "vendor"
     cloud = generation == 2 or options.radar_message == "cloud" or options.radar == "imaging"
     cloud = cloud or second != "none" or bool(antenna.name)
-    base = VENDOR_TOPIC if vendor else CLOUD_TOPIC
+    base = VENDOR_TOPIC if vendor else options.defects.cloud_topic
     topic = f"{base}_{antenna.name}" if antenna.name else base
     for scan, receive in zip(recording.scans_of(antenna), antenna.times.receive_ns, strict=True):
         if vendor:
@@ -109,6 +120,22 @@ def _antenna_messages(
         if second == "topic":
             other = replace(scan, points_radar_m=second_azimuths(scan.points_radar_m))
             yield _cloud(f"{topic}{SECOND_SUFFIX}", other, TimeNs(int(receive)))
+
+
+def _ideal_messages(recording: SimulatedRecording) -> Iterator[RecordedMessage]:
+    """Put the returns that all antennas report in one moment into one cloud; none is left out."""
+    parts = [RadarScans.from_scans(list(recording.scans_of(antenna))) for antenna in recording.stage.antennas]
+    moments = moments_of([part.times_ns for part in parts])
+    together = [aligned(part, own, moments.times_ns) for part, own in zip(parts, moments.scan_of, strict=True)]
+    scans = merged(together, [Spread(np.full(3, 1e-9), 1e-9)] * len(parts), list(range(len(parts))))
+    for number in range(len(scans)):
+        scan = scans.scan(number)
+        yield _cloud(recording.options.defects.cloud_topic, scan, TimeNs(scan.time + _TRANSFER_NS))
+
+
+def _side_messages(recording: SimulatedRecording) -> Iterator[RecordedMessage]:
+    for scan in side_scans(recording.stage):
+        yield _cloud(SIDE_TOPIC, scan, TimeNs(scan.time + _TRANSFER_NS), frame=SIDE_FRAME)
 
 
 def all_messages(
@@ -128,13 +155,15 @@ def all_messages(
     )
 
 
-def _cloud(topic: str, scan: RadarScan, receive: TimeNs, *, second_column: bool = False) -> RecordedMessage:
+def _cloud(
+    topic: str, scan: RadarScan, receive: TimeNs, *, second_column: bool = False, frame: str = RADAR_FRAME
+) -> RecordedMessage:
     names: tuple[str, ...] = ("x", "y", "z", "intensity", "velocity")
     columns = [scan.points_radar_m, scan.snr_db, scan.doppler_mps]
     if second_column:
         names = (*names, SECOND_COLUMN)
         columns.append(polar_from_cartesian(second_azimuths(scan.points_radar_m))[:, 1])
-    return RecordedMessage(topic, receive, CloudMessage(scan.time, RADAR_FRAME, names, np.column_stack(columns)))
+    return RecordedMessage(topic, receive, CloudMessage(scan.time, frame, names, np.column_stack(columns)))
 
 
 def _vendor_scan(topic: str, scan: RadarScan, receive: TimeNs) -> RecordedMessage:

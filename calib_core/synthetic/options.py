@@ -80,6 +80,14 @@ class RadarDefects:
     second_azimuth_share: float = option(
         0.15, "Share of the ranges at which the second azimuth is the true one.", low=0.0, high=1.0
     )
+    cloud_topic: str = option("/ti_mmwave/radar_scan_pcl", "Topic of the radar's clouds, where it sends clouds.")
+    ideal_topic: bool = option(
+        False,
+        "Publish the same returns in one topic, near and far ones of a moment in one cloud, each at its true azimuth.",
+    )
+    side_radar: bool = option(
+        False, "Also publish the clouds of a weaker radar that looks 60 deg to the left, in /radar_left/points."
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,10 @@ PresetName: TypeAlias = Literal[
     "fine",
     "near-far",
     "second-azimuth",
+    "near-far-azimuths",
+    "near-far-column",
+    "two-radars",
+    "lidar-name",
     "two-reflectors",
     "companion",
     "car-park",
@@ -85,6 +89,19 @@ PRESETS: Mapping[PresetName, SimulationOptions] = {
     ),
     "near-far": SimulationOptions(radar="imaging", defects=RadarDefects(near_and_far=True)),
     "second-azimuth": SimulationOptions(radar="imaging", defects=RadarDefects(second_azimuth="topic")),
+    "near-far-azimuths": SimulationOptions(
+        radar="imaging", defects=RadarDefects(near_and_far=True, second_azimuth="topic")
+    ),
+    "near-far-column": SimulationOptions(
+        radar="imaging", defects=RadarDefects(near_and_far=True, second_azimuth="column", second_azimuth_share=0.5)
+    ),
+    "two-radars": SimulationOptions(
+        radar="imaging",
+        scene="field",
+        surroundings=_CAR_PARK,
+        defects=RadarDefects(cloud_topic="/front/points", side_radar=True),
+    ),
+    "lidar-name": SimulationOptions(radar="imaging", defects=RadarDefects(cloud_topic="/lidar_top/points")),
     "two-reflectors": SimulationOptions(reflectors=2),
     "companion": SimulationOptions(surroundings=Surroundings(companion=True)),
     "car-park": SimulationOptions(scene="field", surroundings=_CAR_PARK),

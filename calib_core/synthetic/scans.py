@@ -8,8 +8,8 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points2, Points3
 from calib_core.camera import Camera
-from calib_core.geometry import RigidTransform
-from calib_core.measurements import RadarScan, RadarScans, ReflectorClick, TimeNs
+from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, ReflectorClick, TimeNs
 from calib_core.synthetic.clicking import SimulatedClick, clicks_of
 from calib_core.synthetic.options import SimulationOptions
 from calib_core.synthetic.radar.antennas import Antenna
@@ -21,12 +21,23 @@ from calib_core.synthetic.scene.stage import Stage, child_rng, set_stage
 from calib_core.synthetic.scene.story import Moment, Resting
 from calib_core.synthetic.scene.surroundings import cart_position
 
-__all__ = ["SimulatedScans", "antenna_scans", "radar_scans", "simulate_scans", "targets_at"]
+__all__ = [
+    "SimulatedScans",
+    "antenna_scans",
+    "radar_scans",
+    "side_scans",
+    "simulate_scans",
+    "targets_at",
+    "with_wrong_azimuths",
+]
 
 _REFLECTOR_DBSM = 12.0
 _CARRIED_DBSM = 0.0
 _SHOULDER_M = 0.24
 _STEP_S = 0.01
+_SIDE_RAD = np.deg2rad(60.0)
+_SIDE_WEAKER_DB = 10.0
+_SIDE_LATER_S = 0.013
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,10 +124,24 @@ def antenna_scans(stage: Stage, antenna: Antenna) -> Iterator[RadarScan]:
             calibration_phase=phase,
             defects=stage.options.defects,
         )
-        yield scan if stage.options.defects.second_azimuth == "none" else _with_wrong_azimuths(stage, scan)
+        defects = stage.options.defects
+        certain = defects.second_azimuth == "none" or defects.ideal_topic
+        yield scan if certain else with_wrong_azimuths(stage, scan)
 
 
-def _with_wrong_azimuths(stage: Stage, scan: RadarScan) -> RadarScan:
+def side_scans(stage: Stage) -> Iterator[RadarScan]:
+    """Yield the scans of a weaker radar next to the first one that looks to the left, by its own header stamps."""
+    rng, profile = child_rng(stage.options, 19), stage.antennas[0].profile
+    weaker = replace(profile, threshold_db=profile.threshold_db + _SIDE_WEAKER_DB)
+    turn = rotation_exp(np.array([0.0, 0.0, -_SIDE_RAD]))
+    times = stage.antennas[0].times
+    for moment_s, stamp in zip(times.moment_s, times.header_ns, strict=True):
+        targets = targets_at(stage, float(moment_s) + _SIDE_LATER_S)
+        turned = replace(targets, points_radar_m=targets.points_radar_m @ turn.T)
+        yield measure(rng, turned, profile=weaker, time=TimeNs(int(stamp) + round(_SIDE_LATER_S * NS_PER_S)))
+
+
+def with_wrong_azimuths(stage: Stage, scan: RadarScan) -> RadarScan:
     """Give the returns at some ranges the second azimuth as their first one."""
     points, share = scan.points_radar_m, stage.options.defects.second_azimuth_share
     phase = float(child_rng(stage.options, 12).uniform())

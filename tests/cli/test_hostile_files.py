@@ -12,6 +12,8 @@ from typing import Any
 import pytest
 
 from calib_core import input_files
+from calib_core.errors import InputError
+from calib_core.interchange import FrameNames
 from calib_core.recordings.containers.writing import RecordedMessage, write_ros2
 from tests.cli.conftest import Made
 
@@ -157,3 +159,10 @@ def test_names_from_a_recording_do_not_reach_the_terminal(cocalib: Cocalib, tmp_
     assert "\\u001b[2J" in text.out
     assert not any(line.startswith("warning   forged") for line in text.out.splitlines())
     assert any(row["name"] == topic for row in json.loads(data.out)["topics"])
+
+
+@pytest.mark.parametrize("name", ["../../etc/passwd", "radar/../../x", "..", "./radar", "radar/.."])
+def test_a_frame_name_is_no_path(name: str) -> None:
+    with pytest.raises(InputError, match="which is a path"):
+        FrameNames(radar=name)
+    assert FrameNames(radar="front/radar..1").radar == "front/radar..1"

@@ -44,10 +44,10 @@ class Closed:
             return f"there were no clicks to save, but {self.fault}"
         if self.kept_in is None:
             return f"the clicks ({self.clicks}) could not be saved: {self.fault}"
-        return (
-            f"{self.fault}. All clicks ({self.clicks}) are saved in {self.kept_in}; "
-            "they are used when the recording is opened again"
-        )
+        again = "they are used when it is opened again"
+        if self.kept_in.parent != self.folder:
+            again = f"to continue with them, open the recording with --session {self.kept_in}"
+        return f"{self.fault}. All clicks ({self.clicks}) are saved in {self.kept_in}; {again}"
 
 
 def snapshot_fault(folder: GuardedFolder, clicks: Sequence[ReflectorClick]) -> str:

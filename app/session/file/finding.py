@@ -59,7 +59,10 @@ def find_session_folder(paths: Sequence[Path], facts: RecordingFacts) -> FoundFo
         for folder in folders
         if (candidate := _candidate(folder)) is not None and is_same_recording(candidate.recording, facts)
     ]
-    return _chosen(named, sorted(same, key=lambda candidate: -candidate.changed_at_s), facts)
+    found = _chosen(named, sorted(same, key=lambda candidate: -candidate.changed_at_s), facts)
+    return FoundFolder(
+        found.path, (*found.warnings, *_about_closed([each for each in folders if _is_of(each, paths[0])]))
+    )
 
 
 def _chosen(named: Path, same: Sequence[_Candidate], facts: RecordingFacts) -> FoundFolder:
@@ -69,7 +72,8 @@ def _chosen(named: Path, same: Sequence[_Candidate], facts: RecordingFacts) -> F
     warnings = [_about(candidate, facts) for candidate in same if candidate is not chosen]
     if chosen is None:
         return FoundFolder(named, tuple(warnings))
-    message = f"continuing the session of '{chosen.recording.name}' in {chosen.path}, which has the same frames as {facts.name}"
+    of = "" if chosen.recording.name == facts.name else f" of '{chosen.recording.name}'"
+    message = f"continuing the session{of} in {chosen.path}, which has the frames of {facts.name}"
     hint = f"to start a new session instead, give another folder: --session {named}"
     return FoundFolder(chosen.path, (DataWarning("session-of-other-name", message, hint), *warnings))
 
@@ -86,6 +90,27 @@ def _about(candidate: _Candidate, facts: RecordingFacts) -> DataWarning:
     else:
         hint = f"to continue it, start again with --session {candidate.path}"
     return DataWarning("session-not-used", message, hint)
+
+
+def _is_of(folder: Path, recording: Path) -> bool:
+    """Return whether a session folder next to a recording is named after it."""
+    recording = recording.resolve()
+    return folder.parent == recording.parent and folder.name.startswith(f"{recording.name}.")
+
+
+def _about_closed(folders: Sequence[Path]) -> tuple[DataWarning, ...]:
+    """Tell about folders with the recording's name that may not be looked into, such as another user's."""
+    faults = []
+    for folder in folders:
+        try:
+            GuardedFolder(folder).close()
+        except SessionFileError as error:
+            faults.append(str(error))
+    hint = "to continue with its clicks, do that; a new session is started otherwise"
+    return tuple(
+        DataWarning("session-not-used", f"a session next to the recording is not used: {fault}", hint)
+        for fault in faults
+    )
 
 
 def _candidate(path: Path) -> _Candidate | None:

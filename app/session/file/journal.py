@@ -300,7 +300,7 @@ def _head(line: bytes, place: str) -> tuple[_Head | None, str]:
                 "open it with that version, or give another --session folder"
             )
         head = msgspec.json.decode(found.content, type=_Head)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         return None, str(error)
     if head.schema != (SCHEMA if found.sum else SCHEMA_1):
         return None, "its checksum is missing"
@@ -334,7 +334,7 @@ def _step(content: bytes, number: int | None) -> Step:
     try:
         read = msgspec.json.decode(content, type=_Line)
         step = step_from_form(read.step)
-    except (msgspec.DecodeError, UnicodeDecodeError, CalibrationError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
         raise ValueError(str(error)) from error
     if number is not None and read.n != number:
         raise ValueError(f"found step {read.n}, expected step {number}")

@@ -5,9 +5,10 @@ It ends with a checksum of its own, and names the journal's lines that it contai
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
+from msgspec import Meta
 
 from app.option_changes import options_from_tree
 from app.session import ClicksImported, OptionsChanged, Session, Step
@@ -31,7 +32,7 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     schema: str
     cocalib: str
     recording: RecordingForm
-    steps: int
+    steps: Annotated[int, Meta(ge=0)]
     options: dict[str, Any]
     clicks: tuple[ClickForm, ...]
     last: str = ""
@@ -130,7 +131,7 @@ def read_snapshot(data: bytes, place: str) -> FoundSnapshot:
         )
     except SessionFileError:
         raise
-    except (msgspec.DecodeError, UnicodeDecodeError, CalibrationError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CalibrationError) as error:
         raise _damaged(place, str(error)) from error
 
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import time
-from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
 
@@ -32,11 +31,12 @@ from app.web.messages import (
     parse,
     request_of,
 )
-from app.web.radar_sight import overlay_of
+from app.web.radar_sight import look_of, overlay_of
+from app.web.view3d.looking import Look
 from app.web.view3d.scene import Sight, TabScene
 from calib_core.arrays import Points3
 from calib_core.errors import CalibrationError
-from calib_core.measurements import RadarScan, TimeNs
+from calib_core.measurements import RadarScan, RadarScans, TimeNs
 
 __all__ = ["Channel", "Socket"]
 
@@ -54,23 +54,6 @@ class Socket(Protocol):
     async def send(self, message: str | bytes, /) -> None: ...  # noqa: D102
 
 
-@dataclass(frozen=True, slots=True)
-class Cursor:
-    """What a page shows.
-
-    Attributes:
-        index: of the frame.
-        playing: frames follow one another quickly.
-        selected: id of the selected click.
-        light: the page uses its light theme.
-    """
-
-    index: int = 0
-    playing: bool = False
-    selected: str | None = None
-    light: bool = False
-
-
 class Channel:
     """One page. Runs on the event loop."""
 
@@ -78,7 +61,7 @@ class Channel:
         self.outbox = Outbox()
         self.scene: TabScene | None = None
         self._hub = hub
-        self._cursor = Cursor()
+        self._cursor = CursorMoved(0)
         self._shown: Shown | None = None
         self._greetings = NewestWins(self._greet, self._report)
         self._frames = NewestWins(self._send_frame, self._report)
@@ -163,9 +146,9 @@ class Channel:
         return text
 
     def _move(self, command: CursorMoved) -> None:
-        if not 0 <= command.index < len(self._hub.frames):
+        if not 0 <= command.index < len(self._hub.moments):
             return
-        self._cursor = Cursor(command.index, command.playing, command.selected, command.light)
+        self._cursor = command
         self.refresh()
 
     async def _greet(self, _wanted: Hello) -> None:
@@ -192,31 +175,38 @@ class Channel:
             self._forward = wanted.index > self._cursor.index
         self._hub.frames.prefetch(wanted.index, wanted.size, 1 if self._forward or wanted.playing else -1)
 
-    async def _send_overlay(self, cursor: Cursor) -> None:
-        stamp = TimeNs(int(self._hub.recording.image_times[cursor.index]))
+    async def _send_overlay(self, cursor: CursorMoved) -> None:
+        stamp = TimeNs(int(self._hub.moments[cursor.index]))
         session = self._hub.workspace.session
+        if not self._hub.workspace.facts.has_pictures:
+            trail = await self._trail(stamp, cursor.trail_s)
+            look = look_of(cursor.index, stamp, trail, session.options.gating)
+            self.outbox.put(encode(look), kind="overlay")
+            return
         scan = await self._scan(stamp)
         overlay = overlay_of(
             cursor.index, session, scan, placements_at(self._hub.survey, stamp), self._hub.workspace.reference
         )
         self.outbox.put(encode(overlay), kind="overlay")
 
-    async def _draw_space(self, cursor: Cursor) -> None:
+    async def _draw_space(self, cursor: CursorMoved) -> None:
         """Draw the 3D view; while playing, pause afterwards. The last frame is always drawn."""
         if self.scene is None:
             return
         started = time.monotonic()
-        hub, stamp = self._hub, TimeNs(int(self._hub.recording.image_times[cursor.index]))
+        hub, stamp = self._hub, TimeNs(int(self._hub.moments[cursor.index]))
+        has_pictures = hub.workspace.facts.has_pictures
         sight = Sight(
             session=hub.workspace.session,
             view=hub.view,
             selected=cursor.selected,
             scan=await self._scan(stamp),
             window=await self._window(cursor),
-            picture=await self._thumbnail(cursor.index),
+            picture=await self._thumbnail(cursor.index) if has_pictures else None,
             camera=hub.camera,
             reference=hub.workspace.reference,
             light=cursor.light,
+            look=None if has_pictures else await self._look(cursor, stamp),
         )
         await asyncio.get_running_loop().run_in_executor(hub.executor, self.scene.show, sight)
         if cursor.playing:
@@ -229,7 +219,26 @@ class Channel:
         except CalibrationError:
             return None
 
-    async def _window(self, cursor: Cursor) -> Points3:
+    async def _trail(self, stamp: TimeNs, length_s: float) -> RadarScans:
+        """Return the scans of the last seconds; none if they cannot be read."""
+        try:
+            look = partial(self._hub.radar.trail, stamp, length_s)
+            return await asyncio.get_running_loop().run_in_executor(self._hub.executor, look)
+        except CalibrationError:
+            return RadarScans()
+
+    async def _look(self, cursor: CursorMoved, stamp: TimeNs) -> Look:
+        survey = self._hub.survey
+        return Look(
+            time=stamp,
+            trail=await self._trail(stamp, cursor.trail_s),
+            placements=survey.placements if survey else (),
+            map=survey.map if survey else None,
+            whole=cursor.whole,
+            colour=cursor.colour,
+        )
+
+    async def _window(self, cursor: CursorMoved) -> Points3:
         session = self._hub.workspace.session
         click = next((click for click in session.clicks if click.id == cursor.selected), None)
         if click is None or cursor.playing:

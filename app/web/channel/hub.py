@@ -2,8 +2,9 @@
 
 import asyncio
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
@@ -58,6 +59,7 @@ class Hub:
         self.executor = executor
         self.frames = FrameStore(recording, len(recording.image_times), executor)
         self.radar = RadarSight(recording)
+        self.moments = workspace.facts.moments
         self.camera = recording.camera()
         self.survey: Survey | None = None
         self.tabs: set[Tab] = set()
@@ -95,7 +97,8 @@ class Hub:
         outbox.put(encode(self._recording_note()), kind="recording")
         tab.show()
         if self.survey is not None:
-            outbox.put(encode(Placements(self.survey.rows)), kind="placements")
+            for kind, message in self._found(self.survey):
+                outbox.put(encode(message), kind=kind)
         else:
             outbox.put(encode(Progress(_SEARCHING, 0, 1)), kind="progress")
         if self._edge is not None:
@@ -112,7 +115,8 @@ class Hub:
     def surveyed(self, survey: Survey) -> None:
         """Show what the radar alone says, as far as it is known."""
         before, self.survey = self.survey, survey
-        self.broadcast(Placements(survey.rows), "placements")
+        for kind, message in self._found(survey):
+            self.broadcast(message, kind)
         if before is None:
             self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
 
@@ -137,15 +141,21 @@ class Hub:
         with error_boundary("searching the radar for placements", _log.error):
             try:
                 self.survey = await asyncio.get_running_loop().run_in_executor(
-                    self.executor,
-                    lambda: survey_of(self.recording.radar_windows(), self.recording.image_times, options),
+                    self.executor, lambda: survey_of(self.recording.radar_windows(), self.moments, options)
                 )
             except CalibrationError as error:
                 _log.warning("the radar could not be searched for placements: %s", error)
         self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
-        self.broadcast(Placements(self.survey.rows if self.survey else ()), "placements")
+        for kind, message in self._found(self.survey):
+            self.broadcast(message, kind)
         for tab in self.tabs:
             tab.refresh()
+
+    def _found(self, survey: Survey | None) -> Iterator[tuple[str, Outgoing]]:
+        """Yield the messages about the whole radar recording, each with its kind; the map is drawn only without pictures."""
+        if survey is not None and not self.workspace.facts.has_pictures:
+            yield "radar_map", survey.map
+        yield "placements", survey.message if survey else Placements(())
 
     def _recording_note(self) -> RecordingNote:
         facts, recording, restored = self.workspace.facts, self.recording, self.workspace.restored
@@ -155,17 +165,26 @@ class Hub:
             image_topic=recording.image_topic or "none",
             width_px=facts.width_px,
             height_px=facts.height_px,
-            frame_times=StampColumns.of(facts.image_times),
-            start=Stamp.of(TimeNs(int(facts.image_times[0]))),
+            has_pictures=facts.has_pictures,
+            frame_times=StampColumns.of(facts.moments),
+            start=Stamp.of(TimeNs(int(facts.moments[0]))),
             radar=StampColumns.of(recording.radar_times),
             warnings=tuple(map(warning_in_sentences, (*restored.warnings, *recording.warnings))),
             sensors=(
-                _sensor("radar", recording.radar_topic, recording.topics),
+                _radar_sensor(recording),
                 _sensor("camera", recording.image_topic, recording.topics),
             ),
             session=SessionNote(str(restored.folder), len(restored.history.present.clicks), restored.note),
             version=version(),
         )
+
+
+def _radar_sensor(recording: Recording) -> SensorNote:
+    """Describe how the radar is read, and why this one."""
+    note = _sensor("radar", recording.radar_topic, recording.topics)
+    if not recording.radar_choice:
+        return note
+    return replace(note, topic=" + ".join(recording.radar_topics), about=(recording.radar_choice, *note.about))
 
 
 def _sensor(name: str, chosen: str | None, topics: Sequence[TopicSummary]) -> SensorNote:

@@ -5,19 +5,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.web.messages import PlacementRow
+from app.web.channel.placement_words import SHORTEST_S, placement_figures, placement_note, placement_summary
+from app.web.channel.radar_map import RadarMapSum
+from app.web.messages import PlacementRow, Placements, RadarMap
 from calib_core.arrays import TimesNs
 from calib_core.association.gating import static_returns
 from calib_core.association.placements import Placement, find_placements
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
-from calib_core.recordings.radar.scan_stream import join_scans
+from calib_core.radar import polar_from_cartesian
+from calib_core.recordings.radar.scan_blocks import join_scans
 
 __all__ = ["Activity", "GrowingSurvey", "Survey", "placements_at", "survey_of"]
 
 _MOST_SLICES = 800
 _MOST_STATIC_RETURNS = 1_000_000
 """Limit of one stretch: more than an hour of 25 static returns in each of 10 scans a second; searching it takes about 200 MB."""
+
+_AT_RANGE_M = 1.0
+_OWN_RETURNS_M, _OWN_SHARE = 0.5, 0.1
+"""Returns this far from a placement belong to it [m], and this share of its range more: angles scatter."""
+_STRONG = 0.9
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,14 +49,18 @@ class Survey:
         placements: where the reflector stood still, without those that no frame shows.
         rows: the same in the form sent to the page.
         activity: of the radar.
+        map: of the static returns.
+        message: the placements for the page, with what they are good for.
     """
 
     placements: tuple[Placement, ...]
     rows: tuple[PlacementRow, ...]
     activity: Activity
+    map: RadarMap
+    message: Placements
 
 
-def survey_of(windows: Iterable[RadarScans], image_times: TimesNs, options: GatingOptions) -> Survey:
+def survey_of(windows: Iterable[RadarScans], moments: TimesNs, options: GatingOptions) -> Survey:
     """Survey a whole recording.
 
     Memory is bounded: only the static returns of each window are kept, and a recording with too many of them is searched one
@@ -56,17 +68,18 @@ def survey_of(windows: Iterable[RadarScans], image_times: TimesNs, options: Gati
 
     Args:
         windows: all scans, in order of time.
-        image_times: (m,) stamps of the frames [ns], ascending.
+        moments: (m,) stamps of the frames [ns], ascending; of the scans if there are no frames.
         options: which returns can be the reflector.
     """
-    activity = _ActivitySum(image_times)
+    activity, cells = _ActivitySum(moments), RadarMapSum(options)
     seen = [
         (placement, row)
-        for stretch in _stretches(map(activity.note, windows), options)
-        for placement in find_placements(stretch, options)
-        if (row := _row(placement, image_times)) is not None
+        for stretch in _stretches(map(activity.note, windows), options, cells)
+        if _length_s(stretch.times_ns) >= SHORTEST_S  # searching a few dense clouds in vain would take minutes
+        for placement in find_placements(stretch, options, min_dwell_s=SHORTEST_S)
+        if (row := _row(placement, moments, stretch)) is not None
     ]
-    return Survey(tuple(pair[0] for pair in seen), tuple(pair[1] for pair in seen), activity.total())
+    return _survey(seen, activity, cells, moments)
 
 
 class GrowingSurvey:
@@ -81,7 +94,8 @@ class GrowingSurvey:
     def __init__(self, options: GatingOptions) -> None:
         self._options = options
         self._static = RadarScans()
-        self._settled: tuple[Placement, ...] = ()
+        self._cells = RadarMapSum(options)
+        self._settled: list[tuple[Placement, PlacementRow]] = []
         self._times: list[TimesNs] = []
         self._counts: list[np.ndarray] = []
 
@@ -94,68 +108,107 @@ class GrowingSurvey:
         """Add scans that are later than all before."""
         if not len(scans):
             return
-        if len(self._static.points_radar_m) > _MOST_STATIC_RETURNS:
-            self._settled = (*self._settled, *find_placements(self._static, self._options))
-            self._static = RadarScans()
-        self._static = join_scans([self._static, static_returns(scans, self._options)])
+        static = static_returns(scans, self._options)
+        self._cells.add(static)
+        self._static = join_scans([self._static, static])
         self._times.append(scans.times_ns)
         self._counts.append(np.diff(scans.first_return))
 
-    def survey(self, image_times: TimesNs) -> Survey:
+    def survey(self, moments: TimesNs) -> Survey:
         """Return what is known now.
 
         Args:
-            image_times: (m,) stamps of the frames [ns], ascending.
+            moments: (m,) stamps of the frames [ns], ascending.
         """
-        found = (*self._settled, *find_placements(self._static, self._options))
-        seen = [(one, row) for one in found if (row := _row(one, image_times)) is not None]
-        activity = _ActivitySum(image_times)
+        found = find_placements(self._static, self._options, min_dwell_s=SHORTEST_S)
+        new = [(one, row) for one in found if (row := _row(one, moments, self._static)) is not None]
+        seen = [*self._settled, *new]
+        if len(self._static.points_radar_m) > _MOST_STATIC_RETURNS:
+            self._settled, self._static = seen, RadarScans()
+        activity = _ActivitySum(moments)
         if self._times:
             activity.count(np.concatenate(self._times), np.concatenate(self._counts))
-        return Survey(tuple(pair[0] for pair in seen), tuple(pair[1] for pair in seen), activity.total())
+        return _survey(seen, activity, self._cells, moments)
 
 
-def _stretches(windows: Iterable[RadarScans], options: GatingOptions) -> Iterator[RadarScans]:
-    """Yield the static returns of a recording; in several pieces if there are too many."""
+def _survey(
+    seen: Sequence[tuple[Placement, PlacementRow]], activity: "_ActivitySum", cells: RadarMapSum, moments: TimesNs
+) -> Survey:
+    rows = tuple(pair[1] for pair in seen)
+    figures = placement_figures(rows, *activity.rates())
+    message = Placements(rows, placement_summary(rows, _length_s(moments)), figures)
+    return Survey(tuple(pair[0] for pair in seen), rows, activity.total(), cells.total(), message)
+
+
+def _stretches(windows: Iterable[RadarScans], options: GatingOptions, cells: RadarMapSum) -> Iterator[RadarScans]:
+    """Yield the static returns of a recording, in several pieces if there are too many; put them on the map."""
     pieces: list[RadarScans] = []
     for window in windows:
         pieces.append(static_returns(window, options))
+        cells.add(pieces[-1])
         if sum(len(piece.points_radar_m) for piece in pieces) > _MOST_STATIC_RETURNS:
             yield join_scans(pieces)
             pieces = []
     yield join_scans(pieces)
 
 
-def _row(placement: Placement, image_times: TimesNs) -> PlacementRow | None:
+def _length_s(times_ns: TimesNs) -> float:
+    return (int(times_ns[-1]) - int(times_ns[0])) / NS_PER_S if len(times_ns) else 0.0
+
+
+def _row(placement: Placement, moments: TimesNs, static: RadarScans) -> PlacementRow | None:
     """Return the row of a placement, with the frame nearest to its middle; None if no frame shows it."""
-    first, last = np.searchsorted(image_times, [placement.start, placement.end])
+    first, last = np.searchsorted(moments, [placement.start, placement.end])
     if first >= last:
         return None
     middle = (int(placement.start) + int(placement.end)) // 2
-    frame = int(first + np.argmin(np.abs(image_times[first:last] - middle)))
-    origin = int(image_times[0])
+    frame = int(first + np.argmin(np.abs(moments[first:last] - middle)))
+    origin = int(moments[0])
+    start_s, end_s = ((int(time) - origin) / NS_PER_S for time in (placement.start, placement.end))
+    x_m, y_m, z_m = (round(float(value), 3) for value in placement.position_radar_m)
+    stands_out_db = _stands_out_db(placement, static)
     return PlacementRow(
-        start_s=(int(placement.start) - origin) / NS_PER_S,
-        end_s=(int(placement.end) - origin) / NS_PER_S,
+        start_s=start_s,
+        end_s=end_s,
         frame=frame,
         range_m=float(np.linalg.norm(placement.position_radar_m)),
         score=placement.score,
+        position_radar_m=(x_m, y_m, z_m),
+        azimuth_deg=float(np.rad2deg(polar_from_cartesian(placement.position_radar_m)[1])),
+        snr_db=None if np.isnan(placement.snr_db) else round(placement.snr_db, 1),
+        stands_out_db=stands_out_db,
+        note=placement_note(end_s - start_s, stands_out_db),
     )
+
+
+def _stands_out_db(placement: Placement, static: RadarScans) -> float | None:
+    """Return how far a placement is above the strong static returns elsewhere at its range while it stood; None if unknown."""
+    meanwhile = static.between(placement.start, placement.end)
+    ranges_m = np.linalg.norm(meanwhile.points_radar_m, axis=1)
+    range_m = float(np.linalg.norm(placement.position_radar_m))
+    apart_m = np.linalg.norm(meanwhile.points_radar_m - placement.position_radar_m, axis=1)
+    near = (np.abs(ranges_m - range_m) < _AT_RANGE_M) & (apart_m > _OWN_RETURNS_M + _OWN_SHARE * range_m)
+    others_db = meanwhile.snr_db[near & np.isfinite(meanwhile.snr_db)]
+    if np.isnan(placement.snr_db) or not len(others_db):
+        return None
+    return round(placement.snr_db - float(np.quantile(others_db, _STRONG)), 1)
 
 
 class _ActivitySum:
     """Counts scans and returns by slices of time.
 
     Args:
-        image_times: (m,) stamps of the frames [ns], ascending.
+        moments: (m,) stamps of the frames [ns], ascending; of the scans if there are no frames.
     """
 
-    def __init__(self, image_times: TimesNs) -> None:
-        length_s = max((int(image_times[-1]) - int(image_times[0])) / NS_PER_S, 1e-3)
+    def __init__(self, moments: TimesNs) -> None:
+        length_s = max((int(moments[-1]) - int(moments[0])) / NS_PER_S, 1e-3)
         self._slices = max(1, min(_MOST_SLICES, int(length_s / 0.25)))
         self._step_s = length_s / self._slices
-        self._origin = image_times[0]
+        self._origin = moments[0]
         self._returns, self._scans = np.zeros(self._slices), np.zeros(self._slices, dtype=np.int64)
+
+        self._intervals_s: list[float] = []
 
     def note(self, scans: RadarScans) -> RadarScans:
         """Count some scans; return them."""
@@ -168,6 +221,14 @@ class _ActivitySum:
         inside = (place >= 0) & (place < self._slices)
         self._returns += np.bincount(place[inside], weights=counts[inside], minlength=self._slices)
         self._scans += np.bincount(place[inside], minlength=self._slices)
+        if len(times_ns) > 1:
+            self._intervals_s.append(float(np.median(np.diff(times_ns))) / NS_PER_S)
+
+    def rates(self) -> tuple[float, float]:
+        """Return the mean number of returns per scan, and the number of scans per second, NaN if unknown."""
+        returns = float(self._returns.sum() / max(self._scans.sum(), 1))
+        interval_s = float(np.median(self._intervals_s)) if self._intervals_s else 0.0
+        return returns, 1.0 / interval_s if interval_s > 0 else float("nan")
 
     def total(self) -> Activity:
         """Return the mean number of returns per scan in each slice."""

@@ -12,6 +12,7 @@ from app.web.messages.incoming import (
     Hello,
     ImportWanted,
     Incoming,
+    ReturnColour,
     Viewpoint,
     ViewpointWanted,
     ViewWanted,
@@ -27,8 +28,6 @@ from app.web.messages.outgoing import (
     Outgoing,
     Overlay,
     OverlayReturn,
-    PlacementRow,
-    Placements,
     Problem,
     Progress,
     RecordingNote,
@@ -38,6 +37,7 @@ from app.web.messages.outgoing import (
     encode,
     encode_frame,
 )
+from app.web.messages.radar_messages import PlacementRow, Placements, RadarLook, RadarMap, RadarReturn
 from app.web.messages.view_changes import ClickChange, RowValues, ViewChange, change_between
 
 __all__ = [
@@ -61,7 +61,11 @@ __all__ = [
     "Placements",
     "Problem",
     "Progress",
+    "RadarLook",
+    "RadarMap",
+    "RadarReturn",
     "RecordingNote",
+    "ReturnColour",
     "RowValues",
     "SensorNote",
     "SessionNote",

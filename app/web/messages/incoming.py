@@ -22,6 +22,7 @@ __all__ = [
     "ImportWanted",
     "Incoming",
     "MessageForm",
+    "ReturnColour",
     "ViewWanted",
     "Viewpoint",
     "ViewpointWanted",
@@ -63,6 +64,9 @@ class FrameWanted:
     size: Literal["full", "half"] = "full"
 
 
+ReturnColour: TypeAlias = Literal["speed", "amplitude"]
+
+
 @dataclass(frozen=True, slots=True)
 class CursorMoved:
     """A page shows another frame: the 3D view and the overlay follow.
@@ -72,12 +76,18 @@ class CursorMoved:
         playing: frames follow one another quickly.
         selected: id of the selected click; None if there is none.
         light: the page uses its light theme, and the 3D view follows.
+        trail_s: without pictures, for how long returns stay [s].
+        colour: without pictures, what the colours of returns mean.
+        whole: without pictures, the 3D view shows the static returns of the whole recording.
     """
 
     index: int
     playing: bool = False
     selected: str | None = None
     light: bool = False
+    trail_s: float = 0.0
+    colour: ReturnColour = "speed"
+    whole: bool = False
 
 
 Viewpoint: TypeAlias = Literal["behind", "above", "side", "camera"]
@@ -151,6 +161,9 @@ class CursorForm(_Form, frozen=True, tag="cursor"):
     playing: bool = False
     selected: Annotated[str, Meta(max_length=100)] | None = None
     light: bool = False
+    trail_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
+    colour: ReturnColour = "speed"
+    whole: bool = False
 
 
 class ViewpointForm(_Form, frozen=True, tag="viewpoint"):
@@ -244,7 +257,7 @@ def _frame(form: FrameForm) -> Command:
 
 @_command.register
 def _cursor(form: CursorForm) -> Command:
-    return CursorMoved(form.index, form.playing, form.selected, form.light)
+    return CursorMoved(form.index, form.playing, form.selected, form.light, form.trail_s, form.colour, form.whole)
 
 
 @_command.register

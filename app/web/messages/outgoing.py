@@ -9,6 +9,7 @@ import msgspec
 
 from app.option_changes import OptionGroup, option_groups
 from app.view import FollowState, View
+from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
 from app.web.messages.view_changes import ViewChange
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, Stamp
@@ -24,8 +25,6 @@ __all__ = [
     "Outgoing",
     "Overlay",
     "OverlayReturn",
-    "PlacementRow",
-    "Placements",
     "Problem",
     "Progress",
     "RecordingNote",
@@ -112,8 +111,9 @@ class RecordingNote:
         image_topic: its camera.
         width_px: columns of a frame.
         height_px: rows of a frame.
-        frame_times: the stamp of every frame.
-        start: the stamp of the first frame.
+        has_pictures: whether there are frames to click in; without, the moments to look at are those of the radar scans.
+        frame_times: the stamp of every frame, or moment to look at.
+        start: the stamp of the first.
         radar: the stamp of every radar scan.
         warnings: about the recording.
         sensors: how the radar and the camera are read.
@@ -127,6 +127,7 @@ class RecordingNote:
     image_topic: str
     width_px: int
     height_px: int
+    has_pictures: bool
     frame_times: StampColumns
     start: Stamp
     radar: StampColumns
@@ -164,32 +165,6 @@ class FollowNote:
     state: FollowState
     words: str
     advice: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class PlacementRow:
-    """A placement found in the radar data.
-
-    Attributes:
-        start_s: since the first frame [s].
-        end_s: since the first frame [s].
-        frame: the frame to click in.
-        range_m: of the reflector.
-        score: 0 to 1.
-    """
-
-    start_s: float
-    end_s: float
-    frame: int
-    range_m: float
-    score: float
-
-
-@dataclass(frozen=True, slots=True)
-class Placements:
-    """The placements found from the radar alone."""
-
-    placements: tuple[PlacementRow, ...]
 
 
 class OverlayReturn(msgspec.Struct, frozen=True, array_like=True):
@@ -289,6 +264,8 @@ Outgoing: TypeAlias = (
     | FramesAdded
     | FollowNote
     | Placements
+    | RadarLook
+    | RadarMap
     | Overlay
     | Progress
     | Problem
@@ -303,6 +280,8 @@ TYPES: Mapping[type, str] = {
     FramesAdded: "frames_added",
     FollowNote: "following",
     Placements: "placements",
+    RadarLook: "radar_look",
+    RadarMap: "radar_map",
     Overlay: "overlay",
     Progress: "progress",
     Problem: "error",

@@ -108,7 +108,7 @@ class Entrance:
                 return refusal(429, "Too many pages of this browser are open; close some.")
             return None
         if path == _TICKET:
-            return json_reply(msgspec.json.encode(self._resumption.ticket()))
+            return json_reply(msgspec.json.encode(self._resumption.ticket()), more=(renewed,))
         reply = await self._routes.answer(request.path)
         return replace(reply, headers=(*reply.headers, renewed))
 

@@ -10,6 +10,8 @@ from app.session import Session
 from app.view import Reference, View, shown_calibration
 from app.web.frames import Frame
 from app.web.radar_sight import still_returns
+from app.web.view3d.looking import Look, LookNodes
+from app.web.view3d.nodes import add_cloud, add_lines, fill_cloud, fill_lines
 from app.web.view3d.shapes import (
     DARK,
     LIGHT,
@@ -46,8 +48,6 @@ _VIEWPOINTS = {
 }
 _RINGS_EVERY_M, _RINGS_UP_TO_M = 5.0, 30.0
 _DIM, _ORANGE = (112, 124, 136), (255, 180, 84)
-_NOWHERE = np.zeros((1, 3))
-_NO_LINE = np.zeros((1, 2, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +64,7 @@ class Sight:
         camera: the recording's intrinsics, used until there is a calibration.
         reference: a calibration to show until there is a new one; None if there is none.
         light: drawn on a light background.
+        look: what to show instead of a scan, pairs and camera if the recording has no pictures; else None.
     """
 
     session: Session
@@ -75,6 +76,7 @@ class Sight:
     camera: Camera | None
     reference: Reference | None = None
     light: bool = False
+    look: Look | None = None
 
 
 class TabScene:
@@ -84,21 +86,22 @@ class TabScene:
         self._client = client
         self._lock = threading.Lock()
         self._pictured: int | None = None
+        self._looking: LookNodes | None = None
         self._posed: object = self
         self._radar_from_camera = nominal_camera_from_radar().inverse()
         scene = client.scene
         scene.add_frame("/radar", axes_length=0.6, axes_radius=0.018, origin_radius=0.03)
         self._palette = DARK
         self._grid, self._rings = _ground(scene)
-        self._scan = _cloud(scene, "/scan", 0.12)
-        self._window = _cloud(scene, "/window", 0.06)
-        self._chosen = _cloud(scene, "/chosen", 0.24)
-        self._rays = _lines(scene, "/rays", 1.0, (72, 110, 138))
-        self._ray = _lines(scene, "/ray", 2.0, DARK.ray)
-        self._gap = _lines(scene, "/gap", 3.0, _ORANGE)
-        self._ellipsoids = _lines(scene, "/ellipsoids", 1.0, (96, 118, 140))
-        self._ellipsoid = _lines(scene, "/ellipsoid", 1.5, _ORANGE)
-        self._next = _lines(scene, "/next", 2.0, DARK.next)
+        self._scan = add_cloud(scene, "/scan", 0.12)
+        self._window = add_cloud(scene, "/window", 0.06)
+        self._chosen = add_cloud(scene, "/chosen", 0.24)
+        self._rays = add_lines(scene, "/rays", 1.0, (72, 110, 138))
+        self._ray = add_lines(scene, "/ray", 2.0, DARK.ray)
+        self._gap = add_lines(scene, "/gap", 3.0, _ORANGE)
+        self._ellipsoids = add_lines(scene, "/ellipsoids", 1.0, (96, 118, 140))
+        self._ellipsoid = add_lines(scene, "/ellipsoid", 1.5, _ORANGE)
+        self._next = add_lines(scene, "/next", 2.0, DARK.next)
         self._next_name = scene.add_label("/next_name", "", visible=False, anchor="top-center", font_screen_scale=0.9)
         self._name = scene.add_label("/selected", "", visible=False, anchor="bottom-left", font_screen_scale=0.9)
         self._frustum = scene.add_camera_frustum(
@@ -116,12 +119,22 @@ class TabScene:
         """Draw a Sight."""
         with self._lock, self._client.atomic():
             self._show_theme(sight)
-            self._show_scan(sight)
-            self._show_pose(sight)
-            self._show_pairs(sight)
-            self._show_advice(sight)
-            self._show_picture(sight)
+            if sight.look is not None:
+                self._show_look(sight, sight.look)
+            else:
+                self._show_scan(sight)
+                self._show_pose(sight)
+                self._show_pairs(sight)
+                self._show_advice(sight)
+                self._show_picture(sight)
         self._client.flush()
+
+    def _show_look(self, sight: Sight, look: Look) -> None:
+        """Draw a recording without pictures: there is no camera to show."""
+        if self._looking is None:
+            self._looking = LookNodes(self._client.scene)
+            self._frustum.visible = False
+        self._looking.show(look, sight.session.options.gating, light=sight.light)
 
     def look_from(self, viewpoint: str) -> None:
         """Move the view's own camera: "behind", "above", "side" or "camera"."""
@@ -159,9 +172,9 @@ class TabScene:
         colours = np.where(still[:, None], np.array(self._palette.still), np.array(self._palette.moving)).astype(
             np.uint8
         )
-        _fill_cloud(self._scan, errors.corrected(sight.scan.points_radar_m), colours)
+        fill_cloud(self._scan, errors.corrected(sight.scan.points_radar_m), colours)
         window = np.tile(np.array([self._palette.window], dtype=np.uint8), (len(sight.window), 1))
-        _fill_cloud(self._window, errors.corrected(sight.window), window)
+        fill_cloud(self._window, errors.corrected(sight.window), window)
 
     def _show_pose(self, sight: Sight) -> None:
         """Move the frustum, and the ground to the lowest chosen return, whenever the answer changes."""
@@ -190,19 +203,19 @@ class TabScene:
             return
         points = _true_positions(calibration, calibration.pairs)
         residuals = np.array([pair.distance_px for pair in calibration.pairs])
-        _fill_cloud(self._chosen, points, residual_colours(residuals, sight.view.residual_limit_px or 20.0))
+        fill_cloud(self._chosen, points, residual_colours(residuals, sight.view.residual_limit_px or 20.0))
         chosen = tuple(pair for pair in calibration.pairs if pair.id == sight.selected)
         others = tuple(pair for pair in calibration.pairs if pair.inlier and pair.id != sight.selected)
-        _fill_lines(self._rays, rays_to(calibration, others))
-        _fill_lines(self._ellipsoids, _shells(calibration, others))
-        _fill_lines(self._ellipsoid, _shells(calibration, chosen))
+        fill_lines(self._rays, rays_to(calibration, others))
+        fill_lines(self._ellipsoids, _shells(calibration, others))
+        fill_lines(self._ellipsoid, _shells(calibration, chosen))
         self._show_selected(calibration, chosen)
 
     def _show_selected(self, calibration: Calibration, chosen: tuple[PairResult, ...]) -> None:
         rays = rays_to(calibration, chosen)
-        _fill_lines(self._ray, rays)
+        fill_lines(self._ray, rays)
         points = _true_positions(calibration, chosen)
-        _fill_lines(self._gap, np.stack([rays[0, 1], points[0]])[None] if len(rays) else rays)
+        fill_lines(self._gap, np.stack([rays[0, 1], points[0]])[None] if len(rays) else rays)
         self._name.visible = bool(chosen)
         if chosen:
             self._name.position = tuple(points[0] + np.array([0.0, 0.0, 0.15]))
@@ -216,7 +229,7 @@ class TabScene:
             self._next.visible = self._next_name.visible = False
             return
         place = np.array(advice.position_radar_m)
-        _fill_lines(self._next, next_place(place[None]))
+        fill_lines(self._next, next_place(place[None]))
         self._next_name.position = tuple(place - np.array([0.0, 0.0, 0.3]))
         self._next_name.text = f"next {advice.range_m:.1f} m"
         self._next_name.visible = True
@@ -255,32 +268,6 @@ def _true_positions(calibration: Calibration, pairs: tuple[PairResult, ...]) -> 
 
 def _shells(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:
     return ellipsoids(_true_positions(calibration, pairs), calibration.options.noise, calibration.noise_scale)
-
-
-def _cloud(scene: "viser.SceneApi", name: str, size_m: float) -> Any:
-    return scene.add_point_cloud(
-        name, _NOWHERE, (255, 255, 255), point_size=size_m, point_shape="circle", precision="float32", visible=False
-    )
-
-
-def _lines(scene: "viser.SceneApi", name: str, thickness_px: float, colour: tuple[int, int, int]) -> Any:
-    """Add line segments of one colour: viser treats per-point colours as linear light, but takes one colour as it is."""
-    return scene.add_line_segments(
-        name, _NO_LINE, colour, thickness=thickness_px, thickness_units="screen", visible=False
-    )
-
-
-def _fill_cloud(node: Any, points: Points3, colours: np.ndarray) -> None:
-    """Assign points and colours; viser has no empty cloud, so an empty one is hidden."""
-    node.visible = len(points) > 0
-    if len(points):
-        node.points, node.colors = points, colours
-
-
-def _fill_lines(node: Any, segments: np.ndarray) -> None:
-    node.visible = len(segments) > 0
-    if len(segments):
-        node.points = segments
 
 
 def _place(node: Any, target_from_node: RigidTransform) -> None:

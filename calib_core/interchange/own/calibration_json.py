@@ -8,6 +8,7 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz, quaternion_wxyz_from_matrix
+from calib_core.input_files import encodable
 from calib_core.interchange.calibration_file import (
     EQUATION,
     CalibrationFile,
@@ -136,7 +137,7 @@ def write_calibration(file: CalibrationFile) -> str:
     absent = set() if calibration.angle_map is not None else {"radar_angle_map"}
     if not calibration.systematic_errors and calibration.radar_errors == RadarErrors():
         absent |= {"radar_errors", "systematic_errors"}
-    known = {key: content[key] for key in _KEY_ORDER if key not in absent}
+    known = encodable({key: content[key] for key in _KEY_ORDER if key not in absent})
     return json_text(with_unknown(known, file.unknown))
 
 

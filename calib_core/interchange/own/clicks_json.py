@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 import msgspec
+from msgspec import UNSET
 
 from calib_core.errors import InputError
 from calib_core.interchange.own.documents import CLICKS_SCHEMA, ClickDocument, ClicksDocument, TimeDocument
@@ -40,8 +41,13 @@ def read_clicks(text: str, source: str = "clicks") -> tuple[ReflectorClick, ...]
     )
 
 
-def write_clicks(clicks: Iterable[ReflectorClick]) -> str:
-    """Write clicks as clicks-1 text, sorted by time; the same clicks give the same bytes."""
+def write_clicks(clicks: Iterable[ReflectorClick], *, radar_topics: Sequence[str] = ()) -> str:
+    """Write clicks as clicks-1 text, sorted by time; the same clicks give the same bytes.
+
+    Args:
+        clicks: in any order.
+        radar_topics: of the radar they were made with; written only if there are several, for whoever reads the file.
+    """
     documents = [
         ClickDocument(
             click.id,
@@ -52,7 +58,8 @@ def write_clicks(clicks: Iterable[ReflectorClick]) -> str:
         )
         for click in sorted(clicks, key=lambda click: (click.image_time, click.id))
     ]
-    return json_text(msgspec.to_builtins(ClicksDocument(CLICKS_SCHEMA, documents)))
+    topics = list(radar_topics) if len(radar_topics) > 1 else UNSET
+    return json_text(msgspec.to_builtins(ClicksDocument(CLICKS_SCHEMA, documents, radar_topics=topics)))
 
 
 def refuse_repeated_ids(ids: Sequence[str], *, source: str, place: str) -> None:

@@ -6,7 +6,7 @@ Inputs and settings refuse unknown keys; results may contain more.
 from typing import Annotated, Final, Literal
 
 import msgspec
-from msgspec import Meta, Struct, field
+from msgspec import UNSET, Meta, Struct, UnsetType, field
 
 from calib_core.camera import CameraModel
 from calib_core.options import CalibrationOptions
@@ -88,6 +88,7 @@ class ClicksDocument(Struct, frozen=True, forbid_unknown_fields=True):
 
     schema: Literal["cocalib/clicks-1"]
     clicks: list[ClickDocument]
+    radar_topics: list[str] | UnsetType = UNSET
 
 
 class CameraDocument(Struct, frozen=True, forbid_unknown_fields=True):
@@ -186,6 +187,7 @@ class CandidateDocument(Struct, frozen=True):
     """A radar position that may be the reflector.
 
     sigma_polar holds the standard deviations of range [m], azimuth and elevation [rad]; null if no noise is assumed.
+    Candidates of one pair with the same alternative_of are positions of one return of which at most one is true.
     """
 
     radar_m: Position
@@ -194,6 +196,7 @@ class CandidateDocument(Struct, frozen=True):
     returns: Count = 1
     scans: Count = 1
     snr_db: float | None = None
+    alternative_of: Count | UnsetType = UNSET
 
 
 class SolvedPairDocument(Struct, frozen=True):
@@ -246,11 +249,13 @@ class InputDocument(Struct, frozen=True):
 
 
 class TopicsDocument(Struct, frozen=True):
-    """The topics that were read."""
+    """The topics that were read; radar_all names those of a radar with several, and radar_choice says why it was used."""
 
     radar: str | None = None
     image: str | None = None
     camera_info: str | None = None
+    radar_all: list[str] | UnsetType = UNSET
+    radar_choice: str | UnsetType = UNSET
 
 
 class ClocksDocument(Struct, frozen=True):

@@ -1,6 +1,7 @@
 """Convert a solved pair to and from its document in calibration-1, including the data to solve it again."""
 
 import numpy as np
+from msgspec import UNSET, UnsetType
 
 from calib_core.errors import InputError
 from calib_core.interchange.own import documents
@@ -82,6 +83,7 @@ def _candidate_document(candidate: Candidate) -> documents.CandidateDocument:
         returns=candidate.returns,
         scans=candidate.scans,
         snr_db=finite_or_none(candidate.snr_db),
+        alternative_of=candidate.alternative_of if candidate.alternative_of >= 0 else UNSET,
     )
 
 
@@ -95,6 +97,7 @@ def _candidate(document: documents.CandidateDocument) -> Candidate:
         returns=document.returns,
         scans=document.scans,
         snr_db=nan_if_none(document.snr_db),
+        alternative_of=-1 if isinstance(document.alternative_of, UnsetType) else document.alternative_of,
     )
 
 

@@ -4,8 +4,6 @@ import json
 import math
 from typing import Any
 
-from calib_core.input_files import encodable
-
 __all__ = ["json_text"]
 
 _WIDTH = 118
@@ -17,7 +15,7 @@ def json_text(content: Any) -> str:
 
     Keys keep their order; floats are written with repr, so they read back bit for bit.
     """
-    return _lines(_finite(encodable(content)), 0) + "\n"
+    return _lines(_finite(content), 0) + "\n"
 
 
 def _finite(value: Any) -> Any:

@@ -18,7 +18,7 @@ __all__ = ["checked", "fields_of", "item_type", "json_object", "json_value", "pa
 Document = TypeVar("Document")
 
 _MAX_DEPTH = 100
-_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]|[\ud800-\udfff]")
+_HALF = re.compile("[\ud800-\udfff]")
 MAX_CHARACTERS = 256 * 1024 * 1024
 """Far more than any of our files; keeps a wrong file (a recording) from filling the memory."""
 
@@ -90,15 +90,10 @@ def json_value(text: str, *, source: str) -> Any:
         content = json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_without_repeats)
         if _is_too_deep(content):
             raise RecursionError
-        if _SURROGATE.search(text):
-            json.dumps(content, ensure_ascii=False).encode()  # half a character cannot be written or shown again
         return content
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
         raise InputError(f"{source}: {where}: not JSON ({error.msg}); correct it there") from None
-    except UnicodeEncodeError as error:
-        half = f"\\u{ord(error.object[error.start]):04x}"
-        raise InputError(f"{source}: {half} is half of a character, which is not text; correct the file") from None
     except (ValueError, RecursionError) as error:
         reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise InputError(f"{source}: {reason}; correct the file") from None
@@ -145,8 +140,8 @@ def _faults(value: Any, annotation: Any, place: str) -> Iterator[tuple[str, str]
     """Walk a value along with its type: yield the place and the fault of each unknown key and non-finite number."""
     if isinstance(value, float) and not math.isfinite(value):
         yield place, f"{value} is not a valid number; give its value or remove the entry"
-    elif isinstance(value, str) and get_origin(annotation) is Literal and value not in get_args(annotation):
-        yield place, _unknown_word(f"unknown value {value!r}", value, list(get_args(annotation)), "known values:")
+    elif isinstance(value, str) and (fault := _fault_of_text(value, annotation)):
+        yield place, fault
     elif isinstance(value, dict):
         fields = fields_of(annotation)
         for key, item in value.items():
@@ -157,6 +152,15 @@ def _faults(value: Any, annotation: Any, place: str) -> Iterator[tuple[str, str]
     elif isinstance(value, list):
         for index, item in enumerate(value):
             yield from _faults(item, item_type(annotation), f"{place}[{index}]")
+
+
+def _fault_of_text(value: str, annotation: Any) -> str:
+    """Return what is wrong with a text; "" if nothing is. Results of a later version have no type and are kept as they are."""
+    if annotation is not None and (half := _HALF.search(value)):
+        return f"\\u{ord(half[0]):04x} is half of a character, which is not text; correct it"
+    if get_origin(annotation) is Literal and value not in get_args(annotation):
+        return _unknown_word(f"unknown value {value!r}", value, list(get_args(annotation)), "known values:")
+    return ""
 
 
 def _unknown_word(what: str, word: str, known: list[str], these: str) -> str:

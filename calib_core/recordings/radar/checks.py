@@ -15,10 +15,8 @@ _MIN_ANGLE_RAD = 0.02
 _MIRROR = "--radar-axes forward,right,up"
 
 
-def about_claims(radar: RadarStream | None) -> list[DataWarning]:
+def about_claims(radar: RadarStream) -> list[DataWarning]:
     """Warn about conventions assumed for a radar's layout and about contradictions in a sample of its messages."""
-    if radar is None:
-        return []
     plan, name = radar.layout.plan, radar.topic.name
     warnings = []
     if plan.assumed and plan.axes is None:

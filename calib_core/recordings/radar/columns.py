@@ -11,13 +11,21 @@ from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.recordings.radar.axes import RadarAxes
 from calib_core.recordings.radar.noise import full_covariance, sigma_polar_from_covariance
 
-__all__ = ["ColumnPlan", "Returns", "no_returns", "plan_columns", "returns_from", "unknown"]
+__all__ = ["ColumnPlan", "Returns", "names_a_speed", "no_returns", "plan_columns", "returns_from", "unknown"]
 
 _POSITION_PREFIXES = ("", "position", "poseposition", "poseposeposition", "pos", "point")
 _RANGES = ("range", "r", "distance", "dist", "rangem", "targetrange")
 _AZIMUTHS = ("azimuth", "azimuthangle", "azimuthrad", "azimuthdeg", "az")
 _ELEVATIONS = ("elevation", "elevationangle", "elevationrad", "elevationdeg", "el")
 _CLAIMED_AZIMUTHS = (*_AZIMUTHS, "bearing")
+_FIRST_AZIMUTHS = (*_AZIMUTHS, "azimuth0", "azimuth1")
+_OTHER_AZIMUTHS = (
+    "azimuth1", "azimuth2", "azimuth3", "secondazimuth", "azimuthsecond", "azimuthambiguity", "azimuthambiguous",
+    "azimuthalternative", "alternativeazimuth", "azimuthhypothesis", "azimuthhypothesis1", "azimuthhypothesis2",
+)  # fmt: skip
+_SPEEDLIKE = re.compile(
+    r"doppler|radial_?(vel|speed)|(vel|speed)_?radial|range_?rate|v_?rad(ial)?\b|^v_?r\b", re.IGNORECASE
+)
 _DOPPLERS = (
     "dopplervelocity", "vdopplermps", "radialvelocity", "radialspeed", "rangerate", "dopplermps", "doppler", "vradial",
     "velocity", "vr", "v", "speed", "speedradial", "rrate",
@@ -84,6 +92,8 @@ class ColumnPlan:
         assumed: what the layout's documentation leaves open, as a sentence; "" if nothing.
         shared_with_lidars: whether lidars have the same columns.
         claiming: whether to fill in Returns.claimed_polar.
+        other_azimuths: columns that may hold further azimuths of the same returns.
+        azimuth_from: one of these, to read the positions at; None reads them at the first azimuth.
     """
 
     position: tuple[str, ...]
@@ -105,6 +115,8 @@ class ColumnPlan:
     assumed: str = ""
     shared_with_lidars: bool = False
     claiming: bool = False
+    other_azimuths: tuple[str, ...] = ()
+    azimuth_from: str | None = None
 
     @property
     def looks_like_radar(self) -> bool:
@@ -171,7 +183,7 @@ def plan_columns(names: Iterable[str]) -> ColumnPlan | None:
     polar = not position
     degrees = False
     if polar:
-        polar_names = (first(_RANGES), first(_AZIMUTHS), first(_ELEVATIONS))
+        polar_names = (first(_RANGES), first(_FIRST_AZIMUTHS), first(_ELEVATIONS))
         if polar_names[0] is None or polar_names[1] is None:
             return None
         position = tuple(name for name in polar_names if name is not None)
@@ -191,7 +203,15 @@ def plan_columns(names: Iterable[str]) -> ColumnPlan | None:
         spoils_position=tuple(by_plain[name] for name in _INVALID_POSITION if name in by_plain),
         spoils_doppler=tuple(by_plain[name] for name in _INVALID_DOPPLER if name in by_plain),
         claimed=(first(_RANGES), first(_CLAIMED_AZIMUTHS), first(_ELEVATIONS)),
+        other_azimuths=tuple(
+            by_plain[name] for name in _OTHER_AZIMUTHS if name in by_plain and by_plain[name] not in position
+        ),
     )
+
+
+def names_a_speed(names: Iterable[str]) -> bool:
+    """Return whether a column's name says that it is a radial speed, which only a radar or a rare lidar measures."""
+    return any(_SPEEDLIKE.search(name) for name in names)
 
 
 def _cartesian(by_plain: dict[str, str]) -> tuple[str, ...]:
@@ -216,6 +236,8 @@ def returns_from(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Retur
 
 def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
     position = _position(plan, column)
+    if plan.azimuth_from is not None:
+        position = _turned(plan, position, _floats(column(plan.azimuth_from)))
     n = len(position)
     amplitude = _floats(column(plan.amplitude)) if plan.amplitude else unknown(n)
     doppler = _doppler(plan, column, position)
@@ -251,6 +273,14 @@ def _position(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Points3:
         position[:, 1:] = np.radians(position[:, 1:])
     position[:, 1] *= plan.azimuth_sign
     return cartesian_from_polar(position)
+
+
+def _turned(plan: ColumnPlan, position: Points3, azimuth: Values) -> Points3:
+    """Return positions with their range and elevation at another azimuth, in the unit and with the sign of the first."""
+    degrees = plan.degrees or _plain(plan.azimuth_from or "").endswith("deg")
+    polar = polar_from_cartesian(position)
+    polar[:, 1] = plan.azimuth_sign * (np.radians(azimuth) if degrees else azimuth)
+    return cartesian_from_polar(polar)
 
 
 def _sigma(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Points3) -> Points3:

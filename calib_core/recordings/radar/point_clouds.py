@@ -1,6 +1,7 @@
 """Read radar returns from sensor_msgs/PointCloud2 (and the older PointCloud) of any memory layout."""
 
 import struct
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,7 +12,7 @@ from calib_core.errors import MessageError
 from calib_core.recordings.messages.decoding import Message, decode, payload_byte_order
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.column_plans import plan_for, plan_like
-from calib_core.recordings.radar.columns import ColumnPlan, Returns, no_returns, returns_from
+from calib_core.recordings.radar.columns import ColumnPlan, Returns, names_a_speed, no_returns, returns_from
 
 __all__ = ["ChannelCloudLayout", "CloudLayout", "is_channel_cloud", "is_cloud"]
 
@@ -58,11 +59,12 @@ class CloudLayout:
     def recognise(cls, definition: Definition, payload: bytes) -> "CloudLayout | None":
         """Recognise the layout from a first message; None if it contains no positions."""
         message = decode(definition, payload)
-        plan = plan_for("cloud", _point_dtype(message, payload_byte_order(payload, definition)).names or ())
+        names = _point_dtype(message, payload_byte_order(payload, definition)).names or ()
+        plan = plan_for("cloud", names)
         if plan is None:
             return None
         points = message.whole("height") * message.whole("width")
-        return cls(definition, plan, points > _LIDAR_POINTS or not plan.looks_like_radar)
+        return cls(definition, plan, _lidar_like(plan, names, points))
 
     @property
     def description(self) -> str:
@@ -145,6 +147,13 @@ class CloudLayout:
         except struct.error:
             return None
         return None
+
+
+def _lidar_like(plan: ColumnPlan, names: Iterable[str], points: int) -> bool:
+    """Return whether a cloud may be a lidar's: it has no speed, and either too many points or a lidar's columns only."""
+    if plan.doppler is not None or plan.velocity or names_a_speed(names):
+        return False
+    return points > _LIDAR_POINTS or not plan.looks_like_radar
 
 
 def _after_header(payload: bytes, definition: Definition) -> int:
@@ -234,7 +243,7 @@ class ChannelCloudLayout:
         plan = plan_for("channels", columns)
         if plan is None:
             return None
-        return cls(definition, plan, len(columns["x"]) > _LIDAR_POINTS or not plan.looks_like_radar)
+        return cls(definition, plan, _lidar_like(plan, columns, len(columns["x"])))
 
     @property
     def description(self) -> str:

@@ -77,6 +77,7 @@ folder that contains them, or the folder of a data set, five levels deep. What w
 |---|---|
 | folder of `.pcd` (version 0.7, binary or ascii), such as nuScenes | radar, one scan per file; recognised like a PointCloud2 |
 | folder of `.bin` | View-of-Delft radar, one scan per file; four floats a point (KITTI) are a lidar's and not used |
+| `.bin`, `.dat` of a TI data port, or a folder of them | radar, judged by the bytes; [see below](#data-port-of-ti-radars) |
 | `.csv`, `.txt`, `.jsonl`, `.ndjson`, `.json` | radar; see below. The first line of a CSV names columns and units: `{example}` |
 | folder of `.csv`, `.txt` or `.json` with one scan each | radar; times inside, or in the file names |
 | folder of pictures | camera; pictures that cannot be decoded are left out and counted (`unreadable-pictures`) |
@@ -99,6 +100,21 @@ otherwise they are 0.1 s apart. A warning says so (`numbered-files`), and next t
 Dates without a time zone are UTC. Where the other sensor's times are not of this kind that is an assumption: state the zone with
 `--time-zone +02:00`. If only a zone separates radar and camera, the error names it.
 
+### Data port of TI radars
+
+The bytes that the demos of TI's mmWave SDK send over the data port (AWR1843, IWR6843 and others), as a terminal program or a
+script stored them. Packets begin with the magic word `02 01 04 03 06 05 08 07`; after garbage or a cut packet reading goes on
+at the next one, and `cocalib info` counts what was skipped and which frame numbers are missing. Read are the points (SDK 3:
+metres and m/s as floats; SDK 1 and 2: fixed point) and the SNR in 0.1 dB (amplitude); range profiles, heat maps, statistics
+and temperatures are named and skipped. SDK 1 and 2 send the Doppler only as the number of a bin whose size the stream does
+not state: such scans have no speed. TI counts x to the right, y forward and z up; points are turned to x forward, y left, z up.
+
+The stream carries no dates. `--radar-start TIME` is the time of its first frame, and `--radar-start TIME,SECONDS` also the
+time between frames. Otherwise that is measured by the processor cycles in the packets, read as 200 MHz, which the stream does
+not state: an assumption that `cocalib info` lists. A list beside the file, `NAME.csv` or `NAME.txt` with one time per packet
+in the last column, takes precedence over both. Logs of the configuration port and raw samples of a DCA1000 (`adc_data.bin`)
+hold no detections and are refused by name.
+
 ### Data sets
 
 | data set | open | intrinsics | published pose |
@@ -119,6 +135,7 @@ Intrinsics without a size are for the pictures' own size. Of several cameras or 
 | `unstamped-files` | files without a time in a folder where others have one; they are skipped |
 | `numbered-files` | numbers instead of times: those of the pictures with the same numbers, or 0.1 s apart |
 | `file-order` | the times and the numbers in the file names disagree about the order |
+| `cut-off-row` | a table ends within a row, which is left out |
 | `camera-changes` | the data set has other intrinsics for other frames; those of the first are used |
 | `assumed` | one per assumption below |
 

@@ -1,37 +1,32 @@
 """The stream of radar scans of a recording, decoded in blocks and by window."""
 
 import contextlib
-import threading
-from collections import OrderedDict
-from collections.abc import Iterator, Mapping, Sequence
+import copy
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from calib_core.arrays import Points3, TimesNs, frozen_array
 from calib_core.errors import MessageError, RecordingError
-from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
+from calib_core.measurements import RadarScans
 from calib_core.recordings.radar.columns import Returns, no_returns
 from calib_core.recordings.radar.layouts import RadarLayout
 from calib_core.recordings.radar.list_messages import PointLayout, first_of_scans
 from calib_core.recordings.radar.point_clouds import CloudLayout
+from calib_core.recordings.radar.scan_blocks import ScanBlocks
 from calib_core.recordings.topics import Topic
 
-__all__ = ["RadarStream", "join_scans"]
+__all__ = ["RadarStream"]
 
-_BLOCK_SCANS = 128
 _USUAL_CLOUD_BYTES = 4096
 _SMALLEST_CLOUD_BYTES = 256
 _LONGEST_TOGETHER = 1 << 17
 _CLAIMS_OF_A_SCAN = 16
-_CACHED_RETURNS = 1_000_000
-_WINDOW_RETURNS = 50_000
-_FIRST_WINDOW_SCANS = 16
-_MOST_WINDOW_SCANS = 2048
 _MOST_WINDOW_BYTES = 1 << 23
 
 
-class RadarStream:
+class RadarStream(ScanBlocks):
     """The scans of one radar topic, decoded in blocks on demand.
 
     Args:
@@ -46,8 +41,6 @@ class RadarStream:
         self.layout: RadarLayout = layouts[0]
         """The layout of the first part; with one return per message, all parts share it."""
         self._layouts = layouts
-        self._blocks: OrderedDict[int, RadarScans] = OrderedDict()
-        self._lock = threading.Lock()
         self.unreadable: Mapping[int, str] = {}
         self._cloud_bytes = _USUAL_CLOUD_BYTES
         first = np.arange(len(topic))
@@ -56,7 +49,15 @@ class RadarStream:
         order = np.argsort(stamps_ns[first], kind="stable")
         last = np.append(first[1:], len(topic))
         self._first, self._last = first[order], last[order]
-        self.times_ns: TimesNs = frozen_array(stamps_ns[first][order], (None,), dtype=np.int64)
+        super().__init__(frozen_array(stamps_ns[first][order], (None,), dtype=np.int64))
+
+    def at_azimuth(self, column: str) -> "RadarStream":
+        """Return the same scans with the returns at another azimuth that the messages give for each."""
+        other = copy.copy(self)
+        other.layout, *rest = (layout.with_plan(replace(layout.plan, azimuth_from=column)) for layout in self._layouts)
+        other._layouts = (other.layout, *rest)
+        ScanBlocks.__init__(other, self.times_ns)
+        return other
 
     def _numbers(self, layout: PointLayout, heads: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Read the numbers that separate scans; if a message's strings are longer than the first's, from the whole message."""
@@ -69,58 +70,15 @@ class RadarStream:
                         numbers[row] = message.number(name)
         return frame, point
 
-    def scans(self, start: TimeNs | None = None, end: TimeNs | None = None) -> RadarScans:
-        """Decode the scans with start <= stamp <= end."""
-        first = 0 if start is None else int(np.searchsorted(self.times_ns, start, side="left"))
-        last = len(self.times_ns) if end is None else int(np.searchsorted(self.times_ns, end, side="right"))
-        return self._between(first, max(first, last))
+    @property
+    def parts(self) -> tuple["RadarStream", ...]:
+        """The streams of single topics that it is made of: itself."""
+        return (self,)
 
-    def around(self, times: Sequence[TimeNs], half_window_s: float) -> RadarScans:
-        """Decode the scans within half_window_s of any of the times, each once."""
-        half = round(half_window_s * NS_PER_S)
-        wanted = np.zeros(len(self.times_ns) + 1, dtype=np.int64)
-        for time in times:
-            wanted[np.searchsorted(self.times_ns, int(time) - half, side="left")] += 1
-            wanted[np.searchsorted(self.times_ns, int(time) + half, side="right")] -= 1
-        inside = np.concatenate([[False], np.cumsum(wanted)[:-1] > 0, [False]])
-        edges = np.flatnonzero(np.diff(inside.astype(np.int8)))
-        return join_scans([self._between(int(a), int(b)) for a, b in edges.reshape(-1, 2)])
-
-    def _between(self, first: int, last: int) -> RadarScans:
-        """Return the scans first to last - 1."""
-        pieces = []
-        for number in range(first // _BLOCK_SCANS, -(-last // _BLOCK_SCANS)):
-            block, base = self._block(number), number * _BLOCK_SCANS
-            pieces.append(_cut(block, max(first - base, 0), min(last - base, len(block))))
-        return join_scans(pieces)
-
-    def _block(self, number: int) -> RadarScans:
-        with self._lock:
-            if number in self._blocks:
-                self._blocks.move_to_end(number)
-                return self._blocks[number]
-        block = self._decoded(np.arange(number * _BLOCK_SCANS, min((number + 1) * _BLOCK_SCANS, len(self.times_ns))))
-        with self._lock:
-            self._blocks[number] = block
-            while len(self._blocks) > 2 and sum(len(b.points_radar_m) for b in self._blocks.values()) > _CACHED_RETURNS:
-                self._blocks.popitem(last=False)
-        return block
-
-    def windows(self) -> Iterator[RadarScans]:
-        """Decode all scans in order, about equally many returns at a time, without caching."""
-        first, count = 0, _FIRST_WINDOW_SCANS
-        while first < len(self.times_ns):
-            scans = self._decoded(np.arange(first, min(first + count, len(self.times_ns))))
-            yield scans
-            first += len(scans)
-            per_scan = max(1.0, len(scans.points_radar_m) / len(scans))
-            most = min(_MOST_WINDOW_SCANS, _MOST_WINDOW_BYTES // self._cloud_bytes)
-            count = max(1, min(int(_WINDOW_RETURNS / per_scan), most))
-
-    def sample(self, count: int) -> RadarScans:
-        """Decode at most count scans spread evenly over the recording."""
-        places = np.linspace(0, len(self.times_ns) - 1, min(count, len(self.times_ns)))
-        return self._decoded(np.unique(places.astype(np.int64)))
+    @property
+    def most_together(self) -> int:
+        """The largest number of scans to decode at once."""
+        return _MOST_WINDOW_BYTES // self._cloud_bytes
 
     def claims(self, count: int) -> Returns:
         """Decode ranges and angles as given, and positions in the message's own axes, of at most count scans."""
@@ -139,8 +97,8 @@ class RadarStream:
                 found.append(layout.returns(self.topic.payload(row)))
         return _joined(found)
 
-    def _decoded(self, scans: np.ndarray) -> RadarScans:
-        """Decode the given scans, ascending."""
+    def decoded(self, scans: np.ndarray) -> RadarScans:
+        """Decode the scans with the given numbers, ascending, without caching."""
         if isinstance(self.layout, PointLayout):
             return self._decoded_points(self.layout, scans)
         if isinstance(self.layout, CloudLayout) and len(self._layouts) == 1 and len(scans) > 1:
@@ -234,34 +192,4 @@ def _stacked(times_ns: TimesNs, counts: Sequence[int], returns: Returns) -> Rada
         doppler_mps=returns.doppler_mps,
         snr_db=returns.snr_db,
         sigma_polar=returns.sigma_polar,
-    )
-
-
-def _cut(scans: RadarScans, first: int, last: int) -> RadarScans:
-    """Keep the scans first to last - 1."""
-    if first == 0 and last == len(scans):
-        return scans
-    low, high = int(scans.first_return[first]), int(scans.first_return[last])
-    return RadarScans(
-        times_ns=scans.times_ns[first:last],
-        first_return=scans.first_return[first : last + 1] - low,
-        points_radar_m=scans.points_radar_m[low:high],
-        doppler_mps=scans.doppler_mps[low:high],
-        snr_db=scans.snr_db[low:high],
-        sigma_polar=scans.sigma_polar[low:high],
-    )
-
-
-def join_scans(pieces: Sequence[RadarScans]) -> RadarScans:
-    """Concatenate scans; the pieces must be in time order."""
-    if len(pieces) < 2:
-        return pieces[0] if pieces else RadarScans()
-    counts = np.concatenate([np.diff(piece.first_return) for piece in pieces])
-    return RadarScans(
-        times_ns=np.concatenate([piece.times_ns for piece in pieces]),
-        first_return=np.concatenate([[0], np.cumsum(counts)]),
-        points_radar_m=np.concatenate([piece.points_radar_m for piece in pieces]),
-        doppler_mps=np.concatenate([piece.doppler_mps for piece in pieces]),
-        snr_db=np.concatenate([piece.snr_db for piece in pieces]),
-        sigma_polar=np.concatenate([piece.sigma_polar for piece in pieces]),
     )

@@ -75,10 +75,10 @@ def moments_in(text: str) -> Iterator[WrittenMoment]:
                 int(part["second"] or part["second_s"]),
                 tzinfo=UTC,
             )
+            zone = (part["zone"] or "").strip()
+            second = (moment - _EPOCH) // timedelta(seconds=1) - (zone_of(zone) if zone else 0)
         except ValueError:
             continue
-        zone = (part["zone"] or "").strip()
-        second = (moment - _EPOCH) // timedelta(seconds=1) - (zone_of(zone) if zone else 0)
         digits = _in_nanoseconds(part["digits"], part["unit"])
         yield WrittenMoment(
             second, part["fraction"] or digits, bool(part["point"] or part["unit"] or not digits), bool(zone), match.span()

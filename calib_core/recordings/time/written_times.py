@@ -19,6 +19,7 @@ _IN_NAME = re.compile(r"(?<!\d)(\d{10})(?:\.(\d{1,9})|[_-](\d{1,9}))(?!\d)|(?<!\
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _EXPONENT = re.compile(r"[+-]?\d(?:\.\d*)?[eE]\+?\d{1,2}")
 _EPOCHS_NS = (631_152_000 * NS_PER_S, 2_840_140_800 * NS_PER_S)
+_SHOWN = 60
 _YEARS_NS = (978_307_200 * NS_PER_S, 4_102_444_800 * NS_PER_S)
 
 
@@ -107,7 +108,8 @@ def _read_date(text: str, zone_s: int) -> TimeNs:
         moment = datetime.fromisoformat(re.sub(r"\.\d+", "", text))
     except ValueError as error:
         raise RecordingError(
-            f"'{text}' is not a time; write seconds since 1970 (1714557600.25) or a date (2024-05-01T12:00:00.25+02:00)"
+            f"'{' '.join(text.split())[:_SHOWN]}' is not a time; write seconds since 1970 (1714557600.25) "
+            "or a date (2024-05-01T12:00:00.25+02:00)"
         ) from error
     moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC) - timedelta(seconds=zone_s)
     seconds = (moment - _EPOCH) // timedelta(seconds=1)

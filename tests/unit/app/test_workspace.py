@@ -245,9 +245,11 @@ class Picture:
 class BareRecording:
     radar_topic = image_topic = camera_info_topic = radar_clock = image_clock = None
     radar_axes: str | None = None
+    radar_topics, radar_choice = (), ""
     video_start = None
     radar_frame, camera_frame = "radar", "camera"
-    image_times = radar_times = FACTS.image_times
+    image_times = FACTS.image_times
+    radar_times = FACTS.image_times + 7
 
     def camera(self) -> None:
         return None
@@ -270,10 +272,25 @@ def test_a_workspace_opened_again_has_the_earlier_clicks(tmp_path: Path) -> None
         workspace.close()
 
 
-def test_a_recording_without_frames_is_refused_with_a_clear_error() -> None:
+def test_a_recording_without_pictures_can_be_looked_at_and_stores_nothing(tmp_path: Path) -> None:
     recording = BareRecording()
     recording.image_times = np.zeros(0, dtype=np.int64)
-    with pytest.raises(InputError, match="drive: has no frames to click in"):
+    facts = recording_facts(recording, "drive")
+    assert not facts.has_pictures
+    assert facts.moments.tolist() == recording.radar_times.tolist()
+    workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="drive")
+    assert workspace.view.status == "No camera in this recording: nothing can be clicked"
+    assert "Add the camera's file" in workspace.view.hint
+    with pytest.raises(EventError, match="no frame of drive"):
+        workspace.dispatch(ClickPlaced(TimeNs(int(recording.radar_times[0])), 1.0, 1.0))
+    workspace.close()
+    assert not (tmp_path / "s").exists()
+
+
+def test_a_recording_without_pictures_and_without_radar_is_refused_with_a_clear_error() -> None:
+    recording = BareRecording()
+    recording.image_times = recording.radar_times = np.zeros(0, dtype=np.int64)
+    with pytest.raises(InputError, match="drive: has neither pictures nor radar scans"):
         recording_facts(recording, "drive")
 
 

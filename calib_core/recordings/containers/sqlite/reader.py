@@ -157,7 +157,7 @@ class SqliteSource:
             return FoundRows(kept["columns"].reshape(-1, 3))
         with self._database() as database:
             found = scan_rows(database, self.path)
-        if self._kept is not None and not (found.fault or found.strange or found.repeated or found.absent):
+        if self._kept is not None and not found.incomplete:
             self._kept.put("rows", {"columns": found.columns})
         return found
 

@@ -44,6 +44,7 @@ class FoundRows:
         strange: number of rows whose time or topic is not a number.
         fault: SQLite's error message for the damage; "" if there is none.
         repeated: number of rows with the number of another row, which a damaged table can contain.
+        missed: number of rows that only the table's index of times names.
     """
 
     columns: np.ndarray
@@ -51,6 +52,12 @@ class FoundRows:
     strange: int = 0
     fault: str = ""
     repeated: int = 0
+    missed: int = 0
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether anything is damaged or lost."""
+        return bool(self.fault or self.strange or self.repeated or self.missed or self.absent)
 
     @property
     def absent(self) -> tuple[tuple[int, int], ...]:
@@ -174,10 +181,19 @@ def scan_rows(connection: sqlite3.Connection, path: Path) -> FoundRows:
     except sqlite3.Error as error:
         fault = " ".join(str(error).split())
         found = _around_damage(connection, _last_row(connection, path), fault)
+    found = replace(found, missed=max(0, _counted(connection) - len(found.columns) - found.strange))
     if (np.diff(found.columns[:, 2]) > 0).all():
         return found
     _, first = np.unique(found.columns[:, 2], return_index=True)
     return replace(found, columns=found.columns[np.sort(first)], repeated=len(found.columns) - len(first))
+
+
+def _counted(connection: sqlite3.Connection) -> int:
+    """Count the rows, which SQLite does in the table's smallest index; 0 if that is damaged."""
+    try:
+        return int(connection.execute("SELECT count(*) FROM messages").fetchone()[0])
+    except sqlite3.Error:
+        return 0
 
 
 def _batches(connection: sqlite3.Connection, query: str, values: tuple[int, ...]) -> tuple[list[np.ndarray], int]:
@@ -274,6 +290,8 @@ def about_rows(path: Path, found: FoundRows, unknown: int) -> list[DataWarning]:
         lost.append(
             f"{found.repeated} rows have the number of another row, so others are lost; each number is used once"
         )
+    if found.missed and not found.holes:
+        lost.append(f"{found.missed} rows that its index of times names are lost")
     if found.absent and not found.strange:
         where = ", ".join(_rows_text(low, high) for low, high in found.absent[:3])
         count = sum(high - low + 1 for low, high in found.absent)

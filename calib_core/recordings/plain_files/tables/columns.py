@@ -117,6 +117,8 @@ def choose_columns(
             TableColumn(place, written.strip(), words.quantity, words.unit, words.rank)
         )
     chosen, rivals = _best(claims)
+    if given & {"range", "azimuth"} and not given & {"x", "y"}:
+        chosen = [column for column in chosen if column.quantity not in ("x", "y", "z")]  # the user says what to use
     values = [column for column in (*stated, *chosen) if column.quantity in QUANTITIES]
     _require_position(path, names, values, foreign)
     mapped_time = [column for column in stated if column.quantity == "time"]

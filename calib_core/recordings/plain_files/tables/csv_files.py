@@ -6,6 +6,7 @@ from array import array
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from operator import itemgetter
+from os import SEEK_END
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.field_words import FIELD_SPELLINGS
 from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.tables.columns import TableColumns, units_of
-from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE, TextTable
+from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE, TableRows, TextTable
 from calib_core.recordings.plain_files.tables.times import TimeReader
 
 __all__ = ["CSV_EXAMPLE", "csv_columns", "first_rows", "read_rows", "require_header"]
@@ -60,8 +61,8 @@ def _is_data(row: Sequence[str]) -> bool:
     return bool(row) and any(map(str.strip, row)) and not row[0].lstrip().startswith(_COMMENTS)
 
 
-def read_rows(table: TextTable, columns: TableColumns, times: TimeReader | None) -> tuple[np.ndarray, np.ndarray]:
-    """Read times (n,) [ns], zero without a time reader, and values (n, k) as written.
+def read_rows(table: TextTable, columns: TableColumns, times: TimeReader | None) -> TableRows:
+    """Read the rows; a last one that is cut off is left out.
 
     Raises:
         RecordingError: a row is damaged; the message names its line.
@@ -73,7 +74,7 @@ def read_rows(table: TextTable, columns: TableColumns, times: TimeReader | None)
 
 def _read_numbers(
     table: TextTable, columns: TableColumns, times: TimeReader | None, rows: Iterator[list[str]]
-) -> tuple[np.ndarray, np.ndarray]:
+) -> TableRows:
     stamps, values = array("q"), array("d")  # eight bytes per number; a Python list would take forty
     cells, comma = _cells_of(columns), table.decimal_comma
     key = times.key if times else _no_time
@@ -90,10 +91,28 @@ def _read_numbers(
             except ValueError:
                 numbers = [_number(cell.replace(",", ".") if comma else cell) for cell in written]
         except (ValueError, IndexError, OverflowError, RecordingError) as error:
+            if _is_end(table, rows):
+                return _rows(stamps, values, columns, is_cut_off=True)
             raise _damaged(table, number, error) from error
         stamps.append(time)
         values.extend(numbers)
-    return np.array(stamps, dtype=np.int64), np.array(values, dtype=np.float64).reshape(-1, len(columns.values))
+    return _rows(stamps, values, columns)
+
+
+def _rows(
+    stamps: "array[int]", values: "array[float]", columns: TableColumns, *, is_cut_off: bool = False
+) -> TableRows:
+    times_ns = np.array(stamps, dtype=np.int64)
+    return TableRows(times_ns, np.array(values, dtype=np.float64).reshape(-1, len(columns.values)), is_cut_off)
+
+
+def _is_end(table: TextTable, rows: Iterator[list[str]]) -> bool:
+    """Return whether no row follows and the file does not end with a line feed: its writer was stopped within a row."""
+    if next(rows, None) is not None:
+        return False
+    with table.path.open("rb") as file:
+        file.seek(-2, SEEK_END)
+        return b"\n" not in file.read()
 
 
 def _no_time(_: Sequence[str]) -> object:
@@ -128,7 +147,7 @@ def _is_list(cell: str) -> bool:
 
 def _read_lists(
     table: TextTable, columns: TableColumns, times: TimeReader | None, rows: Iterator[list[str]]
-) -> tuple[np.ndarray, np.ndarray]:
+) -> TableRows:
     """Read rows that hold a scan each: every column is a list of as many numbers, or one number for all returns."""
     stamps, values = array("q"), array("d")
     cells = _cells_of(columns)
@@ -143,11 +162,13 @@ def _read_lists(
                 raise ValueError(f"lists of {' and '.join(str(len(one)) for one in lists)} numbers in one row")
             time = times.read(times.key(row)) if times else 0
         except (ValueError, IndexError, OverflowError, RecordingError) as error:
+            if _is_end(table, rows):
+                return _rows(stamps, values, columns, is_cut_off=True)
             raise _damaged(table, number, error) from error
         full = [one * count if len(one) == 1 else one for one in lists]
         stamps.extend([time] * count)
         values.extend(value for one in zip(*full, strict=True) for value in one)
-    return np.array(stamps, dtype=np.int64), np.array(values, dtype=np.float64).reshape(-1, len(columns.values))
+    return _rows(stamps, values, columns)
 
 
 def _joined(row: Sequence[str], separator: str) -> list[str]:

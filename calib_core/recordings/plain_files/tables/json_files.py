@@ -13,12 +13,15 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.recordings.plain_files.tables.columns import TableColumns
+from calib_core.recordings.plain_files.tables.text_tables import TableRows
 from calib_core.recordings.plain_files.tables.times import TimeReader
 
 __all__ = ["JsonTable", "open_json_table", "read_json_rows"]
 
 _MAX_BYTES = 1 << 28
 _SAMPLED_ROWS = 500
+_DECODER = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
+_LAST_BYTES = 1 << 20
 _POINTS = ("position", "pos", "xyz", "point", "location", "coordinates")
 _NOTHING = ("", "null", "none")
 
@@ -59,8 +62,8 @@ def open_json_table(path: Path) -> JsonTable:
     return JsonTable(path, names, tuple(tuple(row.get(name, "") for name in names) for _, row in first))
 
 
-def read_json_rows(table: JsonTable, columns: TableColumns, times: TimeReader | None) -> tuple[np.ndarray, np.ndarray]:
-    """Read times (n,) [ns], zero without a time reader, and values (n, k) as written.
+def read_json_rows(table: JsonTable, columns: TableColumns, times: TimeReader | None) -> TableRows:
+    """Read the rows; a last line that is cut off is left out.
 
     Raises:
         RecordingError: a line is damaged; the message names it.
@@ -74,7 +77,19 @@ def read_json_rows(table: JsonTable, columns: TableColumns, times: TimeReader | 
         except (ValueError, OverflowError, RecordingError) as error:
             raise RecordingError(f"{table.path}: line {line}: {error}; fix or remove the line") from error
         values.extend(numbers)
-    return np.array(stamps, dtype=np.int64), np.array(values, dtype=np.float64).reshape(-1, len(columns.values))
+    numbers_of_rows = np.array(values, dtype=np.float64).reshape(-1, len(columns.values))
+    return TableRows(np.array(stamps, dtype=np.int64), numbers_of_rows, _is_cut_off(table.path))
+
+
+def _is_cut_off(path: Path) -> bool:
+    """Return whether the last line is not JSON and has no end: its writer was stopped within it."""
+    with path.open("rb") as file:
+        file.seek(max(path.stat().st_size - _LAST_BYTES, 0))
+        last = file.read().rpartition(b"\n")[2]
+    try:
+        return bool(last.strip()) and path.suffix.lower() != ".json" and not _parse(last.decode("utf-8", "replace"))
+    except (ValueError, RecursionError):
+        return True
 
 
 def _number(text: str) -> float:
@@ -117,6 +132,8 @@ def _lines(path: Path) -> Iterator[tuple[int, Any]]:
                 try:
                     yield number, _parse(line)
                 except (ValueError, RecursionError) as error:
+                    if number > 1 and not line.endswith("\n"):
+                        return  # see _is_cut_off
                     raise RecordingError(
                         f"{path}: line {number}: not JSON ({error}); fix or remove the line"
                     ) from error
@@ -124,7 +141,7 @@ def _lines(path: Path) -> Iterator[tuple[int, Any]]:
 
 def _parse(text: str) -> Any:
     """Parse JSON; numbers stay text, because a float rounds nanoseconds."""
-    return json.loads(text, parse_float=str, parse_int=str, parse_constant=str)
+    return _DECODER.decode(text)
 
 
 def _rows_of(value: Any, prefix: str, above: Mapping[str, str]) -> Iterator[dict[str, str]]:

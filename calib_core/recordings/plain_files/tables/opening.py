@@ -16,7 +16,7 @@ from calib_core.recordings.plain_files.tables.columns import TableColumns, choos
 from calib_core.recordings.plain_files.tables.csv_files import first_rows, read_rows, require_header
 from calib_core.recordings.plain_files.tables.json_files import JsonTable, open_json_table, read_json_rows
 from calib_core.recordings.plain_files.tables.scans import RADAR_FRAME, ReturnTable, points_of, source_of, table_words
-from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE, TextTable, open_text_table
+from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE, TableRows, TextTable, open_text_table
 from calib_core.recordings.plain_files.tables.times import TimeReader, time_reader
 from calib_core.recordings.plain_files.tables.units import TableUnits, settle_units
 
@@ -51,11 +51,11 @@ def open_radar_table(path: Path, options: PlainOptions) -> PlainSource:
             f"{path}: no time column; the first line must name columns and units, such as {TABLE_EXAMPLE}; "
             f"the columns are {shown}: say which is the time with --map time=NAME:s"
         )
-    stamps, values = _read(table, columns, times)
-    if not len(stamps):
+    rows = _read(table, columns, times)
+    if not len(rows.times_ns):
         raise RecordingError(f"{path}: the file has a header but no rows")
     what = "radar JSON" if isinstance(table, JsonTable) else "radar CSV"
-    read = ReturnTable(columns, stamps, values, times.zoneless, times.counted, times.assumptions, times.remarks)
+    read = ReturnTable(columns, rows, times.zoneless, times.counted, times.assumptions, times.remarks)
     return source_of(path, what, read, options)
 
 
@@ -103,7 +103,7 @@ def open_table_folder(
     if not tables:
         raise RecordingError(f"{folder}: {len(files)} tables without a row in the {len(sample)} that were looked at")
     columns = _columns(tables[0], options)
-    values = [_read(table, _same_columns(table, columns, options), None)[1] for table in tables]
+    values = [_read(table, _same_columns(table, columns, options), None).values for table in tables]
     units = settle_units(columns, np.concatenate(values), topic, options)
     times = _times(tables[0], columns, topic, options)
     inside = times is not None and not times.counted
@@ -129,6 +129,7 @@ def open_table_folder(
         zoneless=stamped.zoneless,
         counted=stamped.counted,
         mapped=any(column.mapped for column in (*columns.values, *columns.time)),
+        file_of=lambda row: stamped.files[row],
     )
 
 
@@ -166,7 +167,7 @@ def _times(table: Table, columns: TableColumns, topic: str, options: PlainOption
     return time_reader(columns, _rows(table), topic, zone_s=options.zone_s, decimal_comma=comma)
 
 
-def _read(table: Table, columns: TableColumns, times: TimeReader | None) -> tuple[np.ndarray, np.ndarray]:
+def _read(table: Table, columns: TableColumns, times: TimeReader | None) -> TableRows:
     return read_json_rows(table, columns, times) if isinstance(table, JsonTable) else read_rows(table, columns, times)
 
 
@@ -175,7 +176,7 @@ def _points(file: Path, columns: TableColumns, units: TableUnits, options: Plain
     if not table.first_row:
         return points_of(columns, np.zeros((0, len(columns.values))), units)
     own = _same_columns(table, columns, options)
-    return points_of(own, _read(table, own, None)[1], units)
+    return points_of(own, _read(table, own, None).values, units)
 
 
 def _stamped_inside(files: Sequence[Path], times: TimeReader, options: PlainOptions) -> StampedFiles:

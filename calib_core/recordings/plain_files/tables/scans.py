@@ -14,6 +14,7 @@ from calib_core.recordings.plain_files.messages import cloud_channel, cloud_mess
 from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.source import PlainSource, topic_of
 from calib_core.recordings.plain_files.tables.columns import TableColumns
+from calib_core.recordings.plain_files.tables.text_tables import TableRows
 from calib_core.recordings.plain_files.tables.units import TableUnits, settle_units
 from calib_core.results import DataWarning
 
@@ -29,8 +30,7 @@ class ReturnTable:
 
     Attributes:
         columns: which columns were read.
-        times_ns: (n,) of the rows, in the order of the file.
-        values: (n, k) as written.
+        rows: their times and values.
         zoneless: whether the times are dates without a zone.
         counted: whether the times are numbers of scans.
         assumptions: about the times.
@@ -38,8 +38,7 @@ class ReturnTable:
     """
 
     columns: TableColumns
-    times_ns: TimesNs
-    values: np.ndarray
+    rows: TableRows
     zoneless: bool = False
     counted: bool = False
     assumptions: tuple[Assumption, ...] = ()
@@ -49,12 +48,12 @@ class ReturnTable:
 def source_of(path: Path, what: str, table: ReturnTable, options: PlainOptions) -> PlainSource:
     """Return the scans of a table as a recording's topic."""
     topic = topic_of(path, "radar")
-    units = settle_units(table.columns, table.values, topic, options)
-    order = np.argsort(table.times_ns, kind="stable")
-    stamps, first = np.unique(table.times_ns[order], return_index=True)
+    units = settle_units(table.columns, table.rows.values, topic, options)
+    order = np.argsort(table.rows.times_ns, kind="stable")
+    stamps, first = np.unique(table.rows.times_ns[order], return_index=True)
     edges = np.append(first, len(order))
-    points = points_of(table.columns, table.values[order], units)
-    warnings = (_counted(path),) if table.counted else ()
+    points = points_of(table.columns, table.rows.values[order], units)
+    warnings = (*([_counted(path)] if table.counted else ()), *([_cut_off(path)] if table.rows.is_cut_off else ()))
     return PlainSource(
         path,
         path.stat().st_size,
@@ -75,6 +74,14 @@ def _counted(path: Path) -> DataWarning:
         "numbered-files",
         f"{path.name}: the scans are numbered and have no times; an interval of 0.1 s is assumed",
         "correct only if scans and camera files with the same number belong together; otherwise add a column time_ns",
+    )
+
+
+def _cut_off(path: Path) -> DataWarning:
+    return DataWarning(
+        "cut-off-row",
+        f"{path.name}: the file ends within a row, which is left out; its writer was stopped",
+        "no action needed for one row; if more should follow, copy the file again from its source",
     )
 
 
@@ -100,7 +107,8 @@ def _with_positions(names: Sequence[str], values: np.ndarray) -> tuple[list[str]
         if name in names:
             polar[:, place] = values[:, names.index(name)]
     kept = [place for place, name in enumerate(names) if name not in ("x", "y", "z")]
-    positions = np.column_stack([cartesian_from_polar(polar), values[:, kept]])
+    with np.errstate(invalid="ignore"):  # an angle may be infinite
+        positions = np.column_stack([cartesian_from_polar(polar), values[:, kept]])
     return ["x", "y", "z", *(names[place] for place in kept)], np.ascontiguousarray(positions)
 
 

@@ -8,10 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
+import numpy as np
+
+from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
 from calib_core.recordings.field_words import read_field
 
-__all__ = ["TABLE_EXAMPLE", "TextTable", "open_text_table"]
+__all__ = ["TABLE_EXAMPLE", "TableRows", "TextTable", "open_text_table"]
 
 TABLE_EXAMPLE = "time_ns,x_m,y_m,z_m,doppler_mps,snr_db"
 _SEPARATORS = (",", ";", "\t", "|", " ")
@@ -64,6 +67,21 @@ class TextTable:
                 yield _reader(file, self.separator)
         except (OSError, UnicodeError, csv.Error) as error:
             raise RecordingError(f"{self.path}: cannot be read as a table: {error}") from error
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TableRows:
+    """The rows of a table.
+
+    Attributes:
+        times_ns: (n,) their times, in the order of the file; 0 if none were asked for.
+        values: (n, k) numbers of the columns in use, as written.
+        is_cut_off: whether the file ends within a row, which is left out.
+    """
+
+    times_ns: TimesNs
+    values: np.ndarray
+    is_cut_off: bool = False
 
 
 def _reader(file: TextIO, separator: str) -> Iterator[list[str]]:

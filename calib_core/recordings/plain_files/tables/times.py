@@ -138,11 +138,11 @@ def _of_gps(
     """Read GPS time in seconds, which counts from 1980 and has no leap seconds; None for other numbers."""
     if column.unit not in ("", "s") or not _GPS_SINCE_2017_S <= numbers[0] < 2 * _GPS_SINCE_2017_S or column.mapped:
         return None
-    text = f"{column.written} is read as GPS time, {_LEAP_SECONDS} s ahead of UTC"
+    text = f"{column.written} is read as GPS time, {_LEAP_SECONDS} s ahead of UTC; --map time={column.written}:s reads it as UTC"
     return TimeReader(
         itemgetter(column.place),
         lambda cell: TimeNs(read_time(plain(cell), "s") + (_GPS_EPOCH_S - _LEAP_SECONDS) * NS_PER_S),
-        assumptions=(Assumption("time-scale", topic, text, f"--map time={column.written}:s if it is UTC after all"),),
+        assumptions=(Assumption("time-scale", topic, text, "--confirm-assumptions"),),
     )
 
 

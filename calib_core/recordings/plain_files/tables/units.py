@@ -198,9 +198,7 @@ class _Settling:
         if x is None or y is None:
             self._azimuth_sign()
             return False
-        if x.mapped or y.mapped:
-            return False
-        ahead, aside = self.sample["y"], self.sample["x"]
+        ahead, aside = y.sign * self.sample["y"], x.sign * self.sample["x"]
         some = np.isfinite(ahead) & np.isfinite(aside) & (ahead != 0)
         if np.count_nonzero(some) >= _ENOUGH:
             left = float(np.mean(aside[some] < 0))
@@ -209,7 +207,7 @@ class _Settling:
                 text = f"{why}; read as {x.written} to the right, {y.written} forward"
                 self.assumptions.append(Assumption("axes", self.topic, text, "--radar-axes right,forward,up"))
                 return True
-        if y.rank > 0 or x.rank > 0:
+        if (y.rank > 0 and not y.mapped) or (x.rank > 0 and not x.mapped):
             text = f"the directions of {x.written} and {y.written} are not stated; read as forward and to the left"
             self.assumptions.append(Assumption("axes", self.topic, text, "--radar-axes forward,left,up"))
         return False

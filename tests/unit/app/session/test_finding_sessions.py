@@ -78,7 +78,7 @@ def test_a_moved_recording_continues_the_session_in_the_users_folder(
     folder = clicked(state_folder / "drive.bag-12345678.cocalib-session")
     found = find_session_folder([home / "drive.bag"], FACTS)
     assert found.path == folder
-    assert "continuing the session" in found.warnings[0].message
+    assert f"continuing the session in {folder}, which has the frames of drive.bag" in found.warnings[0].message
 
 
 def test_of_two_sessions_the_newest_is_continued_and_the_other_named(home: Path, state_folder: Path) -> None:
@@ -156,6 +156,22 @@ def test_a_session_that_cannot_be_written_is_named_with_the_way_to_its_clicks(
     assert found.path.parent == state_folder
     (warning,) = found.warnings
     assert f"cocalib session export {folder} --out clicks.json" in warning.hint
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give a folder to another user"
+)
+def test_another_users_session_next_to_the_recording_is_named(
+    home: Path, state_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = clicked(home / "drive.bag.cocalib-session")
+    os.chown(folder, 12345, -1)
+    monkeypatch.setattr("app.session.file.folders.is_writable", lambda place: state_folder in (place, place.parent))
+    found = find_session_folder([home / "drive.bag"], FACTS)
+    assert found.path.parent == state_folder
+    (warning,) = found.warnings
+    assert f"{folder}: belongs to user 12345" in warning.message
+    assert "copy it to a folder of your own" in warning.message
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows needs a right to make links")

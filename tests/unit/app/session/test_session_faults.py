@@ -2,6 +2,7 @@
 
 import errno
 import os
+import re
 import shutil
 import stat
 from collections.abc import Callable
@@ -10,14 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.session import ClickPlaced, History, RecordingFacts, advance
+from app.session import ClickPlaced, History, OptionsChanged, RecordingFacts, advance
 from app.session.file import (
     SessionFile,
     SessionFileError,
+    inspect_session,
     open_session_file,
     repair_session,
     set_aside,
 )
+from app.session.file.checksums import line_bytes, sealed, taken_apart
 from app.session.file.guarded_folder import GuardedFolder
 from app.session.file.journal import JOURNAL
 from app.session.file.snapshot import SNAPSHOT
@@ -33,6 +36,7 @@ from benchmarks.reliability.sessions import (
     sampled_bits,
 )
 from calib_core.measurements import TimeNs
+from calib_core.options import CalibrationOptions
 
 START_NS = 1_700_000_000_123_456_789
 FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)
@@ -316,6 +320,41 @@ def test_a_full_disk_at_the_end_costs_only_the_snapshot(tmp_path: Path, monkeypa
     assert not (tmp_path / "s" / SNAPSHOT).exists()
     assert [path.name for path in (tmp_path / "s").iterdir() if path.name.startswith(".")] == []
     assert clicks_in(tmp_path / "s") == [1.0, 2.0]
+
+
+DEEP = b"[" * 100_000 + b"]" * 100_000
+
+
+@pytest.mark.parametrize(
+    "value", [DEEP, b'"\\ud800"', b"1e308", b"-1", b"NaN", b"9" * 400, b"null", b"{}"], ids=lambda value: value[:9]
+)
+@pytest.mark.parametrize("key", [b'"options":', b'"name":', b'"steps":', b'"pixel_px":', b'"recording":', b'"sec":'])
+def test_odd_content_with_right_checksums_is_refused_or_read_but_never_crashes(
+    tmp_path: Path, key: bytes, value: bytes
+) -> None:
+    folder = tmp_path / "s"
+    session_file = open_session_file(folder, FACTS)
+    history = clicked(session_file, 1)
+    step = OptionsChanged(CalibrationOptions(method="paper"))
+    session_file.append(step, advance(history, step, FACTS))
+    session_file.close()
+    with_value = re.compile(re.escape(key) + rb"[^,\]}]*")
+    lines, previous = [], ""
+    for line in lines_of(folder):
+        lines.append(sealed(with_value.sub(lambda _: key + value, taken_apart(line).content), previous))
+        previous = lines[-1].sum
+    snapshot = taken_apart((folder / SNAPSHOT).read_bytes()[:-1]).content
+    for files in ((JOURNAL, lines), (SNAPSHOT, [sealed(with_value.sub(lambda _: key + value, snapshot))])):
+        name, content = files
+        (folder / name).write_bytes(b"".join(line_bytes(line) + b"\n" for line in content))
+        before = {path.name: path.read_bytes() for path in folder.iterdir()}
+        try:
+            inspect_session(folder)
+            open_session_file(folder, FACTS).close()
+        except SessionFileError:
+            assert {
+                path.name: path.read_bytes() for path in folder.iterdir() if path.name != "lock"
+            }.items() <= before.items()
 
 
 class Killed(BaseException):

@@ -215,7 +215,7 @@ def test_a_name_that_is_not_unicode_is_written_as_an_escape(name: str, written: 
     stamps = StampColumns.of(FACTS.image_times)
     sensors = (SensorNote("radar", name, about=(name,)),)
     note = RecordingNote(
-        name, name, "/i", 640, 480, stamps, Stamp(1, 2), stamps, (), sensors, SessionNote(name, 0), "0.1"
+        name, name, "/i", 640, 480, True, stamps, Stamp(1, 2), stamps, (), sensors, SessionNote(name, 0), "0.1"
     )
     sent = json.loads(encode(note).encode("utf-8"))
     assert (sent["name"], sent["sensors"][0]["topic"], sent["session"]["folder"]) == (written,) * 3
@@ -258,7 +258,9 @@ def test_a_message_to_the_page_carries_its_type(message, written: dict[str, obje
 
 def test_a_recording_is_sent_with_every_nanosecond_and_every_option_described() -> None:
     stamps = StampColumns.of(FACTS.image_times)
-    note = RecordingNote("d", "/r", "/i", 640, 480, stamps, Stamp(1, 2), stamps, (), (), SessionNote("/s", 0), "0.1")
+    note = RecordingNote(
+        "d", "/r", "/i", 640, 480, True, stamps, Stamp(1, 2), stamps, (), (), SessionNote("/s", 0), "0.1"
+    )
     written = json.loads(encode(note))
     assert written["frame_times"] == {"sec": [1700000000] * 3, "nanosec": [123456789, 223456789, 323456789]}
     assert [group["name"] for group in written["option_groups"]][:2] == ["", "gating"]

@@ -1,6 +1,7 @@
 """A corpus of tables with known truth: each is read right, or right under an assumption that is stated."""
 
 import json
+import random
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -281,6 +282,61 @@ def test_a_mapped_column_that_does_not_exist_is_refused_with_the_nearest(tmp_pat
         open_recording(path, RecordingOptions(map=("x=f_PosXX:m",)), require=("radar",))
 
 
+def test_a_stated_unit_does_not_hide_that_x_points_to_the_right(tmp_path) -> None:
+    (tmp_path / "a.csv").write_text(table("time_ns,x,y,z", lambda t, x, y, z, *_: f"{t},{-y},{x},{z}"))
+    options = RecordingOptions(map=("x=x:m", "y=y:m", "z=z:m"))
+    with open_recording(tmp_path / "a.csv", options, require=("radar",)) as recording:
+        np.testing.assert_allclose(recording.radar_scans().points_radar_m, T.points_m)
+        assert [one.key for one in recording.assumptions] == ["axes"]
+    options = RecordingOptions(map=("x=y:m", "y=-x:m", "z=z:m"))
+    with open_recording(tmp_path / "a.csv", options, require=("radar",)) as recording:
+        np.testing.assert_allclose(recording.radar_scans().points_radar_m, T.points_m)
+        assert recording.assumptions == ()
+
+
+def test_a_mapped_range_is_used_although_there_are_positions(tmp_path) -> None:
+    rows = "".join(f"{t},{r},{-a},{e},0,0\n" for t, r, a, e, _ in T.polar)
+    (tmp_path / "a.csv").write_text(f"time_ns,range_m,azimuth_deg,elevation_deg,x_m,y_m\n{rows}")
+    options = RecordingOptions(map=("range=range_m:m", "azimuth=-azimuth_deg:deg"))
+    with open_recording(tmp_path / "a.csv", options, require=("radar",)) as recording:
+        np.testing.assert_allclose(recording.radar_scans().points_radar_m, T.points_m, atol=1e-9)
+        assert recording.assumptions == ()
+
+
+def test_scans_nested_in_one_object_are_read(tmp_path) -> None:
+    frames = [
+        {"time": t, "points": dict(zip(NAMES, map(list, zip(*rows, strict=True)), strict=True))} for t, rows in scans()
+    ]
+    (tmp_path / "a.json").write_text(json.dumps({"meta": {"sensor": "front"}, "frames": frames}))
+    with open_recording(tmp_path / "a.json", require=("radar",)) as recording:
+        np.testing.assert_allclose(recording.radar_scans().points_radar_m, T.points_m)
+        np.testing.assert_array_equal(recording.radar_times, np.unique(T.times_ns))
+
+
+@pytest.mark.parametrize("kind", ["ours", "lists in cells", "JSON lines, a return each"])
+def test_a_table_that_ends_within_a_row_is_read_up_to_there(tmp_path, kind) -> None:
+    path = written(tmp_path, kind)
+    whole = path.read_bytes()
+    last = whole.rstrip(b"\n").rfind(b"\n")
+    path.write_bytes(whole[: last + 25])
+    with open_recording(path, require=("radar",)) as recording:
+        kept = len(recording.radar_scans().points_radar_m)
+        (warning,) = recording.warnings
+    assert kept == (24 if kind == "lists in cells" else 35)
+    assert warning.code == "cut-off-row"
+    path.write_bytes(whole[: last + 25] + b"\n" + whole[last + 1 :])
+    with pytest.raises(RecordingError, match="fix or remove the line"):
+        open_recording(path, require=("radar",))
+
+
+def test_gps_time_is_an_assumption(tmp_path) -> None:
+    gps_s = START_NS // NS_PER_S - 315_964_800 + 18
+    (tmp_path / "a.csv").write_text(f"gps_time,x_m,y_m\n{gps_s}.208764,1,2\n")
+    with open_recording(tmp_path / "a.csv", require=("radar",)) as recording:
+        assert recording.radar_times.tolist() == [START_NS]
+        assert [one.key for one in recording.assumptions] == ["time-scale"]
+
+
 def test_the_angle_unit_of_the_axes_option_is_followed(tmp_path) -> None:
     rows = "".join(f"{t},{r},{a / 50},{e / 50}\n" for t, r, a, e, _ in T.polar)
     (tmp_path / "a.csv").write_text(f"time_ns,range_m,azimuth,elevation\n{rows}")
@@ -309,6 +365,47 @@ def test_two_columns_of_one_quantity_are_an_assumption(tmp_path) -> None:
         (assumption,) = recording.assumptions
     assert (assumption.key, assumption.text) == ("field-meaning", "range_m is read as the range, not r_m")
     assert assumption.confirm == "--map range=range_m:m"
+
+
+def test_damaged_tables_are_answered_with_values_or_one_clear_error(tmp_path) -> None:
+    rng = random.Random(5)
+    tokens = [
+        "nan",
+        "inf",
+        "1e400",
+        "9" * 40,
+        "[",
+        "]",
+        "{",
+        '"',
+        ",",
+        ";",
+        "\0",
+        "\n",
+        "#",
+        "time",
+        "-1",
+        "null",
+        "+17:64",
+    ]
+    answers = {True: 0, False: 0}
+    for number in range(400):
+        name, text, _ = DIALECTS[rng.choice(sorted(DIALECTS))]
+        head = text[: text.index("\n", 900) + 1] if "\n" in text[900:] else text
+        for _ in range(rng.randrange(1, 3)):
+            place = rng.randrange(len(head))
+            keep = place + (0 if number % 2 else rng.randrange(12))
+            head = f"{head[:place]}{rng.choice(tokens) if number % 3 else ''}{head[keep:]}"
+        (tmp_path / name).write_text(head, encoding="utf-8")
+        try:
+            with open_recording(tmp_path / name, require=("radar",)) as recording:
+                recording.radar_scans()
+            answers[True] += 1
+        except RecordingError as error:
+            assert str(tmp_path) in str(error)  # noqa: PT017
+            assert "\n" not in str(error)  # noqa: PT017
+            answers[False] += 1
+    assert min(answers.values()) > 40
 
 
 # -- one file per scan

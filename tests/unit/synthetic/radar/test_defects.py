@@ -22,7 +22,7 @@ from calib_core.synthetic import (
 )
 from calib_core.synthetic.messages import CLOUD_TOPIC, SECOND_COLUMN, SECOND_SUFFIX, camera_messages, radar_messages
 from calib_core.synthetic.options import SecondAzimuth
-from calib_core.synthetic.radar.defects import radar_from_reported
+from calib_core.synthetic.radar.defects import radar_from_reported, second_azimuths
 from calib_core.synthetic.radar.returns import Targets, measure
 from calib_core.synthetic.rig import RigOptions, radar_stand
 from calib_core.synthetic.truth import truth_text
@@ -231,13 +231,20 @@ def test_one_of_two_azimuths_is_the_true_one(where: SecondAzimuth, share: float)
 
 
 @pytest.mark.parametrize("where", ["column", "topic"])
-def test_a_recording_with_two_azimuths_is_read_with_the_first_one(where: SecondAzimuth, tmp_path: Path) -> None:
-    recording = simulate(replace(QUIET, placements=2, defects=RadarDefects(second_azimuth=where)))
+def test_a_recording_with_two_azimuths_is_read_with_both_as_alternatives(where: SecondAzimuth, tmp_path: Path) -> None:
+    recording = simulate(replace(QUIET, placements=2, clutter="scene", defects=RadarDefects(second_azimuth=where)))
     path = write_ros1_bag(tmp_path / "radar.bag", radar_messages(recording, 1))
     with open_recording([path], RecordingOptions(), require=("radar",)) as opened:
         scans = opened.radar_scans()
-    expected = np.concatenate([scan.points_radar_m for scan in recording.scans()])
-    assert np.array_equal(scans.points_radar_m, expected)
+    measured = list(recording.scans())
+    assert len(scans) == len(measured)
+    assert scans.alternative_of is not None
+    for number in (0, 40, len(measured) - 1):
+        scan, points = scans.scan(number), measured[number].points_radar_m
+        expected = np.concatenate([points, second_azimuths(points)])
+        assert scan.alternative_of is not None
+        assert scan.points_radar_m == pytest.approx(expected, abs=1e-4)
+        assert scan.alternative_of.tolist() == [*range(len(points)), *range(len(points))]
 
 
 def test_without_defects_no_draw_changes() -> None:

@@ -224,6 +224,22 @@ def test_the_end_says_where_the_clicks_are_if_the_session_folder_was_deleted(
     assert (rescued / "session.json").is_file()
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows does not delete open files")
+def test_an_error_that_ends_the_program_does_not_hide_where_the_clicks_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def click_delete_and_fail(_: Service, workspace: Workspace, recording: Any) -> None:
+        workspace.dispatch(ClickPlaced(TimeNs(int(recording.image_times[1])), 1.0, 1.0))
+        shutil.rmtree(tmp_path / "session")
+        raise OSError("no port is free")
+
+    monkeypatch.setattr(Service, "serve", click_delete_and_fail)
+    assert run(["demo", "--no-browser", "--port", "0", "--session", str(tmp_path / "session")]) == 2
+    clicks, problem = capsys.readouterr().err.splitlines()
+    assert "All clicks (1) are saved in" in clicks
+    assert "no port is free" in problem
+
+
 def test_an_immediate_error_starts_no_server(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(serving, "RunningServer", None)
     with pytest.raises(RecordingError, match="empty"), service(let_in_after_s=LONG_S):
@@ -244,7 +260,7 @@ def test_a_late_error_is_one_line_and_exit_code_2(
 ) -> None:
     link_is_out = threading.Event()
 
-    def slow_and_wrong(*_: object) -> None:
+    def slow_and_wrong(*_: object, **_options: object) -> None:
         assert link_is_out.wait(20)
         raise RecordingError("holiday.bag: not a recording")
 
@@ -270,7 +286,7 @@ def test_a_named_file_that_is_missing_is_refused_before_anything_is_read(
 
 SLOW_TO_OPEN = """
 import calib_core.recordings as recordings
-recordings.open_recording = lambda *_: threading.Event().wait()
+recordings.open_recording = lambda *_, **_options: threading.Event().wait()
 """
 PRINTS_WHEN_IT_SERVES = """
 from app.web.port.server import RunningServer
@@ -384,7 +400,7 @@ def test_a_large_recording_has_its_link_before_it_is_opened(
 ) -> None:
     printed_before = []
 
-    def look(*_: object) -> None:
+    def look(*_: object, **_options: object) -> None:
         printed_before.append(capsys.readouterr().out)
         raise RecordingError("long: not a recording")
 

@@ -1,0 +1,95 @@
+"""A recording without pictures: its radar can be looked at, nothing can be clicked, and the page says what was found."""
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from app.web.port.server import RunningServer, ServerOptions, start
+from app.workspace import open_workspace
+from calib_core.recordings import open_recording
+from tests.browser.driving import Driver
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def radar_server(project_root: Path, tmp_path: Path) -> Iterator[RunningServer]:
+    radar = project_root / "sample_data" / "rooftop" / "radar.bag"
+    with open_recording(radar, require=("radar",)) as recording:
+        workspace = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="radar.bag")
+        running = start(workspace, recording, ServerOptions(port=0, token="test"))
+        yield running
+        running.close()
+        workspace.close()
+    assert not (tmp_path / "s").exists(), "nothing is stored: the session belongs to a recording with pictures"
+
+
+@pytest.fixture
+def page(open_page: Callable[..., Driver], radar_server: RunningServer) -> Driver:
+    driver = open_page(radar_server.url, ready="__cocalib.state.look")
+    driver.until("__cocalib.state.placementsKnown && __cocalib.state.radarMap")
+    return driver
+
+
+def test_the_page_says_what_was_found_and_that_nothing_can_be_clicked(page: Driver) -> None:
+    assert re.match(r"\d+ placements found, [\d.]+ to [\d.]+ m, azimuth", page.text("#status-text"))
+    assert "No camera in this recording: nothing can be clicked" in page.text("#warnings")
+    assert "Add the camera's file to calibrate" in page.text("#warnings")
+    for name in ("undo", "redo", "export"):
+        assert page.page.is_disabled(f"#{name}")
+    assert not page.page.is_visible("#tab-options")
+    assert not page.page.is_visible("#marks")
+
+
+def test_keys_and_the_table_go_from_placement_to_placement(page: Driver) -> None:
+    rows = page.page.locator("#page-pairs [data-placement]")
+    assert rows.count() == page.value("__cocalib.state.placements.length") >= 10
+    page.press("n")
+    page.until("__cocalib.state.look.index === __cocalib.state.placements[0].frame")
+    assert page.text("#guide").startswith("Placement 1 of ")
+    rows.nth(4).click()
+    page.until("__cocalib.state.look.index === __cocalib.state.placements[4].frame")
+    assert rows.nth(4).get_attribute("aria-selected") == "true"
+
+
+def test_the_view_from_above_explains_what_is_under_the_pointer(page: Driver) -> None:
+    page.press("n")
+    page.until("__cocalib.state.look.index === __cocalib.state.placements[0].frame")
+    place = page.page.evaluate(
+        """async () => {
+            const { toCanvas } = await import("/birdseye.js");
+            const box = document.getElementById("birdseye").getBoundingClientRect();
+            const [x, y] = __cocalib.state.placements[0].position_radar_m;
+            const [px, py] = toCanvas(x, y);
+            return [box.left + px, box.top + py];
+        }"""
+    )
+    page.page.mouse.move(*place)
+    page.until("!document.getElementById('tip').hidden")
+    tip = page.text("#tip")
+    assert "Placement 1 of" in tip
+    assert f"{page.value('__cocalib.state.placements[0].range_m'):.1f} m" in tip
+
+
+def test_returns_stay_as_long_as_chosen_and_playing_goes_through_the_scans(page: Driver) -> None:
+    page.press("n", "n")
+    page.until("__cocalib.state.look.index === __cocalib.state.placements[1].frame")
+    oldest = "Math.max(...__cocalib.state.look.returns.map((row) => row[6]))"
+    assert 1.0 < page.value(oldest) <= 2.0
+    page.page.click("#look-options .chip >> nth=0")
+    page.until(f"{oldest} > 5")
+    page.page.click("#look-options .chip >> nth=0")
+    page.until(f"{oldest} === 0")
+    before = page.value("__cocalib.state.cursor")
+    page.press(" ")
+    page.until(f"__cocalib.state.look.index > {before} + 5")
+    page.press(" ")
+    page.until("!__cocalib.state.playing && __cocalib.state.look.index === __cocalib.state.cursor")
+
+
+def test_nothing_can_be_clicked_or_exported_by_keys(page: Driver) -> None:
+    page.press("Enter", "e", "Delete", "x", "Control+z")
+    assert page.view["clicks"] == []
+    assert not page.page.is_visible("#export-dialog")

@@ -1,0 +1,67 @@
+"""`cocalib open` on recordings that lack a sensor: what is served, what is refused, and what is said."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from app.__main__ import run
+from app.workspace import Workspace
+from calib_core.recordings import Recording
+
+
+@pytest.fixture
+def served(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[Workspace]:
+    """Serve nothing; collect what would have been served."""
+    workspaces: list[Workspace] = []
+
+    def serve(_service: object, workspace: Workspace, _recording: Recording) -> None:
+        workspaces.append(workspace)
+
+    monkeypatch.setattr("app.web.port.serving.Service.serve", serve)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return workspaces
+
+
+@pytest.fixture
+def copied(project_root: Path, tmp_path: Path) -> Callable[[str], Path]:
+    def copy(name: str) -> Path:
+        path = tmp_path / name
+        path.write_bytes((project_root / "sample_data" / "rooftop" / name).read_bytes())
+        return path
+
+    return copy
+
+
+def test_a_radar_alone_is_opened_without_intrinsics_and_stores_nothing(
+    served: list[Workspace], copied: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    radar = copied("radar.bag")
+    assert run(["open", str(radar), "--no-browser"]) == 0
+    assert (
+        capsys.readouterr().out == "radar.bag: no pictures: showing the radar only. "
+        "To calibrate, give the camera's recording as well.\n"
+    )
+    assert not served[0].facts.has_pictures
+    assert [path.name for path in radar.parent.iterdir() if path.name != "state"] == ["radar.bag"]
+
+
+@pytest.mark.parametrize("flag", ["--camera", "--calibration", "--clicks"])
+def test_files_that_need_a_camera_are_refused_without_one(
+    flag: str, served: list[Workspace], copied: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    clicks = copied("clicks.json")
+    assert run(["open", str(copied("radar.bag")), "--no-browser", flag, str(clicks)]) == 2
+    errors = capsys.readouterr().err
+    assert "clicks.json cannot be used; give the camera's recording as well" in errors
+    assert served == []
+
+
+def test_a_camera_alone_is_refused_with_what_to_do(
+    served: list[Workspace], copied: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["open", str(copied("camera.bag")), "--no-browser"]) == 2
+    errors = capsys.readouterr().err
+    assert "camera.bag" in errors
+    assert "radar" in errors
+    assert served == []

@@ -1,0 +1,160 @@
+"""A recording without pictures: what the whole radar recording says, and what is shown at one moment."""
+
+import numpy as np
+import pytest
+
+from app.web.channel.placement_words import placement_figures, placement_note, placement_summary
+from app.web.channel.radar_map import RadarMapSum
+from app.web.channel.radar_survey import survey_of
+from app.web.messages import PlacementRow, RadarMap
+from app.web.radar_sight import RadarSight, look_of, shown_rows
+from app.web.view3d.looking import Look, amplitude_colours, map_colours, trail_colours
+from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
+from calib_core.options import GatingOptions
+
+NAN = float("nan")
+
+
+def scan(time_s: float, rows: list[tuple[float, float, float, float, float]]) -> RadarScan:
+    """Return a scan from rows of x, y, z [m], speed [m/s], amplitude [dB]."""
+    table = np.array(rows, dtype=float).reshape(-1, 5)
+    return RadarScan(
+        TimeNs(round(time_s * NS_PER_S)), table[:, :3], table[:, 3], table[:, 4], np.full((len(table), 3), NAN)
+    )
+
+
+def recorded(reflector_db: float = 30.0) -> RadarScans:
+    """Return twenty seconds at 10 Hz: a wall, somebody walking, and a reflector from 5 s to 9 s at the wall's range."""
+    scans = []
+    for time_s in np.arange(0, 20, 0.1):
+        rows = [(6.0, 3.0, 0.0, 0.0, 15.0), (4.0, -2.0 + 0.1 * time_s, 0.0, 1.0, 25.0)]
+        if 5 <= time_s <= 9:
+            rows.append((6.0, -3.0, -0.3, 0.0, reflector_db))
+        scans.append(scan(time_s, rows))
+    return RadarScans.from_scans(scans)
+
+
+class Radar:
+    def radar_scans_around(self, times: list[TimeNs], half_window_s: float) -> RadarScans:
+        half_ns = round(half_window_s * NS_PER_S)
+        return recorded().between(TimeNs(times[0] - half_ns), TimeNs(times[0] + half_ns))
+
+
+def row(lasted_s: float = 6.0, azimuth_deg: float = 10.0, snr_db: float | None = 30.0, note: str = "") -> PlacementRow:
+    return PlacementRow(0.0, lasted_s, 3, 5.0, 1.0, (5.0, 0.0, 0.0), azimuth_deg, snr_db, 12.0, note)
+
+
+def test_without_frames_a_placement_is_found_at_the_radars_own_moments() -> None:
+    scans = recorded()
+    survey = survey_of([scans], scans.times_ns, GatingOptions())
+    (found,) = survey.rows
+    assert found.frame == pytest.approx(70, abs=2), "7 s, the middle, is scan 70"
+    assert found.range_m == pytest.approx(np.sqrt(36 + 9 + 0.09), abs=1e-6)
+    assert found.azimuth_deg == pytest.approx(-26.57, abs=0.01)
+    assert found.position_radar_m == (6.0, -3.0, -0.3)
+    assert (found.snr_db, found.stands_out_db) == (30.0, 15.0)
+    assert found.note == ""
+    assert survey.message.summary == (
+        "1 placement found, 6.7 to 6.7 m, azimuth 27° right to 27° right; a calibration needs at least 4; "
+        "strongest: placement 1, 30 dB"
+    )
+
+
+def test_a_reflector_that_does_not_stand_out_is_named() -> None:
+    scans = recorded(reflector_db=13.0)
+    (found,) = survey_of([scans], scans.times_ns, GatingOptions()).rows
+    assert found.stands_out_db == -2.0
+    assert found.note == "2 dB weaker than other returns"
+
+
+def test_a_recording_shorter_than_a_placement_is_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.web.channel.radar_survey.find_placements", None)
+    scans = recorded().between(TimeNs(0), TimeNs(NS_PER_S))
+    assert survey_of([scans], scans.times_ns, GatingOptions()).rows == ()
+
+
+def test_a_short_placement_is_named() -> None:
+    assert placement_note(2.1, None) == "lasted only 2.1 s"
+    assert placement_note(6.0, 4.0) == "only 4 dB above other returns"
+    assert placement_note(6.0, 20.0) == ""
+
+
+def test_the_summary_says_how_many_where_and_which_to_look_at() -> None:
+    rows = [row(), row(azimuth_deg=-31.2, snr_db=41.0), row(2.1, 28.4, note="lasted only 2.1 s"), row(), row()]
+    assert placement_summary(rows, 60.0) == (
+        "5 placements found, 5.0 to 5.0 m, azimuth 31° right to 28° left; strongest: placement 2, 41 dB; "
+        "placement 3 lasted only 2.1 s"
+    )
+    assert (
+        placement_summary([row(snr_db=None)] * 5, 60.0)
+        == "5 placements found, 5.0 to 5.0 m, azimuth 10° left to 10° left"
+    )
+    assert placement_summary([], 60.0).startswith("No placement found")
+    assert placement_summary([], 0.4) == "The recording is 0.4 s long, too short for a placement of 2 s or longer"
+
+
+def test_few_placements_are_a_warning() -> None:
+    few, enough = (placement_figures([row()] * count, 7.0, 10.0)[0] for count in (3, 4))
+    assert (few.value, few.level) == ("3", "warning")
+    assert (enough.value, enough.level) == ("4", "good")
+    assert placement_figures([], 0.0, NAN)[1].value == "–"
+
+
+def test_the_map_says_how_long_something_was_where() -> None:
+    total = RadarMapSum(GatingOptions())
+    for start in range(0, 20, 5):
+        total.add(recorded().between(TimeNs(start * NS_PER_S), TimeNs((start + 5) * NS_PER_S - 1)))
+    found = total.total()
+    shares = {(round(x), round(y)): share for x, y, share in zip(found.x_m, found.y_m, found.share, strict=True)}
+    assert shares[(6, 3)] == 1.0
+    assert shares[(6, -3)] == pytest.approx(41 / 200, abs=0.006)
+    assert found.cell_m == pytest.approx(0.2)
+    assert found.low_db is not None
+    assert found.high_db is not None
+    assert found.low_db <= 15 <= 30 <= found.high_db + 0.5
+
+
+def test_a_radar_without_amplitude_has_a_map_without_amplitude() -> None:
+    total = RadarMapSum(GatingOptions())
+    total.add(RadarScans.from_scans([scan(time_s, [(5.0, 0.0, 0.0, 0.0, NAN)]) for time_s in range(5)]))
+    found = total.total()
+    assert (found.snr_db, found.low_db, found.high_db) == ((), None, None)
+    assert found.share == (1.0,)
+
+
+def test_equal_amplitudes_are_not_coloured() -> None:
+    total = RadarMapSum(GatingOptions())
+    total.add(RadarScans.from_scans([scan(time_s, [(5.0, 0.0, 0.0, 0.0, 1.0)]) for time_s in range(5)]))
+    assert (total.total().snr_db, total.total().low_db) == ((), None)
+
+
+def test_returns_of_the_last_seconds_are_shown_with_their_age() -> None:
+    sight, now = RadarSight(Radar()), TimeNs(6 * NS_PER_S)  # type: ignore[arg-type]
+    trail = sight.trail(now, 2.0)
+    assert (int(trail.times_ns[0]), int(trail.times_ns[-1])) == (4 * NS_PER_S, 6 * NS_PER_S)
+    look = look_of(60, now, trail, GatingOptions())
+    ages = [seen.age_s for seen in look.returns]
+    assert ages == sorted(ages, reverse=True)
+    assert (ages[0], ages[-1]) == (2.0, 0.0)
+    walker = next(seen for seen in look.returns if seen.x_m == 4.0)
+    assert (walker.static, walker.doppler_mps, walker.snr_db) == (False, 1.0, 25.0)
+    assert len(sight.trail(now, 0.0)) == 1, "one scan"
+    assert len(shown_rows(trail, 10)) <= 10 < len(shown_rows(trail, 1000)) == len(trail.points_radar_m)
+
+
+def test_colours_fade_with_age_and_follow_the_amplitude() -> None:
+    now = TimeNs(6 * NS_PER_S)
+    trail = RadarSight(Radar()).trail(now, 2.0)  # type: ignore[arg-type]
+    cells = RadarMap(0.2, (1.0, 2.0), (0.0, 0.0), (0.0, 0.0), (1.0, 0.01), (12.0, 30.0), 10.0, 30.0)
+    look = Look(now, trail, (), cells, True, "amplitude")
+    for light in (False, True):
+        weak, strong, unknown = amplitude_colours(np.array([10.0, 30.0, NAN]), cells, light=light)
+        assert not np.allclose(weak, strong)
+        assert np.isfinite(unknown).all()
+        drawn = trail_colours(look, GatingOptions(), light=light).astype(int)
+        wall = drawn[trail.snr_db == 15.0]
+        background = np.array([233, 236, 240] if light else [13, 16, 20])
+        assert np.abs(wall[-1] - background).sum() > 2 * np.abs(wall[0] - background).sum()
+        assert map_colours(cells, "amplitude", light=light).shape == (2, 3)
+        stays, came = map_colours(cells, "speed", light=light).astype(int)
+        assert np.abs(stays - background).sum() > np.abs(came - background).sum()

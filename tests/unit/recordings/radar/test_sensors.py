@@ -1,0 +1,255 @@
+"""Which topics are one radar, and which radar is used."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from calib_core.errors import RecordingError
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
+from calib_core.radar import cartesian_from_polar
+from calib_core.recordings import Recording, RecordingOptions, describe, open_recording, recording_summary
+from calib_core.recordings.containers.writing import CloudMessage, RecordedMessage, write_ros1_bag
+from calib_core.recordings.radar.sensors import sensor_name
+from calib_core.synthetic import simulate
+from calib_core.synthetic.messages import SIDE_FRAME, SIDE_TOPIC, radar_messages
+from calib_core.synthetic.presets import PRESETS, PresetName
+
+START_NS = 1_700_000_000 * NS_PER_S
+NAMES = ("x", "y", "z", "intensity", "velocity")
+OTHER_RAD = -0.55
+
+
+def targets(seed: int, count: int = 40, *, far_m: float = 28.0) -> np.ndarray:
+    """Return ranges, azimuths and elevations (n, 3) of things that stand around."""
+    rng = np.random.default_rng(seed)
+    return np.column_stack(
+        [rng.uniform(1.5, far_m, count), rng.uniform(-0.9, 0.9, count), rng.uniform(-0.1, 0.1, count)]
+    )
+
+
+def clouds(
+    topic: str,
+    polar: np.ndarray,
+    *,
+    seed: int,
+    frame: str = "radar",
+    rate_hz: float = 20.0,
+    scans: int = 60,
+    turned_rad: float = 0.0,
+    names: tuple[str, ...] = NAMES,
+) -> Iterable[RecordedMessage]:
+    """Yield noisy scans of static things; equal seeds give equal noise."""
+    rng = np.random.default_rng(seed)
+    for number in range(scans):
+        noisy = polar + [0.02, 0.006, 0.01] * rng.standard_normal(polar.shape)
+        noisy[:, 1] += turned_rad
+        columns = {
+            **dict(zip("xyz", cartesian_from_polar(noisy).T, strict=True)),
+            "intensity": np.full(len(polar), 20.0),
+            "velocity": np.where(np.arange(len(polar)) % 9 == 8, 1.5, 0.0),
+        }
+        columns["doppler_vel"] = columns["velocity"]
+        stamp = TimeNs(START_NS + round(number * NS_PER_S / rate_hz))
+        values = np.column_stack([columns[name] for name in names])
+        yield RecordedMessage(topic, TimeNs(stamp + 2_000_000), CloudMessage(stamp, frame, names, values))
+
+
+def bag(folder: Path, *streams: Iterable[RecordedMessage]) -> Path:
+    messages = sorted((message for stream in streams for message in stream), key=lambda message: message.receive_time)
+    return write_ros1_bag(folder / "radar.bag", messages)
+
+
+def opened(path: Path, radar_topic: str | None = None) -> Recording:
+    return open_recording(path, RecordingOptions(radar_topic=radar_topic), require=("radar",))
+
+
+def near_and_far(everything: np.ndarray) -> tuple[Iterable[RecordedMessage], Iterable[RecordedMessage]]:
+    near, far = everything[everything[:, 0] < 10.0], everything[everything[:, 0] > 5.0]
+    return clouds("/radar/near", near, seed=1, rate_hz=25.0, scans=75), clouds("/radar/far", far, seed=2)
+
+
+def test_near_and_far_scans_are_one_radar(tmp_path: Path) -> None:
+    everything = targets(7, 60)
+    with opened(bag(tmp_path, *near_and_far(everything))) as recording:
+        assert set(recording.radar_topics) == {"/radar/near", "/radar/far"}
+        scans = recording.radar_scans()
+        assert 75 <= len(scans) <= 77
+        assert "/radar/far + /radar/near" in recording.radar_choice
+        counts = np.diff(scans.first_return)
+        assert np.median(counts) == pytest.approx(len(everything), abs=2)  # what both report counts once
+        assert [topic.chosen for topic in recording.topics] == [True, True]
+        windows = list(recording.radar_windows())
+        assert np.array_equal(np.concatenate([one.points_radar_m for one in windows]), scans.points_radar_m)
+        middle = TimeNs(int(scans.times_ns[40]))
+        around = recording.radar_scans_around([middle], 0.5)
+        assert np.array_equal(around.times_ns, scans.between(around.times_ns[0], around.times_ns[-1]).times_ns)
+        assert len(around) == pytest.approx(26, abs=2)
+
+
+def test_radars_that_look_elsewhere_stay_apart_although_their_frames_are_named_alike(tmp_path: Path) -> None:
+    everything = targets(8)
+    path = bag(tmp_path, clouds("/a", everything, seed=1), clouds("/b", everything, seed=2, turned_rad=0.5))
+    with opened(path) as recording:
+        assert len(recording.radar_topics) == 1
+        assert len(recording.radar_sensors) == 2
+        (warning,) = recording.warnings
+        assert warning.code == "several-radars"
+        assert "40 returns a scan at 20.0 Hz" in warning.message
+        assert "--radar-topic" in warning.hint
+
+
+def test_corner_radars_stay_apart_even_where_they_agree(tmp_path: Path) -> None:
+    streams = near_and_far(targets(7, 60))
+    renamed = [
+        [replace(message, topic=name) for message in stream]
+        for stream, name in zip(streams, ("/radar_left", "/radar_right"), strict=True)
+    ]
+    with opened(bag(tmp_path, *renamed)) as recording:
+        assert len(recording.radar_topics) == 1
+
+
+def test_other_frames_are_other_radars_unless_the_user_joins_them(tmp_path: Path) -> None:
+    near, far = near_and_far(targets(7, 60))
+    moved = [replace(message, body=replace(message.body, frame_id="corner")) for message in near]
+    path = bag(tmp_path, moved, far)
+    with opened(path) as recording:
+        assert len(recording.radar_topics) == 1
+    with opened(path, "/radar/far,/radar/near") as recording:
+        assert recording.radar_topics == ("/radar/far", "/radar/near")
+        (warning,) = recording.warnings
+        assert warning.code == "radar-frames-differ"
+        assert "/radar/near has frame 'corner'" in warning.message
+        assert recording.radar_choice.endswith("as requested")
+
+
+def test_one_topic_named_by_the_user_is_used_alone(tmp_path: Path) -> None:
+    with opened(bag(tmp_path, *near_and_far(targets(7, 60))), "/radar/near") as recording:
+        assert recording.radar_topics == ("/radar/near",)
+        assert len(recording.radar_times) == 75
+        assert recording.radar_choice == ""
+
+
+def test_a_radar_can_be_asked_for_by_the_name_that_info_prints(tmp_path: Path) -> None:
+    path = bag(tmp_path, *near_and_far(targets(7, 60)), clouds("/other", targets(9), seed=5))
+    with opened(path) as recording:
+        names = [sensor.name for sensor in recording.radar_sensors]
+        assert sorted(names) == ["/other", "/radar"]
+    with opened(path, "/radar") as recording:
+        assert set(recording.radar_topics) == {"/radar/near", "/radar/far"}
+    with pytest.raises(RecordingError, match=r"no topic /rader; radar topics: .*; radars: "):
+        opened(path, "/rader")
+    with pytest.raises(RecordingError, match="no topic /radar/mid; radar topics: /other, /radar/far, /radar/near"):
+        opened(path, "/radar/near,/radar/mid")
+
+
+def test_a_topic_with_the_same_returns_is_read_once(tmp_path: Path) -> None:
+    everything = targets(7)
+    path = bag(tmp_path, clouds("/radar", everything, seed=1), clouds("/radar_copy", everything, seed=1))
+    with opened(path) as recording:
+        assert len(recording.radar_topics) == 1
+        (sensor,) = recording.radar_sensors
+        assert len(sensor.copies) == 1
+        assert "the same returns as" in recording.radar_choice
+
+
+def test_other_azimuths_of_the_same_returns_are_alternatives(tmp_path: Path) -> None:
+    everything = targets(7)
+    path = bag(
+        tmp_path, clouds("/radar", everything, seed=1), clouds("/radar_2", everything, seed=1, turned_rad=OTHER_RAD)
+    )
+    with opened(path) as recording:
+        assert recording.radar_topics == ("/radar", "/radar_2")
+        scans = recording.radar_scans()
+    assert scans.alternative_of is not None
+    assert (scans.alternative_of >= 0).mean() > 0.98
+    assert _turn_between_alternatives(scans) == pytest.approx(OTHER_RAD, abs=1e-3)
+
+
+def _turn_between_alternatives(scans: RadarScans) -> float:
+    scan = scans.scan(5)
+    assert scan.alternative_of is not None
+    azimuth = np.arctan2(scan.points_radar_m[:, 1], scan.points_radar_m[:, 0])
+    turns = [np.diff(azimuth[scan.alternative_of == of])[0] for of in range(scan.alternative_of.max() + 1)]
+    return float(np.median(turns))
+
+
+def test_the_front_radar_is_chosen_over_a_side_radar_with_a_better_name_and_fewer_returns(tmp_path: Path) -> None:
+    front = clouds("/front/points", targets(7, 52), seed=1, frame="front")
+    side = clouds("/radar_left/points", targets(8, 8), seed=2, frame="left")
+    with opened(bag(tmp_path, front, side)) as recording:
+        assert recording.radar_topics == ("/front/points",)
+        assert recording.warnings == ()
+        assert "52 returns a scan" in recording.radar_choice
+        assert "not used: /radar_left/points, frame 'left': 8 returns a scan" in recording.radar_choice
+
+
+@pytest.mark.parametrize("speed", ["velocity", "doppler_vel"])
+def test_a_cloud_with_doppler_is_no_lidar_whatever_its_topic_and_size(tmp_path: Path, speed: str) -> None:
+    names = ("x", "y", "z", "intensity", speed)
+    dense = clouds("/lidar_top/points", targets(7, 5200), seed=1, scans=6, names=names)
+    with opened(bag(tmp_path, dense)) as recording:
+        assert [warning.code for warning in recording.warnings] == []
+
+
+def test_a_cloud_without_any_speed_still_looks_like_a_lidar(tmp_path: Path) -> None:
+    dense = clouds("/cloud", targets(7, 5200), seed=1, scans=6, names=("x", "y", "z", "intensity"))
+    with opened(bag(tmp_path, dense)) as recording:
+        assert [warning.code for warning in recording.warnings] == ["looks-like-lidar"]
+
+
+def test_info_shows_the_radars_with_their_figures(tmp_path: Path) -> None:
+    path = bag(tmp_path, *near_and_far(targets(7, 60)), clouds("/left", targets(8, 8), seed=2, frame="left"))
+    with opened(path) as recording:
+        text = describe(recording)
+        summary = msgspec.to_builtins(recording_summary(recording))
+    assert "radars" in text
+    assert "/radar/far, /radar/near" in text
+    assert list(summary["radar"]["topics"]) == ["/radar/far", "/radar/near"]
+    assert summary["radar"]["choice"]
+    assert [sensor["name"] for sensor in summary["sensors"]] == ["/radar", "/left"]
+    assert summary["sensors"][1]["figures"]["returns_per_scan"] == 8.0
+
+
+def test_info_gives_the_figures_of_a_single_radar_too(tmp_path: Path) -> None:
+    with opened(bag(tmp_path, clouds("/radar", targets(7), seed=1))) as recording:
+        (sensor,) = recording_summary(recording).sensors
+        assert "radars" not in describe(recording)
+    assert sensor.figures.doppler
+    assert sensor.figures.static_share == pytest.approx(0.9, abs=0.05)
+
+
+def test_names_of_radars_are_what_their_topics_have_in_common() -> None:
+    assert sensor_name(["/radar/near", "/radar/far"]) == "/radar"
+    assert sensor_name(["/r_far", "/r_far_2"]) == "/r_far,/r_far_2"
+    assert sensor_name(["/a/points", "/b/points"]) == "/a/points,/b/points"
+    assert sensor_name(["/alone"]) == "/alone"
+
+
+@pytest.mark.parametrize(
+    ("preset", "topics", "alternatives"),
+    [("near-far", 2, False), ("near-far-azimuths", 4, True), ("near-far-column", 2, True), ("lidar-name", 1, False)],
+)
+def test_simulated_radars_are_opened_as_what_they_are(
+    tmp_path: Path, preset: PresetName, topics: int, alternatives: bool
+) -> None:
+    recording = simulate(replace(PRESETS[preset], placements=2, dwell_s=3.5, seed=5))
+    path = write_ros1_bag(tmp_path / "radar.bag", radar_messages(recording, 1))
+    with opened(path) as found:
+        assert len(found.radar_topics) == topics
+        assert [warning.code for warning in found.warnings] == []
+        scans = found.radar_scans()
+        assert (scans.alternative_of is not None) == alternatives
+
+
+def test_the_simulated_front_radar_is_chosen_over_the_side_radar(tmp_path: Path) -> None:
+    recording = simulate(replace(PRESETS["two-radars"], placements=2, dwell_s=3.5, seed=5))
+    path = write_ros1_bag(tmp_path / "radar.bag", radar_messages(recording, 1))
+    with opened(path) as found:
+        assert found.radar_topics == ("/front/points",)
+        assert SIDE_TOPIC in found.radar_choice
+    with opened(path, SIDE_TOPIC) as found:
+        assert found.radar_frame == SIDE_FRAME
