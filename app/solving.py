@@ -18,6 +18,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
 from calib_core.interchange import (
     CALIBRATION_SCHEMA,
+    AssumptionNote,
     FrameNames,
     Provenance,
     names_schema,
@@ -29,7 +30,7 @@ from calib_core.interchange import calibration_text as interchange_text
 from calib_core.measurements import Pair, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.option_checks import checked_options
 from calib_core.options import CalibrationOptions
-from calib_core.recordings import Recording
+from calib_core.recordings import Recording, about_assumptions
 from calib_core.results import Calibration, InputFile, PairResult
 
 __all__ = [
@@ -210,8 +211,20 @@ def camera_for(recording: Recording, camera_file: Path | None) -> Camera | None:
     return camera
 
 
-def calibration_text(calibration: Calibration, recording: Recording) -> str:
-    """Write a calibration-1 file; the page and the command line give the same bytes for the same clicks."""
+def calibration_text(calibration: Calibration, recording: Recording, confirmed: Sequence[str] = ()) -> str:
+    """Write a calibration-1 file; the page and the command line give the same bytes for the same clicks.
+
+    Args:
+        calibration: what was solved.
+        recording: what it was solved from; assumptions about it that nobody has confirmed become warnings of the file.
+        confirmed: texts of the assumptions that were confirmed after the recording was opened.
+    """
+    assumed = [
+        (one.assumption, one.confirmed or one.assumption.words in confirmed) for one in recording.stated_assumptions
+    ]
+    unconfirmed = about_assumptions([assumption for assumption, sure in assumed if not sure])
+    if unconfirmed:
+        calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *unconfirmed))
     provenance = Provenance(
         inputs=recording.fingerprint(),
         radar_topic=recording.radar_topic,
@@ -224,6 +237,8 @@ def calibration_text(calibration: Calibration, recording: Recording) -> str:
         radar_axes=recording.radar_axes,
         video_start=recording.video_start,
         version=version(),
+        column_map=recording.column_map,
+        assumptions=tuple(AssumptionNote(assumption.words, sure) for assumption, sure in assumed),
     )
     return interchange_text(calibration, _frame_names(recording), provenance)
 
@@ -253,5 +268,7 @@ def calibration_text_of_pairs(calibration: Calibration, text: str, name: str) ->
     if names_schema(text, CALIBRATION_SCHEMA):
         file = read_calibration(text, name)
         provenance = dataclasses.replace(file.provenance, inputs=(origin,), version=version())
+        assumed = tuple(warning for warning in file.calibration.warnings if warning.code == "assumed")
+        calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *assumed))
         return interchange_text(calibration, file.frames, provenance)
     return interchange_text(calibration, provenance=Provenance(inputs=(origin,), version=version()))

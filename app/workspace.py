@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol, TypeAlias
 
 from app.session import (
+    AssumedReading,
     ClicksImported,
     History,
     RecordingFacts,
@@ -29,7 +30,7 @@ from calib_core.errors import InputError
 from calib_core.interchange import read_clicks, write_clicks
 from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
-from calib_core.recordings import Recording
+from calib_core.recordings import Recording, assumption_hint
 from calib_core.results import DataWarning
 
 __all__ = ["Journal", "Solver", "Subscriber", "Workspace", "open_workspace", "recording_facts"]
@@ -252,6 +253,7 @@ def recording_facts(recording: Recording, name: str) -> RecordingFacts:
         recording.radar_axes,
         recording.radar_times,
         recording.radar_topics,
+        tuple(AssumedReading(one.words, assumption_hint(one.confirm)) for one in recording.assumptions),
     )
 
 

@@ -1,7 +1,8 @@
 // @ts-check
 /** Metrics, pose and warnings, with the server's text. */
 
-import { icon, make } from "./notices.js";
+import { icon, make, toast } from "./notices.js";
+import { send } from "./socket.js";
 import { on, state } from "./state.js";
 
 /** @typedef {import("./messages.js").Figure} Figure */
@@ -17,7 +18,7 @@ const EMPTY = [
   ["inliers", "pairs that agree"],
 ];
 /** Warnings that the user has opened stay open. @type {Set<string>} */
-const openCodes = new Set(["unsolvable", "no-camera"]);
+const openCodes = new Set(["unsolvable", "no-camera", "assumed"]);
 export const poseTable = make("table", "", []);
 const poseHead = make("div", "pose-head", "");
 const apartTable = make("table", "", []);
@@ -58,7 +59,7 @@ function draw() {
   adviceLine.textContent = view.advice?.words ?? "";
   drawReference(view);
   const failure = view.stage === "unsolvable" ? [{ code: "unsolvable", message: view.status, hint: view.hint }] : [];
-  drawWarnings([...failure, ...(state.recording?.warnings ?? []), ...view.warnings]);
+  drawWarnings([...failure, ...(state.recording?.warnings ?? []), ...view.warnings], view.assumptions);
 }
 
 /** Name the file that the pose comes from, or show how far the solved pose is from the one in it. @param {import("./messages.js").View} view */
@@ -120,12 +121,30 @@ function row(figure) {
   return line;
 }
 
-/** @param {import("./messages.js").WarningRow[]} rows */
-function drawWarnings(rows) {
-  const text = JSON.stringify(rows);
+/** What the recording does not state, with a button that confirms all of it. @param {import("./messages.js").AssumptionRow[]} rows */
+function assumptionBox(rows) {
+  const confirm = make("button", "", "Confirm");
+  confirm.id = "confirm-assumptions";
+  confirm.onclick = async () => {
+    const refusal = await send({ type: "assumptions_confirmed", texts: rows.map((row) => row.text) });
+    if (refusal) toast(refusal);
+  };
+  const title = rows.length === 1 ? "One assumption about the recording is unconfirmed" : `${rows.length} assumptions about the recording are unconfirmed`;
+  const items = rows.map((row) => make("li", "", [row.words, make("div", "hint", row.hint)]));
+  const box = make("details", "warning", [make("summary", "", [icon("warning"), make("span", "", title)]), confirm, make("ul", "", items)]);
+  box.dataset.code = "assumed";
+  box.open = openCodes.has("assumed");
+  box.ontoggle = () => (box.open ? openCodes.add("assumed") : openCodes.delete("assumed"));
+  return box;
+}
+
+/** @param {import("./messages.js").WarningRow[]} rows @param {import("./messages.js").AssumptionRow[]} assumptions */
+function drawWarnings(rows, assumptions) {
+  const text = JSON.stringify([rows, assumptions]);
   if (text === warningText) return;
   warningText = text;
   warnings.replaceChildren(
+    ...(assumptions.length ? [assumptionBox(assumptions)] : []),
     ...rows.map((warning) => {
       const box = make("details", "warning", [
         make("summary", "", [icon("warning"), make("span", "", warning.message)]),

@@ -145,6 +145,13 @@ export interface Advice {
   words: string;
 }
 
+/** An assumption about the recording that waits for the user's confirmation. */
+export interface AssumptionRow {
+  text: string;
+  words: string;
+  hint: string;
+}
+
 /** One error that all pairs share, as a row of a table. */
 export interface SystematicErrorRow {
   key: string;
@@ -189,6 +196,7 @@ export interface View {
   reference: string;
   comparison: Figure[];
   pose_assumed: Figure[];
+  assumptions: AssumptionRow[];
   systematic_errors: SystematicErrorTable;
 }
 
@@ -451,6 +459,20 @@ export interface ClicksImportedForm {
   request?: number;
 }
 
+/** The recording is read with these columns. */
+export interface ColumnsMappedForm {
+  type: "columns_mapped";
+  column_map: string[];
+  request?: number;
+}
+
+/** Assumptions about the recording confirmed, by their texts. */
+export interface AssumptionsConfirmedForm {
+  type: "assumptions_confirmed";
+  texts: string[];
+  request?: number;
+}
+
 /** The last change undone. */
 export interface UndoForm {
   type: "undo";
@@ -535,6 +557,8 @@ export type FromPage =
   | OptionsChangedForm
   | ClearedForm
   | ClicksImportedForm
+  | ColumnsMappedForm
+  | AssumptionsConfirmedForm
   | UndoForm
   | RedoForm
   | HelloForm

@@ -22,7 +22,8 @@ const COLUMNS = [
   { key: null, label: "Use", hint: "" },
 ];
 const body = make("tbody", "", []);
-const table = make("table", "pairs", []);
+const head = make("thead", "", []);
+const table = make("table", "pairs", [head, body]);
 /** The table's row of each click, and what it was drawn from: a row is made again only when that changes. @type {Map<string, {from: unknown[], row: HTMLElement}>} */
 const made = new Map();
 /** What else was drawn: the head of the table and the steps. */
@@ -71,12 +72,13 @@ function draw() {
   body.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" });
 }
 
-/** The head of the table, and the steps below it as long as there is no calibration. @param {boolean} some @param {boolean} steps */
+/** The head of the table, and the steps below it as long as there is no calibration; the table itself stays where it is. @param {boolean} some @param {boolean} steps */
 function drawAround(some, steps) {
-  const top = page.scrollTop;
-  table.replaceChildren(make("thead", "", [make("tr", "", COLUMNS.map(heading))]), body);
-  page.replaceChildren(...(some ? [table] : []), ...(steps ? [drawSteps()] : []));
-  page.scrollTop = top;
+  if (!table.isConnected && some) page.replaceChildren(table);
+  if (!some) page.replaceChildren();
+  head.replaceChildren(make("tr", "", COLUMNS.map(heading)));
+  page.querySelector(".steps")?.remove();
+  if (steps) page.append(drawSteps());
 }
 
 /** Bring the rows up to date, one by one. @param {Click[]} rows @returns {boolean} whether any changed */

@@ -40,6 +40,7 @@ function place(click, most) {
 }
 
 function draw() {
+  if (document.getElementById("page-pose")?.hidden) return; // "box" comes when the tab is shown
   side = (document.getElementById("panel")?.clientWidth ?? 0) > 440 ? 180 : 140;
   const ratio = window.devicePixelRatio || 1;
   canvas.width = canvas.height = Math.round(side * ratio);

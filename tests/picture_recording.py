@@ -37,6 +37,11 @@ class PictureRecording:
     video_start: str | None = None
     radar_topics: tuple[str, ...] = ("/radar",)
     radar_choice: str = ""
+    assumptions: tuple[Any, ...] = ()
+    stated_assumptions: tuple[Any, ...] = ()
+    column_map: tuple[str, ...] = ()
+    radar_columns: tuple[Any, ...] = ()
+    radar_notes: tuple[str, ...] = ()
     radar_frame: str = "radar"
     camera_frame: str = "camera_optical"
     topics: tuple[Any, ...] = ()

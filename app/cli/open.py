@@ -166,8 +166,8 @@ def _serve(
     require_one_address(serving.socket, serving.host)
     require_token(serving.token, reachable=not is_loopback(serving.host))
     _require_given(camera_file, calibration_file, clicks_file)
-    topics = topics or RecordingOptions()
     admissions = session or recording_session_folder(paths)
+    topics = _with_remembered(topics or RecordingOptions(), admissions, fresh=fresh)
     awaited = AwaitedRecording(paths, topics) if follow else None
     with _service(paths, topics, serving, name, admissions, follow=follow) as service, ExitStack() as stack:
         opened = (
@@ -187,6 +187,8 @@ def _serve(
             recording, camera=camera, session_folder=found.path, name=name, reference=reference, warnings=found.warnings
         )
         stack.push(partial(_close, workspace))
+        _say_how_it_was_read(found.path, topics)
+        _remember(workspace, recording)
         for warning in workspace.restored.warnings:
             print(f"{sentence(warning.message)} {sentence(warning.hint)}")
         if options is not None and options != CalibrationOptions():
@@ -242,6 +244,39 @@ def _close(workspace: "Workspace", kind: type[BaseException] | None, *_: object)
     closed = workspace.close()
     if kind is not None and closed.fault:
         print(f"cocalib: {closed.note}", file=sys.stderr)
+
+
+def _with_remembered(topics: RecordingOptions, session: Path, *, fresh: Switch) -> RecordingOptions:
+    """Return the options with the --map that the session was last opened with, unless the user gives another one."""
+    from app.session.file import remembered_map
+
+    if topics.map or fresh:
+        return topics
+    found = remembered_map(session)
+    if found:
+        print(f"Reading the radar as before in this session: {' '.join(f'--map {one}' for one in found)}")
+    return dataclasses.replace(topics, map=found)
+
+
+def _say_how_it_was_read(session: Path, topics: RecordingOptions) -> None:
+    """Name the --map of a session that was found under another name, after its recording was opened without it."""
+    from app.session.file import remembered_map
+
+    words = remembered_map(session)
+    if words and not topics.map:
+        print(
+            f"In this session the radar was read with {' '.join(f'--map {one}' for one in words)}; open it again with that"
+        )
+
+
+def _remember(workspace: "Workspace", recording: Recording) -> None:
+    """Keep in the session how the recording is read and what was confirmed about it."""
+    from app.session import AssumptionsConfirmed, ColumnsMapped
+
+    workspace.dispatch(ColumnsMapped(recording.column_map))
+    sure = tuple(one.assumption.words for one in recording.stated_assumptions if one.confirmed)
+    if sure:
+        workspace.dispatch(AssumptionsConfirmed(sure))
 
 
 def _service(

@@ -5,12 +5,14 @@ Nothing here deals with files, threads or screens.
 
 from app.session.applying import EventError, apply
 from app.session.events import (
+    AssumptionsConfirmed,
     Cleared,
     ClickExcluded,
     ClickMoved,
     ClickPlaced,
     ClickRemoved,
     ClicksImported,
+    ColumnsMapped,
     Event,
     OptionsChanged,
     OptionsEdited,
@@ -21,15 +23,18 @@ from app.session.events import (
     Undo,
 )
 from app.session.history import History, advance, settled
-from app.session.state import Outcome, RecordingFacts, Session
+from app.session.state import AssumedReading, Outcome, RecordingFacts, Session
 
 __all__ = [
+    "AssumedReading",
+    "AssumptionsConfirmed",
     "Cleared",
     "ClickExcluded",
     "ClickMoved",
     "ClickPlaced",
     "ClickRemoved",
     "ClicksImported",
+    "ColumnsMapped",
     "Event",
     "EventError",
     "History",

@@ -7,12 +7,14 @@ from functools import singledispatch
 from app.option_changes import changed_options
 from app.session.click_stamps import nearest_frame
 from app.session.events import (
+    AssumptionsConfirmed,
     Cleared,
     ClickExcluded,
     ClickMoved,
     ClickPlaced,
     ClickRemoved,
     ClicksImported,
+    ColumnsMapped,
     Event,
     OptionsChanged,
     OptionsEdited,
@@ -44,10 +46,20 @@ def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
         return replace(session, outcome=event.outcome, outcome_revision=event.revision, checked=event.checked)
     if isinstance(event, ScansAdded):
         return replace(session, revision=session.revision + 1)
+    if isinstance(event, ColumnsMapped | AssumptionsConfirmed):
+        return _about_reading(event, session)
     changed = _changed(event, session, facts)
     if changed.clicks == session.clicks and changed.options == session.options:
         return session
     return replace(changed, revision=session.revision + 1)
+
+
+def _about_reading(event: ColumnsMapped | AssumptionsConfirmed, session: Session) -> Session:
+    """Return the session with what the user states about the recording; answers in progress stay valid."""
+    if isinstance(event, ColumnsMapped):
+        return session if event.column_map == session.column_map else replace(session, column_map=event.column_map)
+    confirmed = tuple(dict.fromkeys((*session.confirmed, *event.texts)))
+    return session if confirmed == session.confirmed else replace(session, confirmed=confirmed)
 
 
 @singledispatch

@@ -10,12 +10,14 @@ from calib_core.options import CalibrationOptions
 from calib_core.results import PairResult
 
 __all__ = [
+    "AssumptionsConfirmed",
     "Cleared",
     "ClickExcluded",
     "ClickMoved",
     "ClickPlaced",
     "ClickRemoved",
     "ClicksImported",
+    "ColumnsMapped",
     "Event",
     "OptionsChanged",
     "OptionsEdited",
@@ -87,6 +89,20 @@ class ClicksImported:
 
 
 @dataclass(frozen=True, slots=True)
+class ColumnsMapped:
+    """The recording was opened with these values of --map; the next opening uses them again. Not undone with clicks."""
+
+    column_map: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AssumptionsConfirmed:
+    """The user confirmed assumptions about the recording, by their texts. Not undone with clicks."""
+
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Solved:
     """The solver's answer to one revision; an answer to an older revision changes nothing."""
 
@@ -120,6 +136,8 @@ Event: TypeAlias = (
     | Cleared
     | ClicksImported
     | ScansAdded
+    | ColumnsMapped
+    | AssumptionsConfirmed
     | Solved
 )
 Step: TypeAlias = Event | Undo | Redo

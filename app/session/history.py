@@ -4,7 +4,17 @@ from dataclasses import dataclass, field, replace
 
 from app.option_changes import changed_options
 from app.session.applying import apply
-from app.session.events import OptionsChanged, OptionsEdited, Redo, ScansAdded, Solved, Step, Undo
+from app.session.events import (
+    AssumptionsConfirmed,
+    ColumnsMapped,
+    OptionsChanged,
+    OptionsEdited,
+    Redo,
+    ScansAdded,
+    Solved,
+    Step,
+    Undo,
+)
 from app.session.state import RecordingFacts, Session
 
 __all__ = ["History", "advance", "settled"]
@@ -33,7 +43,7 @@ def advance(history: History, step: Step, facts: RecordingFacts) -> History:
     present = apply(history.present, step, facts)
     if present is history.present:
         return history
-    if isinstance(step, Solved | ScansAdded):
+    if isinstance(step, Solved | ScansAdded | ColumnsMapped | AssumptionsConfirmed):
         return replace(history, present=present)
     return History(present, (*history.past, history.present))
 
@@ -71,4 +81,6 @@ def _resumed(kept: Session, current: Session) -> Session:
         revision=revision,
         next_click=current.next_click,
         outcome_revision=revision if kept.is_solved else kept.outcome_revision,
+        column_map=current.column_map,
+        confirmed=current.confirmed,
     )

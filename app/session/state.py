@@ -10,9 +10,22 @@ from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, PairResult
 
-__all__ = ["Outcome", "RecordingFacts", "Session"]
+__all__ = ["AssumedReading", "Outcome", "RecordingFacts", "Session"]
 
 Outcome: TypeAlias = Calibration | Unsolvable
+
+
+@dataclass(frozen=True, slots=True)
+class AssumedReading:
+    """Something that the recording does not state and reading it takes for granted.
+
+    Attributes:
+        text: what is assumed and about which topic; it identifies the assumption.
+        hint: what to do if it is right, and if it is not.
+    """
+
+    text: str
+    hint: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +40,7 @@ class RecordingFacts:
         radar_axes: what the user specified about the radar's axes and units; None if nothing.
         radar_times: (k,) stamps of the radar's scans [ns], ascending; they identify a recording without frames.
         radar_topics: all topics of the radar.
+        assumptions: what its files do not state and the user has not confirmed on opening it.
     """
 
     name: str
@@ -36,6 +50,7 @@ class RecordingFacts:
     radar_axes: str | None = None
     radar_times: TimesNs = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     radar_topics: tuple[str, ...] = ()
+    assumptions: tuple[AssumedReading, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("image_times", "radar_times"):
@@ -50,6 +65,10 @@ class RecordingFacts:
     def moments(self) -> TimesNs:
         """The stamps (m,) that can be looked at [ns]: of the frames, or of the radar scans if there are no frames."""
         return self.image_times if self.has_pictures else self.radar_times
+
+    def unconfirmed(self, session: "Session") -> tuple[AssumedReading, ...]:
+        """Return the assumptions that the user has not confirmed."""
+        return tuple(one for one in self.assumptions if one.text not in session.confirmed)
 
     def frame_at(self, time: TimeNs) -> int | None:
         """Return the index of the frame with exactly this stamp; None when no frame has it."""
@@ -79,6 +98,8 @@ class Session:
         outcome: the latest answer; it stays while a newer one is being computed.
         outcome_revision: the revision that `outcome` answers; -1 before the first.
         checked: while there is no calibration, the clicks evaluated under the one given for review.
+        column_map: the values of --map that the recording is read with; remembered for the next opening.
+        confirmed: texts of the assumptions about the recording that the user has confirmed.
     """
 
     clicks: tuple[ReflectorClick, ...] = ()
@@ -88,6 +109,8 @@ class Session:
     outcome: Outcome | None = None
     outcome_revision: int = -1
     checked: tuple[PairResult, ...] = ()
+    column_map: tuple[str, ...] = ()
+    confirmed: tuple[str, ...] = ()
 
     @property
     def is_solved(self) -> bool:

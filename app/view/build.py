@@ -4,7 +4,7 @@ from app.session import History, RecordingFacts, Session
 from app.view.advice import advice_for
 from app.view.click_rows import click_rows
 from app.view.figures import assumed_figures, firm_text, metric_figures, pose_figures, residual_limit_px
-from app.view.model import Stage, SystematicErrorTable, View
+from app.view.model import AssumptionRow, Stage, SystematicErrorTable, View
 from app.view.reference import Reference, comparison_figures, reference_words, shown_calibration
 from app.view.systematic_errors import systematic_errors
 from app.view.wording import sentence, warning_in_sentences
@@ -33,6 +33,8 @@ def view(history: History, facts: RecordingFacts, reference: Reference | None = 
     shown = shown_calibration(session, reference)
     stage = _stage(session)
     status, hint = _words(session, stage, reference) if facts.has_pictures else _WITHOUT_PICTURES
+    if stage == "solved" and facts.unconfirmed(session):
+        status += "; unconfirmed assumptions"
     return View(
         revision=session.revision,
         stage=stage,
@@ -56,7 +58,12 @@ def view(history: History, facts: RecordingFacts, reference: Reference | None = 
         advice=advice_for(calibration) if calibration else None,
         reference=reference.name if reference else "",
         comparison=comparison_figures(reference, calibration) if reference and calibration else (),
+        assumptions=_assumptions(session, facts),
     )
+
+
+def _assumptions(session: Session, facts: RecordingFacts) -> tuple[AssumptionRow, ...]:
+    return tuple(AssumptionRow(one.text, sentence(one.text), sentence(one.hint)) for one in facts.unconfirmed(session))
 
 
 def _stage(session: Session) -> Stage:

@@ -167,6 +167,21 @@ class Advice:
 
 
 @dataclass(frozen=True, slots=True)
+class AssumptionRow:
+    """An assumption about the recording that waits for the user's confirmation.
+
+    Attributes:
+        text: identifies it, also in the page's confirmation.
+        words: the same as a sentence.
+        hint: what to do if it is right, and if it is not.
+    """
+
+    text: str
+    words: str
+    hint: str
+
+
+@dataclass(frozen=True, slots=True)
 class View:
     """Everything a client draws about the session.
 
@@ -193,6 +208,7 @@ class View:
         advice: where to put the reflector next; None without a calibration.
         reference: file name of the calibration under review; "" if there is none.
         comparison: how far the solved calibration is from the reference; empty if either is missing.
+        assumptions: what the recording does not state, reading it takes for granted, and nobody has confirmed.
     """
 
     revision: int
@@ -216,4 +232,5 @@ class View:
     reference: str = ""
     comparison: tuple[Figure, ...] = ()
     pose_assumed: tuple[Figure, ...] = ()
+    assumptions: tuple[AssumptionRow, ...] = ()
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)

@@ -16,7 +16,7 @@ import numpy as np
 from app.session import ClickMoved, ClickPlaced, ClickRemoved, History, RecordingFacts, Step, Undo, advance
 from app.session.file import SessionFileError, open_session_file
 from app.session.file.guarded_folder import GuardedFolder
-from app.session.file.journal import JOURNAL
+from app.session.file.journal_reading import JOURNAL
 from app.session.file.reconciling import read_contents
 from app.session.file.snapshot import SNAPSHOT
 from calib_core.measurements import TimeNs

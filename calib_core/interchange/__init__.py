@@ -2,6 +2,7 @@
 
 from calib_core.interchange.adopting import adopt, adopted_calibration
 from calib_core.interchange.calibration_file import (
+    AssumptionNote,
     CalibrationFile,
     FrameNames,
     Provenance,
@@ -28,6 +29,7 @@ from calib_core.interchange.syntax.content import Content
 __all__ = [
     "CALIBRATION_SCHEMA",
     "FORMATS",
+    "AssumptionNote",
     "CalibrationFile",
     "CheckPairs",
     "CheckReport",

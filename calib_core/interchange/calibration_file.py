@@ -69,6 +69,19 @@ def _checked_name(name: str, role: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
+class AssumptionNote:
+    """One unit, sign, order or meaning that the files do not state.
+
+    Attributes:
+        text: what is assumed, with its topic.
+        confirmed: whether the user has confirmed it.
+    """
+
+    text: str
+    confirmed: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Provenance:
     """Where a calibration comes from; None where not applicable.
 
@@ -84,6 +97,8 @@ class Provenance:
         radar_axes: the radar's axes and units as the user gave them, in the syntax of --radar-axes.
         video_start: when a video's first frame was taken, in the syntax of --video-start.
         version: the version of this program.
+        column_map: which columns of the radar the user gave, each in the syntax of --map.
+        assumptions: what the files do not state and reading them takes for granted.
     """
 
     inputs: tuple[InputFile, ...] = ()
@@ -97,6 +112,8 @@ class Provenance:
     version: str | None = None
     radar_topics: tuple[str, ...] = ()
     radar_choice: str = ""
+    column_map: tuple[str, ...] = ()
+    assumptions: tuple[AssumptionNote, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

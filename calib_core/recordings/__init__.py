@@ -1,5 +1,6 @@
 """Read recordings: ROS 1 and ROS 2 files in; radar scans, images and intrinsics out. No other package knows containers."""
 
+from calib_core.recordings.assumptions import about_assumptions, assumption_hint
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.description import clock_lines, describe
 from calib_core.recordings.first_picture import first_picture
@@ -26,6 +27,8 @@ __all__ = [
     "TopicSummary",
     "Verification",
     "WrittenVideo",
+    "about_assumptions",
+    "assumption_hint",
     "clock_lines",
     "describe",
     "first_picture",

@@ -18,17 +18,19 @@ from calib_core.recordings.camera.picture_sizes import frames_of_one_size
 from calib_core.recordings.camera.recorded_intrinsics import published_camera, recorded_camera
 from calib_core.recordings.camera.video_stream import about_video, image_stream
 from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap
+from calib_core.recordings.column_map import parse_column_map
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.plain_files.folder_cameras import FolderCamera
 from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.radar.checks import about_claims
+from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.layouts import layouts_of_parts
-from calib_core.recordings.radar.list_messages import PointLayout
 from calib_core.recordings.radar.merged_stream import MergedStream
 from calib_core.recordings.radar.scan_stream import RadarStream
 from calib_core.recordings.radar.sensors import RadarSensor, other_azimuths
+from calib_core.recordings.radar.single_returns import PointLayout
 from calib_core.recordings.radar_choice import RadarChoice, choose_radar
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.stamping import StampedTopic, read_stamps
@@ -59,6 +61,8 @@ class Assembly:
     camera: Camera | None
     warnings: tuple[DataWarning, ...]
     assumptions: tuple[Assumption, ...]
+    confirmed: bool
+    column_map: tuple[str, ...]
 
     @property
     def used(self) -> frozenset[str]:
@@ -98,7 +102,9 @@ def assemble(
             f"{name}: contains no messages; check that the recorder was set to record the right topics"
         )
     axes = None if options.radar_axes is None else parse_radar_axes(options.radar_axes)
-    inventory = Inventory(name, topics, {topic.name: usage_of(topic).read_as(axes) for topic in topics})
+    stated = StatedReading(parse_column_map(options.map), axes)
+    usages = {topic.name: _usage(topic, stated) for topic in topics}
+    inventory = Inventory(name, topics, usages)
     selection = select(inventory, options, require)
     stamped = _stamped(selection, inventory)
     choice = _radar_choice(selection, stamped, inventory)
@@ -123,8 +129,9 @@ def assemble(
     warnings.extend(
         [*about_camera, *about_radar(radar), *_about_claims(radar), *about_images(images), *about_video(images)]
     )
-    assumptions = _unconfirmed(sources, used, options)
-    warnings.extend(about_assumptions(assumptions))
+    assumptions = _assumptions(sources, used, radar)
+    unconfirmed = () if options.confirm_assumptions else assumptions
+    warnings.extend(about_assumptions(unconfirmed))
     return Assembly(
         topics=tuple(_summary(topic, inventory, used, stamps, diagnoses.get(topic.name)) for topic in topics),
         radar_topics=tuple(topic.name for topic in used.radars),
@@ -139,6 +146,8 @@ def assemble(
         camera=camera,
         warnings=tuple(warnings),
         assumptions=assumptions,
+        confirmed=options.confirm_assumptions,
+        column_map=tuple(one.words for one in stated.column_map),
     )
 
 
@@ -177,12 +186,21 @@ def _used(selection: Selection, choice: RadarChoice, stamped: Mapping[str, Stamp
     return _Used(tuple(by_name[name] for name in names), selection.image, selection.camera_info)
 
 
-def _unconfirmed(sources: Sequence[Source], used: _Used, options: RecordingOptions) -> tuple[Assumption, ...]:
-    """Return what the files of the topics in use do not state and the user has not confirmed."""
-    if options.confirm_assumptions:
-        return ()
+def _usage(topic: Topic, stated: StatedReading) -> Usage:
+    """Determine what a topic can be used for; a file whose reader has applied the user's --map is read as it is."""
+    mapped = any(isinstance(source, PlainSource) and source.mapped for source, _ in topic.parts)
+    return usage_of(topic, replace(stated, column_map=()) if mapped else stated)
+
+
+def _assumptions(
+    sources: Sequence[Source], used: _Used, radar: RadarStream | MergedStream | None
+) -> tuple[Assumption, ...]:
+    """Return what the files of the topics in use and the radar's messages do not state."""
     names = {topic.name for topic in used.all}
-    return tuple(one for source in sources for one in source.assumptions if one.topic in names)
+    stated = [one for source in sources for one in source.assumptions if one.topic in names]
+    parts = radar.parts if radar else ()
+    found = (replace(one.assumption, topic=part.topic.name) for part in parts for one in part.layout.plan.assumptions)
+    return (*stated, *dict.fromkeys(found))
 
 
 def _stamped(selection: Selection, inventory: Inventory) -> Mapping[str, StampedTopic]:

@@ -5,7 +5,11 @@ from dataclasses import dataclass
 
 from calib_core.results import DataWarning
 
-__all__ = ["Assumption", "about_assumptions"]
+__all__ = ["CONFIRM_ALL", "Assumption", "StatedAssumption", "about_assumptions", "assumption_hint"]
+
+
+CONFIRM_ALL = "--confirm-assumptions"
+"""The option that confirms every assumption, and the only one for some."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,14 +29,26 @@ class Assumption:
     text: str
     confirm: str
 
+    @property
+    def words(self) -> str:
+        """The text with its topic."""
+        return f"{self.topic}: {self.text}"
+
+
+@dataclass(frozen=True, slots=True)
+class StatedAssumption:
+    """An assumption, and whether the user has confirmed it."""
+
+    assumption: Assumption
+    confirmed: bool
+
 
 def about_assumptions(assumptions: Sequence[Assumption]) -> list[DataWarning]:
     """Warn about each unconfirmed assumption."""
-    return [
-        DataWarning(
-            "assumed",
-            f"{one.topic}: {one.text}",
-            f"if that is right, confirm it with {one.confirm} or --confirm-assumptions; otherwise state what is right",
-        )
-        for one in assumptions
-    ]
+    return [DataWarning("assumed", one.words, assumption_hint(one.confirm)) for one in assumptions]
+
+
+def assumption_hint(confirm: str) -> str:
+    """Return what to do about an assumption, given the options that state it."""
+    options = " or ".join(dict.fromkeys((confirm, CONFIRM_ALL)))
+    return f"if that is right, confirm it with {options}; otherwise state what is right"

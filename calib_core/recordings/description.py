@@ -41,6 +41,8 @@ def summary_text(summary: RecordingSummary) -> str:
         *_labelled("radars", _sensors(summary)),
         *_labelled("camera", _camera(summary.camera)),
     ]
+    confirmed = [one.assumption.text for one in summary.assumptions if one.confirmed]
+    lines.extend(_labelled("confirmed", [f"{text}." for text in confirmed]))
     if summary.warnings:
         lines.append("")
         for warning in summary.warnings:
@@ -149,6 +151,8 @@ def _radar(radar: RadarSummary | None) -> list[str]:
         f"returns per scan: {middle:.0f} ({low} to {high}{sample})",
         radar.layout,
         *([f"other azimuths of the same returns: {', '.join(radar.other_azimuths)}"] if radar.other_azimuths else []),
+        *_readings(radar),
+        *(f"{note}." for note in radar.notes),
     ]
 
 
@@ -178,6 +182,15 @@ def _topics_of(sensor: RadarSensor) -> str:
     second = [f"{name} (other azimuths)" for place, name in enumerate(sensor.topics) if sensor.repeats[place] != place]
     own = [name for place, name in enumerate(sensor.topics) if sensor.repeats[place] == place]
     return ", ".join([*own, *second, *(f"{name} (the same returns, not read)" for name in sensor.copies)])
+
+
+def _readings(radar: RadarSummary) -> list[str]:
+    """List what was taken for what, unless it is all as ROS or the registry defines it."""
+    if not any(one.why.startswith(("unit:", "--map", "only")) or one.unit == "not stated" for one in radar.columns):
+        return []
+    rows = [("quantity", "read from", "unit", "grows", "known by")]
+    rows += [(one.quantity, one.column, one.unit, one.sign, one.why) for one in radar.columns]
+    return list(_columns(rows))
 
 
 def _camera(camera: CameraSummary | None) -> list[str]:

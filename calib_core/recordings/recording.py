@@ -15,7 +15,7 @@ from calib_core.errors import RecordingError
 from calib_core.input_files import name_text, special_kind
 from calib_core.measurements import RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
-from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.assumptions import Assumption, StatedAssumption
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.column_map import parse_column_map
 from calib_core.recordings.containers.opening import open_sources
@@ -25,6 +25,8 @@ from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.ti_uart import open_uart_streams
 from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 from calib_core.recordings.radar.axes import parse_radar_axes
+from calib_core.recordings.radar.column_plan import ColumnReading
+from calib_core.recordings.radar.column_plans import column_readings
 from calib_core.recordings.radar.merged_stream import MergedStream
 from calib_core.recordings.radar.sensors import RadarSensor, figures_of
 from calib_core.recordings.selection import Need, RecordingOptions
@@ -127,7 +129,27 @@ class Recording:
     @property
     def assumptions(self) -> tuple[Assumption, ...]:
         """What the files do not state, reading takes for granted, and the user has not confirmed."""
-        return self._assembly.assumptions
+        return () if self._assembly.confirmed else self._assembly.assumptions
+
+    @property
+    def stated_assumptions(self) -> tuple[StatedAssumption, ...]:
+        """Every assumption, with whether the user has confirmed it."""
+        return tuple(StatedAssumption(one, self._assembly.confirmed) for one in self._assembly.assumptions)
+
+    @property
+    def column_map(self) -> tuple[str, ...]:
+        """The user's --map of the radar's columns."""
+        return self._assembly.column_map
+
+    @property
+    def radar_columns(self) -> tuple[ColumnReading, ...]:
+        """What was taken for what in the radar's messages; empty without a radar."""
+        return column_readings(self._assembly.radar.layout.plan) if self._assembly.radar else ()
+
+    @property
+    def radar_notes(self) -> tuple[str, ...]:
+        """What else the user should know about the radar's messages, as sentences without their final periods."""
+        return self._assembly.radar.layout.plan.notes if self._assembly.radar else ()
 
     @property
     def warnings(self) -> tuple[DataWarning, ...]:

@@ -8,7 +8,9 @@ import numpy as np
 from calib_core.errors import RecordingError
 from calib_core.input_files import name_text
 from calib_core.measurements import NS_PER_S, Stamp, TimeNs
+from calib_core.recordings.assumptions import StatedAssumption
 from calib_core.recordings.other_clocks import other_clocks
+from calib_core.recordings.radar.column_plan import ColumnReading
 from calib_core.recordings.radar.sensors import RadarSensor
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.time.shared_time import SharedTime, shared_time
@@ -51,6 +53,9 @@ class RadarSummary:
         longest_gap_s: longest time between scans [s].
         returns_per_scan: minimum, median and maximum over at most 200 scans spread over the recording.
         sampled_scans: number of scans used for returns_per_scan.
+        columns: what was taken for what in its messages, and why.
+        notes: what else its messages hold.
+        column_map: the user's --map.
     """
 
     topic: str
@@ -64,6 +69,9 @@ class RadarSummary:
     longest_gap_s: float | None
     returns_per_scan: tuple[int, float, int]
     sampled_scans: int
+    columns: tuple[ColumnReading, ...] = ()
+    notes: tuple[str, ...] = ()
+    column_map: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +122,7 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
         sensors: the radars that were compared, the one in use first.
         camera: None if there is none.
         warnings: what the user must know.
+        assumptions: what the files do not state and reading them takes for granted.
     """
 
     files: tuple[FileSummary, ...]
@@ -127,6 +136,7 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
     sensors: tuple[RadarSensor, ...]
     camera: CameraSummary | None
     warnings: tuple[DataWarning, ...]
+    assumptions: tuple[StatedAssumption, ...] = ()
 
 
 def recording_summary(recording: Recording) -> RecordingSummary:
@@ -149,6 +159,7 @@ def recording_summary(recording: Recording) -> RecordingSummary:
         sensors=recording.radar_sensors,
         camera=_camera(recording),
         warnings=recording.warnings,
+        assumptions=recording.stated_assumptions,
     )
 
 
@@ -179,6 +190,9 @@ def _radar(recording: Recording) -> RadarSummary | None:
         longest_gap_s=rhythm.longest_gap_s,
         returns_per_scan=(int(counts.min()), float(np.median(counts)), int(counts.max())),
         sampled_scans=len(counts),
+        columns=recording.radar_columns,
+        notes=recording.radar_notes,
+        column_map=recording.column_map,
     )
 
 

@@ -1,25 +1,43 @@
 """Determine what each topic can be used for, from its definition and its messages."""
 
-import re
+import contextlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
 from calib_core.recordings.camera.camera_info import is_camera_info
 from calib_core.recordings.camera.images import ImageLayout, is_picture
-from calib_core.recordings.messages.definitions import Definition
-from calib_core.recordings.radar.axes import RadarAxes
+from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
+from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.layouts import RadarLayout, recognise
-from calib_core.recordings.radar.list_messages import PointLayout
+from calib_core.recordings.radar.samples import leaf_names
+from calib_core.recordings.radar.single_returns import PointLayout
+from calib_core.recordings.radar.struct_lists import struct_lists
 from calib_core.recordings.time.clock_faults import HALF_DISTINCT, RETURNS_DISTINCT
 from calib_core.recordings.topics import Topic, TopicKind
 
 __all__ = ["Usage", "usage_of"]
 
-_PACKETS = re.compile(r"/(?!FFMPEG)\w*Packets?$")
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
 _RAW = (
     "raw sensor packets, which only the sensor's driver can decode; play the recording to the driver and record "
     "what it publishes"
 )
+_NOTHING = StatedReading()
+_ENOUGH_BYTES = 16
+_MOST_NAMES = 8
+_ROS_PACKAGES = _words(
+    "actionlib_msgs builtin_interfaces control_msgs diagnostic_msgs geometry_msgs map_msgs nav_msgs rcl_interfaces "
+    "rosgraph_msgs sensor_msgs shape_msgs std_msgs stereo_msgs tf tf2_msgs trajectory_msgs unique_identifier_msgs "
+    "vision_msgs visualization_msgs"
+)
+"""Packages of ROS itself, whose lists of structs are no radar returns and need no remark."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,17 +61,14 @@ class Usage:
         """The least share of different times that is plausible among its messages."""
         return RETURNS_DISTINCT if isinstance(self.radar, PointLayout) else HALF_DISTINCT
 
-    def read_as(self, axes: RadarAxes | None) -> "Usage":
-        """Apply the user's --radar-axes."""
-        if self.radar is None or axes is None:
-            return self
-        return replace(self, radar=self.radar.with_plan(self.radar.plan.read_as(axes)))
 
+def usage_of(topic: Topic, stated: StatedReading = _NOTHING) -> Usage:
+    """Determine what a topic can be used for, from its definition and its first readable message.
 
-def usage_of(topic: Topic) -> Usage:
-    """Determine what a topic can be used for, from its definition and its first readable message."""
-    if _PACKETS.search(topic.type):
-        return Usage("other", problem=_RAW)
+    Args:
+        topic: the topic.
+        stated: what the user states about the radar's messages.
+    """
     try:
         definition = topic.definition()
     except MessageError as error:
@@ -65,7 +80,11 @@ def usage_of(topic: Topic) -> Usage:
     for row in sorted({0, len(topic) // 2, len(topic) - 1}) if len(topic) else ():
         try:
             payload = topic.payload(row)
-            return _image_usage(topic, definition, payload) if pictures else _radar_usage(definition, payload)
+            return (
+                _image_usage(topic, definition, payload)
+                if pictures
+                else _radar_usage(topic, definition, payload, stated)
+            )
         except MessageError as error:
             usage = usage if usage.problem != "no messages" else replace(usage, problem=str(error))
         except RecordingError as error:
@@ -81,6 +100,55 @@ def _image_usage(topic: Topic, definition: Definition, payload: bytes) -> Usage:
     return Usage("image", image=layout)
 
 
-def _radar_usage(definition: Definition, payload: bytes) -> Usage:
-    radar = recognise(definition, payload)
-    return Usage("other") if radar is None else Usage("radar", radar=radar)
+def _radar_usage(topic: Topic, definition: Definition, payload: bytes, stated: StatedReading) -> Usage:
+    def more(count: int) -> list[bytes]:
+        rows = np.unique(np.linspace(0, len(topic) - 1, min(count, len(topic))).astype(np.int64))
+        rows = rows[topic.part[rows] == topic.part[0]]
+        return list(_readable(topic, rows.tolist()))
+
+    try:
+        radar = recognise(definition, payload, more, stated)
+    except MessageError as error:
+        if not stated.column_map:
+            raise
+        if recognise(definition, payload, more) is None:
+            return _no_radar(definition)
+        return Usage("radar", problem=str(error))
+    return _no_radar(definition) if radar is None else Usage("radar", radar=radar)
+
+
+def _readable(topic: Topic, rows: Sequence[int]) -> Iterator[bytes]:
+    """Read messages; unreadable ones are left out: they are reported when they are used."""
+    for row in rows:
+        with contextlib.suppress(RecordingError):
+            yield topic.payload(row)
+
+
+def _no_radar(definition: Definition) -> Usage:
+    """Say why a message that might be a radar's is not read."""
+    if _holds_packets(definition):
+        return Usage("other", problem=_RAW)
+    if definition.type.partition("/")[0] in _ROS_PACKAGES:
+        return Usage("other")
+    for place in struct_lists(definition):
+        names, _ = leaf_names(definition, place.element)
+        if len(names) > 2 and place.element.partition("/")[0] not in _ROS_PACKAGES:
+            shown = ", ".join(names[:_MOST_NAMES]) + (", …" if len(names) > _MOST_NAMES else "")
+            return Usage("other", problem=(
+                f"not read as a radar: its list '{place.name}' has structs with the fields {shown}, and no position and speed or "
+                "amplitude is recognised among them; if it is one, say which is which, such as --map x=FIELD:m --map y=FIELD:m"
+            ))  # fmt: skip
+    return Usage("other")
+
+
+def _holds_packets(definition: Definition) -> bool:
+    """Return whether a message holds a list of structs that are little more than bytes: what a driver receives."""
+    for place in struct_lists(definition):
+        fields = definition.types[place.element]
+        blobs = [field for field in fields if field.count is not None and PRIMITIVES.get(field.type, "")[1:] == "1"]
+        numbers = [
+            name for name in leaf_names(definition, place.element)[0] if not name.startswith(("stamp.", "header."))
+        ]
+        if any((blob.count or _ENOUGH_BYTES) >= _ENOUGH_BYTES for blob in blobs) and len(numbers) <= len(blobs) + 3:
+            return True
+    return False

@@ -9,6 +9,7 @@ from app.web.port.server import ServerOptions, start
 from app.workspace import open_workspace
 from calib_core.recordings import RecordingOptions, open_recording
 from tests.browser.driving import Driver
+from tests.vendor_recording import vendor_sample
 
 pytestmark = pytest.mark.browser
 
@@ -35,6 +36,28 @@ def test_clocks_axes_and_warnings_of_the_recording_are_on_the_page(
             page.until("document.body.innerText.includes('after the stamp')")
             box = page.text('#warnings [data-code="not-closed"]')
             assert "complete messages were recovered by reading the whole file" in box
+        finally:
+            running.close()
+            workspace.close()
+
+
+def test_assumptions_are_listed_until_the_user_confirms_them(
+    open_page: Callable[..., Driver], project_root: Path, tmp_path: Path
+) -> None:
+    with open_recording(vendor_sample(project_root / "sample_data" / "rooftop", tmp_path)) as recording:
+        workspace = open_workspace(recording, camera=recording.camera(), session_folder=tmp_path / "s", name="vendor")
+        running = start(workspace, recording, ServerOptions(port=0, token="test"))
+        try:
+            page = open_page(running.url)
+            box = page.text('#warnings [data-code="assumed"]')
+            assert "2 assumptions about the recording are unconfirmed" in box
+            assert "f_Azimuth is taken as growing to the left" in box
+            assert "--map azimuth=f_Azimuth:rad" in box
+            page.page.locator("#recording-topics .fact").nth(0).hover()
+            page.until("document.body.innerText.includes('azimuth from f_Azimuth [rad], to the left')")
+            page.page.locator("#confirm-assumptions").click()
+            page.until("document.querySelectorAll('#warnings [data-code=assumed]').length === 0")
+            assert len(workspace.session.confirmed) == 2
         finally:
             running.close()
             workspace.close()

@@ -10,6 +10,7 @@ from app.session.file.errors import SessionFileError
 from app.session.file.finding import FoundFolder, find_session_folder
 from app.session.file.folders import recording_session_folder, user_session_folder
 from app.session.file.listing import SessionSummary, session_summaries
+from app.session.file.remembered import remembered_map
 from app.session.file.repairing import Repair, inspect_session, repair_session
 from app.session.file.session_file import Restored, SessionFile, open_session_file, set_aside
 
@@ -25,6 +26,7 @@ __all__ = [
     "inspect_session",
     "open_session_file",
     "recording_session_folder",
+    "remembered_map",
     "repair_session",
     "session_summaries",
     "set_aside",

@@ -10,7 +10,7 @@ from app.session.file.errors import SessionFileError
 from app.session.file.folders import is_writable, recording_session_folder, session_folders_in
 from app.session.file.guarded_folder import GuardedFolder
 from app.session.file.identity import RecordingForm, has_dates, is_same_recording
-from app.session.file.journal import JOURNAL, read_journal
+from app.session.file.journal_reading import JOURNAL, read_journal
 from app.session.file.snapshot import SNAPSHOT, read_snapshot
 from calib_core.results import DataWarning
 

@@ -8,7 +8,7 @@ from app.resources import state_folder
 from app.session.file.errors import SessionFileError
 from app.session.file.folders import recording_session_folder, session_folders_in
 from app.session.file.guarded_folder import GuardedFolder
-from app.session.file.journal import JOURNAL
+from app.session.file.journal_reading import JOURNAL
 from app.session.file.lock import lock_holder
 from app.session.file.repairing import inspect_session
 from app.session.file.snapshot import SNAPSHOT

@@ -7,7 +7,7 @@ from app.session import History, RecordingFacts, Step, advance
 from app.session.file.errors import SessionFileError
 from app.session.file.guarded_folder import GuardedFolder
 from app.session.file.identity import RecordingForm, facts_of, require_same_recording
-from app.session.file.journal import JOURNAL, SCHEMA_1, DoubtfulLine, FoundJournal, read_journal, steps_after
+from app.session.file.journal_reading import JOURNAL, SCHEMA_1, DoubtfulLine, FoundJournal, read_journal, steps_after
 from app.session.file.snapshot import SNAPSHOT, FoundSnapshot, read_snapshot
 from calib_core.errors import CalibrationError
 

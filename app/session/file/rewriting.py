@@ -3,7 +3,8 @@
 from app.resources import version
 from app.session.file.guarded_folder import GuardedFolder
 from app.session.file.identity import RecordingForm
-from app.session.file.journal import JOURNAL, begin_journal
+from app.session.file.journal import begin_journal
+from app.session.file.journal_reading import JOURNAL
 from app.session.file.reconciling import Contents
 from app.session.file.snapshot import SNAPSHOT, write_snapshot
 

@@ -12,7 +12,8 @@ from app.session.file.closing import Closed, rescued, snapshot_fault
 from app.session.file.errors import SessionFileError
 from app.session.file.guarded_folder import GuardedFolder
 from app.session.file.identity import recording_form
-from app.session.file.journal import JOURNAL, Journal, begin_journal
+from app.session.file.journal import Journal, begin_journal
+from app.session.file.journal_reading import JOURNAL
 from app.session.file.lock import FolderLock
 from app.session.file.reconciling import Contents, read_contents
 from app.session.file.rewriting import rewrite

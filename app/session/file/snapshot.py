@@ -11,12 +11,12 @@ import msgspec
 from msgspec import Meta
 
 from app.option_changes import options_from_tree
-from app.session import ClicksImported, OptionsChanged, Session, Step
+from app.session import AssumptionsConfirmed, ClicksImported, ColumnsMapped, OptionsChanged, Session, Step
 from app.session.file.checksums import line_bytes, sealed, taken_apart
 from app.session.file.errors import SessionFileError
 from app.session.file.guarded_folder import GuardedFolder
 from app.session.file.identity import RecordingForm
-from app.session.file.journal import SCHEMA, SCHEMA_1
+from app.session.file.journal_reading import SCHEMA, SCHEMA_1
 from app.session.file.step_json import ClickForm, click_from_form, form_of_click
 from calib_core.errors import CalibrationError
 from calib_core.measurements import ReflectorClick
@@ -37,6 +37,8 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     clicks: tuple[ClickForm, ...]
     last: str = ""
     lines: str = ""
+    column_map: tuple[str, ...] = ()
+    confirmed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +53,8 @@ class FoundSnapshot:
         last: checksum of the journal's line that holds the last of these steps; "" in session-1.
         lines: the first digits of the checksums of all lines up to that one, one after another.
         sum: its own checksum.
+        column_map: the user's --map of that step.
+        confirmed: the assumptions about the recording that were confirmed by then.
     """
 
     recording: RecordingForm
@@ -60,11 +64,15 @@ class FoundSnapshot:
     last: str
     lines: str
     sum: str
+    column_map: tuple[str, ...] = ()
+    confirmed: tuple[str, ...] = ()
 
     @property
     def steps(self) -> tuple[Step, ...]:
         """The steps that lead from an empty session to the snapshot."""
-        return (OptionsChanged(self.options), ClicksImported(self.clicks))
+        reading: tuple[Step, ...] = (ColumnsMapped(self.column_map),) if self.column_map else ()
+        reading += (AssumptionsConfirmed(self.confirmed),) if self.confirmed else ()
+        return (*reading, OptionsChanged(self.options), ClicksImported(self.clicks))
 
     def agrees_with(self, sums: Sequence[str]) -> bool:
         """Return whether the journal's lines are those of the snapshot, as far as both have them."""
@@ -97,6 +105,8 @@ def write_snapshot(
         clicks=tuple(form_of_click(click) for click in session.clicks),
         last=sums[-1],
         lines=_marks(sums),
+        column_map=session.column_map,
+        confirmed=session.confirmed,
     )
     folder.replace(SNAPSHOT, line_bytes(sealed(msgspec.json.encode(snapshot))) + b"\n")
 
@@ -127,6 +137,8 @@ def read_snapshot(data: bytes, place: str) -> FoundSnapshot:
             options=options_from_tree(snapshot.options),
             last=snapshot.last,
             lines=snapshot.lines,
+            column_map=snapshot.column_map,
+            confirmed=snapshot.confirmed,
             sum=found.sum or sealed(data).sum,
         )
     except SessionFileError:

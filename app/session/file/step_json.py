@@ -8,12 +8,14 @@ from msgspec import Meta
 
 from app.option_changes import options_from_tree
 from app.session import (
+    AssumptionsConfirmed,
     Cleared,
     ClickExcluded,
     ClickMoved,
     ClickPlaced,
     ClickRemoved,
     ClicksImported,
+    ColumnsMapped,
     OptionsChanged,
     Redo,
     Step,
@@ -22,6 +24,7 @@ from app.session import (
 from calib_core.measurements import ReflectorClick, Stamp
 
 __all__ = [
+    "AssumptionsConfirmedForm",
     "ClearedForm",
     "ClickExcludedForm",
     "ClickForm",
@@ -30,6 +33,7 @@ __all__ = [
     "ClickPlacedForm",
     "ClickRemovedForm",
     "ClicksImportedForm",
+    "ColumnsMappedForm",
     "OptionsChangedForm",
     "PixelForm",
     "RedoForm",
@@ -44,6 +48,8 @@ __all__ = [
 
 ClickId: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
 PixelForm: TypeAlias = tuple[float, float]
+MapForm: TypeAlias = Annotated[str, Meta(max_length=500)]
+AssumptionForm: TypeAlias = Annotated[str, Meta(max_length=2000)]
 
 
 class StampForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -120,6 +126,18 @@ class ClicksImportedForm(_Form, frozen=True, tag="clicks_imported"):
     clicks: tuple[ClickForm, ...]
 
 
+class ColumnsMappedForm(_Form, frozen=True, tag="columns_mapped"):
+    """The recording is read with these columns."""
+
+    column_map: tuple[MapForm, ...]
+
+
+class AssumptionsConfirmedForm(_Form, frozen=True, tag="assumptions_confirmed"):
+    """Assumptions about the recording confirmed, by their texts."""
+
+    texts: Annotated[tuple[AssumptionForm, ...], Meta(max_length=100)]
+
+
 class UndoForm(_Form, frozen=True, tag="undo"):
     """The last change undone."""
 
@@ -136,6 +154,8 @@ StepForm: TypeAlias = (
     | OptionsChangedForm
     | ClearedForm
     | ClicksImportedForm
+    | ColumnsMappedForm
+    | AssumptionsConfirmedForm
     | UndoForm
     | RedoForm
 )
@@ -208,6 +228,16 @@ def _form_of_imported(step: ClicksImported) -> StepForm:
 
 
 @form_of_step.register
+def _form_of_mapped(step: ColumnsMapped) -> StepForm:
+    return ColumnsMappedForm(step.column_map)
+
+
+@form_of_step.register
+def _form_of_confirmed(step: AssumptionsConfirmed) -> StepForm:
+    return AssumptionsConfirmedForm(step.texts)
+
+
+@form_of_step.register
 def _form_of_undo(step: Undo) -> StepForm:
     return UndoForm()
 
@@ -250,6 +280,16 @@ def _cleared(form: ClearedForm) -> Step:
 @step_from_form.register
 def _imported(form: ClicksImportedForm) -> Step:
     return ClicksImported(tuple(click_from_form(click) for click in form.clicks))
+
+
+@step_from_form.register
+def _mapped(form: ColumnsMappedForm) -> Step:
+    return ColumnsMapped(form.column_map)
+
+
+@step_from_form.register
+def _confirmed(form: AssumptionsConfirmedForm) -> Step:
+    return AssumptionsConfirmed(form.texts)
 
 
 @step_from_form.register

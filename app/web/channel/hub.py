@@ -31,6 +31,7 @@ from app.workspace import Workspace
 from calib_core.errors import CalibrationError
 from calib_core.measurements import Stamp, TimeNs
 from calib_core.recordings import FollowedRecording, Recording, TopicSummary, clock_lines
+from calib_core.results import DataWarning
 
 __all__ = ["Hub", "Tab"]
 
@@ -169,7 +170,7 @@ class Hub:
             frame_times=StampColumns.of(facts.moments),
             start=Stamp.of(TimeNs(int(facts.moments[0]))),
             radar=StampColumns.of(recording.radar_times),
-            warnings=tuple(map(warning_in_sentences, (*restored.warnings, *recording.warnings))),
+            warnings=tuple(map(warning_in_sentences, (*restored.warnings, *_settled(recording)))),
             sensors=(
                 _radar_sensor(recording),
                 _sensor("camera", recording.image_topic, recording.topics),
@@ -179,21 +180,35 @@ class Hub:
         )
 
 
+def _settled(recording: Recording) -> list[DataWarning]:
+    """Return the warnings about a recording, without its assumptions: those are in the view until they are confirmed."""
+    return [warning for warning in recording.warnings if warning.code != "assumed"]
+
+
+def _readings(recording: Recording) -> tuple[str, ...]:
+    """Say what was taken for what in the radar's messages, one quantity a line, and what else they hold."""
+    rows = [
+        f"{one.quantity} from {one.column}{f' [{one.unit}]' if one.unit else ''}{f', {one.sign}' if one.sign else ''} ({one.why})"
+        for one in recording.radar_columns
+    ]
+    return (*rows, *recording.radar_notes)
+
+
 def _radar_sensor(recording: Recording) -> SensorNote:
     """Describe how the radar is read, and why this one."""
-    note = _sensor("radar", recording.radar_topic, recording.topics)
+    note = _sensor("radar", recording.radar_topic, recording.topics, _readings(recording))
     if not recording.radar_choice:
         return note
     return replace(note, topic=" + ".join(recording.radar_topics), about=(recording.radar_choice, *note.about))
 
 
-def _sensor(name: str, chosen: str | None, topics: Sequence[TopicSummary]) -> SensorNote:
+def _sensor(name: str, chosen: str | None, topics: Sequence[TopicSummary], readings: Sequence[str] = ()) -> SensorNote:
     """Describe how a sensor is read."""
     topic = next((topic for topic in topics if topic.name == chosen), None)
     if topic is None:
         return SensorNote(name, chosen or "none")
     clocks = () if topic.clocks is None else clock_lines(topic.clocks)
-    about = tuple(line for line in (topic.layout, *clocks) if line)
+    about = tuple(line for line in (topic.layout, *readings, *clocks) if line)
     return SensorNote(name, topic.name, topic.clock if topic.clocks else "", about)
 
 

@@ -241,6 +241,11 @@ def _options(form: forms.OptionsChangedForm) -> Command:
 
 
 @_command.register
+def _mapped(form: forms.ColumnsMappedForm) -> Command:
+    raise InputError("the columns of the radar are given when the recording is opened, with --map")
+
+
+@_command.register
 def _hello(form: HelloForm) -> Command:
     return Hello()
 

@@ -192,7 +192,7 @@ class _Downloads:
         if not session.is_solved or not isinstance(session.outcome, Calibration):
             return refusal(409, _why_none(session))
         try:
-            return make(calibration_text(session.outcome, self._recording))
+            return make(calibration_text(session.outcome, self._recording, session.confirmed))
         except CalibrationError as error:
             return refusal(409, sentence(str(error)))
 

@@ -46,6 +46,8 @@ _VIEWPOINTS = {
     "above": ((7.0, 0.0, 26.0), (7.01, 0.0, 0.0)),
     "side": ((7.0, -20.0, 4.0), (7.0, 0.0, 0.0)),
 }
+_MOST_ELLIPSOIDS = 200
+"""More would be a cloud in which none can be told from the others, and 2 kB each for every answer."""
 _RINGS_EVERY_M, _RINGS_UP_TO_M = 5.0, 30.0
 _DIM, _ORANGE = (112, 124, 136), (255, 180, 84)
 
@@ -88,6 +90,7 @@ class TabScene:
         self._pictured: int | None = None
         self._looking: LookNodes | None = None
         self._posed: object = self
+        self._paired: object = None
         self._radar_from_camera = nominal_camera_from_radar().inverse()
         scene = client.scene
         scene.add_frame("/radar", axes_length=0.6, axes_radius=0.018, origin_radius=0.03)
@@ -197,6 +200,10 @@ class TabScene:
 
     def _show_pairs(self, sight: Sight) -> None:
         calibration = sight.session.outcome
+        drawn = (calibration, sight.selected, sight.view.residual_limit_px)
+        if drawn == self._paired:  # a Calibration equals only itself; moving through the frames changes none of these
+            return
+        self._paired = drawn
         if not isinstance(calibration, Calibration):
             for node in (self._chosen, self._rays, self._ray, self._gap, self._ellipsoids, self._ellipsoid, self._name):
                 node.visible = False
@@ -207,7 +214,7 @@ class TabScene:
         chosen = tuple(pair for pair in calibration.pairs if pair.id == sight.selected)
         others = tuple(pair for pair in calibration.pairs if pair.inlier and pair.id != sight.selected)
         fill_lines(self._rays, rays_to(calibration, others))
-        fill_lines(self._ellipsoids, _shells(calibration, others))
+        fill_lines(self._ellipsoids, _shells(calibration, others[:_MOST_ELLIPSOIDS]))
         fill_lines(self._ellipsoid, _shells(calibration, chosen))
         self._show_selected(calibration, chosen)
 

@@ -265,6 +265,13 @@ class ClocksDocument(Struct, frozen=True):
     image: str | None = None
 
 
+class AssumptionDocument(Struct, frozen=True):
+    """A unit, sign, order or meaning that the files do not state."""
+
+    text: str
+    confirmed: bool = False
+
+
 class ProvenanceDocument(Struct, frozen=True):
     """Where the result comes from."""
 
@@ -274,6 +281,8 @@ class ProvenanceDocument(Struct, frozen=True):
     radar_axes: str | None = None
     video_start: str | None = None
     version: str | None = None
+    column_map: list[str] | UnsetType = UNSET
+    assumptions: list[AssumptionDocument] | UnsetType = UNSET
 
 
 class NoiseScaleDocument(Struct, frozen=True):

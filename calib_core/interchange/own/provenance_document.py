@@ -2,7 +2,7 @@
 
 from msgspec import UNSET, UnsetType
 
-from calib_core.interchange.calibration_file import Provenance
+from calib_core.interchange.calibration_file import AssumptionNote, Provenance
 from calib_core.interchange.own import documents
 from calib_core.results import InputFile
 
@@ -24,6 +24,8 @@ def provenance_document(provenance: Provenance) -> documents.ProvenanceDocument:
         radar_axes=provenance.radar_axes,
         video_start=provenance.video_start,
         version=provenance.version,
+        column_map=list(provenance.column_map) or UNSET,
+        assumptions=[documents.AssumptionDocument(one.text, one.confirmed) for one in provenance.assumptions] or UNSET,
     )
 
 
@@ -41,6 +43,8 @@ def provenance_of(document: documents.ProvenanceDocument) -> Provenance:
         radar_axes=document.radar_axes,
         video_start=document.video_start,
         version=document.version,
+        column_map=tuple(document.column_map or ()),
+        assumptions=tuple(AssumptionNote(one.text, one.confirmed) for one in document.assumptions or ()),
     )
 
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 from calib_core.errors import MessageError
@@ -35,11 +35,17 @@ class Field:
         name: as the definition has it.
         type: a primitive, "string", "wstring", or the short name of another message ("std_msgs/Header").
         count: None for a single value, 0 for an array of any length, else the fixed length.
+        comment: what the definition says about it; two fields that differ only in this are equal.
     """
 
     name: str
     type: str
     count: int | None = None
+    comment: str = field(default="", compare=False)
+
+
+def _no_remarks() -> dict[str, str]:
+    return {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,11 +56,13 @@ class Definition:
         type: short name, "package/Type".
         types: the fields of each type by short name.
         encoding: the serialisation of its messages.
+        remarks: the comments of each type that stand on lines of their own, by short name.
     """
 
     type: str
     types: Mapping[str, tuple[Field, ...]]
     encoding: Encoding
+    remarks: Mapping[str, str] = field(default_factory=_no_remarks)
 
     @property
     def fields(self) -> tuple[Field, ...]:
@@ -64,11 +72,11 @@ class Definition:
     @property
     def names(self) -> frozenset[str]:
         """The names of the message's own fields."""
-        return frozenset(field.name for field in self.fields)
+        return frozenset(one.name for one in self.fields)
 
     def field(self, name: str) -> Field:
         """Return one of the message's own fields."""
-        return next(field for field in self.fields if field.name == name)
+        return next(one for one in self.fields if one.name == name)
 
     @property
     def stamp_offset(self) -> int | None:
@@ -129,7 +137,7 @@ def parse_definition(name: str, text: str, encoding: Encoding, *, form: str = "m
     types: dict[str, tuple[Field, ...]] = dict(_built_in(encoding))
     types.update(_parse_idl(name, text) if form == "idl" else _parse_sections(name, text))
     types = {owner: _resolve(owner, fields, types) for owner, fields in types.items()}
-    definition = Definition(name, types, encoding)
+    definition = Definition(name, types, encoding, {} if form == "idl" else _remarks(name, text))
     _check(definition, name, ())
     return definition
 
@@ -150,7 +158,12 @@ def _built_in(encoding: Encoding) -> dict[str, tuple[Field, ...]]:
 
 
 def _parse_sections(name: str, text: str) -> dict[str, tuple[Field, ...]]:
-    types: dict[str, tuple[Field, ...]] = {}
+    return {owner: tuple(_parse_fields(owner, body)) for owner, body in _sections(name, text)}
+
+
+def _sections(name: str, text: str) -> list[tuple[str, str]]:
+    """Split concatenated definitions into the short name and the text of each type."""
+    found = []
     for number, section in enumerate(_SEPARATOR.split(text)):
         owner, body = name, section
         if number:
@@ -160,16 +173,28 @@ def _parse_sections(name: str, text: str) -> dict[str, tuple[Field, ...]]:
                     f"the definition of {name} has a section that begins with {head[:40]!r} instead of MSG:"
                 )
             owner = short_type(head[4:].strip())
-        types[owner] = tuple(_parse_fields(owner, body))
-    return types
+        found.append((owner, body))
+    return found
+
+
+def _remarks(name: str, text: str) -> dict[str, str]:
+    """Return the comments on lines of their own, by type."""
+    return {
+        owner: "\n".join(line.strip("# \t") for line in body.splitlines() if line.lstrip().startswith("#"))
+        for owner, body in _sections(name, text)
+    }
 
 
 def _parse_fields(owner: str, body: str) -> list[Field]:
     fields = []
+    above: list[str] = []
     for line in body.splitlines():
-        text = line.split("#", 1)[0].strip() if "=" not in line.split("#", 1)[0] else line.strip()
+        code, _, comment = line.partition("#")
+        text = line.strip() if "=" in code else code.strip()
         if not text:
+            above = [*above, comment.strip("# \t")] if comment else []
             continue
+        said, above = comment.strip("# \t") or " ".join(above), []
         match = _FIELD.match(text)
         if not match:
             raise MessageError(f"the definition of {owner} has a line that is not a field: {text[:60]!r}")
@@ -179,7 +204,7 @@ def _parse_fields(owner: str, body: str) -> list[Field]:
         count = None if match["array"] is None else 0 if "<=" in match["array"] else int(match["count"] or 0)
         if match["array"] is not None and match["count"] and "<=" not in match["array"] and count == 0:
             continue  # neither does a fixed array of length 0
-        fields.append(Field(match["name"], short_type(match["type"]), count))
+        fields.append(Field(match["name"], short_type(match["type"]), count, said))
     return fields
 
 
@@ -216,14 +241,14 @@ def _field_from_rosbags(name: str, description: tuple[int, object]) -> Field:
 def _resolve(owner: str, fields: tuple[Field, ...], types: Mapping[str, tuple[Field, ...]]) -> tuple[Field, ...]:
     """Replace every nested type by its short name: a bare name is in the same package, Header in std_msgs."""
     resolved = []
-    for field in fields:
-        kind = field.type
+    for one in fields:
+        kind = one.type
         if kind not in PRIMITIVES and kind not in ("string", "wstring") and kind not in types:
             package = owner.partition("/")[0]
             kind = "std_msgs/Header" if kind == "Header" else f"{package}/{kind}"
-            if "/" in field.type or kind not in types:
-                kind = _known(field.type if "/" in field.type else kind, owner)
-        resolved.append(Field(field.name, kind, field.count))
+            if "/" in one.type or kind not in types:
+                kind = _known(one.type if "/" in one.type else kind, owner)
+        resolved.append(replace(one, type=kind))
     return tuple(resolved)
 
 
@@ -235,10 +260,10 @@ def _check(definition: Definition, name: str, above: tuple[str, ...]) -> None:
     """Refuse types that contain themselves and implausibly long arrays."""
     if name in above or len(above) > 32:
         raise MessageError(f"the definition of {definition.type} contains itself at {name}")
-    for field in definition.types[name]:
-        if (field.count or 0) > _MAX_FIXED:
+    for one in definition.types[name]:
+        if (one.count or 0) > _MAX_FIXED:
             raise MessageError(
-                f"the definition of {name} has a fixed array of {field.count} elements; at most {_MAX_FIXED} are allowed"
+                f"the definition of {name} has a fixed array of {one.count} elements; at most {_MAX_FIXED} are allowed"
             )
-        if field.type in definition.types:
-            _check(definition, field.type, (*above, name))
+        if one.type in definition.types:
+            _check(definition, one.type, (*above, name))

@@ -36,6 +36,10 @@ KNOWN_DEFINITIONS: Mapping[str, str] = {
         "std_msgs/Header header\nint32 width\nint32 height\nstring encoding\nuint64 pts\nuint8 flags\nbool is_bigendian\n"
         "uint8[] data\n"
     ),
+    "nebula_msgs/NebulaPackets": (
+        "std_msgs/Header header\nNebulaPacket[] packets\n"
+        f"{_SEPARATOR}MSG: nebula_msgs/NebulaPacket\nbuiltin_interfaces/Time stamp\nuint8[] data\n"
+    ),
     "radar_msgs/RadarScan": (
         "std_msgs/Header header\nRadarReturn[] returns\n"
         f"{_SEPARATOR}MSG: radar_msgs/RadarReturn\n"

@@ -29,10 +29,12 @@ class RadarAxes:
     Attributes:
         directions: the directions of the message's x, y and z.
         degrees: whether its angles are in degrees (True) or radians (False); None for the layout's own unit.
+        directed: whether the user gave the directions.
     """
 
     directions: tuple[str, str, str] = ("forward", "left", "up")
     degrees: bool | None = None
+    directed: bool = True
 
     @property
     def matrix(self) -> Matrix33:
@@ -81,7 +83,7 @@ def parse_radar_axes(text: str) -> RadarAxes:
         )
     degrees = units[0] == "degrees" if units else None
     if not directions:
-        return RadarAxes(degrees=degrees)
+        return RadarAxes(degrees=degrees, directed=False)
     if len({_DIRECTIONS[word][0] for word in directions}) < 3:
         raise OptionError(
             f"--radar-axes {text}: two of the directions lie on the same axis; x, y and z must differ; {_EXAMPLE}"

@@ -16,15 +16,9 @@ _MIRROR = "--radar-axes forward,right,up"
 
 
 def about_claims(radar: RadarStream) -> list[DataWarning]:
-    """Warn about conventions assumed for a radar's layout and about contradictions in a sample of its messages."""
+    """Warn about contradictions in a sample of a radar's messages."""
     plan, name = radar.layout.plan, radar.topic.name
-    warnings = []
-    if plan.assumed and plan.axes is None:
-        hint = f"if the calibration turns out mirrored, try {_MIRROR}; add degrees or radians to set the unit"
-        warnings.append(DataWarning("radar-convention-assumed", f"{name} ({plan.decoder}): {plan.assumed}", hint))
-    if any(plan.claimed):
-        warnings.extend(_contradictions(name, plan, radar.claims(_SAMPLED_SCANS)))
-    return warnings
+    return _contradictions(name, plan, radar.claims(_SAMPLED_SCANS)) if any(plan.claimed) else []
 
 
 def _contradictions(name: str, plan: ColumnPlan, found: Returns) -> list[DataWarning]:

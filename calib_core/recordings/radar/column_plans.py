@@ -1,13 +1,20 @@
-"""Choose the columns to use from a message's field names: by the registry, or by the names alone."""
+"""Choose the columns to use: by the registry, by the names that ROS defines, or by what the message says about itself."""
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+from calib_core.recordings.assumptions import Assumption
+from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnReading
 from calib_core.recordings.radar.columns import ColumnPlan, plan_columns
 from calib_core.recordings.radar.plugins import all_decoders
 from calib_core.recordings.radar.registry import Decoder, MessageKind
+from calib_core.recordings.radar.self_describing.candidates import DescribedColumn
+from calib_core.recordings.radar.self_describing.description import describe_columns, fill_in
 
-__all__ = ["find_decoder", "plan_for", "plan_like"]
+__all__ = ["column_readings", "find_decoder", "plan_described", "plan_for", "plan_like"]
+
+_CLOUDS = ("cloud", "channels")
 
 
 def find_decoder(kind: MessageKind, names: Iterable[str]) -> Decoder | None:
@@ -53,15 +60,76 @@ def plan_for(kind: MessageKind, names: Iterable[str], arrays: Iterable[str] = ()
         covariance=spelt[decoder.covariance.lower()] if decoder.covariance else None,
         needed=tuple(spelt[name.lower()] for name in decoder.needed),
         decoder=decoder.name,
-        assumed=decoder.assumed,
+        assumptions=_assumptions(decoder, polar=bool(plan.polar)),
         shared_with_lidars=decoder.shared_with_lidars,
     )
 
 
+def _assumptions(decoder: Decoder, *, polar: bool) -> tuple[ColumnAssumption, ...]:
+    """Return what the layout's documentation leaves open."""
+    if not decoder.assumed:
+        return ()
+    mapped = tuple(re.findall(r"--map (\w+)=", decoder.confirm))
+    key = "field-meaning" if mapped else "azimuth-sign" if polar else "axes"
+    quantities = mapped or (("azimuth",) if polar else ("x", "y"))
+    axes = "--radar-axes" in decoder.confirm
+    unit = "degrees" in decoder.confirm or "radians" in decoder.confirm
+    about = Assumption(key, "", f"{decoder.name}: {decoder.assumed}", decoder.confirm)
+    return (ColumnAssumption(about, quantities, axes, unit),)
+
+
+def plan_described(
+    kind: MessageKind, columns: Sequence[DescribedColumn], arrays: Iterable[str] = (), remarks: str = ""
+) -> ColumnPlan | None:
+    """Plan the columns of a message by the registry, by the names that ROS defines, or by its own description.
+
+    Args:
+        kind: what the fields are fields of.
+        columns: the numbers of a return, with their values in a sample.
+        arrays: names of fixed arrays of numbers, and of strings.
+        remarks: comments of the definition that belong to no field.
+    """
+    names, arrays = [column.name for column in columns], tuple(arrays)
+    if find_decoder(kind, (*names, *arrays)):
+        return plan_for(kind, names, arrays)
+    exact = plan_columns(names)
+    if kind in _CLOUDS and exact is not None and {"x", "y"} <= {name.lower() for name in exact.position}:
+        return fill_in(exact, columns)
+    known = exact is not None and exact.looks_like_radar
+    return describe_columns(columns, remarks, in_ros_frame=kind in _CLOUDS, known=known or kind in _CLOUDS)
+
+
 def plan_like(first: ColumnPlan, kind: MessageKind, names: Iterable[str]) -> ColumnPlan | None:
     """Plan a later message of a topic: its own columns, with the user's axes of the first plan."""
+    names = tuple(names)
+    if first.described or first.mapped:
+        return first if set(first.columns) <= set(names) else None
     plan = plan_for(kind, names)
     if plan is None:
         return None
     plan = replace(plan, claiming=first.claiming, azimuth_from=first.azimuth_from)
     return plan.read_as(first.axes) if first.axes else plan
+
+
+def column_readings(plan: ColumnPlan) -> tuple[ColumnReading, ...]:
+    """Return what was taken for what: as the message describes itself, or as the registry or ROS defines its layout."""
+    if plan.described:
+        return plan.readings
+    why = f"layout '{plan.decoder}'" if plan.decoder else "ROS defines it (REP 103)"
+    angle, side = ("deg" if plan.degrees else "rad"), ("to the left" if plan.azimuth_sign > 0 else "to the right")
+    directions = plan.axes.directions if plan.axes else plan.directions
+    place = [("xyz"[axis], "m", directions[axis]) for axis in range(3)]
+    if plan.polar:
+        place = [("range", "m", ""), ("azimuth", angle, side), ("elevation", angle, "upwards")]
+    rows = [
+        ColumnReading(what, name, unit, sign, why)
+        for name, (what, unit, sign) in zip(plan.position, place, strict=False)
+    ]
+    speed = plan.doppler or ", ".join(plan.velocity)
+    rows += [ColumnReading("doppler" if plan.doppler else "velocity", speed, "m/s", "", why)] if speed else []
+    rows += [ColumnReading("amplitude", plan.amplitude, "dB", "", why)] if plan.amplitude else []
+    noise = plan.covariance or ", ".join(name for name in plan.sigma if name)
+    rows += [ColumnReading("noise", noise, "", "", why)] if noise else []
+    rows += [ColumnReading("other azimuth", name, "", "", "not used") for name in plan.other_azimuths]
+    mapped = {row.quantity for row in plan.readings}
+    return (*(row for row in rows if row.quantity not in mapped), *plan.readings)

@@ -2,13 +2,13 @@
 
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from calib_core.arrays import Points3, Values
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
-from calib_core.recordings.radar.axes import RadarAxes
+from calib_core.recordings.radar.column_plan import ColumnPlan, plain_name
 from calib_core.recordings.radar.noise import full_covariance, sigma_polar_from_covariance
 
 __all__ = ["ColumnPlan", "Returns", "names_a_speed", "no_returns", "plan_columns", "returns_from", "unknown"]
@@ -68,92 +68,6 @@ def no_returns() -> Returns:
     return Returns(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros((0, 3)))
 
 
-@dataclass(frozen=True, slots=True)
-class ColumnPlan:
-    """The driver's names for the columns in use.
-
-    Attributes:
-        position: x, y and optionally z [m]; or range [m], azimuth and optionally elevation.
-        polar: whether position is polar.
-        degrees: whether the angles are in degrees.
-        doppler: radial speed [m/s], or None.
-        velocity: components [m/s]; if doppler is None, the radial speed is their part along the line of sight.
-        amplitude: amplitude in dB, or None.
-        amplitude_scale: unit of the amplitude in dB.
-        sigma: standard deviations of range, azimuth and elevation, None for each that is missing.
-        spoils_position: flags that mark the position as invalid.
-        spoils_doppler: flags that mark the speed as invalid.
-        needed: flags that are zero if there is no return.
-        azimuth_sign: 1 if azimuth is positive to the left, -1 if to the right.
-        covariance: an array with the position's covariance [m^2], or None.
-        claimed: columns of range, azimuth and elevation, whether or not the position is made of them; to find contradictions.
-        axes: the user's axes and units; None if not given.
-        decoder: the layout's name in the registry; "" if the message is read by its column names alone.
-        assumed: what the layout's documentation leaves open, as a sentence; "" if nothing.
-        shared_with_lidars: whether lidars have the same columns.
-        claiming: whether to fill in Returns.claimed_polar.
-        other_azimuths: columns that may hold further azimuths of the same returns.
-        azimuth_from: one of these, to read the positions at; None reads them at the first azimuth.
-    """
-
-    position: tuple[str, ...]
-    polar: bool
-    degrees: bool = False
-    doppler: str | None = None
-    velocity: tuple[str, ...] = ()
-    amplitude: str | None = None
-    amplitude_scale: float = 1.0
-    sigma: tuple[str | None, str | None, str | None] = (None, None, None)
-    spoils_position: tuple[str, ...] = ()
-    spoils_doppler: tuple[str, ...] = ()
-    needed: tuple[str, ...] = ()
-    azimuth_sign: float = 1.0
-    covariance: str | None = None
-    claimed: tuple[str | None, str | None, str | None] = (None, None, None)
-    axes: RadarAxes | None = None
-    decoder: str = ""
-    assumed: str = ""
-    shared_with_lidars: bool = False
-    claiming: bool = False
-    other_azimuths: tuple[str, ...] = ()
-    azimuth_from: str | None = None
-
-    @property
-    def looks_like_radar(self) -> bool:
-        """Return whether there are columns other than the position and intensity that a lidar also has."""
-        if self.decoder:
-            return not self.shared_with_lidars
-        amplitude = self.amplitude is not None and _plain(self.amplitude) != "intensity"
-        return self.polar or self.doppler is not None or bool(self.velocity) or amplitude
-
-    def describe(self) -> str:
-        """Describe briefly which columns are read."""
-        words = [f"position from {', '.join(self.position)}"]
-        if self.polar:
-            side = "left" if self.azimuth_sign > 0 else "right"
-            words[0] += f" (azimuth positive to the {side}, {'degrees' if self.degrees else 'radians'})"
-        elif self.axes is None:
-            words[0] += " (forward, left, up)" if len(self.position) == 3 else " (forward, left)"
-        speed = self.doppler or ", ".join(self.velocity)
-        words.append(f"speed from {speed}" if speed else "no speed")
-        words.append(f"amplitude from {self.amplitude}" if self.amplitude else "no amplitude")
-        if any(self.sigma):
-            words.append(f"noise from {', '.join(name for name in self.sigma if name)}")
-        elif self.covariance:
-            words.append(f"noise from {self.covariance}")
-        if self.axes:
-            words.append(self.axes.describe())
-        return (f"{self.decoder}: " if self.decoder else "") + "; ".join(words)
-
-    def read_as(self, axes: RadarAxes) -> "ColumnPlan":
-        """Apply the user's axes and units."""
-        return replace(self, axes=axes, degrees=self.degrees if axes.degrees is None else axes.degrees)
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[^a-z0-9]", "", name.lower())
-
-
 _UNKNOWN = np.full(3 << 16, np.nan)
 _UNKNOWN.setflags(write=False)
 
@@ -174,7 +88,7 @@ def plan_columns(names: Iterable[str]) -> ColumnPlan | None:
     Args:
         names: as the message spells them; nested ones dotted.
     """
-    by_plain = {_plain(name): name for name in reversed(list(names))}
+    by_plain = {plain_name(name): name for name in reversed(list(names))}
 
     def first(candidates: Iterable[str]) -> str | None:
         return next((by_plain[name] for name in candidates if name in by_plain), None)
@@ -187,7 +101,7 @@ def plan_columns(names: Iterable[str]) -> ColumnPlan | None:
         if polar_names[0] is None or polar_names[1] is None:
             return None
         position = tuple(name for name in polar_names if name is not None)
-        degrees = _plain(position[1]).endswith("deg")
+        degrees = plain_name(position[1]).endswith("deg")
     sets = (tuple(by_plain[name] for name in names if name in by_plain) for names in _VELOCITIES)
     velocity = next((found for found in sets if len(found) >= 2), ())
     doppler = first(_DOPPLERS)
@@ -247,11 +161,12 @@ def _returns(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Returns:
         position[column(flag).reshape(-1) != 0] = np.nan
     for flag in plan.needed:
         position[column(flag).reshape(-1) == 0] = np.nan
-    if plan.axes:
-        position = position @ plan.axes.matrix.T
+    turn = plan.turn
+    if turn is not None:
+        position = position @ turn.T
     if plan.amplitude_scale != 1.0:
         amplitude = amplitude * plan.amplitude_scale
-    claimed = _columns(plan.claimed, column, n) if plan.claiming else None
+    claimed = _columns(plan.claimed, column, n) * plan.claimed_scales if plan.claiming else None
     return Returns(position, doppler, amplitude, _sigma(plan, column, position), claimed)
 
 
@@ -267,6 +182,8 @@ def _position(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Points3:
     for axis, part in enumerate(parts):
         position[:, axis].reshape(part.shape)[...] = part
     position[:, len(parts) :] = 0.0
+    if plan.scales != (1.0, 1.0, 1.0):
+        position *= plan.scales
     if not plan.polar:
         return position
     if plan.degrees:
@@ -277,23 +194,24 @@ def _position(plan: ColumnPlan, column: Callable[[str], np.ndarray]) -> Points3:
 
 def _turned(plan: ColumnPlan, position: Points3, azimuth: Values) -> Points3:
     """Return positions with their range and elevation at another azimuth, in the unit and with the sign of the first."""
-    degrees = plan.degrees or _plain(plan.azimuth_from or "").endswith("deg")
+    degrees = plan.degrees or plain_name(plan.azimuth_from or "").endswith("deg")
+    scale = plan.azimuth_sign * (plan.scales[1] if plan.polar else 1.0)
     polar = polar_from_cartesian(position)
-    polar[:, 1] = plan.azimuth_sign * (np.radians(azimuth) if degrees else azimuth)
+    polar[:, 1] = scale * (np.radians(azimuth) if degrees else azimuth)
     return cartesian_from_polar(polar)
 
 
 def _sigma(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Points3) -> Points3:
-    turn = np.eye(3) if plan.axes is None else plan.axes.matrix
+    turn = plan.turn
     if plan.covariance is not None:
         covariance = full_covariance(np.asarray(column(plan.covariance), dtype=np.float64))
-        return sigma_polar_from_covariance(position, turn @ covariance @ turn.T)
+        return sigma_polar_from_covariance(position, covariance if turn is None else turn @ covariance @ turn.T)
     if not any(plan.sigma):
         return unknown(len(position), 3)
-    sigma = _columns(plan.sigma, column, len(position))
+    sigma = _columns(plan.sigma, column, len(position)) * plan.sigma_scales
     if plan.degrees:
         sigma[:, 1:] = np.radians(sigma[:, 1:])
-    if not turn[2, 2]:
+    if turn is not None and not turn[2, 2]:
         sigma[:, 1:] = np.nan  # the azimuth is then no longer measured about the upward axis
     return sigma
 
@@ -308,10 +226,14 @@ def _columns(names: Iterable[str | None], column: Callable[[str], np.ndarray], n
 
 def _doppler(plan: ColumnPlan, column: Callable[[str], np.ndarray], position: Points3) -> Values:
     if plan.doppler:
-        return _floats(column(plan.doppler))
+        speed = _floats(column(plan.doppler))
+        return speed if plan.doppler_scale == 1.0 else speed * plan.doppler_scale
     if not plan.velocity:
         return unknown(len(position))
     range_m = polar_from_cartesian(position)[:, 0]
     with np.errstate(invalid="ignore", divide="ignore"):
-        along = sum(_floats(column(name)) * position[:, axis] for axis, name in enumerate(plan.velocity))
+        signs = np.copysign(plan.doppler_scale, plan.scales)
+        along = sum(
+            _floats(column(name)) * (signs[axis] * position[:, axis]) for axis, name in enumerate(plan.velocity)
+        )
         return np.asarray(along / range_m, dtype=np.float64)

@@ -1,16 +1,25 @@
 """Recognise radar layouts by a message's fields, never by the name of its package."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeAlias
+
+import numpy as np
 
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.array_messages import ArrayLayout
-from calib_core.recordings.radar.list_messages import ListLayout, PointLayout
-from calib_core.recordings.radar.point_clouds import ChannelCloudLayout, CloudLayout, is_channel_cloud, is_cloud
+from calib_core.recordings.radar.channel_clouds import ChannelCloudLayout, is_channel_cloud
+from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.list_messages import ListLayout
+from calib_core.recordings.radar.point_clouds import CloudLayout, cloud_columns, is_cloud
+from calib_core.recordings.radar.samples import Samples, leaf_names
+from calib_core.recordings.radar.single_returns import PointLayout
+from calib_core.recordings.radar.struct_lists import struct_lists
 
-__all__ = ["RadarLayout", "ScanLayout", "layouts_of_parts", "recognise"]
+__all__ = ["RadarLayout", "ScanLayout", "column_names", "layouts_of_parts", "recognise"]
+
+_NOTHING = StatedReading()
 
 
 ScanLayout: TypeAlias = CloudLayout | ChannelCloudLayout | ListLayout | ArrayLayout
@@ -19,23 +28,54 @@ ScanLayout: TypeAlias = CloudLayout | ChannelCloudLayout | ListLayout | ArrayLay
 RadarLayout: TypeAlias = ScanLayout | PointLayout
 
 
-def recognise(definition: Definition, payload: bytes) -> RadarLayout | None:
+def recognise(
+    definition: Definition,
+    payload: bytes,
+    more: Callable[[int], Sequence[bytes]] | None = None,
+    stated: StatedReading = _NOTHING,
+) -> RadarLayout | None:
     """Return the reader of a message's layout, None if it is not a radar's.
 
+    Args:
+        definition: of the topic's messages.
+        payload: one of them.
+        more: returns up to the given number of messages spread over the topic, to judge values.
+        stated: what the user states about the messages.
+
     Raises:
-        MessageError: its definition is a radar's, but the message is inconsistent.
+        MessageError: its definition is a radar's, but the message is inconsistent, or it lacks a column that the user maps.
     """
+    samples = Samples(definition, payload, more)
+    with np.errstate(all="ignore"):  # damaged bytes may hold signalling NaN, and numbers whose squares overflow
+        found = _recognise(samples, stated)
+    if found is None and stated.column_map:
+        stated.require(column_names(samples))
+    return found
+
+
+def _recognise(samples: Samples, stated: StatedReading) -> RadarLayout | None:
+    definition = samples.definition
     if is_cloud(definition):
-        return CloudLayout.recognise(definition, payload)
+        return CloudLayout.recognise(samples, stated)
     if is_channel_cloud(definition):
-        return ChannelCloudLayout.recognise(definition, payload)
-    if definition.stamp_offset is None:
-        return None
-    return (
-        ListLayout.recognise(definition)
-        or ArrayLayout.recognise(definition)
-        or PointLayout.recognise(definition, payload)
-    )
+        return ChannelCloudLayout.recognise(samples, stated)
+    whole = ListLayout.recognise(definition, samples, stated) or ArrayLayout.recognise(definition, samples, stated)
+    if whole is not None or definition.stamp_offset is None:
+        return whole
+    return PointLayout.recognise(definition, samples, stated)
+
+
+def column_names(samples: Samples) -> list[str]:
+    """Return the columns of a message that --map can name, as it spells them."""
+    definition = samples.definition
+    if is_cloud(definition):
+        return cloud_columns(samples)
+    lists = [
+        f"{place.dotted}.{name}"
+        for place in struct_lists(definition)
+        for name in leaf_names(definition, place.element)[0]
+    ]
+    return [*lists, *leaf_names(definition, definition.type)[0], *leaf_names(definition, definition.type)[1]]
 
 
 def layouts_of_parts(first: RadarLayout, definitions: Sequence[Definition]) -> tuple[RadarLayout, ...]:
@@ -55,10 +95,10 @@ def _same_layout(first: RadarLayout, definition: Definition) -> RadarLayout:
         return replace(first, definition=definition, _known={})
     if isinstance(first, ChannelCloudLayout) and is_channel_cloud(definition):
         return replace(first, definition=definition)
-    found = type(first).recognise(definition) if isinstance(first, ListLayout | ArrayLayout) else None
+    found = first.for_definition(definition) if isinstance(first, ListLayout | ArrayLayout) else None
     if found is None:
         raise MessageError(
             f"the files have {first.definition.type} and {definition.type} messages with different layouts under one topic; "
             "open them one at a time"
         )
-    return found.with_plan(found.plan.read_as(first.plan.axes)) if first.plan.axes else found
+    return found

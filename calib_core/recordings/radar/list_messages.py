@@ -1,49 +1,94 @@
-"""Read radar messages with a list of returns, targets or tracks, and drivers that send one return per message."""
+"""Read radar messages with a list of returns, targets or tracks."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from calib_core.arrays import TimesNs
-from calib_core.recordings.messages.decoding import Message, Pin, decode, fixed_part
-from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
-from calib_core.recordings.radar.column_plans import find_decoder, plan_for
+from calib_core.recordings.assumptions import CONFIRM_ALL, Assumption
+from calib_core.recordings.messages.decoding import Message, decode
+from calib_core.recordings.messages.definitions import Definition
+from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_plan import ColumnAssumption
+from calib_core.recordings.radar.column_plans import find_decoder, plan_described
 from calib_core.recordings.radar.columns import ColumnPlan, Returns, no_returns, returns_from
+from calib_core.recordings.radar.samples import Samples, described, leaf_names
+from calib_core.recordings.radar.self_describing.names import has_word
+from calib_core.recordings.radar.struct_lists import ListPlace, count_field, joined, struct_lists
 
-__all__ = ["ListLayout", "PointLayout", "first_of_scans"]
+__all__ = ["ListLayout"]
 
-_FRAME_NUMBERS = ("radar_frame_idx", "frame_idx", "frame_number", "frame_id_number", "frame_counter")
-_POINT_NUMBERS = ("point_id", "detection_id", "target_id", "index")
-_SHORTEST_CYCLE_NS = 5e6
+_NOTHING = StatedReading()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ListLayout:
-    """Reads messages with a header and one list: radar_msgs, Ainstein, Continental, object lists."""
+    """Reads messages with a list of structs at any depth: radar_msgs, Ainstein, Continental, object lists, vendors' own.
+
+    Attributes:
+        definition: of the message.
+        place: where the list is.
+        plan: which fields of its elements are used.
+        count_field: how many elements of a fixed list are used; None if all are.
+    """
 
     definition: Definition
-    list_name: str
+    place: ListPlace
     plan: ColumnPlan
+    count_field: str | None = None
 
     one_per_message = False
     lidar_like = False
 
     @classmethod
-    def recognise(cls, definition: Definition) -> "ListLayout | None":
-        """Find the list whose elements have a position and a field that only radars have."""
-        for field in definition.fields:
-            if field.count != 0 or field.type not in definition.types:
-                continue
-            plan = plan_for("list", *leaf_names(definition, field.type))
-            if plan is not None and plan.looks_like_radar:
-                return cls(definition, field.name, plan)
-        return None
+    def recognise(
+        cls, definition: Definition, samples: Samples | None = None, stated: StatedReading = _NOTHING
+    ) -> "ListLayout | None":
+        """Find the list that looks most like a radar's returns, or that has the columns the user maps.
+
+        Args:
+            definition: of the message.
+            samples: a few messages; without them, values cannot be judged.
+            stated: what the user states about the messages.
+        """
+        places = struct_lists(definition)
+        found = [one for place in places if (one := _list_at(definition, place, samples, stated)) is not None]
+        if not found:
+            return None
+        best = max(found, key=lambda one: one.rank)
+        spare = [one.place.name for one in found if one is not best]
+        if not spare:
+            return best
+        note = (
+            f"only the list '{best.place.name}' is read; the message also has {', '.join(spare)}, "
+            f"which can be chosen by naming columns with --map, such as --map x={spare[0]}.FIELD"
+        )
+        return best.with_plan(replace(best.plan, notes=(*best.plan.notes, note)))
+
+    @property
+    def rank(self) -> tuple[bool, bool, bool, bool, bool]:
+        """The order of preference among several lists: detections with speed and amplitude first."""
+        plan = self.plan
+        return (
+            bool(plan.mapped),
+            bool(plan.decoder),
+            not self.objects,
+            plan.doppler is not None or bool(plan.velocity),
+            plan.amplitude is not None,
+        )
+
+    @property
+    def objects(self) -> bool:
+        """Whether the elements are tracked objects with an extent, not reflections."""
+        names, _ = leaf_names(self.definition, self.place.element)
+        return has_word(self.place.dotted, "object", "objects", "track", "tracks") or any(
+            has_word(name, "width", "length", "orientation", "yaw") for name in names
+        )
 
     @property
     def description(self) -> str:
         """Describe what is read."""
-        return f"list '{self.list_name}': {self.plan.describe()}"
+        return f"list '{self.place.name}': {self.plan.describe()}"
 
     def returns(self, payload: bytes) -> Returns:
         """Read one list.
@@ -51,191 +96,111 @@ class ListLayout:
         Raises:
             MessageError: the bytes do not fit the definition.
         """
-        message = decode(self.definition, payload)
-        if not message.count(self.list_name):
+        last, message = self.place.path[-1], decode(self.definition, payload)
+        if len(self.place.path) == 1 and self.place.fixed is None:
+            return (
+                returns_from(self.plan, lambda name: message.column(last, name))
+                if message.count(last)
+                else no_returns()
+            )
+        lists = [(parent, count) for parent in self.place.parents(message) if (count := self._count(parent))]
+        if not lists:
             return no_returns()
-        return returns_from(self.plan, lambda name: message.column(self.list_name, name))
+        found = returns_from(
+            self.plan, lambda name: joined([parent.column(last, name)[:count] for parent, count in lists])
+        )
+        if self.place.fixed and self.count_field is None:
+            found.points_radar_m[~found.points_radar_m.any(axis=1)] = np.nan  # unused elements
+        return found
+
+    def _count(self, parent: Message) -> int:
+        count = parent.count(self.place.path[-1])
+        return count if self.count_field is None else min(count, max(0, parent.whole(self.count_field)))
 
     def with_plan(self, plan: ColumnPlan) -> "ListLayout":
         """Return the same layout with another plan."""
         return replace(self, plan=plan)
 
-
-def leaf_names(definition: Definition, kind: str, prefix: str = "") -> tuple[list[str], list[str]]:
-    """Return the dotted names of all single numbers of a type, and of all fixed arrays and strings."""
-    numbers: list[str] = []
-    others: list[str] = []
-    for field in definition.types[kind]:
-        if field.type in PRIMITIVES or field.type == "string":
-            single = field.count is None and field.type in PRIMITIVES
-            if single or field.count != 0:
-                (numbers if single else others).append(prefix + field.name)
-        elif field.count is None:
-            more = leaf_names(definition, field.type, f"{prefix}{field.name}.")
-            numbers.extend(more[0])
-            others.extend(more[1])
-    return numbers, others
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PointLayout:
-    """Reads drivers that publish every return as a separate message (ti_mmwave_rospkg and its forks).
-
-    Attributes:
-        frame_number: the field that numbers scans, or None.
-        point_number: the field that numbers returns within a scan, or None.
-        pins: offsets of the lengths of all strings before the last number, and their values in the first message.
-    """
-
-    definition: Definition
-    plan: ColumnPlan
-    dtype: np.dtype[Any]
-    frame_number: str | None
-    point_number: str | None
-    pins: tuple[Pin, ...]
-
-    one_per_message = True
-    lidar_like = False
-
-    @classmethod
-    def recognise(cls, definition: Definition, payload: bytes) -> "PointLayout | None":
-        """Recognise a radar return by its fields of fixed size: a position and a speed."""
-        dtype, pins = fixed_part(definition, payload)
-        names = dtype.names or ()
-        strings = [field.name for field in definition.fields if field.type == "string"]
-        plan = plan_for("point", names, strings)
-        if plan is None or plan.doppler is None or any("." in name for name in plan.position):
+    def for_definition(self, definition: Definition) -> "ListLayout | None":
+        """Return the same layout for another file's definition; None if that lacks the list or a column in use."""
+        place = next((place for place in struct_lists(definition) if place.path == self.place.path), None)
+        if place is None or place.lists != self.place.lists or place.fixed != self.place.fixed:
             return None
-        decoder = find_decoder("point", (*names, *strings))
-        numbers = (decoder.point_number,) if decoder and decoder.point_number else _POINT_NUMBERS
-        return cls(
+        numbers, others = leaf_names(definition, place.element)
+        scope = {field.name for field in definition.types[place.scope]}
+        fits = set(self.plan.columns) <= {*numbers, *others} and (self.count_field or place.path[-1]) in scope
+        return replace(self, definition=definition, place=place) if fits else None
+
+
+def _list_at(
+    definition: Definition, place: ListPlace, samples: Samples | None, stated: StatedReading
+) -> ListLayout | None:
+    """Return the reader of one list if it holds a radar's returns or the columns that the user maps."""
+    numbers, others = leaf_names(definition, place.element)
+    within = stated.within(place.dotted, numbers)
+    if within is None:
+        return None
+    known = find_decoder("list", (*numbers, *others)) is not None
+    first = plan_described("list", described(definition, place.element, numbers, _no_values), others)
+    if not within.column_map and (first is None or not first.looks_like_radar):
+        return None
+    parents = (
+        [parent for message in samples.messages for parent in place.parents(message)] if samples and not known else []
+    )
+    counter = count_field(definition, place.scope, place.fixed, place.path[-1], parents) if place.fixed else None
+    columns = described(
+        definition, place.element, numbers, lambda name: _sampled(parents, place.path[-1], name, counter)
+    )
+    remarks = "\n".join(definition.remarks.get(kind, "") for kind in (place.element, place.scope))
+    plan = plan_described("list", columns, others, remarks)
+    if plan is not None and not plan.looks_like_radar and not within.column_map:
+        return None
+    plan = within.applied(plan)
+    return (
+        None
+        if plan is None
+        else ListLayout(
             definition,
-            plan,
-            dtype,
-            next((name for name in _FRAME_NUMBERS if name in names), None),
-            next((name for name in numbers if name in names), None),
-            pins,
+            place,
+            _about_place(plan, place, parents, counter, len(samples.messages) if parents and samples else 0),
+            counter,
         )
-
-    @property
-    def description(self) -> str:
-        """Describe what is read."""
-        how = self.frame_number or self.point_number or "pauses"
-        return f"one return per message, scans separated by {how}: {self.plan.describe()}"
-
-    def returns_of_rows(self, rows: np.ndarray) -> Returns:
-        """Read many returns from the first bytes of their messages, (n, dtype.itemsize)."""
-        points = self.view(rows)
-        return _known_snr(returns_from(self.plan, lambda name: points[name]))
-
-    def returns(self, payload: bytes) -> Returns:
-        """Read the return in one whole message with strings of any length.
-
-        Raises:
-            MessageError: the bytes do not fit the definition.
-        """
-        message = self.message(payload)
-        return _known_snr(returns_from(self.plan, lambda name: np.array([message.number(name)])))
-
-    def message(self, payload: bytes) -> Message:
-        """Decode one whole message.
-
-        Raises:
-            MessageError: the bytes do not fit the definition.
-        """
-        return decode(self.definition, payload)
-
-    def misfits(self, rows: np.ndarray) -> np.ndarray:
-        """Return which rows have string lengths other than the first message's, and therefore other field offsets."""
-        moved = np.zeros(len(rows), dtype=bool)
-        for pin in (pin for pin in self.pins if pin.offset + 4 <= rows.shape[1]):
-            moved |= (rows[:, pin.offset : pin.offset + 4] != np.frombuffer(pin.length, dtype=np.uint8)).any(axis=1)
-        return moved
-
-    def with_plan(self, plan: ColumnPlan) -> "PointLayout":
-        """Return the same layout with another plan."""
-        return replace(self, plan=plan)
-
-    def view(self, rows: np.ndarray) -> np.ndarray:
-        """View raw rows (n, dtype.itemsize) as records."""
-        return np.ascontiguousarray(rows).view(self.dtype)[:, 0]
-
-    @property
-    def group_bytes(self) -> int:
-        """How many leading bytes of a message contain the stamp and the numbers that separate scans."""
-        places = [self._place(name) for name in (self.frame_number, self.point_number) if name]
-        return max([12, *(offset + code.itemsize for code, offset in places)])
-
-    def numbers(self, rows: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Read frame and point numbers from rows of at least group_bytes: (n,) each, None for a missing one."""
-        frame = self._column(rows, self.frame_number).copy() if self.frame_number else None
-        return frame, self._column(rows, self.point_number).copy() if self.point_number else None
-
-    def _column(self, rows: np.ndarray, name: str) -> np.ndarray:
-        code, offset = self._place(name)
-        return np.ascontiguousarray(rows[:, offset : offset + code.itemsize]).view(code)[:, 0]
-
-    def _place(self, name: str) -> tuple[np.dtype[Any], int]:
-        assert self.dtype.fields is not None
-        place = self.dtype.fields[name]
-        return place[0], place[1]
+    )
 
 
-def _known_snr(found: Returns) -> Returns:
-    """Replace zero intensities by NaN: the stock driver never fills them in."""
-    if found.snr_db.flags.writeable:
-        found.snr_db[found.snr_db == 0.0] = np.nan
-    return found
+def _no_values(name: str) -> np.ndarray:
+    return np.zeros(0)
 
 
-def first_of_scans(
-    times_ns: TimesNs, frame_numbers: np.ndarray | None = None, point_numbers: np.ndarray | None = None
-) -> np.ndarray:
-    """Find the message that begins each scan, for drivers that send one message per return.
+def _sampled(parents: Sequence[Message], last: str, name: str, counter: str | None) -> np.ndarray:
+    """Return the values of one number in all sampled lists."""
+    columns = [
+        parent.column(last, name)[: parent.whole(counter) if counter else None]
+        for parent in parents
+        if parent.count(last)
+    ]
+    return np.concatenate(columns) if columns else np.zeros(0)
 
-    A scan ends where the frame number changes; without one, where the point number does not rise; and in any case at a
-    pause longer than half the usual time between scans (the numbers cannot separate scans of a single return).
+
+def _about_place(
+    plan: ColumnPlan, place: ListPlace, parents: Sequence[Message], counter: str | None, messages: int
+) -> ColumnPlan:
+    """Add to a plan what its list's place in the message leaves open.
 
     Args:
-        times_ns: (n,) stamps in the order of the recording.
-        frame_numbers: (n,) or None.
-        point_numbers: (n,) or None.
-
-    Returns:
-        (m,) indices, ascending, the first is 0; empty if n is 0.
+        plan: of the list's elements.
+        place: of the list.
+        parents: what holds the list, in a sample of messages.
+        counter: the field that counts the used elements.
+        messages: number of sampled messages.
     """
-    n = len(times_ns)
-    if n < 2:
-        return np.zeros(n, dtype=np.int64)
-    pauses_ns = np.diff(times_ns)
-    if frame_numbers is not None:
-        begins = np.diff(frame_numbers.astype(np.int64)) != 0
-        return np.concatenate([[0], np.flatnonzero(begins) + 1])
-    if point_numbers is not None:
-        begins = np.diff(point_numbers.astype(np.int64)) <= 0
-        usual_ns = float(np.median(np.diff(times_ns[np.flatnonzero(begins) + 1]))) if begins.sum() > 2 else np.inf
-    else:
-        begins = np.zeros(n - 1, dtype=bool)
-        usual_ns = 2.0 * _between_scans_ns(pauses_ns)
-    if usual_ns > 0:
-        begins = begins | (pauses_ns > 0.5 * usual_ns)
-    return np.concatenate([[0], np.flatnonzero(begins) + 1])
-
-
-def _between_scans_ns(pauses_ns: np.ndarray) -> float:
-    """Return a threshold between the pauses within a scan and those between scans.
-
-    It is the middle of the widest gap between their logarithms. If all pauses are alike, it is half of the shortest one, but
-    at least 5 ms: no radar cycle is shorter, and no driver takes that long from one return to the next.
-    """
-    positive = np.sort(pauses_ns[pauses_ns > 0]).astype(np.float64)
-    if not len(positive):
-        return np.inf
-    logs = np.log(positive)
-    if np.any(pauses_ns <= 0):
-        logs = np.concatenate([[logs[0] - 1.0], logs])
-    steps = np.diff(logs)
-    if not len(steps) or steps.max() < np.log(2.0):
-        return max(float(positive[0]) / 2, _SHORTEST_CYCLE_NS)
-    cut = int(np.argmax(steps))
-    return float(np.exp((logs[cut] + logs[cut + 1]) / 2))
+    assumptions, notes = list(plan.assumptions), list(plan.notes)
+    if place.several and len(parents) > messages:
+        outer = ".".join(place.path[:-1])
+        text = f"the returns of all elements of '{outer}' are taken as one sensor's, in one frame"
+        assumptions.append(ColumnAssumption(Assumption("field-meaning", "", text, CONFIRM_ALL), ()))
+    if place.fixed and counter is None:
+        notes.append(f"'{place.name}' has {place.fixed} elements and no count: those at position 0 are skipped")
+    elif place.fixed:
+        notes.append(f"'{place.name}' has {place.fixed} elements; {counter} counts those in use")
+    return replace(plan, assumptions=tuple(assumptions), notes=tuple(notes))

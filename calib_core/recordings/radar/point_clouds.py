@@ -1,4 +1,4 @@
-"""Read radar returns from sensor_msgs/PointCloud2 (and the older PointCloud) of any memory layout."""
+"""Read radar returns from sensor_msgs/PointCloud2 of any memory layout."""
 
 import struct
 from collections.abc import Iterable
@@ -11,25 +11,25 @@ from numpy.lib.stride_tricks import as_strided
 from calib_core.errors import MessageError
 from calib_core.recordings.messages.decoding import Message, decode, payload_byte_order
 from calib_core.recordings.messages.definitions import Definition
-from calib_core.recordings.radar.column_plans import plan_for, plan_like
+from calib_core.recordings.radar.column_mapping import StatedReading
+from calib_core.recordings.radar.column_plans import plan_described, plan_for, plan_like
 from calib_core.recordings.radar.columns import ColumnPlan, Returns, names_a_speed, no_returns, returns_from
+from calib_core.recordings.radar.samples import Samples
+from calib_core.recordings.radar.self_describing.candidates import DescribedColumn
 
-__all__ = ["ChannelCloudLayout", "CloudLayout", "is_channel_cloud", "is_cloud"]
+__all__ = ["CloudLayout", "cloud_columns", "is_cloud", "lidar_like"]
 
 _CLOUD_NAMES = frozenset({"height", "width", "fields", "is_bigendian", "point_step", "row_step", "data"})
 _FORMATS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 _MAX_POINT_STEP = 1 << 16
 _LIDAR_POINTS = 5000
+"""A cloud of more points is a lidar's."""
+_NOTHING = StatedReading()
 
 
 def is_cloud(definition: Definition) -> bool:
     """Return whether a message is laid out as sensor_msgs/PointCloud2."""
     return definition.names >= _CLOUD_NAMES
-
-
-def is_channel_cloud(definition: Definition) -> bool:
-    """Return whether a message is laid out as sensor_msgs/PointCloud."""
-    return definition.names >= {"points", "channels"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,15 +56,22 @@ class CloudLayout:
     one_per_message = False
 
     @classmethod
-    def recognise(cls, definition: Definition, payload: bytes) -> "CloudLayout | None":
+    def recognise(cls, samples: Samples, stated: StatedReading = _NOTHING) -> "CloudLayout | None":
         """Recognise the layout from a first message; None if it contains no positions."""
+        definition, payload = samples.definition, samples.payload
         message = decode(definition, payload)
-        names = _point_dtype(message, payload_byte_order(payload, definition)).names or ()
-        plan = plan_for("cloud", names)
+        dtype = _point_dtype(message, payload_byte_order(payload, definition))
+        within = stated.within("", dtype.names or ())
+        if within is None:
+            return None
+        plan = plan_for("cloud", dtype.names or ())
+        if plan is None or not plan.decoder:
+            plan = plan_described("cloud", _cloud_columns(samples, dtype))
+        plan = within.applied(plan)
         if plan is None:
             return None
         points = message.whole("height") * message.whole("width")
-        return cls(definition, plan, _lidar_like(plan, names, points))
+        return cls(definition, plan, lidar_like(plan, dtype.names or (), points))
 
     @property
     def description(self) -> str:
@@ -149,7 +156,7 @@ class CloudLayout:
         return None
 
 
-def _lidar_like(plan: ColumnPlan, names: Iterable[str], points: int) -> bool:
+def lidar_like(plan: ColumnPlan, names: Iterable[str], points: int) -> bool:
     """Return whether a cloud may be a lidar's: it has no speed, and either too many points or a lidar's columns only."""
     if plan.doppler is not None or plan.velocity or names_a_speed(names):
         return False
@@ -220,60 +227,36 @@ def _points(data: np.ndarray, dtype: np.dtype[Any], height: int, width: int, row
     return np.ascontiguousarray(rows).reshape(-1).view(dtype)
 
 
+def cloud_columns(samples: Samples) -> list[str]:
+    """Return the fields of a first cloud.
+
+    Raises:
+        MessageError: the message is inconsistent.
+    """
+    message = decode(samples.definition, samples.payload)
+    return list(_point_dtype(message, payload_byte_order(samples.payload, samples.definition)).names or ())
+
+
+def _cloud_columns(samples: Samples, dtype: np.dtype[Any]) -> list[DescribedColumn]:
+    """Describe the fields of a cloud with their values in a few messages of the same layout."""
+    scans = [np.zeros(0, dtype)]
+    for payload in samples.payloads():
+        try:
+            message = decode(samples.definition, payload)
+            if _point_dtype(message, payload_byte_order(payload, samples.definition)) == dtype:
+                size = (message.whole(name) for name in ("height", "width", "row_step"))
+                scans.append(_points(message.octets("data"), dtype, *size))
+        except MessageError:
+            continue
+    points = np.concatenate(scans)
+    with np.errstate(invalid="ignore"):
+        return [
+            DescribedColumn(name, dtype[name].kind != "f", "", points[name].astype(np.float64))
+            for name in dtype.names or ()
+        ]
+
+
 def _returns(points: np.ndarray, plan: ColumnPlan) -> Returns:
     if not points.size:
         return no_returns()
     return returns_from(plan, lambda name: points[name])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ChannelCloudLayout:
-    """Reads sensor_msgs/PointCloud: points as float32 x, y, z, and other quantities in named channels (Oculii)."""
-
-    definition: Definition
-    plan: ColumnPlan
-    lidar_like: bool
-
-    one_per_message = False
-
-    @classmethod
-    def recognise(cls, definition: Definition, payload: bytes) -> "ChannelCloudLayout | None":
-        """Recognise the layout from a first message."""
-        columns = _channel_columns(decode(definition, payload))
-        plan = plan_for("channels", columns)
-        if plan is None:
-            return None
-        return cls(definition, plan, _lidar_like(plan, columns, len(columns["x"])))
-
-    @property
-    def description(self) -> str:
-        """Describe what is read."""
-        return self.plan.describe()
-
-    def returns(self, payload: bytes) -> Returns:
-        """Read one cloud.
-
-        Raises:
-            MessageError: a column of the first message is missing.
-        """
-        columns = _channel_columns(decode(self.definition, payload))
-        if not len(columns["x"]):
-            return no_returns()
-        try:
-            return returns_from(self.plan, lambda name: columns[name])
-        except KeyError as error:
-            raise MessageError(f"a cloud lacks the channel {error} of the first cloud") from error
-
-    def with_plan(self, plan: ColumnPlan) -> "ChannelCloudLayout":
-        """Return the same layout with another plan."""
-        return replace(self, plan=plan)
-
-
-def _channel_columns(message: Message) -> dict[str, np.ndarray]:
-    columns = {axis: message.column("points", axis) for axis in "xyz"} if message.count("points") else {}
-    columns = columns or {axis: np.zeros(0) for axis in "xyz"}
-    for number, channel in enumerate(message.messages("channels")):
-        values = channel.numbers("values", channel.count("values"))
-        if len(values) == len(columns["x"]):
-            columns.setdefault(channel.text("name") or f"channel{number}", values)
-    return columns

@@ -34,7 +34,8 @@ class Decoder:
         amplitude: unit of the amplitude.
         noise: what the message says about its own noise.
         note: anything else the user should know.
-        assumed: what no document of the layout states, as a sentence; it becomes a warning.
+        assumed: what no document of the layout states, as a sentence; it becomes an assumption.
+        confirm: the options that state what is assumed.
         polar: range, azimuth and perhaps elevation where their names do not say so.
         doppler: the radial speed where its name does not say so.
         amplitude_field: likewise.
@@ -59,6 +60,7 @@ class Decoder:
     noise: str = _NONE
     note: str = ""
     assumed: str = ""
+    confirm: str = "--radar-axes forward,left,up"
     polar: tuple[str, ...] = ()
     doppler: str | None = None
     amplitude_field: str | None = None
@@ -156,6 +158,7 @@ _CHANNELS = (
         "Oculii cloud, unnamed channels", "the same from drivers that name no channel", "channels",
         _f("x y z channel0 channel1 channel2"), doppler="channel0", amplitude_field="channel2",
         assumed="the channels have no names; the first is assumed to be the speed and the third the power, as in Oculii's order",
+        confirm="--map doppler=channel0:mps --map amplitude=channel2:db",
     ),
 )  # fmt: skip
 
@@ -181,6 +184,7 @@ _LISTS = (
         polar=_f("range.value azimuth.value elevation.value"), doppler="radial_speed.value",
         assumed="the definition states neither the unit nor the sign of the angles; "
         "assumed radians, azimuth positive to the left and elevation upwards",
+        confirm="--radar-axes forward,left,up,radians",
     ),
     Decoder(
         "Ainstein targets", "ainstein_radar_msgs/RadarTargetArray", "list",
@@ -226,6 +230,7 @@ _POINTS = (
         azimuth_sign=-1, angles="deg, azimuth positive to the right (assumed); no elevation", amplitude=_NONE,
         needed=("status",), point_number="id", note="tracks of status 0 are skipped",
         assumed=f"the definition states neither the unit nor the sign of angle; assumed degrees, {_CLOCKWISE}",
+        confirm="--radar-axes forward,left,up,degrees",
     ),
     Decoder(
         "Delphi SRR detections", "AutonomouStuff delphi_srr_msgs/SrrTrack", "point",
@@ -240,6 +245,7 @@ _POINTS = (
         _f("detection_id confid_azimuth azimuth range range_rate amplitude"), azimuth_sign=-1,
         angles="rad, azimuth positive to the right (assumed); no elevation", amplitude="dBsm",
         assumed=f"the definition states neither the unit nor the sign of azimuth; assumed radians, {_CLOCKWISE}",
+        confirm="--radar-axes forward,left,up,radians",
     ),
 )  # fmt: skip
 

@@ -27,13 +27,54 @@ This page is generated from the registry that the decoder uses:
 `python -m calib_core.recordings.radar.registry_table docs/radar-formats.md`. Each row is tested with messages built from the
 definition that the drivers publish (`tests/unit/recordings/radar/radar_samples.py`).
 
-A layout is recognised by its **field names** as declared in the recording, never by the package name. The fields may have any
-order, offset, alignment, number type and byte order. If several layouts match, the one with the most fields is used. A message
-that matches none is read by its column names alone, if it has a position: `x y z`, or a range and an azimuth.
-`cocalib info` shows which layout was recognised and which field each value is read from.
+A layout is recognised by its **field names** as declared in the recording, never by the name of the type or its package. The
+fields may have any order, offset, alignment, number type and byte order. If several layouts match, the one with the most fields
+is used. A message that matches none is read by [what it says about itself](#messages-that-are-in-no-table). `cocalib info`
+shows which layout was recognised and which field each value is read from.
 
 All positions are converted to metres in the radar frame of [conventions](conventions.md): x forward, y left, z up. Speeds are
 in m/s, positive moving away. If a message states its own noise, that noise is kept with each return.
+
+## Messages that are in no table
+
+Any message with a position and a speed or an amplitude is read: a list of structs at any depth, a fixed list whose length
+another field counts, arrays side by side, one return per message, a cloud with unusual field names. What each field is follows
+from
+
+* its **name**, without prefixes (`f_`, `s_`, `u16`, `det_`): `fRange`, `posX`, `x_pos`, `DistLong`, `vRad`, `RCS_dBsm`. Names
+  with `std`, `min`, `max`, `bin`, `id` and the like are not the quantity itself;
+* the **unit** in its name (`range_m`, `Azimuth_deg`) or in the comment of its definition (`# [m]`, `# 0.01 deg`), where
+  comments may also state directions (`# positive to the left`, `# x right, y forward, z up`);
+* its **values**: positions in cm or mm would reach kilometres in m, angles above 6.28 are not radians, no radar sees only
+  within 1.5 degrees, an axis that is never negative points forward;
+* its **agreement** with others: an azimuth that matches x and y shows which axis is forward, and a range with a unit gives x, y
+  and z theirs.
+
+PointCloud2 and the positions of geometry_msgs are in metres, x forward, y left, z up, as ROS defines (REP 103), unless values
+contradict it. `cocalib info` lists for each quantity the field, its unit, the direction in which it grows, and how this is
+known.
+
+What nothing states is an **assumption**: the side to which an azimuth grows, the unit of a speed, left or right of a lateral
+axis, which of two angles is the azimuth, several sensors in one list. It is a warning (`assumed`) and part of the calibration's
+provenance, and `cocalib solve` waits until it is confirmed with `--confirm-assumptions` or stated. On the page, a button
+confirms it.
+
+If several lists of a message hold returns, detections are preferred to tracked objects, and `cocalib info` names the others. If
+no field is recognised, it names the fields. Messages that hold little more than bytes are raw sensor packets, which only the
+driver can decode.
+
+## Stating what a column is
+
+`--map QUANTITY=COLUMN:UNIT` replaces what was recognised and settles what would be assumed; it may be repeated. Columns are
+named as the recording spells them, nested ones dotted, relative to the list or from the message on. A minus turns the sign.
+
+```
+cocalib open  RECORDING --map x=posX:m --map y=-posY:m           posY grows to the right
+cocalib solve RECORDING --map range=u16Range:cm --map azimuth=-theta:deg --map doppler=vel:kmh ...
+```
+
+Mapped x, y and z point forward, left and up, mapped angles grow to the left and upwards. The session remembers the map, and the
+calibration holds it (`provenance.column_map`).
 
 ## Messages with other axes, signs or units
 
@@ -60,7 +101,7 @@ These checks run on a sample of the messages; `cocalib info` and the page show t
 | `radar-azimuth-contradicts` | azimuth and x, y disagree in every unit and sign |
 | `radar-elevation-zero` | the elevation is always 0, but the positions have heights |
 | `radar-angle-unit` | the angles are implausible in the unit they are read in |
-| `radar-convention-assumed` | no document states the layout's signs or units; the row below says what is assumed |
+| `assumed` | neither the message nor a document of its layout states a unit, a sign or a meaning; says what is assumed |
 | `flat-radar` | every return has the same height: the radar measures no elevation |
 
 """

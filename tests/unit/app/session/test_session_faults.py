@@ -22,7 +22,7 @@ from app.session.file import (
 )
 from app.session.file.checksums import line_bytes, sealed, taken_apart
 from app.session.file.guarded_folder import GuardedFolder
-from app.session.file.journal import JOURNAL
+from app.session.file.journal_reading import JOURNAL
 from app.session.file.snapshot import SNAPSHOT
 from benchmarks.reliability.sessions import (
     FACTS as MADE_FACTS,

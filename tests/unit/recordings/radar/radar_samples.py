@@ -150,7 +150,7 @@ def oculii(ros: Any, *, named: bool) -> Sample:
         points=[point(x=x, y=y, z=z) for x, y, z in xyz.tolist()],
         channels=[channel(name=n if named else "", values=np.array(v, dtype=np.float32)) for n, v in values.items()],
     )
-    told = () if named else ("radar-convention-assumed",)
+    told = () if named else ("assumed",)
     return Sample([message], xyz, np.array(values["Doppler"]), np.array(values["Power"]), warnings=told)
 
 
@@ -236,7 +236,7 @@ def unibw(ros: Any) -> Sample:
         for row in rows.tolist()
     ]
     message = ros.new("radar_msgs/msg/DetectionRecord", header=ros.header(START_NS), detections=elements)
-    return Sample([message], cartesian_from_polar(rows[:, :3]), rows[:, 3], warnings=("radar-convention-assumed",))
+    return Sample([message], cartesian_from_polar(rows[:, :3]), rows[:, 3], warnings=("assumed",))
 
 
 def ainstein(ros: Any) -> Sample:
@@ -372,7 +372,7 @@ def esr(ros: Any) -> Sample:
     rows[1]["canmsg"] = "longer than the first"
     messages = singles(ros, "delphi_esr_msgs/msg/EsrTrack", text, rows)
     points = np.array([[10 * np.cos(np.pi / 6), -5, 0], [10 * np.cos(np.pi / 6), 5, 0], [np.nan] * 3])
-    return Sample(messages, points, np.full(3, -2.0), warnings=("flat-radar", "radar-convention-assumed"))
+    return Sample(messages, points, np.full(3, -2.0), warnings=("flat-radar", "assumed"))
 
 
 def srr(ros: Any) -> Sample:
@@ -389,7 +389,7 @@ def srr(ros: Any) -> Sample:
     ]
     messages = singles(ros, "delphi_srr_msgs/msg/SrrTrack", text, rows)
     points = np.array([[10 * np.cos(np.pi / 6), -5, 0], [np.nan] * 3])
-    return Sample(messages, points, np.array([1.5, 0.0]), np.array([-4.0, 0.5]), warnings=("radar-convention-assumed",))
+    return Sample(messages, points, np.array([1.5, 0.0]), np.array([-4.0, 0.5]), warnings=("assumed",))
 
 
 def mrr(ros: Any) -> Sample:
@@ -410,7 +410,7 @@ def mrr(ros: Any) -> Sample:
     ]
     messages = singles(ros, "delphi_mrr_msgs/msg/MrrDetection", text, rows)
     points = cartesian_from_polar(np.array([[10, -0.5, 0], [10, 0.25, 0]]))
-    told = ("flat-radar", "radar-convention-assumed")
+    told = ("flat-radar", "assumed")
     return Sample(messages, points, np.full(2, 0.5), np.full(2, -7.0), warnings=told)
 
 
@@ -431,7 +431,7 @@ def esr_ethernet(ros: Any) -> Sample:
     messages = singles(ros, "delphi_esr_msgs/msg/EsrEthTx", text, [row])
     points = np.stack([values["pos_x"], values["pos_y"], np.zeros(64)], axis=1)[:5].astype(np.float64)
     speed, amplitude = (values[f"target_report_{name}"][:5].astype(np.float64) for name in ("range_rate", "amplitude"))
-    return Sample(messages, points, speed, amplitude, warnings=("flat-radar", "radar-convention-assumed"))
+    return Sample(messages, points, speed, amplitude, warnings=("flat-radar", "assumed"))
 
 
 OTHERS: Mapping[str, Callable[[Any], Sample]] = {

@@ -154,19 +154,27 @@ def polar_cloud(ros: Any, azimuths: np.ndarray) -> Any:
     return ros.cloud(START_NS, points)
 
 
-def test_angles_in_the_wrong_unit_give_a_warning_and_one_option_corrects_them(ros1, write) -> None:
+def test_angles_in_degrees_are_recognised_by_their_values_and_only_their_sign_is_assumed(ros1, write) -> None:
     angles = np.linspace(-60.0, 60.0, 24)
     message = polar_cloud(ros1, angles)
     with opened(write, ros1, [message]) as recording:
-        (warning,) = recording.warnings
-        assert warning.code == "radar-angle-unit"
-        assert "has angles up to 60.0, which cannot be radians" in warning.message
-        assert warning.hint == "if they are degrees: --radar-axes degrees"
-    write_again = lambda *a, **k: write(*a, name="again", **k)  # noqa: E731
-    with opened(write_again, ros1, [message], radar_axes="degrees") as recording:
-        assert recording.warnings == ()
+        assert [one.key for one in recording.assumptions] == ["azimuth-sign"]
         points = recording.radar_scans().points_radar_m
     np.testing.assert_allclose(np.degrees(np.arctan2(points[:, 1], points[:, 0])), angles, atol=1e-4)
+    write_again = lambda *a, **k: write(*a, name="again", **k)  # noqa: E731
+    with opened(write_again, ros1, [message], radar_axes="forward,right,up") as recording:
+        assert recording.warnings == ()
+        points = recording.radar_scans().points_radar_m
+    np.testing.assert_allclose(np.degrees(np.arctan2(points[:, 1], points[:, 0])), -angles, atol=1e-4)
+
+
+def test_angles_that_the_user_states_in_the_wrong_unit_give_a_warning(ros1, write) -> None:
+    message = polar_cloud(ros1, np.linspace(-60.0, 60.0, 24))
+    with opened(write, ros1, [message], radar_axes="forward,left,up,radians") as recording:
+        (warning,) = recording.warnings
+    assert warning.code == "radar-angle-unit"
+    assert "has angles up to 60.0, which cannot be radians" in warning.message
+    assert warning.hint == "if they are degrees: --radar-axes degrees"
 
 
 def test_radians_read_as_degrees_give_a_warning(ros2, write) -> None:
@@ -235,7 +243,7 @@ def test_axes_given_by_the_user_apply_to_positions_and_are_shown(ros, write, clo
 
 def test_a_mirrored_radar_is_corrected_and_its_assumption_gives_no_warning(ros, write) -> None:
     expected = sample(ros, "UniBw detections")
-    with opened(write, ros, expected.messages, radar_axes="forward,right,up") as recording:
+    with opened(write, ros, expected.messages, radar_axes="forward,right,up,radians") as recording:
         found = recording.radar_scans()
         assert recording.warnings == ()
     np.testing.assert_allclose(found.points_radar_m, expected.points * [1, -1, 1], rtol=1e-6)

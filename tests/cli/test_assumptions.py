@@ -1,0 +1,73 @@
+"""The commands on a recording whose messages do not state everything."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.cli import open as opening
+from calib_core.recordings import RecordingOptions
+from tests.vendor_recording import STATED, vendor_sample
+
+Cocalib = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def paths(project_root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    return vendor_sample(project_root / "sample_data" / "rooftop", tmp_path_factory.mktemp("vendor"))
+
+
+@pytest.fixture
+def clicks(project_root: Path) -> Path:
+    return project_root / "sample_data" / "rooftop" / "clicks.json"
+
+
+def test_info_shows_what_was_taken_for_what_and_what_is_assumed(cocalib: Cocalib, paths: tuple[Path, Path]) -> None:
+    answer = cocalib("info", *paths)
+    assert answer.code == 0
+    assert "azimuth    f_Azimuth" in answer.out
+    assert "f_Azimuth is taken as growing to the left" in answer.out
+    summary = json.loads(cocalib("info", "--json", *paths).out)
+    assert [row["quantity"] for row in summary["radar"]["columns"]] == [
+        "range",
+        "azimuth",
+        "elevation",
+        "doppler",
+        "amplitude",
+    ]
+    assert [row["confirmed"] for row in summary["assumptions"]] == [False, False]
+
+
+def test_solve_waits_until_everything_is_confirmed_or_stated(
+    cocalib: Cocalib, paths: tuple[Path, Path], clicks: Path, tmp_path: Path
+) -> None:
+    answer = cocalib("solve", *paths, "--clicks", clicks, "--out", tmp_path / "a.json")
+    assert answer.code == 2
+    assert "f_Azimuth is taken as growing to the left" in answer.err
+    assert "--confirm-assumptions" in answer.err
+    confirmed = cocalib("solve", *paths, "--clicks", clicks, "--out", tmp_path / "b.json", "--confirm-assumptions")
+    assert confirmed.code == 0, confirmed.err
+    provenance = json.loads((tmp_path / "b.json").read_text())["provenance"]
+    assert [one["confirmed"] for one in provenance["assumptions"]] == [True, True]
+    maps = [word for one in STATED for word in ("--map", one)]
+    stated = cocalib("solve", *paths, "--clicks", clicks, "--out", tmp_path / "c.json", *maps)
+    assert stated.code == 0, stated.err
+    provenance = json.loads((tmp_path / "c.json").read_text())["provenance"]
+    assert "assumptions" not in provenance
+    assert tuple(provenance["column_map"]) == STATED
+    first, second = (json.loads((tmp_path / name).read_text())["camera_from_radar"] for name in ("b.json", "c.json"))
+    assert first == second
+
+
+def test_open_uses_the_map_that_the_session_remembers_unless_another_is_given(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    step = {"n": 1, "step": {"type": "columns_mapped", "column_map": list(STATED)}}
+    (tmp_path / "journal.jsonl").write_text(json.dumps(step) + "\n")
+    assert opening._with_remembered(RecordingOptions(), tmp_path, fresh=False).map == STATED
+    assert "--map azimuth=f_Azimuth:rad" in capsys.readouterr().out
+    assert opening._with_remembered(RecordingOptions(), tmp_path, fresh=True).map == ()
+    given = RecordingOptions(map=("x=posX:m",))
+    assert opening._with_remembered(given, tmp_path, fresh=False) is given
