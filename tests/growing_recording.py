@@ -46,12 +46,12 @@ class SampleWriter:
 
     Args:
         path: of the file to write.
-        shift_ns: added to all stamps and receive times [ns].
+        begin_ns: the first receive time [ns], to which all stamps are moved; None leaves them as they are.
         compression: "" or "lz4".
     """
 
-    def __init__(self, path: Path, *, shift_ns: int = 0, compression: str = "") -> None:
-        self._shift_ns, self._compression = shift_ns, compression
+    def __init__(self, path: Path, *, begin_ns: int | None = None, compression: str = "") -> None:
+        self._compression = compression
         self._channels: list[Channel] = []
         self._messages: list[_Message] = []
         for source in open_sources([_SAMPLE / "radar.bag", _SAMPLE / "camera.bag"]):
@@ -64,6 +64,7 @@ class SampleWriter:
             source.close()
         self._messages.sort()
         self.start_ns = self._messages[0].receive_ns
+        self._shift_ns = 0 if begin_ns is None else begin_ns - self.start_ns
         self.length_s = (self._messages[-1].receive_ns - self.start_ns) / _NS
         self._written = 0
         self._file = path.open("wb")
@@ -121,8 +122,7 @@ class SampleWriter:
 
 def main(path: Path, rate: float, chunk_s: float) -> None:
     """Write the sample at a rate relative to the recorded one, in chunks of a length [s of the sample]."""
-    writer = SampleWriter(path)
-    writer = SampleWriter(path, shift_ns=time.time_ns() - writer.start_ns)
+    writer = SampleWriter(path, begin_ns=time.time_ns())
     began, seconds = time.monotonic(), 0.0
     while seconds < writer.length_s:
         seconds += chunk_s
