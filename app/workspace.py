@@ -3,6 +3,7 @@
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
@@ -12,6 +13,7 @@ from app.session import (
     History,
     RecordingFacts,
     Redo,
+    ScansAdded,
     Session,
     Solved,
     Step,
@@ -22,10 +24,11 @@ from app.session import (
 from app.session.file import Closed, Restored, open_session_file
 from app.solver_worker import SolverWorker
 from app.view import Reference, View, view
+from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import read_clicks, write_clicks
-from calib_core.measurements import ReflectorClick
+from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, assumption_hint
 from calib_core.results import DataWarning
@@ -135,12 +138,27 @@ class Workspace:
             after = advance(self._history, step, self.facts)
             if after is self._history:
                 return
-            if not isinstance(step, Solved):
+            if not isinstance(step, Solved | ScansAdded):
                 self._journal.append(step, after)
             self._history = after
             self._pending.append((view(after, self.facts, self.reference), self._subscribers))
         self._ask_for_answer(after.present)
         self._notify()
+
+    def extend(self, image_times: TimesNs, scans_from: TimeNs | None) -> None:
+        """Take in frames and scans that have been written since; clicks with new scans in their window are solved again.
+
+        Args:
+            image_times: (m,) stamps of all frames; those before stay the first ones.
+            scans_from: stamp of the first new scan; None if there is none.
+        """
+        with self._lock:
+            self.facts = replace(self.facts, image_times=image_times)
+            session = self._history.present
+        locating = session.options.locating
+        reach_ns = round((locating.window_s / 2 + locating.max_time_gap_s) * NS_PER_S)
+        if scans_from is not None and any(click.image_time + reach_ns >= scans_from for click in session.clicks):
+            self.dispatch(ScansAdded())
 
     def undo(self) -> None:
         """Undo the last change, if there is one."""

@@ -2,6 +2,7 @@
 /** Pointer input on the frame: click to place, drag a mark to move it, drag elsewhere to pan, wheel to zoom at the cursor, arrow keys to nudge. */
 
 import { onImage, pan, toCss, toImage, viewport } from "./geometry.js";
+import { leaveLive } from "./live.js";
 import { hold } from "./loupe.js";
 import { marks, redraw, zoomBy } from "./picture.js";
 import { send } from "./socket.js";
@@ -43,6 +44,7 @@ function inBox(event) {
 function pressed(event) {
   if (event.button > 1 || !state.shown) return;
   flushNudge();
+  leaveLive();
   const [x, y] = inBox(event);
   const [u, v] = toImage(x, y);
   const mark = event.button === 0 ? markNear(x, y) : null;
@@ -117,6 +119,7 @@ export async function place(u, v) {
 /** Place a click where the reflector is expected, or else in the middle of the view, to be moved with the arrow keys. */
 export function placeByKey() {
   if (!state.shown || state.shown.index !== state.cursor || state.playing || clickIn(state.cursor)) return;
+  leaveLive();
   const guess = state.overlay?.index === state.shown.index ? state.overlay.guesses[0] : undefined;
   const [u, v] = guess ?? toImage(viewport.width / 2, viewport.height / 2);
   return place(...clamped(u, v));

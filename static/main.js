@@ -11,6 +11,7 @@ import { listen, placement } from "./keys.js";
 import { activity } from "./lanes.js";
 import { startLayers } from "./layers.js";
 import { startLayout } from "./layout.js";
+import { startLive, takeFollowing, takeFrames } from "./live.js";
 import { startLooking } from "./looking.js";
 import { startLoupe } from "./loupe.js";
 import { setBanner, startTips, toast } from "./notices.js";
@@ -45,6 +46,8 @@ const readers = {
     if (follower.follow(message)) takeView();
     else tell({ type: "view" });
   },
+  frames_added: takeFrames,
+  following: takeFollowing,
   placements(message) {
     state.placements = message.placements;
     state.placementSummary = message.summary;
@@ -129,6 +132,7 @@ startStatus();
 startPicture();
 startLayers();
 startLoupe();
+startLive();
 startClicking();
 startTimeline();
 startPairs();

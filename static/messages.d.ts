@@ -289,6 +289,21 @@ export interface RecordingNote {
   option_groups: OptionGroup[];
 }
 
+/** Frames have been written since; they follow those that a page knows. */
+export interface FramesAdded {
+  type: "frames_added";
+  first: number;
+  frame_times: StampColumns;
+}
+
+/** How a recording that is still being written goes on. */
+export interface FollowNote {
+  type: "following";
+  state: "live" | "quiet" | "complete" | "ended";
+  words: string;
+  advice: string;
+}
+
 /** A placement found in the radar data. */
 export interface PlacementRow {
   start_s: number;
@@ -524,6 +539,8 @@ export type FromServer =
   | ViewChange
   | Opening
   | RecordingNote
+  | FramesAdded
+  | FollowNote
   | Placements
   | RadarLook
   | RadarMap

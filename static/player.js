@@ -127,11 +127,12 @@ export function requestAgain() {
 export async function receiveFrame(header, data) {
   if (header.index < 0) return receivePreview(header, data);
   coming = coming.filter((request) => request > header.request);
-  const stale = header.request < newest && !state.playing;
+  const moving = state.playing || state.live;
+  const stale = header.request < newest && !moving;
   if (stale) return;
   const shown = { index: header.index, ...(await decoded(header, data)) };
   keep(shown);
-  const wanted = state.playing ? header.index > (state.shown?.index ?? -1) || header.request === newest : header.index === state.cursor;
+  const wanted = moving ? header.index > (state.shown?.index ?? -1) || header.request === newest : header.index === state.cursor;
   if (wanted) show(shown);
 }
 

@@ -4,7 +4,7 @@
 /** @typedef {import("./messages.js").View} View */
 /** @typedef {import("./messages.js").ClickRow} Click */
 /** A decoded frame. @typedef {{index: number, bitmap: ImageBitmap, scale: number, width: number, height: number}} Shown */
-/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"} Topic */
+/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"} Topic */
 
 export const state = {
   /** While the recording is being opened. @type {import("./messages.js").Opening|null} */ opening: null,
@@ -25,6 +25,8 @@ export const state = {
   /** The frame asked for; the one on screen is `shown`. */ cursor: 0,
   /** @type {string|null} */ selected: null,
   playing: false,
+  /** How a recording that is still being written goes on; null for others. @type {import("./messages.js").FollowNote|null} */ following: null,
+  /** The newest frame is shown as it comes. */ live: false,
   connected: false,
   /** @type {import("./messages.js").Progress|null} */ progress: null,
   /** @type {{u: number, v: number}|null} */ hover: null,

@@ -17,9 +17,9 @@ const REACH = 8;
 export function startStatus() {
   on(["opening"], drawOpening);
   on(["recording"], drawRecording);
-  on(["opening", "view", "connection", "progress", "placements"], drawStatus);
+  on(["opening", "view", "connection", "progress", "placements", "following"], drawStatus);
   get("zoom").onclick = fit;
-  on(["cursor", "shown", "recording"], drawClock);
+  on(["cursor", "shown", "recording", "grown"], drawClock);
   on(["playing"], drawPlay);
   on(["hover", "shown", "box"], drawReadout);
 }
@@ -65,7 +65,7 @@ function drawStatus() {
   get("connection").dataset.stage = view?.stage ?? "collecting";
   const opening = state.opening;
   const found = state.looking ? [state.placementSummary, view?.status ?? ""].filter(Boolean) : null;
-  const words = found?.length ? found : opening || !view ? [opening?.problem || opening?.doing || "Opening the recording…"] : [view.status, nextWords()].filter(Boolean);
+  const words = found?.length ? found : opening || !view ? [opening?.problem || opening?.doing || "Opening the recording…"] : [...followWords(), view.status, nextWords()].filter(Boolean);
   get("status-text").textContent = words.join("  ·  ");
   get("status-text").dataset.hint = [...words, view?.stage === "unsolvable" ? view.hint : ""].filter(Boolean).join("\n");
   const undo = /** @type {HTMLButtonElement} */ (get("undo"));
@@ -82,6 +82,13 @@ function drawStatus() {
   if (!progress || !running) return;
   bar.max = progress.total;
   bar.value = progress.done;
+}
+
+/** How a recording that is still being written goes on, and where the next placement pays. @returns {string[]} */
+function followWords() {
+  const note = state.following;
+  if (!note) return [];
+  return note.state === "complete" || note.state === "ended" ? [note.words] : [note.words, note.advice];
 }
 
 function drawClock() {

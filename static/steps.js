@@ -22,7 +22,9 @@ export function drawSteps() {
   const found = state.placements.length;
   const foundNone = "No placement was found in the radar data. Go to a frame in which the reflector stands still.";
   const goesOn = state.recording ? "Searching the radar data for places where the reflector stood still…" : "Once the recording is open, the radar data is searched for places where the reflector stood still.";
-  const searching = state.placementsKnown ? foundNone : goesOn;
+  const soFar = "No placement so far. Put the reflector down and step away for five seconds.";
+  const live = state.following?.state === "live" || state.following?.state === "quiet";
+  const searching = live ? soFar : state.placementsKnown ? foundNone : goesOn;
   const now = count === 0 ? 0 : count < FEWEST ? 1 : 2;
   const steps = [
     ["Go to a placement", found ? [key("N"), ` jumps to the next of ${found} found in the radar data.`] : [searching]],

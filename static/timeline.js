@@ -10,6 +10,8 @@ const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById("timeli
 const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
 /** A press this close to a stem goes to its frame [CSS px]. */
 const REACH = 5;
+/** How far beyond the last frame the timeline reaches while frames are added. */
+const ROOM = 1.25;
 /** The visible span of time [s]. */
 export const span = { from: 0, to: 1 };
 /** @type {number|null} */
@@ -20,6 +22,7 @@ let dragging = false;
 export function startTimeline() {
   new ResizeObserver(redraw).observe(canvas);
   on(["recording"], showAll);
+  on(["grown"], extend);
   on(["view", "placements", "shown", "selected", "cursor", "theme"], redraw);
   canvas.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
@@ -47,6 +50,14 @@ export function startTimeline() {
 export function showAll() {
   const last = state.seconds.length ? state.seconds[state.seconds.length - 1] : 1;
   [span.from, span.to] = [-0.01 * last, Math.max(1.01 * last, 0.1)];
+  redraw();
+}
+
+/** Make room for new frames if everything was shown; the scale changes rarely, so that nothing moves under the pointer. */
+function extend() {
+  const last = state.seconds[state.seconds.length - 1];
+  const whole = span.from <= 0 && last > span.to && !dragging;
+  if (whole) span.to = ROOM * last;
   redraw();
 }
 
@@ -104,7 +115,7 @@ function follow() {
   const now = state.seconds[state.cursor];
   if (now === undefined || (now >= span.from && now <= span.to) || dragging) return;
   const width = span.to - span.from;
-  span.from = now - 0.1 * width;
+  span.from = now - (state.live ? 0.9 : 0.1) * width;
   span.to = span.from + width;
 }
 

@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from time import sleep
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -21,7 +22,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.options import CalibrationOptions
-from calib_core.recordings import Recording, RecordingOptions
+from calib_core.recordings import AwaitedRecording, Recording, RecordingOptions
 
 if TYPE_CHECKING:
     from app.session.file import FoundFolder
@@ -33,6 +34,7 @@ __all__ = ["Demo", "Open"]
 _RECORDING_SUFFIXES = (".bag", ".mcap", ".db3")
 _LARGE_BYTES = 1_000_000_000
 """If the files are this large in total, the page is served before they are opened."""
+_LOOK_EVERY_S = 0.2
 _SOON_S = 0.2
 """Smaller files are usually open within this time, and the page then shows no waiting screen [s]."""
 
@@ -103,6 +105,8 @@ class Open:
     """Session folder; by default the one with this recording's frames, next to it or in your user folder, else a new one."""
     fresh: Switch = False
     """Start without the previous clicks (a backup is kept)."""
+    follow: Switch = False
+    """Open a recording that is still being written (.bag, .mcap, .db3, folders): frames and placements appear as they come."""
     measured: CameraPosition = field(default_factory=MeasuredCamera)
     topics: Topics = field(default_factory=TopicFlags)
     options: Options = field(default_factory=CalibrationOptions)
@@ -112,7 +116,7 @@ class Open:
         """Serve until Ctrl+C, SIGTERM or SIGHUP; return the exit code."""
         from calib_core.recordings import require_files
 
-        paths = require_files(self.recording)
+        paths = self.recording if self.follow and self.recording else require_files(self.recording)
         return _serve(
             paths,
             session=self.session,
@@ -124,6 +128,7 @@ class Open:
             calibration_file=self.calibration,
             topics=self.topics,
             options=self.measured.over(self.options),
+            follow=self.follow,
         )
 
 
@@ -139,6 +144,7 @@ def _serve(
     calibration_file: Path | None = None,
     topics: RecordingOptions | None = None,
     options: CalibrationOptions | None = None,
+    follow: bool = False,
 ) -> int:
     """Open everything, serve until Ctrl+C, SIGTERM or SIGHUP, close everything.
 
@@ -162,8 +168,14 @@ def _serve(
     _require_given(camera_file, calibration_file, clicks_file)
     admissions = session or recording_session_folder(paths)
     topics = _with_remembered(topics or RecordingOptions(), admissions, fresh=fresh)
-    with _service(paths, topics, serving, name, admissions) as service, ExitStack() as stack:
-        recording = stack.enter_context(open_recording(paths, topics, require=("radar",)))
+    awaited = AwaitedRecording(paths, topics) if follow else None
+    with _service(paths, topics, serving, name, admissions, follow=follow) as service, ExitStack() as stack:
+        opened = (
+            _awaited(awaited, service, name)
+            if awaited is not None
+            else open_recording(paths, topics, require=("radar",))
+        )
+        recording = stack.enter_context(opened)
         if not len(recording.image_times):
             _require_nothing_to_calibrate(recording, camera_file, calibration_file, clicks_file)
         if recording.radar_choice:
@@ -191,6 +203,25 @@ def _serve(
     with contextlib.suppress(OSError):  # the terminal may be gone
         print(f"\nStopped; {closed.note}." if workspace.facts.has_pictures else "\nStopped.")
     return 0
+
+
+def _awaited(awaited: AwaitedRecording, service: "Service", name: str) -> Recording:
+    """Wait until there is enough of a recording that is being written, telling the terminal and the pages what is missing.
+
+    Raises:
+        RecordingError: the recording cannot be followed.
+    """
+    told = ""
+    try:
+        while (recording := awaited.look()) is None:
+            if awaited.missing != told:
+                told = awaited.missing
+                service.tell(f"Waiting for {name}: {told}…")
+            sleep(_LOOK_EVERY_S)
+    except BaseException:
+        awaited.close()
+        raise
+    return recording
 
 
 def _session_folder(
@@ -249,7 +280,7 @@ def _remember(workspace: "Workspace", recording: Recording) -> None:
 
 
 def _service(
-    paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str, session: Path
+    paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str, session: Path, *, follow: bool
 ) -> "Service":
     """Return the service; it serves the page of a large recording before the recording is open."""
     from app.web.messages import Opening
@@ -261,9 +292,9 @@ def _service(
     size = f" ({size_bytes / 1e9:.1f} GB)" if size_bytes >= _LARGE_BYTES / 10 else ""
     return Service(
         ServerOptions(**dataclasses.asdict(serving), session=str(session.absolute())),
-        Opening(name, f"Opening {name}{size}: reading its index and times…"),
-        partial(first_picture, paths, topics),
-        let_in_after_s=0.0 if size_bytes >= _LARGE_BYTES else _SOON_S,
+        Opening(name, f"Waiting for {name}…" if follow else f"Opening {name}{size}: reading its index and times…"),
+        partial(first_picture, () if follow else paths, topics),
+        let_in_after_s=0.0 if follow or size_bytes >= _LARGE_BYTES else _SOON_S,
     )
 
 

@@ -18,6 +18,7 @@ from app.session.events import (
     Event,
     OptionsChanged,
     OptionsEdited,
+    ScansAdded,
     Solved,
 )
 from app.session.state import RecordingFacts, Session
@@ -43,6 +44,8 @@ def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
         if event.revision != session.revision:
             return session
         return replace(session, outcome=event.outcome, outcome_revision=event.revision, checked=event.checked)
+    if isinstance(event, ScansAdded):
+        return replace(session, revision=session.revision + 1)
     if isinstance(event, ColumnsMapped | AssumptionsConfirmed):
         return _about_reading(event, session)
     changed = _changed(event, session, facts)

@@ -22,6 +22,7 @@ __all__ = [
     "OptionsChanged",
     "OptionsEdited",
     "Redo",
+    "ScansAdded",
     "Solved",
     "Step",
     "Undo",
@@ -111,6 +112,11 @@ class Solved:
 
 
 @dataclass(frozen=True, slots=True)
+class ScansAdded:
+    """Scans have been written that belong to the window of a click: the clicks are solved again. It is not journalled."""
+
+
+@dataclass(frozen=True, slots=True)
 class Undo:
     """Undo the last change."""
 
@@ -129,6 +135,7 @@ Event: TypeAlias = (
     | OptionsEdited
     | Cleared
     | ClicksImported
+    | ScansAdded
     | ColumnsMapped
     | AssumptionsConfirmed
     | Solved

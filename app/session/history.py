@@ -10,6 +10,7 @@ from app.session.events import (
     OptionsChanged,
     OptionsEdited,
     Redo,
+    ScansAdded,
     Solved,
     Step,
     Undo,
@@ -42,7 +43,7 @@ def advance(history: History, step: Step, facts: RecordingFacts) -> History:
     present = apply(history.present, step, facts)
     if present is history.present:
         return history
-    if isinstance(step, Solved | ColumnsMapped | AssumptionsConfirmed):
+    if isinstance(step, Solved | ScansAdded | ColumnsMapped | AssumptionsConfirmed):
         return replace(history, present=present)
     return History(present, (*history.past, history.present))
 

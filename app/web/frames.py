@@ -58,6 +58,10 @@ class FrameStore:
     def __len__(self) -> int:
         return self._count
 
+    def extend(self, count: int) -> None:
+        """Take note of the number of frames that there are now; those before keep their indices."""
+        self._count = max(self._count, count)
+
     @property
     def kept_bytes(self) -> int:
         """Size of the frames in memory [bytes]."""

@@ -4,6 +4,7 @@ from calib_core.recordings.assumptions import about_assumptions, assumption_hint
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.description import clock_lines, describe
 from calib_core.recordings.first_picture import first_picture
+from calib_core.recordings.following import AwaitedRecording, FollowedRecording, Growth
 from calib_core.recordings.plain_files.folder_cameras import size_of_pictures_beside
 from calib_core.recordings.recording import Recording, inspect_recording, open_recording, require_files
 from calib_core.recordings.selection import RecordingOptions
@@ -15,8 +16,11 @@ from calib_core.recordings.verification_text import verification_text
 from calib_core.recordings.video_writing import WrittenVideo, write_video
 
 __all__ = [
+    "AwaitedRecording",
     "ClockDiagnosis",
     "EncodedImage",
+    "FollowedRecording",
+    "Growth",
     "Recording",
     "RecordingOptions",
     "RecordingSummary",

@@ -64,9 +64,23 @@ class Assembly:
     confirmed: bool
     column_map: tuple[str, ...]
 
+    @property
+    def used(self) -> frozenset[str]:
+        """The topics whose messages are read."""
+        return frozenset((*self.radar_topics, *((self.image_topic,) if self.image_topic is not None else ())))
+
+    @property
+    def clocks(self) -> Mapping[str, Literal["header", "receive"]]:
+        """The clock of each of these topics."""
+        return {topic.name: topic.clock for topic in self.topics if topic.name in self.used}
+
 
 def assemble(
-    paths: Sequence[Path], sources: tuple[Source, ...], options: RecordingOptions, require: Sequence[Need]
+    paths: Sequence[Path],
+    sources: tuple[Source, ...],
+    options: RecordingOptions,
+    require: Sequence[Need],
+    before: Assembly | None = None,
 ) -> Assembly:
     """Choose topics and clocks and build the streams.
 
@@ -75,12 +89,13 @@ def assemble(
         sources: the open files.
         options: topics and clock asked for.
         require: what the recording must have; if both, they must also overlap in time.
+        before: of the same recording when its files were shorter: its choices stay, and only the streams are built again.
 
     Raises:
         RecordingError: the recording lacks what the options ask for.
     """
     name = " + ".join(str(path) for path in paths)
-    topics, repeated = join_topics(sources)
+    topics, repeated = join_topics(sources, before.used if before else None)
     warnings = [warning for source in sources for warning in source.warnings] + list(repeated)
     if not any(len(topic) for topic in topics) and require:
         raise RecordingError(
@@ -96,10 +111,12 @@ def assemble(
     used = _used(selection, choice, stamped)
     lost = [warning for topic in used.all for warning in about_lost(topic.name, len(topic), stamped[topic.name])]
     used = used.readable(stamped)
-    clocks, stamps, about_choice = _clocks(used, stamped, inventory, options)
+    clocks, stamps, about_choice = _clocks(used, stamped, inventory, options, before)
     warnings.extend([*lost, *choice.warnings, *about_choice])
     radar = _radar_stream(used, choice, inventory, stamps, stamped)
     images, about_pictures = frames_of_one_size(_image_stream(used.image, inventory, stamps))
+    if before is not None:
+        return replace(before, radar=radar, images=images)
     warnings.extend(about_pictures)
     zoneless = {s.channel.topic for s in sources if isinstance(s, PlainSource) and s.zoneless}
     warnings.extend(check_overlap(name, radar, images, required=len(require) == 2, zoneless=zoneless))
@@ -217,7 +234,11 @@ def _both_clocks(both: StampedTopic, inventory: Inventory) -> Stamps:
 
 
 def _clocks(
-    used: _Used, stamped: Mapping[str, StampedTopic], inventory: Inventory, options: RecordingOptions
+    used: _Used,
+    stamped: Mapping[str, StampedTopic],
+    inventory: Inventory,
+    options: RecordingOptions,
+    before: Assembly | None,
 ) -> tuple[Mapping[str, Literal["header", "receive"]], Mapping[str, TimesNs], tuple[DataWarning, ...]]:
     """Choose the clock of the radar, all of whose topics share it, and of the camera; return clocks and times by topic."""
     read = {topic.name: _both_clocks(stamped[topic.name], inventory) for topic in used.all}
@@ -226,7 +247,9 @@ def _clocks(
             if both.header_ns is None:
                 raise RecordingError(f"topic {both.topic} has no stamps; use the receive times: --clock receive")
     sensors = [read[topic.name] for topic in (*used.radars[:1], *((used.image,) if used.image is not None else ()))]
-    if len(sensors) == 2:
+    if before is not None:
+        choice = ClockChoice(tuple(before.clocks[both.topic] for both in sensors), ())
+    elif len(sensors) == 2:
         choice = choose_clocks(sensors[0], sensors[1], options.clock)
     else:
         choice = choose_clock(sensors[0], options.clock) if sensors else ClockChoice((), ())

@@ -1,6 +1,6 @@
 """Topics: channels with the same name joined across files."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -195,11 +195,20 @@ def read_heads(wanted: Sequence[tuple[Topic, np.ndarray]], size: int, *, keep: b
     return found
 
 
-def join_topics(sources: tuple[Source, ...]) -> tuple[tuple[Topic, ...], tuple[DataWarning, ...]]:
-    """Join the channels of all files by topic, and warn about files that repeat each other's messages."""
+def join_topics(
+    sources: tuple[Source, ...], only: Collection[str] | None = None
+) -> tuple[tuple[Topic, ...], tuple[DataWarning, ...]]:
+    """Join the channels of all files by topic, and warn about files that repeat each other's messages.
+
+    Args:
+        sources: the files.
+        only: the topics wanted; None for all.
+    """
     found: dict[str, list[tuple[Source, Channel]]] = {}
     for source in sources:
         for channel in source.channels:
+            if only is not None and channel.topic not in only:
+                continue
             found.setdefault(channel.topic, []).append((source, channel))
     topics = tuple(_join(name, tuple(parts)) for name, parts in sorted(found.items()))
     repeated = sum(topic.repeated for topic in topics)

@@ -11,6 +11,7 @@ from typing import Protocol
 from app.error_boundary import error_boundary
 from app.resources import version
 from app.view import View, warning_in_sentences
+from app.web.channel.live_edge import LiveEdge
 from app.web.channel.outbox import Outbox
 from app.web.channel.radar_survey import Survey, survey_of
 from app.web.channel.view_feed import ViewFeed
@@ -29,7 +30,7 @@ from app.web.radar_sight import RadarSight
 from app.workspace import Workspace
 from calib_core.errors import CalibrationError
 from calib_core.measurements import Stamp, TimeNs
-from calib_core.recordings import Recording, TopicSummary, clock_lines
+from calib_core.recordings import FollowedRecording, Recording, TopicSummary, clock_lines
 from calib_core.results import DataWarning
 
 __all__ = ["Hub", "Tab"]
@@ -66,6 +67,9 @@ class Hub:
         self.steps = ThreadPoolExecutor(max_workers=1, thread_name_prefix="steps")
         self.feed = ViewFeed(workspace.view)
         self._searching: asyncio.Task[None] | None = None
+        self._edge = (
+            LiveEdge(self, workspace, recording, self.camera) if isinstance(recording, FollowedRecording) else None
+        )
 
     async def start(self) -> None:
         """Subscribe to the workspace, and start searching the radar."""
@@ -73,13 +77,14 @@ class Hub:
         self._end_subscription = self.workspace.subscribe(
             lambda view: None if loop.is_closed() else _soon(loop, partial(self._take, view))
         )
-        self._searching = loop.create_task(self._search())
+        self._searching = loop.create_task(self._edge.run() if self._edge else self._search())
 
     async def end(self) -> None:
         """Unsubscribe, and cancel pending work."""
         self._end_subscription()
         if self._searching is not None:
             self._searching.cancel()
+            await asyncio.gather(self._searching, return_exceptions=True)
         await self.frames.close()
 
     @property
@@ -97,6 +102,24 @@ class Hub:
                 outbox.put(encode(message), kind=kind)
         else:
             outbox.put(encode(Progress(_SEARCHING, 0, 1)), kind="progress")
+        if self._edge is not None:
+            outbox.put(encode(self._edge.note), kind="following")
+
+    def grown(self, count: int) -> None:
+        """Take note of the number of frames of a recording that is still being written."""
+        self.frames.extend(count)
+
+    def concluded(self) -> None:
+        """Show what is known of the recording now that it is complete: its warnings, and how its sensors are read."""
+        self.broadcast(self._recording_note(), "recording")
+
+    def surveyed(self, survey: Survey) -> None:
+        """Show what the radar alone says, as far as it is known."""
+        before, self.survey = self.survey, survey
+        for kind, message in self._found(survey):
+            self.broadcast(message, kind)
+        if before is None:
+            self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
 
     def broadcast(self, message: Outgoing, kind: str) -> None:
         """Send a message to all pages; it is encoded once."""

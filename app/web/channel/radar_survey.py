@@ -11,12 +11,12 @@ from app.web.messages import PlacementRow, Placements, RadarMap
 from calib_core.arrays import TimesNs
 from calib_core.association.gating import static_returns
 from calib_core.association.placements import Placement, find_placements
-from calib_core.measurements import NS_PER_S, RadarScans
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 from calib_core.radar import polar_from_cartesian
 from calib_core.recordings.radar.scan_blocks import join_scans
 
-__all__ = ["Activity", "Survey", "placements_at", "survey_of"]
+__all__ = ["Activity", "GrowingSurvey", "Survey", "placements_at", "survey_of"]
 
 _MOST_SLICES = 800
 _MOST_STATIC_RETURNS = 1_000_000
@@ -79,6 +79,61 @@ def survey_of(windows: Iterable[RadarScans], moments: TimesNs, options: GatingOp
         for placement in find_placements(stretch, options, min_dwell_s=SHORTEST_S)
         if (row := _row(placement, moments, stretch)) is not None
     ]
+    return _survey(seen, activity, cells, moments)
+
+
+class GrowingSurvey:
+    """Surveys a recording that is still being written: each scan is read once, and the placements are searched for again.
+
+    Memory is bounded as in `survey_of`: the placements of a full stretch stay as they are.
+
+    Args:
+        options: which returns can be the reflector.
+    """
+
+    def __init__(self, options: GatingOptions) -> None:
+        self._options = options
+        self._static = RadarScans()
+        self._cells = RadarMapSum(options)
+        self._settled: list[tuple[Placement, PlacementRow]] = []
+        self._times: list[TimesNs] = []
+        self._counts: list[np.ndarray] = []
+
+    @property
+    def until(self) -> TimeNs | None:
+        """The stamp of the last scan noted; None before the first."""
+        return TimeNs(int(self._times[-1][-1])) if self._times else None
+
+    def note(self, scans: RadarScans) -> None:
+        """Add scans that are later than all before."""
+        if not len(scans):
+            return
+        static = static_returns(scans, self._options)
+        self._cells.add(static)
+        self._static = join_scans([self._static, static])
+        self._times.append(scans.times_ns)
+        self._counts.append(np.diff(scans.first_return))
+
+    def survey(self, moments: TimesNs) -> Survey:
+        """Return what is known now.
+
+        Args:
+            moments: (m,) stamps of the frames [ns], ascending.
+        """
+        found = find_placements(self._static, self._options, min_dwell_s=SHORTEST_S)
+        new = [(one, row) for one in found if (row := _row(one, moments, self._static)) is not None]
+        seen = [*self._settled, *new]
+        if len(self._static.points_radar_m) > _MOST_STATIC_RETURNS:
+            self._settled, self._static = seen, RadarScans()
+        activity = _ActivitySum(moments)
+        if self._times:
+            activity.count(np.concatenate(self._times), np.concatenate(self._counts))
+        return _survey(seen, activity, self._cells, moments)
+
+
+def _survey(
+    seen: Sequence[tuple[Placement, PlacementRow]], activity: "_ActivitySum", cells: RadarMapSum, moments: TimesNs
+) -> Survey:
     rows = tuple(pair[1] for pair in seen)
     figures = placement_figures(rows, *activity.rates())
     message = Placements(rows, placement_summary(rows, _length_s(moments)), figures)
@@ -157,14 +212,17 @@ class _ActivitySum:
 
     def note(self, scans: RadarScans) -> RadarScans:
         """Count some scans; return them."""
-        place = ((scans.times_ns - self._origin) / NS_PER_S // self._step_s).astype(np.int64)
-        inside = (place >= 0) & (place < self._slices)
-        counts = np.diff(scans.first_return)[inside]
-        self._returns += np.bincount(place[inside], weights=counts, minlength=self._slices)
-        self._scans += np.bincount(place[inside], minlength=self._slices)
-        if len(scans) > 1:
-            self._intervals_s.append(float(np.median(np.diff(scans.times_ns))) / NS_PER_S)
+        self.count(scans.times_ns, np.diff(scans.first_return))
         return scans
+
+    def count(self, times_ns: TimesNs, counts: np.ndarray) -> None:
+        """Count scans by their stamps [ns] and numbers of returns."""
+        place = ((times_ns - self._origin) / NS_PER_S // self._step_s).astype(np.int64)
+        inside = (place >= 0) & (place < self._slices)
+        self._returns += np.bincount(place[inside], weights=counts[inside], minlength=self._slices)
+        self._scans += np.bincount(place[inside], minlength=self._slices)
+        if len(times_ns) > 1:
+            self._intervals_s.append(float(np.median(np.diff(times_ns))) / NS_PER_S)
 
     def rates(self) -> tuple[float, float]:
         """Return the mean number of returns per scan, and the number of scans per second, NaN if unknown."""

@@ -21,7 +21,9 @@ from app.web.messages.incoming import (
 )
 from app.web.messages.outgoing import (
     Done,
+    FollowNote,
     FrameHeader,
+    FramesAdded,
     Opening,
     Outgoing,
     Overlay,
@@ -44,8 +46,10 @@ __all__ = [
     "Command",
     "CursorMoved",
     "Done",
+    "FollowNote",
     "FrameHeader",
     "FrameWanted",
+    "FramesAdded",
     "Hello",
     "ImportWanted",
     "Incoming",

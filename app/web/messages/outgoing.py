@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import msgspec
 
 from app.option_changes import OptionGroup, option_groups
-from app.view import View
+from app.view import FollowState, View
 from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
 from app.web.messages.view_changes import ViewChange
 from calib_core.arrays import TimesNs
@@ -18,7 +18,9 @@ from calib_core.results import DataWarning
 __all__ = [
     "TYPES",
     "Done",
+    "FollowNote",
     "FrameHeader",
+    "FramesAdded",
     "Opening",
     "Outgoing",
     "Overlay",
@@ -136,6 +138,35 @@ class RecordingNote:
     option_groups: tuple[OptionGroup, ...] = field(default_factory=option_groups)
 
 
+@dataclass(frozen=True, slots=True)
+class FramesAdded:
+    """Frames have been written since; they follow those that a page knows.
+
+    Attributes:
+        first: index of the first of them; a page that does not have all before greets again.
+        frame_times: the stamp of each.
+    """
+
+    first: int
+    frame_times: StampColumns
+
+
+@dataclass(frozen=True, slots=True)
+class FollowNote:
+    """How a recording that is still being written goes on.
+
+    Attributes:
+        state: "live" while it grows, "quiet" when nothing has been written for a while, "complete" once it has been closed,
+            "ended" if it can no longer be followed.
+        words: the same in one or two sentences, with the delay.
+        advice: how many placements there are, and where the next one pays; "" while that is unknown.
+    """
+
+    state: FollowState
+    words: str
+    advice: str = ""
+
+
 class OverlayReturn(msgspec.Struct, frozen=True, array_like=True):
     """One radar return on the picture; written as an array, since there are many.
 
@@ -230,6 +261,8 @@ Outgoing: TypeAlias = (
     | ViewChange
     | Opening
     | RecordingNote
+    | FramesAdded
+    | FollowNote
     | Placements
     | RadarLook
     | RadarMap
@@ -244,6 +277,8 @@ TYPES: Mapping[type, str] = {
     ViewChange: "view_change",
     Opening: "opening",
     RecordingNote: "recording",
+    FramesAdded: "frames_added",
+    FollowNote: "following",
     Placements: "placements",
     RadarLook: "radar_look",
     RadarMap: "radar_map",

@@ -19,6 +19,7 @@ from app.error_boundary import error_boundary
 from app.resources import static_folder
 from app.web.channel.channel import Channel, Socket
 from app.web.channel.hub import Hub
+from app.web.messages import Opening
 from app.web.port import guard
 from app.web.port.admissions import Admissions
 from app.web.port.entrance import Entrance
@@ -116,6 +117,10 @@ class RunningServer:
             RuntimeError: the server has stopped.
         """
         self._viser.get_event_loop().call_soon_threadsafe(self._room.show, picture)
+
+    def tell(self, opening: Opening) -> None:
+        """Tell the pages that are waiting what is being done."""
+        self._viser.get_event_loop().call_soon_threadsafe(self._room.tell, opening)
 
     def refuse(self, problem: str) -> None:
         """Tell the waiting pages why the recording cannot be opened; do nothing if it was admitted or the server is closed."""

@@ -74,6 +74,13 @@ class Service:
     ) -> None:
         self._end(error)
 
+    def tell(self, doing: str) -> None:
+        """Say what is being done, in the terminal and on the pages that wait."""
+        print(doing, flush=True)
+        server = self._early.result()
+        if server is not None:
+            server.tell(Opening(self._opening.name, doing))
+
     def serve(self, workspace: Workspace, recording: Recording) -> None:
         """Serve the opened recording until a signal ends it; the caller then closes the session and says so.
 

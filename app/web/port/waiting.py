@@ -25,6 +25,10 @@ class WaitingRoom:
         self._over = False
         self._waiting: set[asyncio.Task[None]] = set()
 
+    def tell(self, opening: Opening) -> None:
+        """Say what is being done now."""
+        self._add(encode(opening))
+
     def show(self, picture: EncodedImage) -> None:
         """Show a picture. It is not a frame yet: it has no index and no time."""
         header = FrameHeader(-1, 0, picture.width_px, picture.height_px, 1.0, picture.format)

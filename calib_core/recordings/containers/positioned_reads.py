@@ -74,6 +74,10 @@ class FileBytes:
                 f"{self.path}: reading at byte {offset} failed: {error}; is it still there?"
             ) from error
 
+    def look_again(self) -> None:
+        """Take in the present size of a file that is being written."""
+        self.size_bytes = os.fstat(self._file.fileno()).st_size
+
     def expect(self, places: Sequence[tuple[int, int]]) -> None:
         """Announce the next small reads (begin, end) to the system, so that a slow disk can fetch them together."""
         if hasattr(os, "posix_fadvise"):

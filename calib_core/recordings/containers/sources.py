@@ -12,7 +12,7 @@ from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.containers.accounts import FileAccount, Progress
 from calib_core.results import DataWarning
 
-__all__ = ["Channel", "Encoding", "Heads", "MessageIndex", "Source"]
+__all__ = ["Channel", "Encoding", "GrowingSource", "Heads", "MessageIndex", "Source"]
 
 Encoding = Literal["ros1", "cdr"]
 
@@ -60,6 +60,15 @@ class MessageIndex:
         """Sort by receive time; messages with equal times keep the order of the file."""
         order = np.lexsort((offset, chunk, receive_ns))
         return cls(receive_ns[order], chunk[order], offset[order])
+
+    def followed_by(self, later: "MessageIndex") -> "MessageIndex":
+        """Add messages from later in the file, which usually, but not always, were received later."""
+        columns = (
+            np.concatenate([getattr(self, name), getattr(later, name)]) for name in ("receive_ns", "chunk", "offset")
+        )
+        if len(self) and len(later) and later.receive_ns[0] < self.receive_ns[-1]:
+            return MessageIndex.sorted_from(*columns)
+        return MessageIndex(*columns)
 
     def take(self, rows: np.ndarray) -> "MessageIndex":
         """Keep the given rows, in the given order."""
@@ -148,4 +157,25 @@ class Source(Protocol):
 
     def close(self) -> None:
         """Close the file."""
+        ...
+
+
+class GrowingSource(Source, Protocol):
+    """A file that is still being written."""
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the writer has closed the file."""
+        ...
+
+    def grow(self) -> int:
+        """Index the messages that have been written completely since; return how many there are.
+
+        Raises:
+            RecordingError: what had been read has changed, or what follows cannot be read.
+        """
+        ...
+
+    def renamed(self, path: Path) -> None:
+        """Take note that the writer has renamed the file."""
         ...

@@ -293,3 +293,28 @@ def test_a_recording_without_pictures_and_without_radar_is_refused_with_a_clear_
     recording.image_times = recording.radar_times = np.zeros(0, dtype=np.int64)
     with pytest.raises(InputError, match="drive: has neither pictures nor radar scans"):
         recording_facts(recording, "drive")
+
+
+def test_a_recording_that_grows_gets_frames_that_can_be_clicked(workspace: Workspace, journal: ListJournal) -> None:
+    later = FACTS.image_times[-1] + 100_000_000
+    with pytest.raises(EventError):
+        workspace.dispatch(ClickPlaced(TimeNs(int(later)), 1.0, 2.0))
+    workspace.extend(np.append(FACTS.image_times, later), None)
+    workspace.dispatch(ClickPlaced(TimeNs(int(later)), 1.0, 2.0))
+    assert workspace.view.clicks[0].frame == len(FACTS.image_times)
+    assert len(journal.steps) == 1
+
+
+def test_clicks_are_solved_again_when_scans_of_their_windows_come(
+    workspace: Workspace, solver: HeldSolver, journal: ListJournal
+) -> None:
+    workspace.dispatch(ClickPlaced(TIMES[3], 1.0, 2.0))
+    second_ns = 1_000_000_000
+    workspace.extend(FACTS.image_times, TimeNs(TIMES[3] + 10 * second_ns))
+    workspace.extend(FACTS.image_times, None)
+    assert solver.revisions == [1]
+    workspace.extend(FACTS.image_times, TimeNs(TIMES[3] + second_ns))
+    assert solver.revisions == [1, 2]
+    assert [type(step).__name__ for step in journal.steps] == ["ClickPlaced"]
+    workspace.undo()
+    assert workspace.session.clicks == ()

@@ -30,13 +30,15 @@ from calib_core.recordings.containers.mcap.records import (
 )
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
 
-__all__ = ["FoundInMcap", "Part", "parts_of_mcap", "scan_mcap"]
+__all__ = ["FoundInMcap", "Part", "parts_of_mcap", "scan_further", "scan_mcap"]
 
 _CANDIDATE = re.compile(rb"[\x03-\x06][\x00-\xff]{4}\x00\x00\x00\x00")
 _COMPRESSIONS = ("", "lz4", "zstd")
 _MAX_TRIES = 20_000
 _LAST_KIND = 15
 _END_SIZES = {DATA_END: 4, FOOTER: 20}
+_MOST_RECORD_BYTES = 1 << 36
+_DATA_AND_ENDS = DATA_KINDS | {CHUNK, *_END_SIZES}
 
 
 @dataclass(slots=True)
@@ -124,6 +126,38 @@ def parts_of_mcap(file: FileBytes, found: FoundInMcap) -> Iterator[Part]:
         place = part.end
     if not found.ended and place < stretch.size:
         yield Part(0, place, place, stretch.size)
+
+
+def scan_further(file: FileBytes, place: int, found: FoundInMcap) -> int:
+    """Scan the complete records of a file that is being written; return the position of the first incomplete one.
+
+    Args:
+        file: the file.
+        place: position of the first record to read.
+        found: receives what is found.
+
+    Raises:
+        RecordingError: there is no record at a position.
+    """
+    found.chunks[0] = Chunk(0, file.size_bytes, file.size_bytes, "")
+    stretch = FileStretch(file, 0, file.size_bytes)
+    while place + RECORD.size <= stretch.size and not found.ended:
+        kind, size = RECORD.unpack(stretch.up_to(place, RECORD.size))
+        start = place + RECORD.size
+        if kind == size == 0:
+            break  # space that the system has allocated but the writer has not filled yet
+        if not (kind in _DATA_AND_ENDS or kind >= PRIVATE) or size > _MOST_RECORD_BYTES:
+            raise RecordingError(f"{file.path}: no record at byte {place}, where the next one should begin")
+        if size > stretch.size - start:
+            break
+        head = chunk_head(stretch.up_to(start, 64)) if kind == CHUNK else None
+        if head is not None and _sound(head):
+            _scan_chunk(file, start + head.size, min(head.stored_bytes, size - head.size), head, found)
+        elif kind != CHUNK and not (kind == MESSAGE and size > MAX_RECORD_BYTES):
+            found.ended = kind in _END_SIZES
+            _note(stretch, kind, start, size, found)
+        place = start + size
+    return place
 
 
 def _data_after(stretch: Stretch, place: int, found: FoundInMcap) -> bool:

@@ -15,7 +15,7 @@ from calib_core.recordings.containers.recovery_warnings import about_recovery
 from calib_core.recordings.containers.rosbag1.account import account_for_bag
 from calib_core.recordings.containers.rosbag1.index import read_indexes
 from calib_core.recordings.containers.rosbag1.records import fields_of
-from calib_core.recordings.containers.rosbag1.recovery import scan_bag
+from calib_core.recordings.containers.rosbag1.recovery import FoundInBag, scan_bag
 from calib_core.recordings.containers.rosbag1.tail import (
     CONNECTION,
     ChunkInfo,
@@ -30,7 +30,7 @@ from calib_core.recordings.containers.sources import Channel, MessageIndex
 if TYPE_CHECKING:
     from calib_core.recordings.containers.positioned_reads import FileBytes
 
-__all__ = ["Rosbag1Source"]
+__all__ = ["Rosbag1Source", "channels_of"]
 
 _MAGIC = re.compile(rb"#ROSBAG V(\d+)\.(\d+)\n")
 _MESSAGE, _BAG_HEADER = 2, 3
@@ -62,15 +62,19 @@ class Rosbag1Source(ChunkedSource):
         header, after = self._record(magic.end(), _BAG_HEADER)
         if header.get("encryptor"):
             raise RecordingError(f"{file.path}: the bag is encrypted; decrypt it first: rosbag decrypt")
+        self._open(header, after[0] + after[1], first_of)
+
+    def _open(self, header: Mapping[str, bytes], start: int, first_of: ChannelFilter | None) -> None:
+        """Read the index, or build one by scanning from the first record after the header."""
         if self.restore():
             return
         try:
             infos, end = self._read_tail(header, first_of)
-            self._read_indexes(infos, (after[0] + after[1], end), first_of)
+            self._read_indexes(infos, (start, end), first_of)
         except RecordingError as fault:
             if first_of is not None:
                 raise
-            self._recover(after[0] + after[1], fault)
+            self._recover(start, fault)
         self.keep()
 
     def _read_tail(self, header: Mapping[str, bytes], first_of: ChannelFilter | None) -> tuple[list[ChunkInfo], int]:
@@ -108,11 +112,7 @@ class Rosbag1Source(ChunkedSource):
         found = scan_bag(self.file, start)
         self.recovered = True
         self.chunks = found.chunks
-        channels: dict[int, Channel] = {}
-        for fields, data in found.connections.values():
-            channel = channel_of(fields, data)
-            if channel is not None:
-                channels[channel.id] = channel
+        channels = channels_of(found)
         self.channels = tuple(channels.values())
         known = {number: entries for number, entries in found.messages.items() if number in channels}
         if not known:
@@ -186,6 +186,12 @@ class Rosbag1Source(ChunkedSource):
             return np.zeros(len(rows), dtype=bool), words[:, 1].astype(np.int64)
         usual &= (rows[:, mark : mark + 4] == np.frombuffer(b"op=\x02", dtype=np.uint8)).all(axis=1)
         return usual, words[:, 1].astype(np.int64)
+
+
+def channels_of(found: FoundInBag) -> dict[int, Channel]:
+    """Return the channels that a scan has found, by number."""
+    channels = (channel_of(fields, data) for fields, data in found.connections.values())
+    return {channel.id: channel for channel in channels if channel is not None}
 
 
 def _number(value: bytes, size: int) -> int:

@@ -15,7 +15,7 @@ from calib_core.recordings.containers.compression import refuse_bomb, unpack, un
 from calib_core.recordings.containers.positioned_reads import FileBytes, FileStretch, MemoryStretch, Stretch
 from calib_core.recordings.containers.rosbag1.records import fields_of
 
-__all__ = ["BagWalk", "FoundInBag", "Record", "note_record", "scan_bag", "scan_chunk"]
+__all__ = ["BagWalk", "FoundInBag", "Record", "note_record", "scan_bag", "scan_chunk", "scan_further"]
 
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
 _OTHER_KINDS = frozenset({3, 4, 6})  # the bag's header, and its index
@@ -142,6 +142,43 @@ def scan_bag(file: FileBytes, start: int) -> FoundInBag:
         elif record.kind not in _OTHER_KINDS and not note_record(stretch, record, 0, found):
             found.lost_bytes += record.end - record.place
     return found
+
+
+def scan_further(file: FileBytes, place: int, found: FoundInBag) -> int:
+    """Scan the complete records of a bag that is being written; return the position of the first incomplete one.
+
+    A recorder writes the header of a chunk with a size of 0 and replaces it once the chunk is complete.
+
+    Args:
+        file: the bag.
+        place: position of the first record to read.
+        found: receives what is found.
+
+    Raises:
+        RecordingError: there is no record at a position.
+    """
+    found.chunks[0] = Chunk(0, file.size_bytes, file.size_bytes, "none")
+    stretch = FileStretch(file, 0, file.size_bytes)
+    while place + 8 <= stretch.size:
+        record = _record(stretch, place)
+        if record is None:
+            if _may_be_incomplete(stretch, place):
+                break
+            raise RecordingError(f"{file.path}: no record at byte {place}, where the next one should begin")
+        if record.end > stretch.size or (record.kind == _CHUNK and not record.data_size):
+            break
+        if record.kind == _CHUNK:
+            scan_chunk(file, record, found)
+        elif record.kind not in _OTHER_KINDS:
+            note_record(stretch, record, 0, found)
+        place = record.end
+    return place
+
+
+def _may_be_incomplete(stretch: Stretch, place: int) -> bool:
+    """Return whether the header of a record ends beyond the file, or is space that has not been filled yet."""
+    length = _U32.unpack(stretch.up_to(place, 4))[0]
+    return length == 0 or stretch.size - place - 8 < length <= _MAX_HEADER_BYTES
 
 
 def scan_chunk(file: FileBytes, record: Record, found: FoundInBag) -> None:

@@ -2,8 +2,8 @@
 
 import sqlite3
 import threading
-from collections.abc import Mapping
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,14 +59,24 @@ class SqliteSource:
         log = Path(f"{file.stored}-wal")
         self._kept = None if log.exists() and log.stat().st_size else cache_of(file)
         try:
-            self._connection = connect(file, self._until_closed)
-            self._until_closed.callback(self._connection.close)
+            self._connect()
             self.channels: tuple[Channel, ...] = self._read_channels()
             if not self.channels:
                 self.index(0)  # warns about messages of unknown topics
         except RecordingError:
             self._until_closed.close()
             raise
+
+    def _connect(self) -> None:
+        """Open the database, until the file is closed."""
+        self._connection = connect(self._file, self._until_closed)
+        self._until_closed.callback(self._connection.close)
+
+    @contextmanager
+    def _database(self) -> Iterator[sqlite3.Connection]:
+        """Give the database to one thread at a time."""
+        with self._lock:
+            yield self._connection
 
     @property
     def counts(self) -> Mapping[int, int]:
@@ -93,8 +103,8 @@ class SqliteSource:
 
     def _rows(self, query: str, *values: Any) -> list[tuple[Any, ...]]:
         try:
-            with self._lock:
-                return self._connection.execute(query, values).fetchall()
+            with self._database() as database:
+                return database.execute(query, values).fetchall()
         except (sqlite3.Error, UnicodeDecodeError) as error:  # the latter if the message contains a damaged name
             raise self._damaged(error) from error
 
@@ -145,16 +155,16 @@ class SqliteSource:
         kept = self._kept.get("rows") if self._kept is not None else None
         if kept is not None and kept.keys() == {"columns"} and kept["columns"].dtype == np.int64:
             return FoundRows(kept["columns"].reshape(-1, 3))
-        with self._lock:
-            found = scan_rows(self._connection, self.path)
+        with self._database() as database:
+            found = scan_rows(database, self.path)
         if self._kept is not None and not found.incomplete:
             self._kept.put("rows", {"columns": found.columns})
         return found
 
     def _beginning(self, count: int) -> FoundRows:
         try:
-            with self._lock:
-                return first_rows(self._connection, count)
+            with self._database() as database:
+                return first_rows(database, count)
         except sqlite3.Error as error:
             raise self._damaged(error) from error
 
@@ -240,7 +250,7 @@ class SqliteSource:
             data = self.read(row, 0)
             return data[:size], len(data)
         try:
-            with self._lock, self._connection.blobopen("messages", "data", row, readonly=True) as blob:
+            with self._database() as database, database.blobopen("messages", "data", row, readonly=True) as blob:
                 return blob.read(size), len(blob)
         except sqlite3.Error as error:
             raise self._damaged(error) from error

@@ -16,7 +16,16 @@ from calib_core.errors import RecordingError
 from calib_core.recordings.containers.positioned_reads import FileBytes
 from calib_core.results import DataWarning
 
-__all__ = ["FoundRows", "about_rows", "connect", "damaged_database", "first_rows", "scan_rows"]
+__all__ = [
+    "FoundRows",
+    "about_rows",
+    "connect",
+    "damaged_database",
+    "first_rows",
+    "open_database",
+    "rows_after",
+    "scan_rows",
+]
 
 _MAX_VALUE_BYTES = 1 << 28
 _BATCH_ROWS = 20_000
@@ -77,8 +86,8 @@ def connect(file: FileBytes, until_closed: ExitStack) -> sqlite3.Connection:
     """
     log = Path(f"{file.stored}-wal")
     if not (log.exists() and log.stat().st_size):
-        return _connection(file.path, file.stored, "mode=ro&immutable=1")
-    connection = _connection(file.path, file.stored, "mode=ro")
+        return open_database(file.path, file.stored, "mode=ro&immutable=1")
+    connection = open_database(file.path, file.stored, "mode=ro")
     try:
         connection.execute("SELECT count(*) FROM sqlite_master").fetchall()
     except sqlite3.OperationalError:
@@ -101,10 +110,20 @@ def _copied(file: FileBytes, log: Path, until_closed: ExitStack) -> sqlite3.Conn
             f"{file.path}: its -wal file can only be read in a writable folder, and copying both failed: "
             f"{error.strerror}; copy both files to a writable folder"
         ) from error
-    return _connection(file.path, copy, "mode=ro")
+    return open_database(file.path, copy, "mode=ro")
 
 
-def _connection(path: Path, stored: Path, mode: str) -> sqlite3.Connection:
+def open_database(path: Path, stored: Path, mode: str) -> sqlite3.Connection:
+    """Open a database that may be malicious.
+
+    Args:
+        path: as the user named it, for messages.
+        stored: the file that holds it.
+        mode: SQLite's parameters, such as "mode=ro".
+
+    Raises:
+        RecordingError: SQLite refuses it.
+    """
     address = f"file:{quote(str(stored.resolve()))}?{mode}"
     try:
         connection = sqlite3.connect(address, uri=True, check_same_thread=False, isolation_level=None)
@@ -135,6 +154,17 @@ def first_rows(connection: sqlite3.Connection, count: int) -> FoundRows:
     batches, strange = _batches(
         connection, "SELECT topic_id, timestamp, id FROM messages ORDER BY id LIMIT ?", (count,)
     )
+    return FoundRows(_joined(batches), strange=strange)
+
+
+def rows_after(connection: sqlite3.Connection, last: int) -> FoundRows:
+    """Read topic, time and number of the rows after one, in order.
+
+    Raises:
+        sqlite3.Error: they are damaged.
+    """
+    query = "SELECT topic_id, timestamp, id FROM messages WHERE id > ? ORDER BY id"
+    batches, strange = _batches(connection, query, (last,))
     return FoundRows(_joined(batches), strange=strange)
 
 

@@ -1,0 +1,54 @@
+"""`cocalib open --follow`: the file may come later, and what is waited for is said."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from calib_core.recordings import FollowedRecording, Recording
+from tests.growing_recording import SampleWriter
+
+
+@pytest.fixture
+def served(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Recording, int]]:
+    """Return the recordings that would be served, each with its number of frames."""
+    found: list[tuple[Recording, int]] = []
+    monkeypatch.setattr(
+        "app.web.port.serving.Service.serve",
+        lambda _service, _workspace, recording: found.append((recording, len(recording.image_times))),
+    )
+    return found
+
+
+def test_a_recording_that_has_not_been_begun_is_waited_for(
+    cocalib: Callable[..., Any],
+    served: list[tuple[Recording, int]],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "drive.mcap"
+    writers: list[SampleWriter] = []
+
+    def write_on(_seconds: float) -> None:
+        if not writers:
+            writers.append(SampleWriter(path))
+        else:
+            writers[0].write_until(8.0)
+
+    monkeypatch.setattr("app.cli.open.sleep", write_on)
+    answer = cocalib("open", "--follow", path, "--no-browser", "--port", 0, "--session", tmp_path / "session")
+    writers[0].stop()
+    assert answer.code == 0, answer.err
+    assert "Waiting for drive.mcap: drive.mcap has not been begun…" in answer.out
+    assert "Waiting for drive.mcap: no radar messages yet; topics so far: none…" in answer.out
+    [(recording, frames)] = served
+    assert isinstance(recording, FollowedRecording)
+    assert frames > 5
+
+
+def test_what_cannot_be_followed_is_refused_at_once(cocalib: Callable[..., Any], tmp_path: Path) -> None:
+    answer = cocalib("open", "--follow", tmp_path / "radar.csv", "--no-browser", "--port", 0)
+    assert answer.code == 2
+    assert "radar.csv: cannot be followed" in answer.err
+    assert "no recording given" in cocalib("open", "--follow", "--no-browser").err

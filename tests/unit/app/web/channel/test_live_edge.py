@@ -1,0 +1,186 @@
+"""What the pages of a recording that is still being written are told."""
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.session import ClickPlaced, RecordingFacts
+from app.session.file import open_session_file
+from app.web.channel.live_edge import LiveEdge
+from app.web.channel.radar_survey import GrowingSurvey, Survey, survey_of
+from app.web.messages import FollowNote, FramesAdded, Outgoing
+from app.workspace import Workspace
+from calib_core.association.placements import Placement
+from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.options import GatingOptions
+from calib_core.recordings import AwaitedRecording, FollowedRecording, open_recording
+from tests.growing_recording import SampleWriter
+
+DEADLINE_S = 60.0
+
+
+class ToldPages:
+    def __init__(self) -> None:
+        self.messages: list[Outgoing] = []
+        self.frames = 0
+        self.survey: Survey | None = None
+        self.conclusions = 0
+
+    def broadcast(self, message: Outgoing, kind: str) -> None:
+        self.messages.append(message)
+
+    def grown(self, count: int) -> None:
+        self.frames = count
+
+    def surveyed(self, survey: Survey) -> None:
+        self.survey = survey
+
+    def concluded(self) -> None:
+        self.conclusions += 1
+
+    @property
+    def note(self) -> FollowNote:
+        return [FollowNote("live", ""), *(each for each in self.messages if isinstance(each, FollowNote))][-1]
+
+
+class NoSolver:
+    def request(self, *_: object) -> None: ...
+
+    def close(self) -> None: ...
+
+
+async def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < end, "it never came"
+        await asyncio.sleep(0.01)
+
+
+def follow(
+    tmp_path: Path, story: Callable[[SampleWriter, ToldPages, Workspace, FollowedRecording], Awaitable[None]]
+) -> None:
+    """Follow the sample from its tenth second on while a story is told."""
+    writer = SampleWriter(tmp_path / "drive.mcap")
+    writer.write_until(10.0)
+    recording = AwaitedRecording([tmp_path / "drive.mcap"]).look()
+    assert recording is not None
+    facts = RecordingFacts("drive", recording.image_times, 960, 600)
+    session_file = open_session_file(tmp_path / "session", facts)
+    workspace = Workspace(facts, session_file.restored, session_file, NoSolver())
+    pages = ToldPages()
+
+    async def run() -> None:
+        edge = LiveEdge(pages, workspace, recording, recording.camera())
+        following = asyncio.create_task(edge.run())
+        try:
+            await story(writer, pages, workspace, recording)
+        finally:
+            following.cancel()
+            await asyncio.gather(following, return_exceptions=True)
+
+    asyncio.run(run())
+    workspace.close()
+    recording.close()
+    writer.stop()
+
+
+def test_every_frame_is_told_once_and_in_order(tmp_path: Path) -> None:
+    async def story(writer: SampleWriter, pages: ToldPages, workspace: Workspace, recording: FollowedRecording) -> None:
+        known = len(recording.image_times)
+        for seconds in (12.0, 15.0, 25.0):
+            writer.write_until(seconds)
+            await until(lambda: pages.frames == len(recording.image_times) > known)
+        writer.finish()
+        await until(lambda: pages.note.state == "complete")
+        assert pages.conclusions == 1
+        told = known
+        for message in pages.messages:
+            if isinstance(message, FramesAdded):
+                assert message.first == told
+                told += len(message.frame_times.sec)
+        assert told == len(recording.image_times) == len(workspace.facts.image_times)
+
+    follow(tmp_path, story)
+
+
+def test_in_the_end_the_placements_are_those_of_the_whole_recording(tmp_path: Path) -> None:
+    async def story(writer: SampleWriter, pages: ToldPages, workspace: Workspace, recording: FollowedRecording) -> None:
+        writer.write_until(60.0)
+        await until(lambda: pages.survey is not None and len(pages.survey.rows) > 2)
+        await until(lambda: " of 20 placements; next: " in pages.note.advice)
+        writer.finish()
+        whole = survey_of(
+            [window async for window in _windows(recording, pages)], recording.image_times, GatingOptions()
+        )
+        await until(lambda: pages.survey is not None and pages.survey.rows == whole.rows)
+        assert pages.survey is not None
+        assert pages.survey.activity == whole.activity
+
+    follow(tmp_path, story)
+
+
+async def _windows(recording: FollowedRecording, pages: ToldPages):  # type: ignore[no-untyped-def]
+    await until(lambda: recording.is_complete)
+    for window in recording.radar_windows():
+        yield window
+
+
+def test_a_file_that_was_truncated_ends_the_following_in_words(tmp_path: Path) -> None:
+    async def story(writer: SampleWriter, pages: ToldPages, workspace: Workspace, recording: FollowedRecording) -> None:
+        workspace.dispatch(ClickPlaced(TimeNs(int(recording.image_times[0])), 1.0, 2.0))
+        with (tmp_path / "drive.mcap").open("r+b") as file:
+            file.truncate(50)
+        await until(lambda: pages.note.state == "ended")
+        assert "was truncated to 50 bytes" in pages.note.words
+        assert pages.note.words.endswith("All clicks are kept.")
+        assert len(workspace.session.clicks) == 1
+
+    follow(tmp_path, story)
+
+
+def test_a_writer_that_stops_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.web.channel.live_edge._QUIET_AFTER_S", 0.05)
+
+    async def story(writer: SampleWriter, pages: ToldPages, workspace: Workspace, recording: FollowedRecording) -> None:
+        writer.write_until(14.0)
+        writer.stop()
+        await until(
+            lambda: any(isinstance(each, FollowNote) for each in pages.messages) and pages.note.state == "quiet"
+        )
+        assert "the recorder has stopped or pauses" in pages.note.words
+
+    follow(tmp_path, story)
+
+
+def test_a_growing_survey_without_scans_is_empty() -> None:
+    survey = GrowingSurvey(GatingOptions()).survey(np.array([0, 10**9]))
+    assert survey.rows == ()
+
+
+def test_placements_are_found_while_the_reflector_still_stands(project_root: Path) -> None:
+    """In steps of two seconds; the first is there for more than half of the recording so far, and is found later."""
+    folder = project_root / "sample_data" / "rooftop"
+    found: dict[int, float] = {}
+    with open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording:
+        end_ns = int(recording.radar_times[0]) + 70 * NS_PER_S
+        survey = survey_of(recording.radar_windows(), recording.image_times, GatingOptions())
+        whole = [placement for placement in survey.placements if placement.end < end_ns]
+        growing = GrowingSurvey(GatingOptions())
+        for now in range(int(recording.radar_times[40]), end_ns, 2 * NS_PER_S):
+            growing.note(recording.radar_scans(TimeNs((growing.until or 0) + 1), TimeNs(now)))
+            survey = growing.survey(recording.image_times[recording.image_times <= now])
+            for number, placement in enumerate(whole):
+                if any(_is_same(placement, other) for other in survey.placements):
+                    found.setdefault(number, (now - placement.end) / NS_PER_S)
+    assert len(found) == len(whole) > 5
+    assert found[0] < 4.0
+    assert max(found[number] for number in range(1, len(whole))) < 0.0
+
+
+def _is_same(one: Placement, other: Placement) -> bool:
+    together = min(one.end, other.end) - max(one.start, other.start)
+    return together > 0 and float(np.linalg.norm(one.position_radar_m - other.position_radar_m)) < 0.5
