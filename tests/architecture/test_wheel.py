@@ -71,7 +71,12 @@ def test_the_wheel_contains_the_page_and_the_sample(wheel: Path) -> None:
 def test_the_installed_command_finds_its_own_page_and_sample(installed: Path, tmp_path: Path) -> None:
     code = "from app import resources; print(resources.static_folder()); print(resources.sample_folder())"
     printed = subprocess.run(
-        [installed / "bin" / "python", "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True
+        [installed / "bin" / "python", "-c", code],
+        cwd=tmp_path,
+        check=True,
+        capture_output=True,
+        text=True,
+        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
     ).stdout.split()
     assert len(printed) == 2
     for line in printed:

@@ -33,7 +33,7 @@ def test_clocks_axes_and_warnings_of_the_recording_are_on_the_page(
             facts.nth(0).hover()
             page.until("document.body.innerText.includes('because --clock receive was given')")
             page.until("document.body.innerText.includes('axes as given: x forward, y left, z up')")
-            page.until("document.body.innerText.includes('after the stamp')")
+            page.until("document.body.innerText.includes('after its stamp')")
             box = page.text('#warnings [data-code="not-closed"]')
             assert "complete messages were recovered by reading the whole file" in box
         finally:
