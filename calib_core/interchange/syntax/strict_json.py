@@ -58,6 +58,9 @@ def checked(content: Mapping[str, Any], document: type[Document], *, source: str
         raise InputError(f"{source}: {where or 'the file'}: {fault}")
     try:
         return msgspec.convert(content, document)
+    except UnicodeEncodeError as error:
+        half = f"{error.object[error.start]!a}"
+        raise InputError(f"{source}: {place or 'the file'}: contains half a character ({half}); remove it") from None
     except (msgspec.ValidationError, OverflowError) as error:
         raise InputError(f"{source}: {_from_msgspec(str(error), place)}") from None
 
