@@ -5,7 +5,18 @@ from functools import cache
 
 from calib_core.recordings.field_words.spellings import AMBIGUOUS, SPELLINGS
 
-__all__ = ["BLOCKERS", "FILLERS", "NUMBERS", "SECOND", "STATISTICS", "TYPE_PREFIXES", "folded", "has_word", "words_of"]
+__all__ = [
+    "BLOCKERS",
+    "FILLERS",
+    "NUMBERS",
+    "SECOND",
+    "STATISTICS",
+    "SUBJECTS",
+    "TYPE_PREFIXES",
+    "folded",
+    "has_word",
+    "words_of",
+]
 
 
 def _words(text: str) -> frozenset[str]:
@@ -15,12 +26,16 @@ def _words(text: str) -> frozenset[str]:
 TYPE_PREFIXES = _words("f s m u i b n g p fl dbl flt ui my us ul si sl af mf mu ms a l k e t st str")
 """Letters at the start of a name that encode its type or scope."""
 
-FILLERS = _words(
-    "det detection detections target targets tgt obj object objects point points pt pts return returns report meas measured "
-    "measurement radar sensor data value val values track tracks can tx rx detect est estimated rel relative raw cluster polar "
-    "cart cartesian spherical sph coord coords coordinate coordinates pose loc location filtered refl reflection reflections "
-    "reflector plot peak peaks current cur info general kinematic kinematics msg messages header field list samples scans "
-    "frames the of to from in"
+SUBJECTS = _words(
+    "radar radarpoint target targets tgt detection detections det dets point points pt pts return returns object objects obj "
+    "objs reflection reflections refl cluster clusters hit hits plot plots echo echoes peak peaks track tracks data list frames "
+    "scans samples messages msg header field value val values cartesian polar raw meas measured measurement"
+)
+"""Words for what a name belongs to, such as a return: they may precede any name."""
+
+FILLERS = SUBJECTS | _words(
+    "report sensor can tx rx detect est estimated rel relative cart spherical sph coord coords coordinate coordinates pose loc "
+    "location filtered reflector current cur info general kinematic kinematics the of to from in"
 )
 """Words that may stand anywhere in a name without changing its meaning."""
 

@@ -9,6 +9,7 @@ from calib_core.recordings.column_map import parse_column_map
 from calib_core.recordings.field_words.names import SPELT, quantity_of, spelt
 from calib_core.recordings.field_words.spellings import AMBIGUOUS, SPELLINGS, Spelling
 from calib_core.recordings.field_words.units import UNITS_BY_SPELLING, Unit, unit_of_word
+from calib_core.recordings.field_words.words import SUBJECTS
 from calib_core.recordings.plain_files.tables.column_names import read_column_name
 from calib_core.recordings.radar.self_describing.comment_units import unit_in
 from calib_core.recordings.radar.self_describing.names import meaning_of
@@ -27,6 +28,17 @@ def test_a_spelling_means_the_same_as_a_column_and_as_a_field(spelling: Spelling
         assert column.quantity == quantity
         assert field.quantity == ("amplitude" if quantity in LEVELS else quantity)
         assert (field.rank, field.sigma, field.second, field.vague) == (spelling.rank, False, False, False)
+
+
+@pytest.mark.parametrize("subject", sorted(SUBJECTS))
+def test_the_word_for_a_return_may_precede_columns_and_fields(subject: str) -> None:
+    column, field = read_column_name(f"{subject}.pos.x"), meaning_of(f"{subject}.pos.x")
+    assert column is not None
+    assert field is not None
+    assert column.quantity == field.quantity == "x"
+    time = read_column_name(f"{subject}.timestamp")
+    assert time is not None
+    assert time.quantity == "time"
 
 
 def test_no_words_are_spellings_of_two_kinds() -> None:

@@ -8,7 +8,7 @@ from functools import cache
 from calib_core.recordings.field_words.names import NamedQuantity, named_quantity, quantity_of, spelt
 from calib_core.recordings.field_words.spellings import SPELLINGS, Spelling
 from calib_core.recordings.field_words.units import dimension_of, unit_of_word, unit_of_words
-from calib_core.recordings.field_words.words import words_of
+from calib_core.recordings.field_words.words import SUBJECTS, words_of
 
 __all__ = ["COLUMN_SPELLINGS", "TIME_QUANTITIES", "ColumnName", "read_column_name"]
 
@@ -38,13 +38,7 @@ _HAS_LETTER = re.compile(r"[^\W\d_]")
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*?)\s*[\])>]\s*")
 _TYPE_PREFIXES = frozenset({"f", "s", "n", "d", "i", "u", "b", "m", "fl", "ui", "dbl", "flt", "p", "str"})
 """Fewer than in messages: t_x is a translation."""
-_SUBJECTS = frozenset({
-    "radar", "target", "targets", "detection", "detections", "det", "point", "points", "pts", "return", "returns", "object",
-    "obj", "reflection", "reflections", "data", "peak", "peaks", "track", "frames", "scans", "samples", "messages", "msg",
-    "header", "cartesian", "polar", "field", "val", "values", "list", "raw", "meas", "measured", "measurement",
-})  # fmt: skip
-"""Words that may precede a time; sensor is none of them, because sensor_frame is no number of a scan."""
-_PREFIXES = _TYPE_PREFIXES | _SUBJECTS
+_PREFIXES = _TYPE_PREFIXES | SUBJECTS
 
 
 def _spellings() -> dict[str, tuple[str, ...]]:
