@@ -1,28 +1,23 @@
 """The user's --map: which column of a radar's messages or file holds which quantity, in which unit and with which sign."""
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from calib_core.errors import OptionError
+from calib_core.recordings.field_words.units import unit_of_word, units_for
 
 __all__ = ["QUANTITIES", "UNITS", "MappedColumn", "parse_column_map"]
 
-_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0}
-_ANGLES = {"rad": 1.0, "deg": math.pi / 180.0, "mrad": 0.001}
-_SPEEDS = {"mps": 1.0, "kmh": 1 / 3.6, "kph": 1 / 3.6, "cmps": 0.01}
-_DECIBELS = {"db": 1.0, "dbsm": 1.0, "dbm": 1.0}
-_TIMES = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9}
-
+QUANTITIES: tuple[str, ...] = (
+    "x", "y", "z", "range", "azimuth", "elevation", "doppler", "amplitude", "time", "sigma_range", "sigma_azimuth",
+    "sigma_elevation",
+)  # fmt: skip
 UNITS: Mapping[str, Mapping[str, float]] = {
-    "x": _LENGTHS, "y": _LENGTHS, "z": _LENGTHS, "range": _LENGTHS, "azimuth": _ANGLES, "elevation": _ANGLES,
-    "doppler": _SPEEDS, "amplitude": _DECIBELS, "time": _TIMES,
-    "sigma_range": _LENGTHS, "sigma_azimuth": _ANGLES, "sigma_elevation": _ANGLES,
-}  # fmt: skip
+    quantity: {unit.flag: unit.scale for unit in units_for(quantity)} for quantity in QUANTITIES
+}
 """Units of each quantity, and the factor to m, rad, m/s, dB or ns. The first is the one that is assumed."""
 
-QUANTITIES: tuple[str, ...] = tuple(UNITS)
 _WORDS = re.compile(r"(?P<quantity>\w+)=(?P<minus>-?)(?P<column>[^:=]+)(?::(?P<unit>\w+))?")
 _EXAMPLE = "for example --map x=posX:m, or --map azimuth=-theta:deg where the message counts it to the right"
 
@@ -66,7 +61,7 @@ def parse_column_map(texts: Sequence[str]) -> tuple[MappedColumn, ...]:
         match = _WORDS.fullmatch(text.strip())
         if match is None:
             raise OptionError(f"--map {text}: give QUANTITY=COLUMN:UNIT; {_EXAMPLE}")
-        quantity, unit = match["quantity"].lower(), (match["unit"] or "").lower()
+        quantity, unit = match["quantity"].lower(), _unit(match["unit"] or "")
         if quantity not in UNITS:
             raise OptionError(f"--map {text}: unknown quantity '{quantity}'; known: {', '.join(QUANTITIES)}")
         if unit and unit not in UNITS[quantity]:
@@ -75,3 +70,9 @@ def parse_column_map(texts: Sequence[str]) -> tuple[MappedColumn, ...]:
             raise OptionError(f"--map {text}: {quantity} is already read from '{columns[quantity].column}'")
         columns[quantity] = MappedColumn(quantity, match["column"].strip(), unit, -1 if match["minus"] else 1)
     return tuple(columns.values())
+
+
+def _unit(written: str) -> str:
+    """Return a unit in the spelling of UNITS: kmh for kph, m for metres."""
+    unit = unit_of_word(written)
+    return unit.flag if unit else written.lower()

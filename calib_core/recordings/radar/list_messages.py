@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.recordings.assumptions import CONFIRM_ALL, Assumption
+from calib_core.recordings.field_words.words import has_word
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
@@ -13,7 +14,6 @@ from calib_core.recordings.radar.column_plan import ColumnAssumption
 from calib_core.recordings.radar.column_plans import find_decoder, plan_described
 from calib_core.recordings.radar.columns import ColumnPlan, Returns, no_returns, returns_from
 from calib_core.recordings.radar.samples import Samples, described, leaf_names
-from calib_core.recordings.radar.self_describing.names import has_word
 from calib_core.recordings.radar.struct_lists import ListPlace, count_field, joined, struct_lists
 
 __all__ = ["ListLayout"]

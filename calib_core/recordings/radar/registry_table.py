@@ -207,7 +207,8 @@ above 2 pi are degrees; a number that is a time between 1990 and 2060 in one uni
 A column that `--map` names and that does not exist is an error with the nearest name. A file without a header needs one, or `--map` with
 numbers of columns: `--map time=1:s --map x=2:m --map y=3:m`.
 
-Spellings, without case, separators and prefixes, and units; the first is ours:
+Spellings, in any order of their words and with or without separators, and units; the first is ours. Messages know the same
+spellings of positions, speeds and levels:
 
 | quantity | spellings | units |
 |---|---|---|

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.errors import MessageError
+from calib_core.recordings.field_words.words import has_word, words_of
 from calib_core.recordings.messages.decoding import Message
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
-from calib_core.recordings.radar.self_describing.names import has_word, words_of
 
 __all__ = ["ListPlace", "count_field", "joined", "struct_lists"]
 

@@ -7,25 +7,28 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.column_map import UNITS, MappedColumn
-from calib_core.recordings.field_words import FIELD_SPELLINGS, FieldWords, read_field
+from calib_core.recordings.column_map import MappedColumn
+from calib_core.recordings.field_words.units import units_for
+from calib_core.recordings.plain_files.tables.column_names import (
+    COLUMN_SPELLINGS,
+    TIME_QUANTITIES,
+    ColumnName,
+    read_column_name,
+)
 from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE
 
 __all__ = ["QUANTITIES", "TableColumn", "TableColumns", "choose_columns", "units_of"]
 
-_TIME_QUANTITIES = ("time", "sec", "nanosec", "date", "frame")
-QUANTITIES: tuple[str, ...] = tuple(name for name in FIELD_SPELLINGS if name not in _TIME_QUANTITIES)
+QUANTITIES: tuple[str, ...] = tuple(name for name in COLUMN_SPELLINGS if name not in TIME_QUANTITIES)
 """What a column of numbers may hold, and the name it has from then on."""
 
-_SAME_UNITS = {"vx": "doppler", "vy": "doppler", "vz": "doppler", "snr": "amplitude", "rcs": "amplitude", "power": "amplitude",
-               "intensity": "amplitude"}  # fmt: skip
 _POSITION = ("x", "y", "z", "range", "azimuth", "elevation")
 _CLOCK = re.compile(r"\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?")
 
 
 def units_of(quantity: str) -> dict[str, float]:
     """Return the units of a quantity with their factors to m, rad, m/s, dB or ns; the first is assumed if none is given."""
-    return dict(UNITS[_SAME_UNITS.get(quantity, quantity)])
+    return {unit.flag: unit.scale for unit in units_for(quantity)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +40,7 @@ class TableColumn:
         written: its name in the file.
         quantity: one of QUANTITIES or of the quantities of time.
         unit: a key of units_of(quantity); "" if the file does not state it.
-        rank: 0 if the name is the documented one; see FieldWords.
+        rank: 0 if the name is the documented one; see ColumnName.
         mapped: whether --map chose it.
         sign: -1 where --map turns its sign.
     """
@@ -102,13 +105,13 @@ def choose_columns(
     taken = {column.place for column in stated}
     given = {column.quantity for column in stated}
     claims: dict[str, list[TableColumn]] = {}
-    foreign: list[tuple[str, FieldWords]] = []
+    foreign: list[tuple[str, ColumnName]] = []
     for place, written in enumerate(names):
-        words = read_field(written)
+        words = read_column_name(written)
         if place in taken or words is None or words.quantity in given:
             continue
         if not words.unit and place < len(units) and units[place].strip("[]() -"):
-            below = read_field(f"x [{units[place].strip('[]() ')}]")
+            below = read_column_name(f"x [{units[place].strip('[]() ')}]")
             words = replace(words, unit=below.unit if below else "")
         if words.unit and not words.unit_is_known and words.quantity in (*QUANTITIES, "time"):
             foreign.append((written, words))
@@ -160,7 +163,7 @@ def _best(claims: dict[str, list[TableColumn]]) -> tuple[list[TableColumn], dict
 
 
 def _require_position(
-    path: Path, names: Sequence[str], values: Sequence[TableColumn], foreign: Sequence[tuple[str, FieldWords]]
+    path: Path, names: Sequence[str], values: Sequence[TableColumn], foreign: Sequence[tuple[str, ColumnName]]
 ) -> None:
     have = {column.quantity for column in values}
     if {"x", "y"} <= have or {"range", "azimuth"} <= have:
@@ -175,7 +178,7 @@ def _require_position(
     )
 
 
-def _foreign_unit(path: Path, written: str, words: FieldWords) -> RecordingError:
+def _foreign_unit(path: Path, written: str, words: ColumnName) -> RecordingError:
     units = units_of(words.quantity)
     return RecordingError(
         f"{path}: column '{written.strip()}' has the unknown unit '{words.unit}'; known units: {', '.join(units)}; "

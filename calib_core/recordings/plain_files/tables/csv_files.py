@@ -11,8 +11,8 @@ from os import SEEK_END
 import numpy as np
 
 from calib_core.errors import RecordingError
-from calib_core.recordings.field_words import FIELD_SPELLINGS
 from calib_core.recordings.plain_files.reading_options import PlainOptions
+from calib_core.recordings.plain_files.tables.column_names import COLUMN_SPELLINGS, TIME_QUANTITIES
 from calib_core.recordings.plain_files.tables.columns import TableColumns, units_of
 from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE, TableRows, TextTable
 from calib_core.recordings.plain_files.tables.times import TimeReader
@@ -21,6 +21,7 @@ __all__ = ["CSV_EXAMPLE", "csv_columns", "first_rows", "read_rows", "require_hea
 
 CSV_EXAMPLE = TABLE_EXAMPLE
 _SAMPLED_ROWS = 2000
+_SHOWN_SPELLINGS = 18
 _COMMENTS = ("#", "%")
 _SUSPECT = frozenset({"", " ", "\t", *_COMMENTS})
 _WRITTEN_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf", re.IGNORECASE)
@@ -29,11 +30,11 @@ _WRITTEN_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-
 def csv_columns() -> tuple[str, ...]:
     """Return the table rows of columns and units for the documentation."""
     rows = []
-    for quantity, spellings in FIELD_SPELLINGS.items():
+    for quantity, spellings in COLUMN_SPELLINGS.items():
         units = {"time": "ns, us, ms, s, or dates"}.get(quantity, "")
-        if not units and quantity not in ("sec", "nanosec", "date", "frame"):
+        if not units and quantity not in TIME_QUANTITIES:
             units = ", ".join(units_of(quantity))
-        names = ", ".join(f"`{spelling}`" for spelling in spellings[:12])
+        names = ", ".join(f"`{spelling}`" for spelling in spellings[:_SHOWN_SPELLINGS])
         rows.append(f"| {quantity} | {names} | {units} |")
     return tuple(rows)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.errors import RecordingError
-from calib_core.recordings.field_words import read_field
+from calib_core.recordings.plain_files.tables.column_names import read_column_name
 
 __all__ = ["TABLE_EXAMPLE", "TableRows", "TextTable", "open_text_table"]
 
@@ -155,7 +155,7 @@ def _header_place(lines: Sequence[str]) -> tuple[int | None, str]:
         for separator in _SEPARATORS:
             if separator not in bare:
                 continue
-            known = sum(1 for cell in _cells(bare, separator) if cell and read_field(cell) is not None)
+            known = sum(1 for cell in _cells(bare, separator) if cell and read_column_name(cell) is not None)
             if known > best[0]:
                 best = known, place, separator
     if best[1] is not None:
@@ -190,12 +190,12 @@ def _are_units(cells: Sequence[str]) -> bool:
     words = [cell.strip("[]() ") for cell in cells]
     return any(words) and not any(re.search(r"\d", word) and not word.startswith("m") for word in words) and all(
         len(word) <= 12 for word in words
-    ) and any(read_field(f"x [{word}]") and _known_unit(word) for word in words if word)  # fmt: skip
+    ) and any(read_column_name(f"x [{word}]") and _known_unit(word) for word in words if word)  # fmt: skip
 
 
 def _known_unit(word: str) -> bool:
     return any(
-        (found := read_field(f"{name} [{word}]")) and found.unit_is_known
+        (found := read_column_name(f"{name} [{word}]")) and found.unit_is_known
         for name in ("x", "azimuth", "doppler", "time")
     )
 

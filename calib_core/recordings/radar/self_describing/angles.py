@@ -3,11 +3,11 @@
 import numpy as np
 
 from calib_core.recordings.assumptions import CONFIRM_ALL
+from calib_core.recordings.field_words.units import Unit, unit_of_word
 from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
 from calib_core.recordings.radar.self_describing.candidates import Chosen, Picked
 from calib_core.recordings.radar.self_describing.comments import positive_side
 from calib_core.recordings.radar.self_describing.lengths import are, assume, flag_unit, length_unit_of
-from calib_core.recordings.radar.self_describing.units import Unit, unit_of_word
 from calib_core.recordings.radar.self_describing.values import Finding, angle_unit
 
 __all__ = ["polar_part"]

@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Values
+from calib_core.recordings.field_words.units import Unit, dimension_of
+from calib_core.recordings.field_words.words import has_word, words_of
+from calib_core.recordings.radar.self_describing.comment_units import unit_in
 from calib_core.recordings.radar.self_describing.comments import angle_in
-from calib_core.recordings.radar.self_describing.names import Meaning, has_word, meaning_of, words_of
-from calib_core.recordings.radar.self_describing.units import Unit, dimension_of, unit_in
+from calib_core.recordings.radar.self_describing.names import Meaning, meaning_of
 
 __all__ = ["Chosen", "DescribedColumn", "Picked", "choose"]
 

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from calib_core.recordings.assumptions import CONFIRM_ALL
+from calib_core.recordings.field_words.words import words_of
 from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
 from calib_core.recordings.radar.self_describing.angles import polar_part
 from calib_core.recordings.radar.self_describing.candidates import Chosen, DescribedColumn, choose
 from calib_core.recordings.radar.self_describing.lengths import assume
-from calib_core.recordings.radar.self_describing.names import words_of
 from calib_core.recordings.radar.self_describing.positions import cartesian_part
 from calib_core.recordings.radar.self_describing.speeds import speed_part
 

@@ -1,9 +1,9 @@
 """The unit of a length, with what states it, and how assumptions are worded."""
 
 from calib_core.recordings.assumptions import CONFIRM_ALL, Assumption
+from calib_core.recordings.field_words.units import Unit, unit_of_word
 from calib_core.recordings.radar.column_plan import ColumnAssumption
 from calib_core.recordings.radar.self_describing.candidates import Picked
-from calib_core.recordings.radar.self_describing.units import Unit, unit_of_word
 from calib_core.recordings.radar.self_describing.values import Finding, farthest, length_unit
 
 __all__ = ["are", "assume", "flag_unit", "length_unit_of"]
@@ -24,8 +24,7 @@ def assume(
 
 def flag_unit(unit: Unit) -> str:
     """Return how --map spells a unit; "" if it has no name there."""
-    name = unit.name.replace("/", "").lower()
-    return {"ms": ":mps", "kmh": ":kmh", "cms": ":cmps"}.get(name, f":{name}" if name.isalpha() else "")
+    return f":{unit.flag}" if unit.flag else ""
 
 
 def _metre() -> Unit:

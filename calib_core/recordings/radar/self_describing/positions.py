@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from calib_core.recordings.field_words.units import Unit, unit_of_word
 from calib_core.recordings.radar.axes import RadarAxes
 from calib_core.recordings.radar.column_plan import ColumnAssumption, ColumnPlan, ColumnReading
 from calib_core.recordings.radar.self_describing.candidates import Chosen, Picked
 from calib_core.recordings.radar.self_describing.comments import Direction, axes_in, axis_side, positive_side
 from calib_core.recordings.radar.self_describing.lengths import assume, length_unit_of
-from calib_core.recordings.radar.self_describing.units import Unit, unit_of_word
 from calib_core.recordings.radar.self_describing.values import Finding, PolarAgreement, agreement, forward_axis
 
 __all__ = ["cartesian_part"]

@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 from calib_core.recordings.assumptions import CONFIRM_ALL
+from calib_core.recordings.field_words.units import unit_of_word
 from calib_core.recordings.radar.column_plan import ColumnPlan, ColumnReading
 from calib_core.recordings.radar.self_describing.candidates import Chosen, Picked
 from calib_core.recordings.radar.self_describing.lengths import assume, flag_unit
-from calib_core.recordings.radar.self_describing.units import unit_of_word
 from calib_core.recordings.radar.self_describing.values import speed_unit
 
 __all__ = ["speed_part"]

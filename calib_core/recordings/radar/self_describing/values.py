@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Values
-from calib_core.recordings.radar.self_describing.units import Unit, unit_of_word
+from calib_core.recordings.field_words.units import Unit, unit_of_word
 
 __all__ = [
     "Finding",

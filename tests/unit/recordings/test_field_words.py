@@ -1,0 +1,131 @@
+"""The shared vocabulary: a spelling means the same as a column of a table, as a field of a message, and in --map."""
+
+import math
+import re
+
+import pytest
+
+from calib_core.recordings.column_map import parse_column_map
+from calib_core.recordings.field_words.names import SPELT, quantity_of, spelt
+from calib_core.recordings.field_words.spellings import AMBIGUOUS, SPELLINGS, Spelling
+from calib_core.recordings.field_words.units import UNITS_BY_SPELLING, Unit, unit_of_word
+from calib_core.recordings.field_words.words import SUBJECTS
+from calib_core.recordings.plain_files.tables.column_names import read_column_name
+from calib_core.recordings.radar.self_describing.comment_units import unit_in
+from calib_core.recordings.radar.self_describing.names import meaning_of
+
+LEVELS = ("snr", "intensity", "rcs", "power", "amplitude")
+MEASURED = {"length": "range", "angle": "azimuth", "speed": "doppler", "level": "snr", "time": "time"}
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS, ids=lambda one: one.words)
+def test_a_spelling_means_the_same_as_a_column_and_as_a_field(spelling: Spelling) -> None:
+    quantity = quantity_of(spelling)
+    for name in ("_".join(spelling.words.split()), "target." + ".".join(spelling.words.split())):
+        column, field = read_column_name(name), meaning_of(name)
+        assert column is not None
+        assert field is not None
+        assert column.quantity == quantity
+        assert field.quantity == ("amplitude" if quantity in LEVELS else quantity)
+        assert (field.rank, field.sigma, field.second, field.vague) == (spelling.rank, False, False, False)
+
+
+@pytest.mark.parametrize("subject", sorted(SUBJECTS))
+def test_the_word_for_a_return_may_precede_columns_and_fields(subject: str) -> None:
+    column, field = read_column_name(f"{subject}.pos.x"), meaning_of(f"{subject}.pos.x")
+    assert column is not None
+    assert field is not None
+    assert column.quantity == field.quantity == "x"
+    time = read_column_name(f"{subject}.timestamp")
+    assert time is not None
+    assert time.quantity == "time"
+
+
+def test_no_words_are_spellings_of_two_kinds() -> None:
+    for spelling in SPELLINGS:
+        (words,) = spelt([spelling])
+        assert SPELT[words].kind == spelling.kind, spelling
+
+
+@pytest.mark.parametrize("spelling", AMBIGUOUS, ids=lambda one: one.words)
+def test_an_ambiguous_spelling_is_not_shared(spelling: Spelling) -> None:
+    (words,) = spelt([spelling])
+    assert words not in SPELT
+    assert meaning_of(spelling.words) is not None
+
+
+@pytest.mark.parametrize(("word", "unit"), UNITS_BY_SPELLING.items())
+def test_a_unit_means_the_same_everywhere(word: str, unit: Unit) -> None:
+    quantity = MEASURED[unit.dimension]
+    column = read_column_name(f"{quantity} [{word}]")
+    assert column is not None
+    assert (column.quantity, column.unit) == (quantity, unit.flag)
+    assert column.unit_is_known
+    assert unit_of_word(word) == unit
+    if unit.dimension != "time":
+        assert unit_in(f"[{word}]", unit.dimension) == unit
+    if re.fullmatch(r"\w+", word) and quantity != "snr":
+        (mapped,) = parse_column_map([f"{quantity}=column:{word}"])
+        assert mapped.scale == unit.scale
+
+
+@pytest.mark.parametrize(
+    ("name", "flag"),
+    [
+        ("range_cm", "cm"), ("doppler_m_s", "mps"), ("velocity_km_per_h", "kmh"), ("rcs_dBsm", "dbsm"), ("rcs_dBm²", "dbsm"),
+        ("rcs_dbm2", "dbsm"), ("azimuth_cdeg", "cdeg"), ("elevation°", "deg"), ("vx_mmps", "mmps"),
+    ],
+)  # fmt: skip
+def test_a_unit_at_the_end_of_a_name_is_the_same_in_tables_and_messages(name: str, flag: str) -> None:
+    column, field = read_column_name(name), meaning_of(name)
+    assert column is not None
+    assert field is not None
+    assert field.unit is not None
+    assert column.unit == field.unit.flag == flag
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["dx", "lat", "long", "latitude", "longitude", "position_latitude", "gps_x", "height", "altitude", "alpha", "t_x", "x1", "x2",
+     "azimuth2", "ego_x", "they", "latest"],
+)  # fmt: skip
+def test_names_of_other_things_are_no_columns_of_returns(name: str) -> None:
+    assert read_column_name(name) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "rank"),
+    [("theta", "azimuth", 4), ("angle", "azimuth", 5), ("phi", "azimuth", 3), ("height", "z", 1), ("lat", "y", 1)],
+)
+def test_messages_keep_their_ambiguous_names(name: str, quantity: str, rank: int) -> None:
+    meaning = meaning_of(name)
+    assert meaning is not None
+    assert (meaning.quantity, meaning.rank) == (quantity, rank)
+
+
+def test_only_the_documented_spelling_has_rank_zero() -> None:
+    ranks = {
+        name: column.rank
+        for name in ("range_m", "f_Range_m", "target.range", "sigma_range_m", "rng_m", "range_filtered", "range_std_m")
+        if (column := read_column_name(name)) is not None
+    }
+    assert [name for name, rank in ranks.items() if rank == 0] == [
+        "range_m",
+        "f_Range_m",
+        "target.range",
+        "sigma_range_m",
+    ]
+    assert len(ranks) == 7
+
+
+def test_a_unit_with_a_long_s_in_a_comment_is_read_as_any_other() -> None:
+    unit = unit_in("[m/\u017f]", "speed")
+    assert unit is not None
+    assert unit.scale == 1.0
+
+
+def test_units_of_a_map_are_known_in_all_spellings() -> None:
+    (speed,) = parse_column_map(["doppler=v:kph"])
+    assert (speed.unit, speed.scale) == ("kmh", pytest.approx(1 / 3.6))
+    (angle,) = parse_column_map(["azimuth=-a:degrees"])
+    assert (angle.unit, angle.scale) == ("deg", pytest.approx(-math.pi / 180.0))
