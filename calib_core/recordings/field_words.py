@@ -79,9 +79,10 @@ _QUANTITY = {
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*?)\s*[\])>]\s*")
 _HUNGARIAN = frozenset({"f", "s", "n", "d", "i", "u", "b", "m", "fl", "db", "ui", "dbl", "flt", "p", "str", "val"})
 _SUBJECTS = frozenset({
-    "radar", "target", "targets", "detection", "detections", "det", "point", "points", "pts", "return", "returns", "object",
-    "obj", "reflection", "reflections", "data", "radarpoint", "peak", "peaks", "track", "frames", "scans", "samples", "messages",
-    "msg", "header", "cartesian", "polar", "field", "values", "list", "raw", "meas", "measured", "measurement",
+    "radar", "target", "targets", "detection", "detections", "det", "dets", "point", "points", "pts", "return", "returns",
+    "object", "objects", "obj", "objs", "cluster", "clusters", "hit", "hits", "plot", "plots", "echo", "echoes", "reflection",
+    "reflections", "data", "radarpoint", "peak", "peaks", "track", "frames", "scans", "samples", "messages", "msg", "header",
+    "cartesian", "polar", "field", "values", "list", "raw", "meas", "measured", "measurement",
 })  # fmt: skip
 
 
