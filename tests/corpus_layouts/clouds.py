@@ -35,6 +35,20 @@ def odd_big_endian_cloud(folder: Path) -> Truth:
     return Truth((bag.path,), returns.where(filled), picture_times())
 
 
+def cloud_of_integers(folder: Path) -> Truth:
+    """ROS 2 mcap: a cloud of int16 in centimetres, against the convention of ROS, and speeds in cm/s."""
+    returns = scene(17)
+    kind = np.dtype([("x", "<i2"), ("y", "<i2"), ("z", "<i2"), ("intensity", "<u2"), ("velocity", "<i2")])
+    with Bag(folder, "mcap") as bag:
+        for scan in returns.scans():
+            rows = np.zeros(len(scan.times_ns), dtype=kind)
+            rows["x"], rows["y"], rows["z"] = np.rint(scan.points_m * 100).T
+            rows["velocity"], rows["intensity"] = np.rint(scan.doppler_mps * 100), np.rint(scan.snr_db * 10)
+            bag.write_cloud("/radar_cloud", "radar", int(scan.times_ns[0]), rows)
+        bag.write_camera(picture_times())
+    return Truth((bag.path,), returns, picture_times(), position_tolerance_m=0.01)
+
+
 _DOPPLER = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("doppler", "<f4")])
 _LIDAR = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("ring", "<u2"), ("time", "<f4")])
 

@@ -75,6 +75,17 @@ def german_table(folder: Path) -> Truth:
     return Truth((folder,), returns, picture_times(), has_camera=False, time_tolerance_ns=1000)
 
 
+def tab_separated(folder: Path) -> Truth:
+    """A .tsv with two lines of comments, a row of units in brackets, and millimetres."""
+    returns = scene(25)
+    rows = ["# radar log, version 2", "# sensor: front", "time\tx\ty\tz\tv", "[ns]\t[mm]\t[mm]\t[mm]\t[m/s]"]
+    for time_ns, (x, y, z), doppler, _ in _table(returns):
+        rows.append(f"{time_ns}\t{x * 1e3:.1f}\t{y * 1e3:.1f}\t{z * 1e3:.1f}\t{doppler:.3f}")
+    (folder / "radar.tsv").write_text("\n".join(rows) + "\n")
+    write_dated_pictures(folder / "camera", picture_times())
+    return Truth((folder,), returns, picture_times(), has_camera=False)
+
+
 def _table(returns: Returns) -> list[tuple[int, list[float], float, float]]:
     return list(
         zip(

@@ -1,4 +1,4 @@
-"""Twenty ways in which rigs, vendors and data sets record, each written into a folder with its truth."""
+"""Ways in which rigs, vendors and data sets record, each written into a folder with its truth."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,12 +19,16 @@ LAYOUTS: dict[str, Callable[[Path], Truth]] = {
         messages.integers_with_a_least_bit,
         messages.nested_twice,
         messages.arrays_side_by_side,
+        messages.angle_from_the_zenith,
+        messages.bare_millimetres,
         clouds.odd_big_endian_cloud,
+        clouds.cloud_of_integers,
         clouds.points_beside_a_lidar,
         clouds.near_and_far,
         clouds.front_and_side,
         files.json_lines,
         files.german_table,
+        files.tab_separated,
         files.lists_and_dates,
         files.scans_paired_by_number,
         files.data_port,

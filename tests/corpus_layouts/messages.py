@@ -7,7 +7,7 @@ import numpy as np
 
 from calib_core.recordings import RecordingOptions
 from tests.corpus_layouts.bags import Bag, Kind
-from tests.corpus_layouts.truth import Returns, Truth, picture_times, polar, scene
+from tests.corpus_layouts.truth import Returns, Truth, mirrored, picture_times, polar, scene
 
 
 def _each_scan(
@@ -128,7 +128,7 @@ def polar_without_comments(folder: Path) -> Truth:
     stated = RecordingOptions(
         map=("range=range:m", "azimuth=-angle_az:deg", "elevation=angle_el:deg", "doppler=velocity:mps")
     )
-    return Truth((path,), returns, picture_times(), stated=stated, may_mirror=True)
+    return Truth((path,), returns, picture_times(), stated=stated, as_assumed_m=mirrored(returns.points_m))
 
 
 def scaled_integers(folder: Path) -> Truth:
@@ -263,3 +263,37 @@ def arrays_side_by_side(folder: Path) -> Truth:
         bag.write("/radar/frame", name, message, time_ns)
 
     return Truth((_each_scan(folder, "bag", returns, prepare),), returns, picture_times())
+
+
+def angle_from_the_zenith(folder: Path) -> Truth:
+    """ROS 2 mcap: spherical coordinates of physics, whose theta is no elevation; it may be left out, but not silently."""
+    returns = scene(15)
+    text = (
+        "float32 r      # m\n"
+        "float32 phi    # azimuth, rad, positive to the left\n"
+        "float32 theta  # polar angle from the zenith, rad\n"
+        "float32 v      # m/s, positive away\n"
+    )
+    angles = polar(returns.points_m)
+
+    def rows(scan: Returns) -> dict[str, np.ndarray]:
+        values = polar(scan.points_m)
+        return {"r": values[:, 0], "phi": values[:, 1], "theta": np.pi / 2 - values[:, 2], "v": scan.doppler_mps}
+
+    path = _polar_list(folder, "mcap", returns, "physics_radar/msg/Frame", text, rows)
+    level_m = angles[:, :1] * np.column_stack([np.cos(angles[:, 1]), np.sin(angles[:, 1]), np.zeros(len(angles))])
+    return Truth((path,), returns, picture_times(), as_assumed_m=level_m)
+
+
+def bare_millimetres(folder: Path) -> Truth:
+    """ROS 2 db3: x, y, z and v as int32 in millimetres, and nothing that says so."""
+    returns = scene(16)
+
+    def rows(scan: Returns) -> dict[str, np.ndarray]:
+        points_mm = np.rint(scan.points_m * 1000).astype(int)
+        speed = np.rint(scan.doppler_mps * 1000).astype(int)
+        return {"x": points_mm[:, 0], "y": points_mm[:, 1], "z": points_mm[:, 2], "v": speed}
+
+    text = "int32 x\nint32 y\nint32 z\nint32 v\n"
+    path = _polar_list(folder, "db3", returns, "tiny_radar/msg/Points", text, rows)
+    return Truth((path,), returns, picture_times(), has_doppler=False)

@@ -33,9 +33,8 @@ def read(truth: Truth, options: RecordingOptions | None = None) -> Reading:
         with open_recording(list(truth.paths), truth.given if options is None else options) as recording:
             differences = _differences(recording, truth)
             keys = sorted({f"{item.key} of {item.topic}" for item in recording.assumptions})
-            mirrored = _mirrored(truth) if truth.may_mirror else None
-            if differences and keys and mirrored is not None and not _differences(recording, mirrored):
-                return Reading("differs as assumed", "y mirrored; assumed: " + ", ".join(keys))
+            if differences and keys and not _differences(recording, _as_assumed(truth)):
+                return Reading("differs as assumed", ", ".join(keys))
     except CalibrationError as error:
         return Reading("refused", str(error))
     if differences:
@@ -43,8 +42,10 @@ def read(truth: Truth, options: RecordingOptions | None = None) -> Reading:
     return Reading("right as assumed", ", ".join(keys)) if keys else Reading("right", "")
 
 
-def _mirrored(truth: Truth) -> Truth:
-    return replace(truth, returns=truth.returns.with_points(truth.returns.points_m * [1, -1, 1]))
+def _as_assumed(truth: Truth) -> Truth:
+    """Return the truth under the other assumption that the layout leaves open, if it does."""
+    points_m = truth.returns.points_m if truth.as_assumed_m is None else truth.as_assumed_m
+    return replace(truth, returns=truth.returns.with_points(points_m))
 
 
 def _differences(recording: Recording, truth: Truth) -> list[str]:

@@ -1,4 +1,4 @@
-"""Twenty layouts of recordings, opened as a user does: at least 18 read right, none misread without saying what was assumed."""
+"""Layouts of recordings, opened as a user does: nine of ten are read right, none is misread without a stated assumption."""
 
 from collections import Counter
 
@@ -20,12 +20,12 @@ def readings(truths) -> dict[str, Reading]:
     return {name: read(truth) for name, truth in truths.items()}
 
 
-def test_at_least_eighteen_of_twenty_layouts_are_read_right(readings):
+def test_nine_of_ten_layouts_are_read_right(readings):
     print("\n".join(f"{name:26} {reading.outcome:18} {reading.why}" for name, reading in readings.items()))
     counts = Counter(reading.outcome for reading in readings.values())
-    assert len(readings) == 20
+    assert len(readings) >= 20
     assert counts["wrong"] == 0
-    assert counts["right"] + counts["right as assumed"] + counts["differs as assumed"] >= 18
+    assert counts["right"] + counts["right as assumed"] >= 0.9 * len(readings)
 
 
 @pytest.mark.parametrize("name", LAYOUTS)

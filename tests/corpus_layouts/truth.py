@@ -8,7 +8,18 @@ import numpy as np
 
 from calib_core.recordings import RecordingOptions
 
-__all__ = ["CAMERA", "START_NS", "Returns", "Truth", "grey_of_frame", "jpeg", "picture_times", "polar", "scene"]
+__all__ = [
+    "CAMERA",
+    "START_NS",
+    "Returns",
+    "Truth",
+    "grey_of_frame",
+    "jpeg",
+    "mirrored",
+    "picture_times",
+    "polar",
+    "scene",
+]
 
 START_NS = 1_715_938_951_208_764_000  # 2024-05-17T09:42:31.208764Z
 SCANS, FRAMES = 40, 48
@@ -71,7 +82,7 @@ class Truth:
         times_are_relative: the files hold no times; scan k belongs to frame k.
         given: options a user has to give to read it at all, such as the start of a stream without times.
         stated: options that say what the layout leaves open.
-        may_mirror: the layout does not state the side to which y or the azimuth grows.
+        as_assumed_m: (n, 3) the positions under another assumption, where the layout leaves open what they are.
     """
 
     paths: tuple[Path, ...]
@@ -84,7 +95,7 @@ class Truth:
     times_are_relative: bool = False
     given: RecordingOptions = field(default_factory=RecordingOptions)
     stated: RecordingOptions | None = None
-    may_mirror: bool = False
+    as_assumed_m: np.ndarray | None = None
     frame_step: int = 1
 
 
@@ -109,6 +120,11 @@ def _scan(rng: np.random.Generator, time_ns: int) -> Returns:
     doppler_mps = np.where(rng.uniform(size=count) < 0.3, rng.uniform(-9.0, 9.0, count), rng.normal(0.0, 0.05, count))
     snr_db = rng.uniform(6.0, 35.0, count)
     return Returns(np.full(count, time_ns, dtype=np.int64), points_m, doppler_mps, snr_db)
+
+
+def mirrored(points_m: np.ndarray) -> np.ndarray:
+    """Return the positions (n, 3) of an azimuth that is taken to grow to the other side."""
+    return points_m * [1.0, -1.0, 1.0]
 
 
 def polar(points_m: np.ndarray) -> np.ndarray:

@@ -13,7 +13,6 @@ from calib_core.recordings.plain_files.radar_scans import open_bin_folder, open_
 from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.plain_files.tables.opening import (
-    JSON_SUFFIXES,
     TABLE_SUFFIXES,
     open_radar_table,
     open_table_folder,
@@ -142,7 +141,7 @@ class _Opening:
             if files[0].suffix.lower() in TABLE_SUFFIXES:
                 return open_table_folder(path, files, self.options, numbered)
             return _FOLDERS[files[0].suffix.lower()](path, files, self.options, numbered)
-        if suffix == ".csv" or suffix in JSON_SUFFIXES or suffix == ".txt":
+        if suffix in TABLE_SUFFIXES:
             return open_radar_table(path, self.options)
         if suffix in VIDEO_SUFFIXES:
             return open_video(path, self.options.video_start)
