@@ -97,7 +97,7 @@ def _topic_table(topics: Sequence[TopicSummary]) -> list[str]:
                 "" if topic.rate_hz is None else f"{topic.rate_hz:.1f} Hz",
                 "" if topic.longest_gap_s is None else f"{topic.longest_gap_s:.3f} s",
                 "" if topic.jitter_s is None else f"{topic.jitter_s * 1e3:.1f} ms",
-                _CLOCKS[topic.clock] if topic.clocks is not None else "",
+                _CLOCKS[topic.clock] if topic.chosen and topic.clocks is not None else "",
             )
         )
     lines = list(_columns(rows, right={3, 4, 5, 6}))

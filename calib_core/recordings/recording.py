@@ -3,6 +3,7 @@
 import hashlib
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -309,11 +310,12 @@ def open_recording(
     """
     chosen = (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
     options = options or RecordingOptions()
-    streams, rest = open_uart_streams(require_files(chosen), options.radar_start)
+    streams, rest, taken = open_uart_streams(require_files(chosen), options.radar_start)
     sources: tuple[Source, ...] = streams
     try:
-        plain, others = open_plain_sources(rest, _plain_options(options)) if rest else ((), ())
-        sources = plain = (*streams, *plain)
+        plain_options = replace(_plain_options(options), taken=taken)
+        plain, others = open_plain_sources(rest, plain_options, streams) if rest else (streams, ())
+        sources = plain
         sources = (*(open_sources(others) if others else ()), *plain)
         return Recording(chosen, sources, _assembled(chosen, sources, options, require), options.video_start)
     except BaseException:

@@ -20,6 +20,9 @@ _KNOWN_TABLES = re.compile(
     r"timestamps?|times?|calib.*|.*calibration.*|intrinsics|extrinsics|readme.*|licen[cs]e.*|notes.*", re.I
 )
 _CALIBRATIONS = frozenset({"calib", "calibration", "oxts", "pose", "poses"})
+_SUMS = re.compile(
+    r"_\d+_?(?:frames|scans|sweeps)$", re.I
+)  # View-of-Delft: radar_3frames and radar_5frames beside radar
 _ROS_SUFFIXES = (".bag", ".mcap", ".db3")
 _SAMPLED_FILES = 50
 
@@ -57,7 +60,7 @@ def contents_of(folder: Path, options: PlainOptions) -> Contents:
         RecordingError: it cannot be read, or holds files of several kinds side by side.
     """
     try:
-        entries = _entries(folder)
+        entries = _entries(folder, options)
         below = [inner for entry in entries if entry.is_dir() for inner in entry.iterdir()]
         if any(map(is_ros, (*entries, *below))):
             return Contents(is_ros=True)
@@ -76,8 +79,8 @@ def contents_of(folder: Path, options: PlainOptions) -> Contents:
     return contents
 
 
-def _entries(folder: Path) -> list[Path]:
-    return sorted(inner for inner in folder.iterdir() if not inner.name.startswith("."))
+def _entries(folder: Path, options: PlainOptions) -> list[Path]:
+    return sorted(inner for inner in folder.iterdir() if not inner.name.startswith(".") and inner not in options.taken)
 
 
 def _kind(file: Path) -> str:
@@ -110,7 +113,7 @@ def _one_kind(folder: Path, kinds: dict[str, list[Path]]) -> tuple[Path, ...]:
 
 def _walk(folder: Path, contents: Contents, options: PlainOptions, depth: int) -> None:
     """Add what is below a data-set folder."""
-    entries = _entries(folder)
+    entries = _entries(folder, options)
     folders = [entry for entry in entries if entry.is_dir()]
     files = [entry for entry in entries if entry.is_file()]
     if any(map(is_ros, files)):
@@ -125,6 +128,10 @@ def _walk(folder: Path, contents: Contents, options: PlainOptions, depth: int) -
     for inner in folders:
         if inner.name.lower() in _CALIBRATIONS:
             continue  # read with the pictures beside it
+        single = _SUMS.sub("", inner.name)
+        if single != inner.name and (folder / single).is_dir():
+            contents.refused.append((inner, f"sums of several scans of {single}, which are used one by one"))
+            continue
         if inner.name == "sweeps" and (folder / "samples").is_dir():
             contents.refused.append((inner, "frames between the annotated ones; open its folders by their own paths"))
         elif depth >= _DEPTH:

@@ -13,7 +13,6 @@ from calib_core.recordings.plain_files.radar_scans import open_bin_folder, open_
 from calib_core.recordings.plain_files.reading_options import PlainOptions
 from calib_core.recordings.plain_files.source import PlainSource
 from calib_core.recordings.plain_files.tables.opening import (
-    JSON_SUFFIXES,
     TABLE_SUFFIXES,
     open_radar_table,
     open_table_folder,
@@ -33,18 +32,19 @@ _MOST_NAMED = 6
 
 
 def open_plain_sources(
-    paths: Sequence[Path], options: PlainOptions
+    paths: Sequence[Path], options: PlainOptions, streams: Sequence[PlainSource] = ()
 ) -> tuple[tuple[PlainSource, ...], tuple[Path, ...]]:
-    """Open the paths that are not ROS recordings; return their sources and the remaining paths.
+    """Open the paths that are not ROS recordings; return the streams and their sources, and the remaining paths.
 
     Args:
         paths: as the user gave them.
         options: the user's.
+        streams: what was found in these paths already; paths that hold nothing else are no error.
 
     Raises:
         RecordingError: such a file or folder cannot be used.
     """
-    opening = _Opening(options)
+    opening = _Opening(options, tuple(streams))
     try:
         for path in paths:
             opening.add(path)
@@ -71,8 +71,9 @@ def _require_use(
 class _Opening:
     """The sources opened so far, and what was looked at and not used."""
 
-    def __init__(self, options: PlainOptions) -> None:
+    def __init__(self, options: PlainOptions, streams: tuple[PlainSource, ...]) -> None:
         self.options = options
+        self.streams = streams
         self.left: list[Path] = []
         self.found: list[tuple[Path, tuple[Path, ...], bool]] = []
         self.refused: list[tuple[Path, str]] = []
@@ -87,9 +88,10 @@ class _Opening:
         contents = contents_of(path, self.options) if path.is_dir() else Contents([(path, ())], inside=False)
         self.found.extend((inner, files, contents.inside) for inner, files in contents.sources)
         self.refused.extend(contents.refused)
-        if not contents.sources and contents.refused:
+        has_stream = any(file.is_relative_to(path) for file in self.options.taken)
+        if not contents.sources and contents.refused and not has_stream:
             raise RecordingError(f"{path}: nothing in it can be used: {_reasons(contents.refused)}")
-        if not contents.sources:
+        if contents.is_ros or not (contents.sources or has_stream):
             self.left.append(path)
 
     def finish(self) -> tuple[tuple[PlainSource, ...], tuple[Path, ...]]:
@@ -107,9 +109,9 @@ class _Opening:
                 opened[place] = source
                 self.sources.append(source)
                 numbered = numbered or (dict(source.numbers) if _has_pictures(files) else {})
-        if not opened and not self.left:
+        if not (opened or self.left or self.streams):
             raise RecordingError(f"{self.found[0][0].parent}: nothing in it can be used: {_reasons(self.refused)}")
-        named: list[PlainSource] = []
+        named = list(self.streams)
         for place in sorted(opened):
             named.append(_with_own_topic(opened[place], [other.channel.topic for other in named]))
         return self._with_refusals(_with_open_times(named, ros=bool(self.left))), tuple(self.left)
@@ -139,7 +141,7 @@ class _Opening:
             if files[0].suffix.lower() in TABLE_SUFFIXES:
                 return open_table_folder(path, files, self.options, numbered)
             return _FOLDERS[files[0].suffix.lower()](path, files, self.options, numbered)
-        if suffix == ".csv" or suffix in JSON_SUFFIXES or suffix == ".txt":
+        if suffix in TABLE_SUFFIXES:
             return open_radar_table(path, self.options)
         if suffix in VIDEO_SUFFIXES:
             return open_video(path, self.options.video_start)

@@ -29,6 +29,8 @@ __all__ = ["open_uart_streams"]
 _SUFFIXES = (".bin", ".dat", ".raw", ".log", "")
 _FRAME = "radar"
 _LOOK_BYTES = 1 << 20
+_DEPTH = 5
+_SAMPLED_FILES = 4  # of a folder below the one that was named
 _COMMANDS = re.compile(rb"mmwDemo:/>|^(?:sensorStart|sensorStop|profileCfg|frameCfg)\b", re.MULTILINE)
 _WORD = re.compile(re.escape(MAGIC))
 _ADC_NAME = re.compile(r"adc_?data|_raw_\d+$", re.IGNORECASE)
@@ -36,11 +38,11 @@ _ADC_NAME = re.compile(r"adc_?data|_raw_\d+$", re.IGNORECASE)
 
 def open_uart_streams(
     paths: Sequence[Path], radar_start: str | None
-) -> tuple[tuple[PlainSource, ...], tuple[Path, ...]]:
-    """Open the paths that hold the bytes of a TI data port; return their sources and the remaining paths.
+) -> tuple[tuple[PlainSource, ...], tuple[Path, ...], frozenset[Path]]:
+    """Open the bytes of TI data ports; return their sources, the paths that hold anything else, and the files read.
 
     Args:
-        paths: files, or folders with the chunks of one stream; judged by their bytes, not by their names.
+        paths: files, or folders with the chunks of one stream in them or below; judged by their bytes, not by their names.
         radar_start: --radar-start, the time of the first frame, with the time between frames after a comma.
 
     Raises:
@@ -48,21 +50,41 @@ def open_uart_streams(
     """
     opened: list[PlainSource] = []
     left: list[Path] = []
+    taken: set[Path] = set()
     for path in paths:
-        chunks = _candidates(path)
-        if any(map(_is_stream, chunks)):
-            chunks = [file for file in chunks if not _is_command_log(file)]
-            opened.append(_open(path, chunks, radar_start))
-        else:
-            if path.is_file():
-                _refuse_other_data(path)
+        found = _streams_of(path)
+        for place, files in found:
+            chunks = [file for file in files if not _is_command_log(file)]
+            opened.append(_open(place, chunks, radar_start))
+            taken.update(files)
+        if path.is_file() and not found:
+            _refuse_other_data(path)
+        if path.is_dir() or not found:
             left.append(path)
     if radar_start is not None and not opened:
         raise RecordingError(
             f"--radar-start {radar_start}: no TI data-port stream among {', '.join(path.name for path in paths)}; "
             "remove the option, or add the stream"
         )
-    return tuple(opened), tuple(left)
+    return tuple(opened), tuple(left), frozenset(taken)
+
+
+def _streams_of(path: Path) -> list[tuple[Path, list[Path]]]:
+    """Return the streams in a file, a folder and the folders below, each with its files."""
+    files = _candidates(path)
+    found = [(path, files)] if any(map(_is_stream, files)) else []
+    for folder in _folders_below(path, _DEPTH):
+        files = _candidates(folder)
+        if any(map(_is_stream, files[:_SAMPLED_FILES])):
+            found.append((folder, files))
+    return found
+
+
+def _folders_below(path: Path, depth: int) -> list[Path]:
+    if not (depth and path.is_dir()):
+        return []
+    inner = sorted(entry for entry in path.iterdir() if entry.is_dir() and not entry.name.startswith("."))
+    return [folder for entry in inner for folder in (entry, *_folders_below(entry, depth - 1))]
 
 
 def _candidates(path: Path) -> list[Path]:
@@ -159,8 +181,8 @@ def _about_damage(path: Path, scan: "_Scan") -> list[DataWarning]:
     return [
         DataWarning(
             "damaged-file",
-            f"{path.name}: {scan.broken} of {scan.broken + len(scan.packets)} packets are damaged or cut off, and "
-            f"{scan.strange_bytes} bytes belong to no packet; they are skipped; by their numbers, {missing} frames are missing",
+            f"{path.name}: of {scan.broken + len(scan.packets)} packets, {scan.broken} are damaged or cut off and skipped; "
+            f"{scan.strange_bytes} bytes belong to no packet; by their numbers, {missing} frames are missing",
             "no action needed for a few: the port drops bytes; if there are many, check its speed and the cable",
         )
     ]

@@ -11,6 +11,8 @@ from calib_core.recordings.radar.plugins import all_decoders
 from calib_core.recordings.radar.registry import Decoder, MessageKind
 from calib_core.recordings.radar.self_describing.candidates import DescribedColumn
 from calib_core.recordings.radar.self_describing.description import describe_columns, fill_in
+from calib_core.recordings.radar.self_describing.lengths import FARTHEST_M
+from calib_core.recordings.radar.self_describing.values import farthest
 
 __all__ = ["column_readings", "find_decoder", "plan_described", "plan_for", "plan_like"]
 
@@ -90,13 +92,20 @@ def plan_described(
         remarks: comments of the definition that belong to no field.
     """
     names, arrays = [column.name for column in columns], tuple(arrays)
+    exact = plan_columns(names)
+    if kind in _CLOUDS and exact is not None and not exact.polar and _is_too_far(exact, columns):
+        return describe_columns(columns, remarks, in_ros_frame=True, known=True)
     if find_decoder(kind, (*names, *arrays)):
         return plan_for(kind, names, arrays)
-    exact = plan_columns(names)
     if kind in _CLOUDS and exact is not None and {"x", "y"} <= {name.lower() for name in exact.position}:
         return fill_in(exact, columns)
     known = exact is not None and exact.looks_like_radar
     return describe_columns(columns, remarks, in_ros_frame=kind in _CLOUDS, known=known or kind in _CLOUDS)
+
+
+def _is_too_far(plan: ColumnPlan, columns: Sequence[DescribedColumn]) -> bool:
+    """Return whether positions would be farther away than any radar sees if they were metres."""
+    return farthest(*(column.values for column in columns if column.name in plan.position)) > FARTHEST_M
 
 
 def plan_like(first: ColumnPlan, kind: MessageKind, names: Iterable[str]) -> ColumnPlan | None:

@@ -65,7 +65,8 @@ class CloudLayout:
         if within is None:
             return None
         plan = plan_for("cloud", dtype.names or ())
-        if plan is None or not plan.decoder:
+        whole = plan is not None and any(dtype[name].kind != "f" for name in plan.position)
+        if plan is None or not plan.decoder or whole:  # integers are hardly metres
             plan = plan_described("cloud", _cloud_columns(samples, dtype))
         plan = within.applied(plan)
         if plan is None:

@@ -51,8 +51,8 @@ from
   and z theirs.
 
 PointCloud2 and the positions of geometry_msgs are in metres, x forward, y left, z up, as ROS defines (REP 103), unless values
-contradict it. `cocalib info` lists for each quantity the field, its unit, the direction in which it grows, and how this is
-known.
+contradict it: positions beyond 1 km get the likeliest unit, an assumption. `cocalib info` lists for each
+quantity the field, its unit, the direction in which it grows, and how this is known.
 
 What nothing states is an **assumption**: the side to which an azimuth grows, the unit of a speed, left or right of a lateral
 axis, which of two angles is the azimuth, several sensors in one list. It is a warning (`assumed`) and part of the calibration's
@@ -118,8 +118,8 @@ folder that contains them, or the folder of a data set, five levels deep. What w
 |---|---|
 | folder of `.pcd` (version 0.7, binary or ascii), such as nuScenes | radar, one scan per file; recognised like a PointCloud2 |
 | folder of `.bin` | View-of-Delft radar, one scan per file; four floats a point (KITTI) are a lidar's and not used |
-| `.bin`, `.dat` of a TI data port, or a folder of them | radar, judged by the bytes; [see below](#data-port-of-ti-radars) |
-| `.csv`, `.txt`, `.jsonl`, `.ndjson`, `.json` | radar; see below. The first line of a CSV names columns and units: `{example}` |
+| `.bin`, `.dat` of a TI data port, or a folder with them | radar, judged by the bytes; [see below](#data-port-of-ti-radars) |
+| `.csv`, `.tsv`, `.txt`, `.jsonl`, `.ndjson`, `.json` | radar; see below. The first line of a CSV names columns and units: `{example}` |
 | folder of `.csv`, `.txt` or `.json` with one scan each | radar; times inside, or in the file names |
 | folder of pictures | camera; pictures that cannot be decoded are left out and counted (`unreadable-pictures`) |
 | video file, with `--video-start` | camera; most videos do not store the original frame times: use the recording if possible |
@@ -165,7 +165,8 @@ hold no detections and are refused by name.
 | nuScenes | its root | `v1.0-*/calibrated_sensor.json`, of the car the pictures come from | in the same file |
 
 Intrinsics without a size are for the pictures' own size. Of several cameras or radars the one whose name contains "front" is chosen;
-`--radar-topic` and `--image-topic` choose another.
+`--radar-topic` and `--image-topic` choose another. Sums of scans beside the scans (`radar_3frames`, `radar_5frames`) and the
+`sweeps` beside `samples` are named and not used; open them by their own paths.
 
 ### Warnings about files
 

@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
-TABLE_SUFFIXES = (".csv", ".txt", *JSON_SUFFIXES)
+TABLE_SUFFIXES = (".csv", ".tsv", ".txt", *JSON_SUFFIXES)
 _SAMPLED_FILES = 12
 
 Table: TypeAlias = TextTable | JsonTable

@@ -57,7 +57,9 @@ def polar_part(chosen: Chosen, remarks: str) -> ColumnPlan:
         sigma_scales=(own[0], own[1] / base.scale, own[2] / base.scale),
         other_azimuths=chosen.other_azimuths,
         readings=tuple(readings),
-        assumptions=tuple(one for one in (about, about_angle, about_sign, _about_vague(chosen)) if one),
+        assumptions=tuple(
+            one for one in (about, about_angle, about_sign, _about_vague(chosen), _about_unused(chosen)) if one
+        ),
     )
 
 
@@ -110,6 +112,14 @@ def _azimuth_sign(azimuth: Picked, angle: Unit, remarks: str) -> tuple[int, str,
         ("azimuth",),
         axes=True,
     )  # fmt: skip
+
+
+def _about_unused(chosen: Chosen) -> ColumnAssumption | None:
+    if not chosen.unused_angles:
+        return None
+    names = ", ".join(chosen.unused_angles)
+    text = f"the returns are taken as level with the radar; {names} may hold their elevation and is not used"
+    return assume("field-meaning", text, f"--map elevation={chosen.unused_angles[0]}", ("elevation",))
 
 
 def _about_vague(chosen: Chosen) -> ColumnAssumption | None:

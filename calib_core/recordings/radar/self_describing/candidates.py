@@ -87,12 +87,14 @@ class Chosen:
         sigma: standard deviations by quantity.
         vague: angles whose names fit azimuth and elevation alike, if they had to be told apart.
         other_azimuths: columns with further hypotheses.
+        unused_angles: columns that may hold the elevation, if no other does.
     """
 
     picked: dict[str, Picked]
     sigma: dict[str, Picked]
     vague: tuple[Picked, ...] = ()
     other_azimuths: tuple[str, ...] = ()
+    unused_angles: tuple[str, ...] = ()
 
 
 def choose(columns: Sequence[DescribedColumn]) -> Chosen:
@@ -117,7 +119,9 @@ def choose(columns: Sequence[DescribedColumn]) -> Chosen:
     )
     others = tuple(one.column.name for one in second) if "azimuth" in picked else ()
     vague = _told_apart([one for one in first if one.meaning.vague], picked)
-    return Chosen(picked, sigma, vague, others)
+    used = [one.column.name for one in picked.values()]
+    unused = tuple(one.column.name for one in first if one.meaning.vague and one.column.name not in used)
+    return Chosen(picked, sigma, vague, others, () if "elevation" in picked else unused)
 
 
 def _stripped(columns: Sequence[DescribedColumn]) -> list[tuple[DescribedColumn, str]]:

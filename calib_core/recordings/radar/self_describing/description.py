@@ -42,7 +42,8 @@ def describe_columns(
         plan = polar_part(chosen, remarks)
     else:
         return None
-    return _flags(_amplitude(speed_part(plan, chosen, in_ros_frame=in_ros_frame), chosen), columns)
+    metres = in_ros_frame and plan.scales[0] == 1.0
+    return _flags(_amplitude(speed_part(plan, chosen, in_ros_frame=metres), chosen), columns)
 
 
 def _looks_like_radar(chosen: Chosen) -> bool:

@@ -6,9 +6,10 @@ from calib_core.recordings.radar.column_plan import ColumnAssumption
 from calib_core.recordings.radar.self_describing.candidates import Picked
 from calib_core.recordings.radar.self_describing.values import Finding, farthest, length_unit
 
-__all__ = ["are", "assume", "flag_unit", "length_unit_of"]
+__all__ = ["FARTHEST_M", "are", "assume", "flag_unit", "length_unit_of"]
 
-_FARTHEST_M = 1000.0
+FARTHEST_M = 1000.0
+"""No radar returns lie farther away."""
 _ROS = "ROS defines it (REP 103)"
 _AS_MAPPED = {
     "forward": ("x", ""), "backward": ("x", "-"), "left": ("y", ""), "right": ("y", "-"), "up": ("z", ""), "down": ("z", "-"),
@@ -47,9 +48,9 @@ def length_unit_of(
     units = [one.unit or usual for one in group]
     largest = farthest(*(one.column.values * unit.scale for one, unit in zip(group, units, strict=True)))
     names = ", ".join(one.column.name for one in group)
-    if stated or standard:
+    if stated or (standard and largest <= FARTHEST_M):
         why = stated.why if stated else _ROS
-        if largest <= _FARTHEST_M:
+        if largest <= FARTHEST_M:
             return units, why, None
         text = f"{names} would reach {largest:.4g} m in {usual.name} ({why}), which is too far; the unit is taken all the same"
         return units, why, _about_length(text, group, usual, sides)

@@ -21,6 +21,8 @@ __all__ = [
 
 _NEAREST_M, _FARTHEST_M = 4.0, 500.0
 """No recording of a radar ends nearer than the first, and no automotive radar sees farther than the second [m]."""
+_USUAL_M = 300.0
+"""Of several units that fit, the one is likelier in which nothing lies farther away than this."""
 _NEAREST_METRES = 1.0
 """Values in metres are believed to be metres from here on: in cm or mm they would all lie within a finger's width."""
 _FASTEST_MPS = 150.0
@@ -72,7 +74,8 @@ def length_unit(largest: float, *, integer: bool) -> Finding:
     if not fitting:
         return Finding(_unit("m"), False, "no value tells the unit")
     why = f"values up to {largest:.4g}"
-    return Finding(fitting[0], len(fitting) == 1 and not integer, why)
+    usual = [unit for unit in fitting if largest * unit.scale <= _USUAL_M]
+    return Finding((usual or fitting)[0], len(fitting) == 1 and not integer, why)
 
 
 def angle_unit(angles: Values, *, integer: bool) -> Finding:

@@ -69,6 +69,18 @@ def test_view_of_delft_brings_its_camera_and_names_its_pose(tmp_path, inner) -> 
         assert "velodyne (3 lidar clouds, which this program does not use)" in text
 
 
+def test_sums_of_scans_beside_the_scans_are_not_the_radar(tmp_path) -> None:
+    root = view_of_delft(tmp_path / "view_of_delft")
+    for number in range(3):
+        floats_bin(root / "radar_5frames" / "training" / "velodyne" / f"{number:05}.bin", 60, 7)
+    with open_recording(root) as recording:
+        assert recording.radar_topic == "/velodyne/radar"
+        assert np.diff(recording.radar_scans().first_return).tolist() == [5, 6, 7]
+        assert "radar_5frames (sums of several scans of radar, which are used one by one)" in describe(recording)
+    with open_recording([root / "radar_5frames", root / "radar" / "training" / "image_2"]) as recording:
+        assert np.diff(recording.radar_scans().first_return).tolist() == [60, 60, 60]
+
+
 def test_intrinsics_that_differ_between_frames_are_told(tmp_path) -> None:
     root = view_of_delft(tmp_path / "drive")
     (root / "radar" / "training" / "calib" / "00002.txt").write_text(calib_text(K * [[1.1], [1.1], [1]]))

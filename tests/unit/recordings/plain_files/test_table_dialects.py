@@ -443,6 +443,17 @@ def test_numbered_scans_have_the_times_of_the_pictures_with_their_numbers(tmp_pa
     assert "they have the times of the pictures with their numbers" in warning.message
 
 
+@pytest.mark.parametrize("word", ["objects", "clusters", "hits", "dets"])
+def test_a_list_of_json_may_have_any_common_word_for_returns(tmp_path, word) -> None:
+    lines = [
+        json.dumps({"ts": START_NS / 1e9 + 0.1 * number, word: [{"id": 3, "pos": {"x": 9.25, "y": 1.5, "z": 0.5}}]})
+        for number in range(4)
+    ]
+    (tmp_path / "a.jsonl").write_text("\n".join(lines) + "\n")
+    with open_recording(tmp_path / "a.jsonl", require=("radar",)) as recording:
+        np.testing.assert_allclose(recording.radar_scans().points_radar_m, [[9.25, 1.5, 0.5]] * 4)
+
+
 def test_json_files_with_one_scan_each_are_a_radar(tmp_path) -> None:
     folder = tmp_path / "radar"
     folder.mkdir()

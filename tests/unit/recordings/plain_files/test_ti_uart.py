@@ -218,3 +218,26 @@ def test_a_stream_is_opened_with_the_pictures_of_its_camera(tmp_path):
     with open_recording([folder, path], RecordingOptions(radar_start=f"{START},0.05")) as recording:
         assert (len(recording.image_times), len(recording.radar_times)) == (10, 20)
         assert recording.image_times[0] == recording.radar_times[0]
+
+
+@pytest.mark.parametrize("inner", ["", "radar/raw"])
+def test_a_folder_with_a_stream_and_pictures_below_is_read_whole(tmp_path, jpeg, inner):
+    (tmp_path / inner).mkdir(parents=True, exist_ok=True)
+    written(tmp_path / inner, stream(scans(20, np.random.default_rng(14))))
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes" / "plan.csv").write_text("who,what\nme,this\n")
+    (tmp_path / "front").mkdir()
+    for number in range(10):
+        (tmp_path / "front" / f"{START_S * NS_PER_S + 250_000_000 + number * 10**8}.jpg").write_bytes(jpeg)
+    with open_recording(tmp_path, RecordingOptions(radar_start=f"{START},0.05")) as recording:
+        assert (len(recording.image_times), len(recording.radar_times)) == (10, 20)
+        assert "plan.csv" in describe(recording)
+
+
+def test_a_folder_with_only_a_stream_names_what_it_does_not_use(tmp_path):
+    written(tmp_path, stream(scans(20, np.random.default_rng(15))))
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes" / "plan.csv").write_text("who,what\nme,this\n")
+    with opened(tmp_path) as recording:
+        assert len(recording.radar_times) == 20
+        assert "plan.csv" in describe(recording)

@@ -1,0 +1,39 @@
+"""Ways in which rigs, vendors and data sets record, each written into a folder with its truth."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.corpus_layouts import clouds, data_sets, files, messages
+from tests.corpus_layouts.truth import Truth
+
+__all__ = ["LAYOUTS"]
+
+LAYOUTS: dict[str, Callable[[Path], Truth]] = {
+    layout.__name__: layout
+    for layout in (
+        messages.vendor_structs,
+        messages.packets_with_comments,
+        messages.polar_without_comments,
+        messages.scaled_integers,
+        messages.right_forward_comment,
+        messages.integers_with_a_least_bit,
+        messages.nested_twice,
+        messages.arrays_side_by_side,
+        messages.angle_from_the_zenith,
+        messages.bare_millimetres,
+        clouds.odd_big_endian_cloud,
+        clouds.cloud_of_integers,
+        clouds.points_beside_a_lidar,
+        clouds.near_and_far,
+        clouds.front_and_side,
+        files.json_lines,
+        files.german_table,
+        files.tab_separated,
+        files.lists_and_dates,
+        files.scans_paired_by_number,
+        files.data_port,
+        data_sets.view_of_delft,
+        data_sets.kitti_raw_drive,
+        data_sets.nuscenes_mini,
+    )
+}

@@ -1,0 +1,54 @@
+"""Layouts of recordings, opened as a user does: nine of ten are read right, none is misread without a stated assumption."""
+
+from collections import Counter
+
+import pytest
+
+from calib_core.recordings import describe, open_recording
+from tests.corpus_layouts.layouts import LAYOUTS
+from tests.corpus_layouts.reading import Reading, read
+from tests.corpus_layouts.truth import Truth
+
+
+@pytest.fixture(scope="module")
+def truths(tmp_path_factory) -> dict[str, Truth]:
+    return {name: write(tmp_path_factory.mktemp(name)) for name, write in LAYOUTS.items()}
+
+
+@pytest.fixture(scope="module")
+def readings(truths) -> dict[str, Reading]:
+    return {name: read(truth) for name, truth in truths.items()}
+
+
+def test_nine_of_ten_layouts_are_read_right(readings):
+    print("\n".join(f"{name:26} {reading.outcome:18} {reading.why}" for name, reading in readings.items()))
+    counts = Counter(reading.outcome for reading in readings.values())
+    assert len(readings) >= 20
+    assert counts["wrong"] == 0
+    assert counts["right"] + counts["right as assumed"] >= 0.9 * len(readings)
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_no_layout_is_misread_without_a_stated_assumption(readings, name):
+    reading = readings[name]
+    assert reading.outcome != "wrong", reading.why
+
+
+def test_saying_what_a_layout_leaves_open_makes_it_right(truths):
+    stated = {name: truth for name, truth in truths.items() if truth.stated is not None}
+    assert len(stated) >= 3
+    for name, truth in stated.items():
+        reading = read(truth, truth.stated)
+        assert reading.outcome == "right", f"{name}: {reading.outcome}: {reading.why}"
+
+
+def test_what_a_layout_holds_and_is_not_read_is_named(truths):
+    for name, what in (("view_of_delft", "radar_5frames"), ("nuscenes_mini", "sweeps"), ("kitti_raw_drive", "lidar")):
+        with open_recording(list(truths[name].paths)) as recording:
+            assert what in describe(recording), name
+
+
+def test_a_refused_layout_names_what_was_looked_at(readings):
+    for name, reading in readings.items():
+        if reading.outcome == "refused":
+            assert "looked at and not used" in reading.why, f"{name}: {reading.why}"
