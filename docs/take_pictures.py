@@ -21,11 +21,11 @@ PICTURES = ROOT / "docs" / "pictures"
 SIZE = {"width": 1440, "height": 900}
 
 
-def opened(browser: Browser, server: RunningServer, theme: str) -> Driver:
+def opened(browser: Browser, server: RunningServer, theme: str, ready: str = "__cocalib.state.shown") -> Driver:
     """Open the page in a theme, 3D view included."""
     page = browser.new_page(viewport=SIZE)  # type: ignore[arg-type]
     page.add_init_script(f"if (top === window) localStorage.setItem('cocalib-layout', '{{\"theme\": \"{theme}\"}}')")
-    driver = Driver(page, server.url)
+    driver = Driver(page, server.url, ready)
     driver.until("__cocalib.state.placementsKnown")
     page.frame_locator("#space-view").locator("canvas").last.wait_for(state="attached")
     return driver
@@ -67,6 +67,20 @@ def take_all(browser: Browser, server: RunningServer, clicks: list[dict[str, Any
     shoot(opened(browser, server, "light"), "light")
 
 
+def take_radar_only(browser: Browser, folder: Path, session: Path) -> None:
+    """Look at the sample's radar without its camera: the third placement."""
+    with open_recording(folder / "radar.bag", require=("radar",)) as recording:
+        workspace = open_workspace(recording, camera=None, session_folder=session, name="radar.bag")
+        server = start(workspace, recording, ServerOptions(port=0, token="pictures"))
+        driver = opened(browser, server, "dark", "__cocalib.state.look")
+        driver.until("__cocalib.state.radarMap")
+        driver.press("n", "n", "n")
+        driver.until("__cocalib.state.look.index === __cocalib.state.placements[2].frame")
+        shoot(driver, "radar")
+        server.close()
+        workspace.close()
+
+
 def main() -> None:
     """Serve the sample with a session of its own and take the pictures."""
     PICTURES.mkdir(parents=True, exist_ok=True)
@@ -83,6 +97,7 @@ def main() -> None:
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=str(find_browser()), args=FLAGS)
             take_all(browser, server, clicks)
+            take_radar_only(browser, folder, Path(session) / "radar")
             browser.close()
         server.close()
         workspace.close()

@@ -48,7 +48,7 @@ function draw() {
   figures.classList.toggle("stale", view.solving && !view.checking && view.has_calibration);
   if (state.looking) {
     figures.replaceChildren(...state.placementFigures.map(cell));
-    return drawWarnings([{ code: "no-camera", message: view.status, hint: view.hint }, ...(state.recording?.warnings ?? [])]);
+    return drawWarnings([{ code: "no-camera", message: view.status, hint: view.hint }, ...(state.recording?.warnings ?? [])], view.assumptions);
   }
   const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Available after the first calibration.", level: "none" }));
   figures.replaceChildren(...shown.map(cell));

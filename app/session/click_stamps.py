@@ -11,6 +11,9 @@ from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs, time_parts
 
 __all__ = ["ClicksAtFrames", "clicks_at_frames", "half_interval_ns", "nearest_frame"]
 
+_ROUNDED_NS = 1_000
+"""Names of pictures and many programs state microseconds: a click that is off by less names its frame all the same."""
+
 
 @dataclass(frozen=True, slots=True)
 class ClicksAtFrames:
@@ -18,7 +21,7 @@ class ClicksAtFrames:
 
     Attributes:
         clicks: sorted by time.
-        moved: one sentence per click whose stamp was no frame's.
+        moved: one sentence per click whose stamp was no frame's, rounding to microseconds aside.
     """
 
     clicks: tuple[ReflectorClick, ...]
@@ -52,7 +55,8 @@ def clicks_at_frames(clicks: Sequence[ReflectorClick], image_times: TimesNs, *, 
                 f"({half_ns / 1e6:.1f} ms); give the clicks of this recording, with the stamps of its frames"
             )
         at_frames.append(replace(click, image_time=frame))
-        moved.append(f"{what} {where}, and is used")
+        if abs(frame - click.image_time) >= _ROUNDED_NS:
+            moved.append(f"{what} {where}, and is used")
     return ClicksAtFrames(tuple(sorted(at_frames)), tuple(moved))
 
 

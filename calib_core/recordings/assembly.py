@@ -17,7 +17,7 @@ from calib_core.recordings.camera.images import ImageLayout
 from calib_core.recordings.camera.picture_sizes import frames_of_one_size
 from calib_core.recordings.camera.recorded_intrinsics import published_camera, recorded_camera
 from calib_core.recordings.camera.video_stream import about_video, image_stream
-from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap
+from calib_core.recordings.checks import about_images, about_lost, about_radar, check_overlap, without_certain_zone
 from calib_core.recordings.column_map import parse_column_map
 from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.messages.decoding import Message
@@ -129,7 +129,7 @@ def assemble(
     warnings.extend(
         [*about_camera, *about_radar(radar), *_about_claims(radar), *about_images(images), *about_video(images)]
     )
-    assumptions = _assumptions(sources, used, radar)
+    assumptions = without_certain_zone(_assumptions(sources, used, radar), radar, images)
     unconfirmed = () if options.confirm_assumptions else assumptions
     warnings.extend(about_assumptions(unconfirmed))
     return Assembly(
@@ -343,6 +343,11 @@ def _frame(topic: Topic | None) -> str:
     return str(frame).lstrip("/")
 
 
+def _computed(topic: Topic) -> str:
+    source = topic.parts[0][0]
+    return source.computed if isinstance(source, PlainSource) else ""
+
+
 def _summary(
     topic: Topic,
     inventory: Inventory,
@@ -363,7 +368,7 @@ def _summary(
         clock=diagnosis.chosen if diagnosis else "receive",
         problem=usage.problem,
         chosen=any(t and t.name == topic.name for t in (*used.all, used.camera_info)),
-        layout=usage.radar.description if usage.radar else "",
+        layout="; ".join(filter(None, (usage.radar.description, _computed(topic)))) if usage.radar else "",
         rate_hz=rhythm.rate_hz,
         longest_gap_s=rhythm.longest_gap_s,
         jitter_s=rhythm.jitter_s,

@@ -7,6 +7,7 @@ import numpy as np
 from calib_core.arrays import TimesNs
 from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.radar.merged_stream import MergedStream
 from calib_core.recordings.radar.scan_stream import RadarStream
@@ -14,7 +15,7 @@ from calib_core.recordings.stamping import StampedTopic
 from calib_core.recordings.time.dates import utc
 from calib_core.results import DataWarning
 
-__all__ = ["about_images", "about_lost", "about_radar", "check_overlap"]
+__all__ = ["about_images", "about_lost", "about_radar", "check_overlap", "without_certain_zone"]
 
 _SAMPLED_SCANS = 12
 _ZONES_S = range(-12 * 3600, 14 * 3600 + 1, 15 * 60)
@@ -81,14 +82,41 @@ def check_overlap(
     return [DataWarning("no-overlap", what, hint)]
 
 
+def without_certain_zone(
+    assumptions: tuple[Assumption, ...], radar: RadarStream | MergedStream | None, images: ImageStream | None
+) -> tuple[Assumption, ...]:
+    """Leave out that dates are UTC where radar and camera would never meet in any other time zone.
+
+    Args:
+        assumptions: about the topics in use.
+        radar: the radar stream, if any.
+        images: the image stream, if any.
+    """
+    zoneless = {one.topic for one in assumptions if one.key == "time-zone"}
+    if radar is None or images is None or not zoneless:
+        return assumptions
+    of_radar = {part.topic.name for part in radar.parts} <= zoneless
+    if of_radar == (images.topic.name in zoneless):
+        return assumptions
+    local_ns, others_ns = (radar.times_ns, images.times_ns) if of_radar else (images.times_ns, radar.times_ns)
+    met = [offset_s for offset_s, overlap_ns in _zone_overlaps(local_ns, others_ns).items() if overlap_ns >= 0]
+    return assumptions if met != [0] else tuple(one for one in assumptions if one.key != "time-zone")
+
+
 def _zone_between(local_ns: TimesNs, others_ns: TimesNs) -> int | None:
     """Return the offset from UTC [s] with which local times overlap the others most; None if none does."""
+    overlaps = _zone_overlaps(local_ns, others_ns)
+    best = max(overlaps, key=lambda offset_s: (overlaps[offset_s], offset_s % 3600 == 0))
+    return best if overlaps[best] >= 0 else None
+
+
+def _zone_overlaps(local_ns: TimesNs, others_ns: TimesNs) -> dict[int, int]:
+    """Return for each offset from UTC [s] for how long [ns] local times overlap the others; negative if they do not."""
     overlaps = {}
     for offset_s in _ZONES_S:
         low, high = (int(end) - offset_s * NS_PER_S for end in (local_ns[0], local_ns[-1]))
         overlaps[offset_s] = min(high, int(others_ns[-1])) - max(low, int(others_ns[0]))
-    best = max(overlaps, key=lambda offset_s: (overlaps[offset_s], offset_s % 3600 == 0))
-    return best if overlaps[best] >= 0 else None
+    return overlaps
 
 
 def _interval(times_ns: TimesNs) -> str:

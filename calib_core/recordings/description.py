@@ -146,9 +146,10 @@ def _radar(radar: RadarSummary | None) -> list[str]:
     rate = "" if radar.rate_hz is None else f" at {radar.rate_hz:.1f} Hz"
     gap = "" if radar.longest_gap_s is None else f", longest gap {radar.longest_gap_s:.3f} s"
     sample = "" if radar.sampled_scans >= radar.scans else f", from {radar.sampled_scans} scans"
+    twice = ", each at every azimuth reported for it" if radar.other_azimuths else ""
     return [
         f"{' + '.join(radar.topics)}, frame '{radar.frame}': {_counted(radar.scans, 'scan')}{rate}{gap}",
-        f"returns per scan: {middle:.0f} ({low} to {high}{sample})",
+        f"returns per scan: {middle:.0f} ({low} to {high}{sample}){twice}",
         radar.layout,
         *([f"other azimuths of the same returns: {', '.join(radar.other_azimuths)}"] if radar.other_azimuths else []),
         *_readings(radar),

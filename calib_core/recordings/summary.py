@@ -1,6 +1,6 @@
 """The contents of a recording as plain values, for `cocalib info` and `cocalib info --json`."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import msgspec
 import numpy as np
@@ -9,7 +9,7 @@ from calib_core.errors import RecordingError
 from calib_core.input_files import name_text
 from calib_core.measurements import NS_PER_S, Stamp, TimeNs
 from calib_core.recordings.assumptions import StatedAssumption
-from calib_core.recordings.other_clocks import other_clocks
+from calib_core.recordings.other_clocks import with_other_clocks
 from calib_core.recordings.radar.column_plan import ColumnReading
 from calib_core.recordings.radar.sensors import RadarSensor
 from calib_core.recordings.recording import Recording
@@ -141,7 +141,6 @@ class RecordingSummary(msgspec.Struct, frozen=True, rename={"warnings": "caution
 
 def recording_summary(recording: Recording) -> RecordingSummary:
     """Summarize an open recording; reads a few radar scans, one image, and the stamps of other usable topics."""
-    spare = other_clocks(recording)
     used = [topic for topic in recording.topics if topic.chosen and topic.kind in ("radar", "image")]
     timed = used or recording.topics
     start = min((topic.start.time for topic in timed if topic.start is not None), default=None)
@@ -154,7 +153,7 @@ def recording_summary(recording: Recording) -> RecordingSummary:
         duration_s=(end - start) / NS_PER_S if start is not None and end is not None else 0.0,
         overlap_s=shared.seconds if shared is not None else None,
         overlap_stretches=shared.stretches if shared is not None else None,
-        topics=tuple(replace(topic, clocks=topic.clocks or spare.get(topic.name)) for topic in recording.topics),
+        topics=with_other_clocks(recording),
         radar=_radar(recording),
         sensors=recording.radar_sensors,
         camera=_camera(recording),

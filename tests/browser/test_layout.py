@@ -86,3 +86,17 @@ def test_nothing_is_cut_off_or_covered_at_any_common_size(page: Driver) -> None:
                 "return !part.contains(top); })()"
             )
             assert not covered, button
+
+
+@pytest.mark.parametrize("width", [1024, 1440])
+def test_long_names_are_cut_short_and_push_nothing_out_of_the_window(page: Driver, width: int) -> None:
+    page.page.set_viewport_size({"width": width, "height": 720})
+    page.value(
+        "document.querySelectorAll('#recording-topics .fact').forEach((fact, place) => "
+        "{ if (!place) fact.append(' + /front_radar/points_with_a_long_name'.repeat(5)); })"
+    )
+    page.value("document.getElementById('recording-name').append('_of_a_long_day'.repeat(20))")
+    page.drawn()
+    for part in ("#bar", "#help", "#right", "#timeline", "#recording-topics .fact:last-child"):
+        assert page.value(f"document.querySelector('{part}').getBoundingClientRect().right") <= width, part
+    assert page.value("document.querySelector('#recording-topics .fact:nth-child(2)').offsetWidth") >= 88

@@ -51,6 +51,7 @@ class PlainSource:
         camera: the intrinsics that its data set publishes; None if there are none.
         file_of: the file of a row, in a folder of one file per row.
         unreadable: files of the folder that were skipped on opening, and why.
+        computed: what the fields of its messages were computed from, where they are not the file's own; "" if they are.
         account_of: accounts for the bytes of a file whose format says what they are.
     """
 
@@ -70,6 +71,7 @@ class PlainSource:
     camera: FolderCamera | None = None
     file_of: Callable[[int], Path] | None = None
     unreadable: Mapping[Path, str] = field(default_factory=_no_faults)
+    computed: str = ""
     account_of: Callable[[Progress | None], FileAccount] | None = None
 
     def __post_init__(self) -> None:

@@ -50,9 +50,12 @@ def open_json_table(path: Path) -> JsonTable:
     """Find the fields of a JSON file's returns.
 
     Raises:
-        RecordingError: it is not JSON, or contains no objects.
+        RecordingError: it is not JSON, contains no objects, or is a file of clicks or results.
     """
     first = list(islice(_rows(path), _SAMPLED_ROWS))
+    schema = first[0][1].get("schema", "") if first else ""
+    if schema.startswith("cocalib/"):
+        raise RecordingError(f"{path}: a {schema} file, no recording")
     names = tuple(dict.fromkeys(name for _, row in first for name in row))
     if not names:
         raise RecordingError(

@@ -15,7 +15,14 @@ from calib_core.recordings.plain_files.source import PlainSource, topic_of
 from calib_core.recordings.plain_files.tables.columns import TableColumns, choose_columns
 from calib_core.recordings.plain_files.tables.csv_files import first_rows, read_rows, require_header
 from calib_core.recordings.plain_files.tables.json_files import JsonTable, open_json_table, read_json_rows
-from calib_core.recordings.plain_files.tables.scans import RADAR_FRAME, ReturnTable, points_of, source_of, table_words
+from calib_core.recordings.plain_files.tables.scans import (
+    RADAR_FRAME,
+    ReturnTable,
+    computed_words,
+    points_of,
+    source_of,
+    table_words,
+)
 from calib_core.recordings.plain_files.tables.text_tables import TABLE_EXAMPLE, TableRows, TextTable, open_text_table
 from calib_core.recordings.plain_files.tables.times import TimeReader, time_reader
 from calib_core.recordings.plain_files.tables.units import TableUnits, settle_units
@@ -130,6 +137,7 @@ def open_table_folder(
         counted=stamped.counted,
         mapped=any(column.mapped for column in (*columns.values, *columns.time)),
         file_of=lambda row: stamped.files[row],
+        computed=computed_words(columns),
     )
 
 

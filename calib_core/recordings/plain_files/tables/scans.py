@@ -18,7 +18,7 @@ from calib_core.recordings.plain_files.tables.text_tables import TableRows
 from calib_core.recordings.plain_files.tables.units import TableUnits, settle_units
 from calib_core.results import DataWarning
 
-__all__ = ["ReturnTable", "points_of", "source_of", "table_words"]
+__all__ = ["ReturnTable", "computed_words", "points_of", "source_of", "table_words"]
 
 RADAR_FRAME = "radar"
 _MOST_NAMES = 8
@@ -66,6 +66,7 @@ def source_of(path: Path, what: str, table: ReturnTable, options: PlainOptions) 
         zoneless=table.zoneless,
         counted=table.counted,
         mapped=any(column.mapped for column in (*table.columns.values, *table.columns.time)),
+        computed=computed_words(table.columns),
     )
 
 
@@ -110,6 +111,14 @@ def _with_positions(names: Sequence[str], values: np.ndarray) -> tuple[list[str]
     with np.errstate(invalid="ignore"):  # an angle may be infinite
         positions = np.column_stack([cartesian_from_polar(polar), values[:, kept]])
     return ["x", "y", "z", *(names[place] for place in kept)], np.ascontiguousarray(positions)
+
+
+def computed_words(columns: TableColumns) -> str:
+    """Say which columns x, y and z were computed from; "" if the table has positions of its own."""
+    if columns.of("x") and columns.of("y"):
+        return ""
+    polar = (columns.of(quantity) for quantity in ("range", "azimuth", "elevation"))
+    return f"x, y, z computed from {', '.join(column.written for column in polar if column)}"
 
 
 def table_words(columns: TableColumns, remarks: tuple[str, ...]) -> str:

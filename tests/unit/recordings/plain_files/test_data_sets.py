@@ -217,6 +217,8 @@ def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path) -> None:
     (tmp_path / "radar.csv").write_text(f"time_ns,x_m,y_m\n{START_NS},3,1\n")
     (tmp_path / "imu.csv").write_text("time_ns,gyro_x,gyro_y\n1,2,3\n")
     (tmp_path / "objects.json").write_text('{"boxes": "none"}')
+    clicks = '{"id": "c1", "image_time": {"sec": 1, "nanosec": 2}, "pixel_px": [3, 4]}'
+    (tmp_path / "clicks.json").write_text(f'{{"schema": "cocalib/clicks-1", "clicks": [{clicks}]}}')
     mixed = tmp_path / "mixed"
     picture(mixed / f"{START_NS}.png", (8, 8))
     (mixed / "a.pcd").write_bytes(b"")
@@ -225,11 +227,12 @@ def test_what_a_folder_holds_and_nobody_reads_is_named(tmp_path) -> None:
     with open_recording(tmp_path) as recording:
         assert (recording.radar_topic, recording.image_topic) == ("/radar/radar", "/camera/image")
         (warning,) = (one for one in recording.warnings if one.code == "unused-files")
-    assert warning.message.startswith("5 files and folders were looked at and not used: ")
+    assert warning.message.startswith("6 files and folders were looked at and not used: ")
     for words in (
         "thumbnails (no times in the file names",
         "imu.csv (no position columns",
         "objects.json (no position columns",
+        "clicks.json (a cocalib/clicks-1 file, no recording)",
         "mixed (the folder contains",
         "bag (a ROS recording; open it by its own path)",
     ):

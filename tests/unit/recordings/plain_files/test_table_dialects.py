@@ -357,6 +357,10 @@ def test_what_was_taken_for_what_and_what_was_left_out_is_shown(tmp_path) -> Non
         text = describe(recording)
     assert "x, y, z in millimetres, since the range agrees" in text
     assert "azimuth in radians, since it agrees with the positions" in text
+    assert "computed" not in text
+    (tmp_path / "polar.csv").write_text("Timestamp,Range [m],Azimuth (deg)\n2024/05/17 09:42:31.2,5,10\n")
+    with open_recording(tmp_path / "polar.csv", require=("radar",)) as recording:
+        assert "; x, y, z computed from Range [m], Azimuth (deg)\n" in describe(recording)
 
 
 def test_two_columns_of_one_quantity_are_an_assumption(tmp_path) -> None:
@@ -492,6 +496,10 @@ def test_a_missing_zone_is_an_assumption_only_where_it_matters(tmp_path) -> None
             cv2.imwrite(str(folder / name), np.zeros((8, 8, 3), np.uint8))
     with open_recording([path, local]) as recording:
         assert recording.assumptions == ()
+    with open_recording([path, epoch]) as recording:
+        assert recording.assumptions == (), "radar and camera meet in no other time zone"
+    late = max(t for t, _ in scans()) + 1_000 * NS_PER_S
+    cv2.imwrite(str(epoch / f"{late}.png"), np.zeros((8, 8, 3), np.uint8))
     with open_recording([path, epoch]) as recording:
         (assumption,) = recording.assumptions
         assert (assumption.key, assumption.confirm) == ("time-zone", "--time-zone UTC")

@@ -188,6 +188,24 @@ def test_the_front_radar_is_chosen_over_a_side_radar_with_a_better_name_and_fewe
         assert "not used: /radar_left/points, frame 'left': 8 returns a scan" in recording.radar_choice
 
 
+def test_the_times_of_a_radar_not_in_use_are_by_the_clock_that_is_named_for_it(tmp_path: Path) -> None:
+    front = clouds("/front/points", targets(7, 52), seed=1, frame="front")
+    side = clouds("/radar_left/points", targets(8, 8), seed=2, frame="left")
+    late_ns = (15_000_000, 35_000_000)
+    messages = [
+        replace(message, receive_time=TimeNs(message.receive_time + late_ns[place % 2]))
+        for place, message in enumerate((*front, *side))
+    ]
+    with opened(bag(tmp_path, messages)) as recording:
+        used, unused = (
+            next(topic for topic in recording_summary(recording).topics if topic.name == name)
+            for name in ("/front/points", "/radar_left/points")
+        )
+    assert unused.clocks is not None
+    assert unused.clocks.chosen == unused.clock == used.clock == "header"
+    assert (unused.jitter_s, unused.start) == (used.jitter_s, used.start)
+
+
 @pytest.mark.parametrize("speed", ["velocity", "doppler_vel"])
 def test_a_cloud_with_doppler_is_no_lidar_whatever_its_topic_and_size(tmp_path: Path, speed: str) -> None:
     names = ("x", "y", "z", "intensity", speed)
