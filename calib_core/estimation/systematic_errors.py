@@ -27,6 +27,7 @@ __all__ = ["NO_ERRORS", "Sensitivity", "SystematicError", "SystematicErrors", "s
 
 _RADAR_ERRORS = {one.name for one in fields(RadarErrors)}
 _EXACT = RadarErrors()
+_NONE = 1e-30  # a standard deviation up to this counts as 0; the square of its reciprocal must stay finite
 _SMALL = 1e-4  # standard deviations over which a derivative is taken
 
 
@@ -179,7 +180,7 @@ def systematic_errors(options: CalibrationOptions, camera: Camera, *, flat: bool
     ]
     (estimated if taped else widening).extend(reflector)
     return SystematicErrors(
-        tuple(one for one in estimated if one.sigma > 0.0), tuple(one for one in widening if one.sigma > 0.0)
+        tuple(one for one in estimated if one.sigma > _NONE), tuple(one for one in widening if one.sigma > _NONE)
     )
 
 

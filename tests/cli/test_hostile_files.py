@@ -126,6 +126,69 @@ def test_deep_nesting_is_refused(cocalib: Cocalib, tmp_path: Path, depth: int, k
         assert "deep" in one_line(cocalib(*command))
 
 
+@POSIX
+def test_a_pipe_that_nobody_reads_is_no_output(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    assert "nobody reads from this pipe" in one_line(cocalib("solve", "--pairs", pairs_file(), "--out", pipe))
+    reading = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        assert cocalib("solve", "--pairs", pairs_file(), "--out", pipe).code == 0
+        assert os.read(reading, 20).startswith(b"{")
+    finally:
+        os.close(reading)
+
+
+@pytest.mark.parametrize("name", ["", "  ", ","])
+def test_a_topic_without_a_name_is_not_chosen_for_the_user(cocalib: Cocalib, made: MadeRecording, name: str) -> None:
+    assert "no topic" in one_line(cocalib("info", made(), "--radar-topic", name))
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"a":' * 100_000], ids=["lists", "objects"])
+def test_deeply_nested_pairs_are_refused(cocalib: Cocalib, tmp_path: Path, text: str) -> None:
+    path = tmp_path / "deep.json"
+    path.write_text(text)
+    one_line(cocalib("solve", "--pairs", path))
+
+
+@pytest.mark.parametrize("sigma", [1e308, 1e200, 5e-324, 1e-200])
+def test_a_standard_deviation_beyond_any_measurement_is_refused(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path, sigma: float
+) -> None:
+    path = tmp_path / "calibration.json"
+    assert cocalib("solve", "--pairs", pairs_file(), "--out", path).code == 0
+    document = json.loads(path.read_text())
+    document["pairs"][1]["candidates"][0]["sigma_polar"][1] = sigma
+    path.write_text(json.dumps(document))
+    assert "pairs[1].candidates[0].sigma_polar[1]" in one_line(cocalib("solve", "--pairs", path))
+
+
+@pytest.mark.parametrize("sigma", ["0", "5e-324", "1e-200", "1e-20"])
+def test_an_error_of_next_to_no_standard_deviation_counts_as_exact(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], sigma: str
+) -> None:
+    priors = ("radar.range-scale-sigma", "radar.range-bias-sigma-m", "radar.height-sigma-m", "lens.distortion-sigma",
+              "lens.focal-length-sigma", "radar.azimuth-scale-sigma", "reflector.offset-sigma-m")  # fmt: skip
+    typed = [word for prior in priors for word in (f"--{prior}", sigma)]
+    assert cocalib("solve", "--pairs", pairs_file(), *typed).code == 0
+
+
+@pytest.mark.parametrize("field", ["image_width", "camera_matrix"])
+def test_a_whole_number_of_400_digits_in_a_camera_file_is_refused(
+    cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path, field: str
+) -> None:
+    camera = {"image_width": 320, "image_height": 240, "camera_matrix": [260, 0, 160, 0, 260, 120, 0, 0, 1]}
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps(camera | {field: 10**400 if field == "image_width" else [10**400] * 9}))
+    calibration = tmp_path / "calibration.json"
+    assert cocalib("solve", "--pairs", pairs_file(), "--out", calibration).code == 0
+    assert "not a valid number" in one_line(
+        cocalib("import", calibration, "--camera", path, "--out", tmp_path / "c.json")
+    )
+
+
 @pytest.mark.parametrize("value", ["1e308", "-1e308", "1e200", "1e400"])
 def test_a_quaternion_of_huge_numbers_is_refused(cocalib: Cocalib, tmp_path: Path, value: str) -> None:
     path = tmp_path / "static.txt"

@@ -85,7 +85,7 @@ class Journal:
             whole: read it and verify every line, instead of looking at its place and length only.
         """
         if self._descriptor < 0:
-            return "it is closed"
+            return "it could no longer be written"
         if not self._folder.has(JOURNAL, self._descriptor):
             return "the file, or its folder, was deleted, moved or replaced while the session was open"
         size = os.fstat(self._descriptor).st_size
@@ -121,7 +121,7 @@ class Journal:
             self._take_back()
             raise SessionFileError(
                 f"{path}: the change could not be saved and was not made: {error.strerror}; "
-                "free some disk space or restore the folder, then try again"
+                "free some disk space or make the file writable again, then try again"
             ) from error
         self._length += len(line)
 

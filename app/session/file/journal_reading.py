@@ -119,7 +119,7 @@ def steps_after(journal: FoundJournal, previous: str) -> tuple[tuple[Step, ...],
 
 
 def _read(raw: Sequence[bytes], data: bytes, torn: int, place: str, *, damaged_end: bool = False) -> FoundJournal:
-    head, why = _head(raw[0], place) if raw else (None, "the file is empty")
+    head, why = _head(raw[0], place) if raw else (None, _no_line(data))
     faults = [f"line 1 is damaged ({why})"] if head is None else []
     if head is not None and head.schema == SCHEMA_1:
         return _read_1(head, raw, len(data) - torn, torn)
@@ -142,6 +142,10 @@ def _read(raw: Sequence[bytes], data: bytes, torn: int, place: str, *, damaged_e
         sound_bytes=len(data) - torn,
         torn_bytes=torn,
     )
+
+
+def _no_line(data: bytes) -> str:
+    return "it has no end" if data.strip(b"\0") else "it holds only zeros" if data else "the file is empty"
 
 
 def _read_1(head: Head, raw: Sequence[bytes], sound_bytes: int, torn: int) -> FoundJournal:

@@ -37,7 +37,7 @@ def remembered_map(folder: Path) -> tuple[str, ...]:
     for line in lines:
         try:
             step = msgspec.json.decode(line, type=_Line).step
-        except (msgspec.DecodeError, UnicodeDecodeError):
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
             continue
         if step is not None and step.type == "columns_mapped":
             found = step.column_map

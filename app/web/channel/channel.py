@@ -44,7 +44,7 @@ _SPACE_EVERY_S = 0.34
 """Minimum time between two drawings of the 3D view while playing: it shares the page's main thread [s]."""
 
 _GREET_EVERY_S = 0.25
-"""Minimum time between two greetings of one page [s]."""
+"""Minimum time between two greetings of one page, and between two whole Views that it asks for [s]."""
 
 
 class Socket(Protocol):
@@ -64,6 +64,7 @@ class Channel:
         self._cursor = CursorMoved(0)
         self._shown: Shown | None = None
         self._greetings = NewestWins(self._greet, self._report)
+        self._views = NewestWins(self._show_whole, self._report)
         self._frames = NewestWins(self._send_frame, self._report)
         self._overlay = NewestWins(self._send_overlay, self._report)
         self._space = NewestWins(self._draw_space, self._report)
@@ -80,7 +81,7 @@ class Channel:
                 task.result()
         finally:
             self._hub.tabs.discard(self)
-            for worker in (self._greetings, self._frames, self._overlay, self._space):
+            for worker in (self._greetings, self._views, self._frames, self._overlay, self._space):
                 worker.close()
             for task in (sending, reading):
                 task.cancel()
@@ -124,8 +125,7 @@ class Channel:
         elif isinstance(command, Hello):
             self._greetings.give(command)
         elif isinstance(command, ViewWanted):
-            self._shown = None
-            self.show()
+            self._views.give(command)
         elif isinstance(command, ViewpointWanted):
             if self.scene is not None:
                 self.scene.look_from(command.viewpoint)
@@ -155,6 +155,12 @@ class Channel:
         """Greet the page, at most so often: a greeting costs more than asking for it."""
         self._shown = None
         self._hub.greet(self)
+        await asyncio.sleep(_GREET_EVERY_S)
+
+    async def _show_whole(self, _wanted: ViewWanted) -> None:
+        """Send the whole View, at most as often as a greeting."""
+        self._shown = None
+        self.show()
         await asyncio.sleep(_GREET_EVERY_S)
 
     async def _send_frame(self, wanted: FrameWanted) -> None:

@@ -6,6 +6,7 @@ names and other users of the machine must not get access.
 
 import hmac
 import ipaddress
+import re
 import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from app.web.port.admissions import Admissions
 
 __all__ = ["Admitted", "Allowed", "Guard", "Refused", "Request", "Verdict", "host_name", "is_address", "is_loopback"]
 
+_HOST = re.compile(r"(\[[^\]]*\]|[^:\[\]]*)(?::[0-9]*)?")
 _LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
 
 
@@ -182,10 +184,9 @@ def _bytes(text: str) -> bytes:
 
 
 def host_name(host: str) -> str:
-    """Return a Host header without its port."""
-    if host.startswith("["):
-        return host.partition("]")[0] + "]"
-    return host.partition(":")[0]
+    """Return a Host header without its port; the whole of one that has more than a name and a port."""
+    found = _HOST.fullmatch(host)
+    return found[1] if found else host
 
 
 def is_address(name: str) -> bool:

@@ -105,6 +105,16 @@ class Connection(ServerConnection):
             return
         super().data_received(data)
 
+    def eof_received(self) -> bool | None:  # type: ignore[override]
+        """Answer a client that sends no more after its request; a WebSocket needs both directions.
+
+        The protocol is not told, for it would close the connection before the answer; it closes it afterwards.
+        """
+        if self.head is not None and not self.head.upgrades:
+            return True
+        super().eof_received()
+        return None
+
     def _begun(self) -> None:
         with contextlib.suppress(ValueError):
             self.beginning.remove(self)

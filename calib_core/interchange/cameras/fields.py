@@ -215,7 +215,7 @@ def floats(value: Any, *, source: str, place: str, length: int | None = None) ->
 def _number(value: Any, *, source: str, place: str) -> float:
     try:
         number = float("nan") if isinstance(value, bool) else float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = float("nan")
     if not abs(number) <= _LARGEST:
         raise InputError(f"{source}: {place}: {str(value)[:60]!r} is not a valid number; correct it")

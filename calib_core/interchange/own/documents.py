@@ -44,7 +44,7 @@ def names_schema(text: str, schema: str) -> bool:
     """Return whether JSON text names a schema, without checking anything else."""
     try:
         content = msgspec.json.decode(text)
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, RecursionError):  # whoever reads it says what is wrong with it
         return False
     return isinstance(content, dict) and content.get("schema") == schema
 
@@ -62,7 +62,8 @@ Matrix22 = tuple[Vector2, Vector2]
 Matrix33 = tuple[Position, Position, Position]
 Matrix66 = tuple[Vector6, Vector6, Vector6, Vector6, Vector6, Vector6]
 Name = Annotated[str, Meta(min_length=1, max_length=200)]
-Positive = Annotated[float, Meta(gt=0)]
+Positive = Annotated[float, Meta(ge=1e-12, le=1e9)]
+"""A standard deviation; its square and the reciprocal of that are far from overflowing."""
 Count = Annotated[int, Meta(ge=0)]
 
 

@@ -43,6 +43,11 @@ def solved(workspace: Workspace, clicks: str) -> Calibration:
     return workspace.session.outcome
 
 
+def test_a_deeply_nested_line_of_a_journal_names_no_columns(tmp_path: Path) -> None:
+    (tmp_path / "journal.jsonl").write_text('{"step":{"type":"x","a":' + "[" * 100_000 + "\n")
+    assert remembered_map(tmp_path) == ()
+
+
 def test_an_unconfirmed_assumption_is_in_the_view_the_status_and_the_file(
     recording: Recording, project_root: Path, tmp_path: Path
 ) -> None:

@@ -405,3 +405,34 @@ def test_a_long_made_session_opens_as_it_was(tmp_path: Path) -> None:
     session_file = open_session_file(tmp_path / "s", MADE_FACTS)
     assert session_file.restored.history == made.histories[-1]
     session_file.close()
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [(b"", "the file is empty"), (b"\0" * 5000, "it holds only zeros"), (b"[" * 5000, "it has no end")],
+)
+def test_a_journal_without_a_line_is_described_as_it_is(tmp_path: Path, content: bytes, why: str) -> None:
+    (tmp_path / JOURNAL).write_bytes(content)
+    with pytest.raises(SessionFileError, match=re.escape(f"line 1 is damaged ({why})")):
+        open_session_file(tmp_path, FACTS)
+    assert (tmp_path / JOURNAL).read_bytes() == content
+
+
+@POSIX
+def test_a_journal_that_can_no_longer_be_written_is_not_called_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session_file = open_session_file(tmp_path, FACTS)
+    clicked(session_file, 1, 2)
+
+    def refused(*_: object) -> int:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "write", refused)
+        patch.setattr(os, "ftruncate", refused)
+        with pytest.raises(SessionFileError, match="make the file writable again"):
+            clicked(session_file, 3)
+    closed = session_file.close()
+    assert closed.clicks == 2
+    assert closed.fault.endswith("it could no longer be written")

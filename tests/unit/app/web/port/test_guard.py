@@ -153,8 +153,10 @@ def test_a_token_does_not_open_a_websocket() -> None:
 
 
 @pytest.mark.parametrize(
-    "host", ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "192.168.0.7:8080", "[::2]"]
-)
+    "host",
+    ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "192.168.0.7:8080", "[::2]",
+     "127.0.0.1:8080@evil.example", "127.0.0.1:evil.example", "[::1].evil.example", "[::1]@evil.example", "localhost:80:80"],
+)  # fmt: skip
 def test_a_foreign_host_name_is_not_answered(host: str) -> None:
     assert status(guard().check(request(host=host, cookie=guard().cookie))) == 421
 

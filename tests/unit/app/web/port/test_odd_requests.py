@@ -156,6 +156,19 @@ def test_a_cookie_of_an_admitted_browser_is_renewed_by_each_answer(server: Runni
     assert f"Set-Cookie: {cookie}; Max-Age=".encode() in answer
 
 
+@pytest.mark.parametrize("method", [b"GET", b"HEAD", b"POST"])
+def test_a_client_that_sends_no_more_is_still_answered(server: RunningServer, cookie: str, method: bytes) -> None:
+    head = method + b" / HTTP/1.1\r\n" + HOST
+    for cookies, wanted in ((b"", 401), (f"Cookie: {cookie}\r\n".encode(), 405 if method == b"POST" else 200)):
+        with socket.create_connection(("127.0.0.1", server.port), timeout=20) as connection:
+            connection.sendall(head + cookies + b"\r\n")
+            connection.shutdown(socket.SHUT_WR)
+            answer = b""
+            while part := connection.recv(65536):
+                answer += part
+        assert status(answer) == wanted
+
+
 def test_versions_are_not_told(server: RunningServer) -> None:
     assert b"websockets" not in asked(server, b"GET / HTTP/1.1\r\n" + HOST)
 

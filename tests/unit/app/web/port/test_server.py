@@ -268,6 +268,19 @@ def test_a_flood_of_greetings_leaves_other_pages_served(server: RunningServer, c
         assert greetings < 200, "20,000 were asked for"
 
 
+def test_a_flood_of_requests_for_the_whole_view_is_answered_seldom_and_by_the_newest(
+    server: RunningServer, cookie: str
+) -> None:
+    with channel(server, cookie, "/ws/flood") as flood:
+        views = 0
+        for request in range(400):
+            flood.send(json.dumps({"type": "view", "request": request}))
+            while (message := json.loads(flood.recv(timeout=60))).get("request") != request:
+                views += message["type"] == "view"
+        assert views < 200, "400 were asked for"
+        assert wanted(flood, "view")["type"] == "view", "the last request is answered too"
+
+
 def test_one_browser_opens_only_so_many_sockets(server: RunningServer) -> None:
     full, other = come_in(server), come_in(server)
     with ExitStack() as pages:
