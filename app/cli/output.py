@@ -82,11 +82,21 @@ def required_camera(recording: "Recording", camera_file: Path | None) -> "Camera
             if recording.camera_info_topic
             else "it has no CameraInfo topic"
         )
+        near = _intrinsics_near(recording.paths)
         raise InputError(
             f"{recording.paths[0].name}: no intrinsics for {recording.image_topic}: {found}; "
             "give them with --camera FILE (ROS camera_info YAML, OpenCV YAML or XML, Kalibr camchain, JSON)"
+            + (f", such as --camera {near}" if near else "")
         )
     return camera
+
+
+def _intrinsics_near(paths: Sequence[Path]) -> Path | None:
+    """Return a file of intrinsics in or next to the recording, by its name; None if there is none."""
+    folders = dict.fromkeys(path if path.is_dir() else path.parent for path in paths)
+    names = ("*camera*.y*ml", "*intrinsic*.y*ml", "*camchain*.y*ml", "*calib*.y*ml")
+    found = (file for folder in folders for name in names for file in sorted(folder.glob(name)))
+    return next((file for file in found if file.is_file()), None)
 
 
 @contextmanager

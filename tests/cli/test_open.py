@@ -8,6 +8,7 @@ import pytest
 from app.__main__ import run
 from app.workspace import Workspace
 from calib_core.recordings import Recording
+from calib_core.synthetic import SimulationOptions, simulate, write_recording
 
 
 @pytest.fixture
@@ -65,3 +66,11 @@ def test_a_camera_alone_is_refused_with_what_to_do(
     assert "camera.bag" in errors
     assert "radar" in errors
     assert served == []
+
+
+def test_intrinsics_next_to_the_recording_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = SimulationOptions(placements=2, dwell_s=4.0, width_px=128, height_px=80, camera_rate_hz=2.0)
+    write_recording(simulate(options), tmp_path, ("csv",))
+    clicks = tmp_path / "clicks.json"
+    assert run(["solve", str(tmp_path / "recording_csv"), "--clicks", str(clicks), "--confirm-assumptions"]) == 2
+    assert f"such as --camera {tmp_path / 'recording_csv' / 'camera.yaml'}" in capsys.readouterr().err

@@ -135,7 +135,7 @@ def _walk(folder: Path, contents: Contents, options: PlainOptions, depth: int) -
         if inner.name == "sweeps" and (folder / "samples").is_dir():
             contents.refused.append((inner, "frames between the annotated ones; open its folders by their own paths"))
         elif depth >= _DEPTH:
-            contents.refused.append((inner, "too many folders deep"))
+            contents.refused.append((inner, "too many folders deep: give its path instead"))
         else:
             _walk(inner, contents, options, depth + 1)
 
