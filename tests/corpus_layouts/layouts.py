@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.corpus_layouts import clouds, data_sets, files, messages
+from tests.corpus_layouts import clouds, data_sets, files, messages, odd_messages
 from tests.corpus_layouts.truth import Truth
 
 __all__ = ["LAYOUTS"]
@@ -19,8 +19,10 @@ LAYOUTS: dict[str, Callable[[Path], Truth]] = {
         messages.integers_with_a_least_bit,
         messages.nested_twice,
         messages.arrays_side_by_side,
-        messages.angle_from_the_zenith,
-        messages.bare_millimetres,
+        odd_messages.angle_from_the_zenith,
+        odd_messages.bare_millimetres,
+        odd_messages.elevation_downwards,
+        odd_messages.cylindrical,
         clouds.odd_big_endian_cloud,
         clouds.cloud_of_integers,
         clouds.points_beside_a_lidar,

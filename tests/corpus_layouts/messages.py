@@ -60,7 +60,7 @@ def vendor_structs(folder: Path) -> Truth:
     return Truth((_each_scan(folder, "bag", returns, prepare),), returns, picture_times())
 
 
-def _polar_list(
+def target_list(
     folder: Path, kind: Kind, returns: Returns, name: str, text: str, rows: Callable[[Returns], dict[str, np.ndarray]]
 ) -> Path:
     """Write a message with a header and a list of targets whose fields are the columns of rows."""
@@ -105,7 +105,7 @@ def packets_with_comments(folder: Path) -> Truth:
             "rcs": scan.snr_db - 20,
         }
 
-    path = _polar_list(folder, "mcap", returns, "acme_radar/msg/RadarPackets", text, rows)
+    path = target_list(folder, "mcap", returns, "acme_radar/msg/RadarPackets", text, rows)
     return Truth((path,), returns, picture_times())
 
 
@@ -124,7 +124,7 @@ def polar_without_comments(folder: Path) -> Truth:
             "snr": scan.snr_db,
         }
 
-    path = _polar_list(folder, "db3", returns, "corner_radar/msg/TargetList", text, rows)
+    path = target_list(folder, "db3", returns, "corner_radar/msg/TargetList", text, rows)
     stated = RecordingOptions(
         map=("range=range:m", "azimuth=-angle_az:deg", "elevation=angle_el:deg", "doppler=velocity:mps")
     )
@@ -152,7 +152,7 @@ def scaled_integers(folder: Path) -> Truth:
             "u8_snr": np.rint(scan.snr_db).astype(int),
         }
 
-    path = _polar_list(folder, "mcap", returns, "imaging_radar/msg/DetectionList", text, rows)
+    path = target_list(folder, "mcap", returns, "imaging_radar/msg/DetectionList", text, rows)
     return Truth((path,), returns, picture_times(), position_tolerance_m=0.02)
 
 
@@ -176,7 +176,7 @@ def right_forward_comment(folder: Path) -> Truth:
             "power": scan.snr_db,
         }
 
-    path = _polar_list(folder, "mcap", returns, "mmwave_driver/msg/Targets", text, rows)
+    path = target_list(folder, "mcap", returns, "mmwave_driver/msg/Targets", text, rows)
     return Truth((path,), returns, picture_times())
 
 
@@ -201,7 +201,7 @@ def integers_with_a_least_bit(folder: Path) -> Truth:
             "snr": np.rint(scan.snr_db * 10).astype(int),
         }
 
-    path = _polar_list(folder, "bag", returns, "can_radar/msg/ObjectFrame", text, rows)
+    path = target_list(folder, "bag", returns, "can_radar/msg/ObjectFrame", text, rows)
     return Truth((path,), returns, picture_times(), position_tolerance_m=0.01)
 
 
@@ -263,37 +263,3 @@ def arrays_side_by_side(folder: Path) -> Truth:
         bag.write("/radar/frame", name, message, time_ns)
 
     return Truth((_each_scan(folder, "bag", returns, prepare),), returns, picture_times())
-
-
-def angle_from_the_zenith(folder: Path) -> Truth:
-    """ROS 2 mcap: spherical coordinates of physics, whose theta is no elevation; it may be left out, but not silently."""
-    returns = scene(15)
-    text = (
-        "float32 r      # m\n"
-        "float32 phi    # azimuth, rad, positive to the left\n"
-        "float32 theta  # polar angle from the zenith, rad\n"
-        "float32 v      # m/s, positive away\n"
-    )
-    angles = polar(returns.points_m)
-
-    def rows(scan: Returns) -> dict[str, np.ndarray]:
-        values = polar(scan.points_m)
-        return {"r": values[:, 0], "phi": values[:, 1], "theta": np.pi / 2 - values[:, 2], "v": scan.doppler_mps}
-
-    path = _polar_list(folder, "mcap", returns, "physics_radar/msg/Frame", text, rows)
-    level_m = angles[:, :1] * np.column_stack([np.cos(angles[:, 1]), np.sin(angles[:, 1]), np.zeros(len(angles))])
-    return Truth((path,), returns, picture_times(), as_assumed_m=level_m)
-
-
-def bare_millimetres(folder: Path) -> Truth:
-    """ROS 2 db3: x, y, z and v as int32 in millimetres, and nothing that says so."""
-    returns = scene(16)
-
-    def rows(scan: Returns) -> dict[str, np.ndarray]:
-        points_mm = np.rint(scan.points_m * 1000).astype(int)
-        speed = np.rint(scan.doppler_mps * 1000).astype(int)
-        return {"x": points_mm[:, 0], "y": points_mm[:, 1], "z": points_mm[:, 2], "v": speed}
-
-    text = "int32 x\nint32 y\nint32 z\nint32 v\n"
-    path = _polar_list(folder, "db3", returns, "tiny_radar/msg/Points", text, rows)
-    return Truth((path,), returns, picture_times(), has_doppler=False)

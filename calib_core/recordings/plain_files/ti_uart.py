@@ -1,5 +1,6 @@
 """Read recordings of the data port of TI's mmWave radars, such as the AWR1843: .bin or .dat files as the port sent them."""
 
+import os
 import re
 from bisect import bisect_right
 from collections.abc import Sequence
@@ -81,15 +82,17 @@ def _streams_of(path: Path) -> list[tuple[Path, list[Path]]]:
 
 
 def _folders_below(path: Path, depth: int) -> list[Path]:
-    if not (depth and path.is_dir()):
-        return []
-    inner = sorted(entry for entry in path.iterdir() if entry.is_dir() and not entry.name.startswith("."))
+    if not (depth and os.access(path, os.R_OK | os.X_OK) and path.is_dir()):
+        return []  # what cannot be read is told when the folder is opened
+    entries = (entry for entry in path.iterdir() if not entry.name.startswith("."))
+    inner = sorted(entry for entry in entries if entry.is_dir() and not entry.is_symlink())
     return [folder for entry in inner for folder in (entry, *_folders_below(entry, depth - 1))]
 
 
 def _candidates(path: Path) -> list[Path]:
     """Return the files of a path that may be chunks of a stream, in the order of the numbers in their names."""
-    inside = [path] if path.is_file() else list(path.iterdir()) if path.is_dir() else []
+    readable = path.is_dir() and os.access(path, os.R_OK | os.X_OK)
+    inside = [path] if path.is_file() else list(path.iterdir()) if readable else []
     files = [file for file in inside if file.is_file() and file.suffix.lower() in _SUFFIXES]
     return sorted(files, key=lambda file: [int(part) if part.isdigit() else part for part in _parts(file.name)])
 

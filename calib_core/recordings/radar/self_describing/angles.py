@@ -29,6 +29,9 @@ def polar_part(chosen: Chosen, remarks: str) -> ColumnPlan:
     base = unit_of_word("deg" if degrees else "rad")
     assert base is not None
     scales = [one.scale / base.scale for one in units]
+    down = elevation is not None and positive_side(elevation.column.comment) == "down"
+    if down:
+        scales[-1] = -scales[-1]
     side = "left" if sign > 0 else "right"
     readings = [
         ColumnReading("range", distance.column.name, unit.name, "", f"unit: {why}"),
@@ -37,13 +40,11 @@ def polar_part(chosen: Chosen, remarks: str) -> ColumnPlan:
         ),
     ]
     if elevation is not None:
-        readings.append(
-            ColumnReading(
-                "elevation", elevation.column.name, units[-1].name, "upwards", f"unit: {why_angle}; sign: as usual"
-            )
-        )
+        side, why = ("downwards", _COMMENT) if down else ("upwards", "as usual")
+        why = f"unit: {why_angle}; sign: {why}"
+        readings.append(ColumnReading("elevation", elevation.column.name, units[-1].name, side, why))
     sigma = [chosen.sigma.get(name) for name in ("range", "azimuth", "elevation")]
-    usual = (unit.scale, *(scale * base.scale for scale in (scales[0], scales[-1])))
+    usual = (unit.scale, *(abs(scale) * base.scale for scale in (scales[0], scales[-1])))
     own = [(one.unit.scale if one and one.unit else scale) for one, scale in zip(sigma, usual, strict=True)]
     return ColumnPlan(
         position=tuple(one.column.name for one in (distance, *angles)),
@@ -115,11 +116,11 @@ def _azimuth_sign(azimuth: Picked, angle: Unit, remarks: str) -> tuple[int, str,
 
 
 def _about_unused(chosen: Chosen) -> ColumnAssumption | None:
-    if not chosen.unused_angles:
+    if not chosen.unused_heights:
         return None
-    names = ", ".join(chosen.unused_angles)
-    text = f"the returns are taken as level with the radar; {names} may hold their elevation and is not used"
-    return assume("field-meaning", text, f"--map elevation={chosen.unused_angles[0]}", ("elevation",))
+    names = ", ".join(chosen.unused_heights)
+    text = f"the returns are taken as level with the radar; {names} may hold their elevation or height, and is not used"
+    return assume("field-meaning", text, CONFIRM_ALL, ("elevation",))
 
 
 def _about_vague(chosen: Chosen) -> ColumnAssumption | None:

@@ -87,14 +87,14 @@ class Chosen:
         sigma: standard deviations by quantity.
         vague: angles whose names fit azimuth and elevation alike, if they had to be told apart.
         other_azimuths: columns with further hypotheses.
-        unused_angles: columns that may hold the elevation, if no other does.
+        unused_heights: columns that may hold the elevation or height of a polar position, if none is sure to.
     """
 
     picked: dict[str, Picked]
     sigma: dict[str, Picked]
     vague: tuple[Picked, ...] = ()
     other_azimuths: tuple[str, ...] = ()
-    unused_angles: tuple[str, ...] = ()
+    unused_heights: tuple[str, ...] = ()
 
 
 def choose(columns: Sequence[DescribedColumn]) -> Chosen:
@@ -121,7 +121,8 @@ def choose(columns: Sequence[DescribedColumn]) -> Chosen:
     vague = _told_apart([one for one in first if one.meaning.vague], picked)
     used = [one.column.name for one in picked.values()]
     unused = tuple(one.column.name for one in first if one.meaning.vague and one.column.name not in used)
-    return Chosen(picked, sigma, vague, others, () if "elevation" in picked else unused)
+    heights = tuple(one.column.name for one in first if one.meaning.quantity == "z" and one.column.filled)
+    return Chosen(picked, sigma, vague, others, () if "elevation" in picked else (*unused, *heights))
 
 
 def _stripped(columns: Sequence[DescribedColumn]) -> list[tuple[DescribedColumn, str]]:
