@@ -76,6 +76,8 @@ FIELD_SPELLINGS: dict[str, tuple[str, ...]] = {
 _QUANTITY = {
     spelling: (quantity, rank) for quantity, spellings in FIELD_SPELLINGS.items() for rank, spelling in enumerate(spellings)
 }  # fmt: skip
+_LONGEST_NAME = 500
+"""No name of a field is longer; the patterns take the cube of the length of what is none."""
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*?)\s*[\])>]\s*")
 _HUNGARIAN = frozenset({"f", "s", "n", "d", "i", "u", "b", "m", "fl", "db", "ui", "dbl", "flt", "p", "str", "val"})
 _SUBJECTS = frozenset({
@@ -113,7 +115,7 @@ def read_field(written: str) -> FieldWords | None:
     A unit may follow in brackets or after a separator. Letters that encode a type (f_) and the word for a return
     (detections.) are skipped.
     """
-    text = written.strip().strip("#%\"'\ufeff ").strip()
+    text = written[:_LONGEST_NAME].strip().strip("#%\"'\ufeff ").strip()
     bracketed = _BRACKETS.fullmatch(text)
     if bracketed:
         found = _named(_words(bracketed["name"]))
