@@ -141,6 +141,16 @@ def test_a_pipe_that_nobody_reads_is_no_output(
         os.close(reading)
 
 
+@pytest.mark.parametrize(
+    "cell", ["[" * 100_000, "(" * 100_000 + "m", " " * 100_000 + "x", "_" * 100_000, "f_" * 50_000]
+)
+def test_a_table_with_a_long_cell_is_read_in_time(cocalib: Cocalib, tmp_path: Path, cell: str) -> None:
+    """A pattern that tries every place took minutes here: this test would not end."""
+    path = tmp_path / "radar.csv"
+    path.write_text(f'time_ns,points,x\n1,"{cell}",2\n')
+    one_line(cocalib("info", path))
+
+
 @pytest.mark.parametrize("name", ["", "  ", ","])
 def test_a_topic_without_a_name_is_not_chosen_for_the_user(cocalib: Cocalib, made: MadeRecording, name: str) -> None:
     assert "no topic" in one_line(cocalib("info", made(), "--radar-topic", name))

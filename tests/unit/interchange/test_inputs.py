@@ -63,7 +63,7 @@ def test_clicks_come_back_in_order_of_time_with_every_nanosecond():
         ({"radar_m": [0, 0, 0]}, "pairs[0].radar_m: is at the radar's origin"),
         ({"alternatives_radar_m": [[0, 0, 0]]}, "pairs[0].alternatives_radar_m[0]: is at the radar's origin"),
         ({"radar_m": [0.001, 0, 0]}, "pairs[0].radar_m: is 1 mm from the radar's origin"),
-        ({"sigma_px": 0}, "pairs[0].sigma_px: expected float > 0.0"),
+        ({"sigma_px": 0}, "pairs[0].sigma_px: expected float >= 1e-12"),
         ({"sigma_px": "2"}, "pairs[0].sigma_px: expected float | null, got str"),
         ({"id": ""}, "pairs[0].id: expected str of length >= 1"),
         ({"pixel_px": [True, 1]}, "pairs[0].pixel_px[0]: expected float, got bool"),

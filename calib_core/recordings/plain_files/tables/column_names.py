@@ -35,6 +35,8 @@ _ACCURACY = re.compile("accuracy", re.IGNORECASE)
 _ON_EARTH = frozenset({"latitude", "longitude", "altitude", "lon", "lng", "gps", "gnss"})
 _BARE = frozenset({"lat", "long"})
 _HAS_LETTER = re.compile(r"[^\W\d_]")
+_LONGEST_NAME = 500
+"""No name of a column is longer; the patterns take the cube of the length of what is none."""
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[\[(<]\s*(?P<unit>[^\])>]*?)\s*[\])>]\s*")
 _TYPE_PREFIXES = frozenset({"f", "s", "n", "d", "i", "u", "b", "m", "fl", "ui", "dbl", "flt", "p", "str"})
 """Fewer than in messages: t_x is a translation."""
@@ -88,7 +90,7 @@ def read_column_name(written: str) -> ColumnName | None:
     A unit may follow in brackets or after a separator. Letters that encode a type (f_) and the word for a return
     (detections.) are skipped.
     """
-    text = written.strip().strip("#%\"'\ufeff ").strip()
+    text = written[:_LONGEST_NAME].strip().strip("#%\"'\ufeff ").strip()
     if not _HAS_LETTER.search(text):
         return None  # a number
     bracketed = _BRACKETS.fullmatch(text)
