@@ -27,10 +27,10 @@ from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.radar.checks import about_claims
 from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.layouts import layouts_of_parts
-from calib_core.recordings.radar.merged_stream import MergedStream
+from calib_core.recordings.radar.message_layouts.single_returns import PointLayout
 from calib_core.recordings.radar.scan_stream import RadarStream
-from calib_core.recordings.radar.sensors import RadarSensor, other_azimuths
-from calib_core.recordings.radar.single_returns import PointLayout
+from calib_core.recordings.radar.several_topics.merged_stream import MergedStream
+from calib_core.recordings.radar.several_topics.sensors import RadarSensor, other_azimuths
 from calib_core.recordings.radar_choice import RadarChoice, choose_radar
 from calib_core.recordings.selection import Inventory, Need, RecordingOptions, Selection, select
 from calib_core.recordings.stamping import StampedTopic, read_stamps

@@ -9,8 +9,8 @@ from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.recordings.assumptions import Assumption
 from calib_core.recordings.camera.image_stream import ImageStream
-from calib_core.recordings.radar.merged_stream import MergedStream
 from calib_core.recordings.radar.scan_stream import RadarStream
+from calib_core.recordings.radar.several_topics.merged_stream import MergedStream
 from calib_core.recordings.stamping import StampedTopic
 from calib_core.recordings.time.dates import utc
 from calib_core.results import DataWarning

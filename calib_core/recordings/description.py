@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from calib_core.measurements import Stamp
-from calib_core.recordings.radar.sensors import RadarSensor
+from calib_core.recordings.radar.several_topics.sensors import RadarSensor
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.summary import (
     CameraSummary,

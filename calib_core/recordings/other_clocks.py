@@ -6,7 +6,7 @@ import numpy as np
 
 from calib_core.errors import RecordingError
 from calib_core.measurements import Stamp, TimeNs
-from calib_core.recordings.radar.single_returns import PointLayout, first_of_scans
+from calib_core.recordings.radar.message_layouts.single_returns import PointLayout, first_of_scans
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.stamping import StampedTopic, read_stamps
 from calib_core.recordings.time.clock_choice import choose_clock

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from calib_core.recordings.radar.scan_stream import RadarStream
-from calib_core.recordings.radar.sensors import Examined, Figures, RadarSensor, sensors_of
+from calib_core.recordings.radar.several_topics.sensors import Examined, Figures, RadarSensor, sensors_of
 from calib_core.recordings.selection import Inventory, Selection, holds_objects, radar_rank, unknown_radar
 from calib_core.results import DataWarning
 

@@ -28,8 +28,8 @@ from calib_core.recordings.plain_files.video import VIDEO_SUFFIXES
 from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.radar.column_plan import ColumnReading
 from calib_core.recordings.radar.column_plans import column_readings
-from calib_core.recordings.radar.merged_stream import MergedStream
-from calib_core.recordings.radar.sensors import RadarSensor, figures_of
+from calib_core.recordings.radar.several_topics.merged_stream import MergedStream
+from calib_core.recordings.radar.several_topics.sensors import RadarSensor, figures_of
 from calib_core.recordings.selection import Need, RecordingOptions
 from calib_core.recordings.time.written_dates import parse_zone
 from calib_core.recordings.topics import TopicSummary

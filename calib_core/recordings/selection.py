@@ -6,7 +6,7 @@ from typing import Literal
 
 from calib_core.errors import MessageError, RecordingError
 from calib_core.options import option
-from calib_core.recordings.radar.single_returns import PointLayout
+from calib_core.recordings.radar.message_layouts.single_returns import PointLayout
 from calib_core.recordings.time.clock_choice import Clock
 from calib_core.recordings.topics import Topic, TopicKind
 from calib_core.recordings.usages import Usage

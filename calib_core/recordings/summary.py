@@ -11,7 +11,7 @@ from calib_core.measurements import NS_PER_S, Stamp, TimeNs
 from calib_core.recordings.assumptions import StatedAssumption
 from calib_core.recordings.other_clocks import with_other_clocks
 from calib_core.recordings.radar.column_plan import ColumnReading
-from calib_core.recordings.radar.sensors import RadarSensor
+from calib_core.recordings.radar.several_topics.sensors import RadarSensor
 from calib_core.recordings.recording import Recording
 from calib_core.recordings.time.shared_time import SharedTime, shared_time
 from calib_core.recordings.topics import Rhythm, TopicSummary

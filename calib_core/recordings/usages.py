@@ -12,9 +12,9 @@ from calib_core.recordings.camera.images import ImageLayout, is_picture
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.layouts import RadarLayout, recognise
-from calib_core.recordings.radar.samples import leaf_names
-from calib_core.recordings.radar.single_returns import PointLayout
-from calib_core.recordings.radar.struct_lists import struct_lists
+from calib_core.recordings.radar.message_layouts.samples import leaf_names
+from calib_core.recordings.radar.message_layouts.single_returns import PointLayout
+from calib_core.recordings.radar.message_layouts.struct_lists import struct_lists
 from calib_core.recordings.time.clock_faults import HALF_DISTINCT, RETURNS_DISTINCT
 from calib_core.recordings.topics import Topic, TopicKind
 

@@ -18,7 +18,7 @@ from calib_core.recordings.containers.recorded_messages import (
     RecordedMessage,
     VendorScanMessage,
 )
-from calib_core.recordings.radar.merging import Spread, aligned, merged, moments_of
+from calib_core.recordings.radar.several_topics.merging import Spread, aligned, merged, moments_of
 from calib_core.synthetic.options import RadarDefects
 from calib_core.synthetic.radar.antennas import Antenna
 from calib_core.synthetic.radar.defects import second_azimuths

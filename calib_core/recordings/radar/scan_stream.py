@@ -12,9 +12,9 @@ from calib_core.errors import MessageError, RecordingError
 from calib_core.measurements import RadarScans
 from calib_core.recordings.radar.columns import Returns, no_returns
 from calib_core.recordings.radar.layouts import RadarLayout
-from calib_core.recordings.radar.point_clouds import CloudLayout
+from calib_core.recordings.radar.message_layouts.point_clouds import CloudLayout
+from calib_core.recordings.radar.message_layouts.single_returns import PointLayout, first_of_scans
 from calib_core.recordings.radar.scan_blocks import ScanBlocks
-from calib_core.recordings.radar.single_returns import PointLayout, first_of_scans
 from calib_core.recordings.topics import Topic
 
 __all__ = ["RadarStream"]

@@ -11,7 +11,7 @@ from calib_core.measurements import NS_PER_S
 from calib_core.radar import cartesian_from_polar
 from calib_core.recordings import RecordingOptions, open_recording
 from calib_core.recordings.radar.columns import plan_columns
-from calib_core.recordings.radar.single_returns import first_of_scans
+from calib_core.recordings.radar.message_layouts.single_returns import first_of_scans
 
 START_NS = 1_700_000_000 * NS_PER_S
 

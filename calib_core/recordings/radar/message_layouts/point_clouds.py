@@ -14,7 +14,7 @@ from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.column_plans import plan_described, plan_for, plan_like
 from calib_core.recordings.radar.columns import ColumnPlan, Returns, names_a_speed, no_returns, returns_from
-from calib_core.recordings.radar.samples import Samples
+from calib_core.recordings.radar.message_layouts.samples import Samples
 from calib_core.recordings.radar.self_describing.candidates import DescribedColumn
 
 __all__ = ["CloudLayout", "cloud_columns", "is_cloud", "lidar_like"]

@@ -12,7 +12,7 @@ from calib_core.recordings.messages.definitions import Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.column_plans import find_decoder, plan_described, plan_for
 from calib_core.recordings.radar.columns import ColumnPlan, Returns, returns_from
-from calib_core.recordings.radar.samples import Samples, described
+from calib_core.recordings.radar.message_layouts.samples import Samples, described
 
 __all__ = ["PointLayout", "first_of_scans"]
 

@@ -7,9 +7,9 @@ import numpy as np
 from calib_core.measurements import RadarScans
 from calib_core.recordings.radar.columns import Returns
 from calib_core.recordings.radar.layouts import RadarLayout
-from calib_core.recordings.radar.merging import Spread, aligned, merged, moments_of, spread_of
 from calib_core.recordings.radar.scan_blocks import ScanBlocks
 from calib_core.recordings.radar.scan_stream import RadarStream
+from calib_core.recordings.radar.several_topics.merging import Spread, aligned, merged, moments_of, spread_of
 from calib_core.recordings.topics import Topic
 
 __all__ = ["MergedStream", "measured_spread"]

@@ -10,9 +10,9 @@ from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
 from calib_core.recordings.radar.column_mapping import StatedReading
 from calib_core.recordings.radar.column_plans import find_decoder, plan_described, plan_for
 from calib_core.recordings.radar.columns import ColumnPlan, Returns, no_returns, returns_from
-from calib_core.recordings.radar.samples import Samples
+from calib_core.recordings.radar.message_layouts.samples import Samples
+from calib_core.recordings.radar.message_layouts.struct_lists import count_field
 from calib_core.recordings.radar.self_describing.candidates import DescribedColumn
-from calib_core.recordings.radar.struct_lists import count_field
 
 __all__ = ["ArrayLayout"]
 

@@ -1,0 +1,1 @@
+"""One file per kind of message: how its returns are laid out."""
