@@ -100,5 +100,7 @@ def print_exactly(text: str) -> None:
         terminal_stream(sys.stdout).write(text)
 
 
-def _escaping(stream: TextIO) -> TextIO:
+def _escaping(stream: TextIO | None) -> TextIO:
+    if stream is None:  # closed by whoever started the program, as by `>&-`
+        stream = io.StringIO()
     return stream if isinstance(stream, _EscapingStream) else _EscapingStream(stream)  # type: ignore[return-value]

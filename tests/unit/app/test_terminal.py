@@ -111,3 +111,10 @@ def test_a_terminal_without_the_character_does_not_stop_a_command(monkeypatch: p
     with escaped_output():
         print("±")
     assert data.getvalue() == b"\\xb1\n"
+
+
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+def test_a_closed_output_does_not_stop_a_command(monkeypatch: pytest.MonkeyPatch, stream: str) -> None:
+    monkeypatch.setattr(sys, stream, None)
+    with escaped_output():
+        print("shown to nobody", file=getattr(sys, stream))
