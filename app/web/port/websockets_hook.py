@@ -81,6 +81,7 @@ class Connection(ServerConnection):
         super().__init__(*arguments, **named)
         self.head: Head | None = None
         self._received = bytearray()
+        self._ended_early = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:  # noqa: D102
         super().connection_made(transport)
@@ -108,12 +109,21 @@ class Connection(ServerConnection):
     def eof_received(self) -> bool | None:  # type: ignore[override]
         """Answer a client that sends no more after its request; a WebSocket needs both directions.
 
-        The protocol is not told, for it would close the connection before the answer; it closes it afterwards.
+        Until the answer is sent the protocol is not told, for it would close the connection.
         """
-        if self.head is not None and not self.head.upgrades:
+        if self.head is not None and not self.head.upgrades and self.response is None:
+            self._ended_early = True
             return True
         super().eof_received()
         return None
+
+    def send_data(self) -> None:
+        """Send, and close the connection of a client that had ended its side before the answer."""
+        super().send_data()
+        if self._ended_early and self.response is not None:
+            self._ended_early = False
+            super().eof_received()
+            self.transport.close()
 
     def _begun(self) -> None:
         with contextlib.suppress(ValueError):

@@ -162,3 +162,23 @@ def test_what_the_event_loop_reports_is_one_line_with_a_report(
     assert "Too many" in first
     assert "internal error (LookupError: of ours)" in second
     assert third == "something else"
+
+
+def ask_and_leave_before_the_answer(port: int) -> None:
+    with socket.create_connection(("127.0.0.1", port), timeout=10) as connection:
+        connection.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        connection.shutdown(socket.SHUT_WR)
+        assert connection.recv(1000).startswith(b"HTTP/1.1 426")
+
+
+@pytest.mark.parametrize("client", [scan, ask_and_leave_before_the_answer])
+def test_a_connection_ends_with_its_answer_and_not_when_time_is_up(client: Callable[[int], None]) -> None:
+    async def main() -> None:
+        with wrapped_serve(lambda _given: serve_nobody, kept):
+            async with websocket_server.serve(echo, "127.0.0.1", 0, close_timeout=600) as running:
+                await asyncio.to_thread(client, next(iter(running.sockets)).getsockname()[1])
+                async with asyncio.timeout(60):
+                    while running.handlers:
+                        await asyncio.sleep(0)
+
+    asyncio.run(main())
