@@ -3,9 +3,12 @@
 import errno
 import os
 import secrets
+import time
 from pathlib import Path
 
 __all__ = ["write_whole"]
+
+_PATIENCE_S = 2.0
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -37,13 +40,18 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def _write_into(path: Path, data: bytes) -> None:
-    """Write to a device or a pipe; opening a pipe that nobody reads would wait for ever."""
-    try:
-        descriptor = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
-    except OSError as error:
-        if error.errno != errno.ENXIO:
-            raise
-        raise OSError(errno.ENXIO, "nobody reads from this pipe or socket; name a file", str(path)) from error
+    """Write to a device or a pipe; one that nobody reads is refused after a while, not waited for for ever."""
+    until_s = time.monotonic() + _PATIENCE_S
+    while True:
+        try:
+            descriptor = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
+            break
+        except OSError as error:
+            if error.errno != errno.ENXIO:
+                raise
+            if time.monotonic() > until_s:  # its reader may have been started together with us
+                raise OSError(errno.ENXIO, "nobody reads from this pipe or socket; name a file", str(path)) from error
+            time.sleep(0.02)
     with os.fdopen(descriptor, "wb") as file:
         os.set_blocking(descriptor, True)
         file.write(data)
