@@ -187,7 +187,6 @@ def _serve(
             recording, camera=camera, session_folder=found.path, name=name, reference=reference, warnings=found.warnings
         )
         stack.push(partial(_close, workspace))
-        _say_how_it_was_read(found.path, topics)
         _remember(workspace, recording)
         for warning in workspace.restored.warnings:
             print(f"{sentence(warning.message)} {sentence(warning.hint)}")
@@ -258,22 +257,19 @@ def _with_remembered(topics: RecordingOptions, session: Path, *, fresh: Switch) 
     return dataclasses.replace(topics, map=found)
 
 
-def _say_how_it_was_read(session: Path, topics: RecordingOptions) -> None:
-    """Name the --map of a session that was found under another name, after its recording was opened without it."""
-    from app.session.file import remembered_map
-
-    words = remembered_map(session)
-    if words and not topics.map:
-        print(
-            f"In this session the radar was read with {' '.join(f'--map {one}' for one in words)}; open it again with that"
-        )
-
-
 def _remember(workspace: "Workspace", recording: Recording) -> None:
-    """Keep in the session how the recording is read and what was confirmed about it."""
+    """Keep in the session how the recording is read and what was confirmed about it.
+
+    A session found under another name may have a --map that was not known when its recording was opened: it is named and kept.
+    """
     from app.session import AssumptionsConfirmed, ColumnsMapped
 
-    workspace.dispatch(ColumnsMapped(recording.column_map))
+    before = workspace.session.column_map
+    if before and not recording.column_map:
+        words = " ".join(f"--map {one}" for one in before)
+        print(f"In this session the radar was read with {words}; open it again with that")
+    else:
+        workspace.dispatch(ColumnsMapped(recording.column_map))
     sure = tuple(one.assumption.words for one in recording.stated_assumptions if one.confirmed)
     if sure:
         workspace.dispatch(AssumptionsConfirmed(sure))

@@ -218,7 +218,7 @@ def _radar_choice(selection: Selection, stamped: Mapping[str, StampedTopic], inv
         if selection.radar_named:
             about_lost(topic.name, len(topic), both)  # what the user named must be readable
         if len(both.topic):
-            stamps = Stamps(topic.name, both.topic.receive_ns, both.header_ns)
+            stamps = _both_clocks(both, inventory)
             times_ns = _times(stamps, choose_clock(stamps).clocks[0])
             streams.append(_topic_stream(both.topic, inventory, times_ns, both.heads))
             frames.append(_frame(both.topic))
