@@ -390,4 +390,4 @@ class CalibrationDocument(Struct, frozen=True):
 
 for _document in (ClicksDocument, PairsDocument, CalibrationDocument):
     msgspec.json.Decoder(_document)
-"""msgspec learns the types here, in the one thread that imports them: two that read their first file at once could crash it (0.22.0)."""
+"""msgspec learns the types here, in the one thread that imports them: two that read their first file crashed it (0.22.0)."""
