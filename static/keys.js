@@ -5,6 +5,7 @@ import { comeTo } from "./arriving.js";
 import { fitEye, zoomEye } from "./birdseye.js";
 import { flushNudge, nudgeBy, placeByKey, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
 import { openExport } from "./exporting.js";
+import { toggleContours } from "./contours.js";
 import { toggleHelp } from "./help.js";
 import { toggleLayer } from "./layers.js";
 import { nextWorst } from "./pairs.js";
@@ -28,7 +29,7 @@ export const KEYS = [
   { keys: ["Ctrl", "Shift", "Z"], does: "redo" },
   { keys: ["F"], does: "fit the picture" },
   { keys: ["+", "−"], does: "zoom" },
-  { keys: ["1", "–", "4"], does: "toggle overlays" },
+  { keys: ["1", "–", "5"], does: "toggle overlays" },
   { keys: ["E"], does: "export" },
   { keys: ["?"], does: "this help" },
 ];
@@ -50,6 +51,7 @@ const PLAIN = {
   2: () => toggleLayer("others"),
   3: () => toggleLayer("ellipses"),
   4: () => toggleLayer("predictions"),
+  5: toggleContours,
   Enter: placeByKey,
   Delete: removeSelected,
   Backspace: removeSelected,
@@ -94,6 +96,7 @@ function typing(event) {
   if (target.closest("dialog")) return event.key !== "?" || !target.closest("#help-dialog");
   if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
   const presses = event.key === " " || event.key === "Enter";
+  if (target.matches(".plot")) return presses || event.key.startsWith("Arrow") || event.key === "Escape";
   if (target.matches("button, a, summary, label, input") && presses) return !target.matches("#play");
   return target.closest("[role=tablist], .divider") !== null && event.key.startsWith("Arrow");
 }

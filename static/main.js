@@ -3,6 +3,8 @@
 
 import { startArriving } from "./arriving.js";
 import { startClicking, turnBack } from "./clicking.js";
+import { startCompare, takeCompared } from "./compare.js";
+import { startContours, takeUncertainty } from "./contours.js";
 import { setFormats, startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
@@ -19,6 +21,7 @@ import { startOptions } from "./options.js";
 import { startPairs } from "./pairs.js";
 import { startPicture } from "./picture.js";
 import { frameFailed, goTo, pause, play, receiveFrame, requestAgain, step, tellCursor } from "./player.js";
+import { startReview, takePair, takeReview } from "./review.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace } from "./space.js";
@@ -72,6 +75,10 @@ const readers = {
     state.progress = message;
     emit("progress");
   },
+  review: takeReview,
+  pair_review: takePair,
+  compared: takeCompared,
+  uncertainty: takeUncertainty,
   error(message) {
     toast(message.message, message.hint);
     frameFailed(message.request);
@@ -138,6 +145,9 @@ startTimeline();
 startPairs();
 startFigures();
 startScatter();
+startReview();
+startCompare();
+startContours();
 startOptions();
 startExporting();
 startGuide();

@@ -5,6 +5,8 @@
  */
 
 import { ink, residualColour } from "./colours.js";
+import { drawCompared } from "./compare.js";
+import { drawContours } from "./contours.js";
 import { toCss, toDevice, viewport, zoom } from "./geometry.js";
 import { clicks, state } from "./state.js";
 
@@ -19,6 +21,7 @@ const CLOSE_ZOOM = 2;
 /** Draw all marks of the frame on screen. @param {Ink} pen */
 export function drawMarks(pen) {
   const index = state.shown?.index ?? -1;
+  drawContours(pen);
   const overlay = state.overlay?.index === index ? state.overlay : null;
   if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
   const clicked = clicks().some((click) => click.frame === index);
@@ -27,6 +30,7 @@ export function drawMarks(pen) {
   const here = clicks();
   if (state.layers.others) for (const click of here) if (click.frame !== index) drawOther(pen, click);
   for (const click of here) if (click.frame === index) drawClick(pen, click);
+  drawCompared(pen);
 }
 
 /** @param {Ink} pen @param {import("./messages.js").OverlayReturn[]} returns */

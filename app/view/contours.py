@@ -69,7 +69,7 @@ def _contour_map(calibration: Calibration, distance_m: float, farthest_m: float)
     if not len(known):
         return ContourMap(label, distance_m, "This method states no uncertainty, so there is nothing to draw.", ())
     lines = tuple(
-        Contour(f"{plain(level)} px", line)
+        Contour(f"{level:g} px", line)
         for level in _levels(float(known.min()), float(known.max()))
         for line in contour_lines(found.columns_px, found.rows_px, found.semi_major_px, level)
     )

@@ -15,6 +15,8 @@ MAP_DISTANCES_M = (5.0, 20.0, 60.0)
 
 _CHI2_95_2D = 5.991464547107979
 _CHI2_95_6D = 12.591587243743977
+_SAME_PX = 1e-3
+"""A ray that does not project to its own pixel lies where the lens folds back."""
 _FEWEST_DEGREES, _MANY_DEGREES = 1.0, 1e7
 
 
@@ -62,7 +64,7 @@ def uncertainty_map(calibration: Calibration, distance_m: float, *, columns: int
     points_camera_m = camera.rays(grid_px) * distance_m
     semi_major_px = np.full(len(grid_px), np.nan)
     seen = np.asarray(np.isfinite(points_camera_m).all(axis=1))
-    seen[seen] = camera.sees(points_camera_m[seen])
+    seen[seen] = np.linalg.norm(camera.project(points_camera_m[seen]) - grid_px[seen], axis=1) < _SAME_PX
     radar_from_camera: RigidTransform = calibration.camera_from_radar.inverse()
     covariances_px2 = calibration.pixel_covariance(radar_from_camera @ points_camera_m[seen])
     quantile = pixel_quantile(calibration.covariance_quantile)
