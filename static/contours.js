@@ -78,7 +78,7 @@ function drawChips() {
   if (held !== undefined) /** @type {HTMLElement|null} */ (group.querySelector(`[data-contours="${held}"]`))?.focus({ preventScroll: true });
 }
 
-/** Draw the lines with their labels. @param {CanvasRenderingContext2D} pen @returns {string[]} the labels that were drawn */
+/** Draw the lines with their labels, and say the same in words. @param {CanvasRenderingContext2D} pen */
 export function drawContours(pen) {
   const map = shown === null ? undefined : known?.maps.find((one) => one.label === shown);
   /** @type {string[]} */ const labels = [];
@@ -92,7 +92,8 @@ export function drawContours(pen) {
     labels.push(contour.label);
     label(pen, contour.label, at);
   }
-  return labels;
+  const words = labels.length ? `: lines at ${[...new Set(labels)].join(", ")}` : "";
+  group.setAttribute("aria-label", `Uncertainty in the picture${words}`);
 }
 
 /** @param {CanvasRenderingContext2D} pen @param {[number, number][]} line */
@@ -112,7 +113,7 @@ function trace(pen, line) {
 function labelPlace(line, taken) {
   const margin = 24 * viewport.ratio;
   const [right, bottom] = [viewport.width * viewport.ratio - margin, viewport.height * viewport.ratio - margin];
-  const inView = line.filter(([x, y]) => margin < x && x < right && margin * 2 < y && y < bottom);
+  const inView = line.filter(([x, y]) => margin < x && x < right && margin * 2 < y && y < bottom - margin * 2);
   const middle = inView.length / 2;
   const ranked = inView.map((at, index) => ({ at, off: Math.abs(index - middle) })).sort((a, b) => a.off - b.off);
   const free = ranked.find(({ at }) => taken.every((other) => Math.hypot(at[0] - other[0], at[1] - other[1]) > 60 * viewport.ratio));

@@ -21,7 +21,7 @@ import { startOptions } from "./options.js";
 import { startPairs } from "./pairs.js";
 import { startPicture } from "./picture.js";
 import { frameFailed, goTo, pause, play, receiveFrame, requestAgain, step, tellCursor } from "./player.js";
-import { startReview, takePair, takeReview } from "./review.js";
+import { plots, startReview, takePair, takeReview } from "./review.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace } from "./space.js";
@@ -178,5 +178,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, goTo, unconfirmed, follower },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, goTo, unconfirmed, follower, plots },
 });

@@ -14,6 +14,7 @@ import { hideTip, make, showTip } from "./notices.js";
 /** What the owner wants to know. @typedef {{hover: (mark: Mark|null) => void, go: (mark: Mark) => void, brush: (ids: string[]) => void}} Listener */
 /** What is highlighted in all plots. @typedef {{hovered: Set<string>, brushed: Set<string>, selected: string|null}} Highlight */
 
+const COLOURS = ["accent", "accent-soft", "attention", "ink", "line", "line-strong", "muted"];
 const EDGE = { left: 38, right: 8, top: 18, bottom: 28 };
 /** A mark this close to the pointer is meant [CSS px]. */
 const REACH = 12;
@@ -29,6 +30,7 @@ export class Plot {
     /** @type {Content} */ this.content = { marks: [], x: { label: "", low: 0, high: 1 }, y: { label: "", low: 0, high: 1 }, bar: 0, curve: [], limit: null, empty: "" };
     /** @type {Highlight} */ this.highlight = { hovered: new Set(), brushed: new Set(), selected: null };
     this.at = -1;
+    /** Colours of the theme, read once per drawing. @type {Record<string, string>} */ this.colour = {};
     /** @type {{x: number, y: number, toX: number, toY: number}|null} */ this.press = null;
     this.canvas = make("canvas", "plot", []);
     this.canvas.dataset.plot = key;
@@ -74,6 +76,7 @@ export class Plot {
   draw() {
     const [width, height] = this.size;
     if (!width || !height) return;
+    this.colour = Object.fromEntries(COLOURS.map((name) => [name, themeColour(name)]));
     const ratio = window.devicePixelRatio || 1;
     const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (this.canvas.width !== wide || this.canvas.height !== high) [this.canvas.width, this.canvas.height] = [wide, high];
@@ -102,25 +105,25 @@ export class Plot {
     pen.lineWidth = 1;
     pen.textBaseline = "alphabetic";
     for (const [axis, upright] of /** @type {[Axis, boolean][]} */ ([[content.x, false], [content.y, true]])) {
-      for (const value of ticks(axis, Math.max(2, Math.floor((upright ? floor - EDGE.top : right - EDGE.left) / (upright ? 28 : 48))))) {
+      for (const value of ticks(axis, Math.max(2, Math.floor((upright ? floor - EDGE.top : right - EDGE.left) / (upright ? 20 : 32))))) {
         const [x, y] = this.place(upright ? content.x.low : value, upright ? value : content.y.low);
-        pen.strokeStyle = themeColour("line");
+        pen.strokeStyle = this.colour.line;
         pen.beginPath();
         pen.moveTo(Math.round(x) + 0.5, upright ? Math.round(y) + 0.5 : EDGE.top);
         pen.lineTo(upright ? right : Math.round(x) + 0.5, upright ? Math.round(y) + 0.5 : floor);
         pen.stroke();
-        pen.fillStyle = themeColour("muted");
+        pen.fillStyle = this.colour.muted;
         pen.textAlign = upright ? "right" : "center";
         pen.fillText(words(value), upright ? EDGE.left - 5 : Math.min(x, right - 6), upright ? y + 3.5 : floor + 12);
       }
     }
-    pen.strokeStyle = themeColour("line-strong");
+    pen.strokeStyle = this.colour["line-strong"];
     pen.beginPath();
     pen.moveTo(EDGE.left + 0.5, EDGE.top);
     pen.lineTo(EDGE.left + 0.5, floor + 0.5);
     pen.lineTo(right, floor + 0.5);
     pen.stroke();
-    pen.fillStyle = themeColour("muted");
+    pen.fillStyle = this.colour.muted;
     pen.textAlign = "right";
     pen.fillText(content.x.label, right, height - 4);
     pen.textAlign = "left";
@@ -132,7 +135,7 @@ export class Plot {
     const { pen, content } = this;
     const [x, y] = this.place(mark.x, mark.y);
     const loud = this.loudness(mark);
-    const colour = themeColour(mark.kind === "agreeing" ? "accent" : mark.kind === "outlier" ? "attention" : "muted");
+    const colour = this.colour[mark.kind === "agreeing" ? "accent" : mark.kind === "outlier" ? "attention" : "muted"];
     const size = (content.marks.length > 120 ? 2.2 : 3.2) * (loud === 2 ? 1.4 : 1);
     pen.globalAlpha = loud || !this.highlight.brushed.size ? 0.9 : 0.22;
     pen.fillStyle = pen.strokeStyle = colour;
@@ -144,7 +147,7 @@ export class Plot {
     mark.kind === "agreeing" || mark.kind === "outlier" ? pen.fill() : pen.stroke();
     pen.globalAlpha = 1;
     if (loud !== 2) return;
-    pen.strokeStyle = themeColour("ink");
+    pen.strokeStyle = this.colour.ink;
     pen.lineWidth = 1.2;
     pen.beginPath();
     pen.arc(x, y, size + 3.5, 0, 2 * Math.PI);
@@ -158,7 +161,7 @@ export class Plot {
     const [left, top] = this.place(mark.x - content.bar / 2, mark.y);
     const [right, floor] = this.place(mark.x + content.bar / 2, 0);
     const loud = this.loudness(mark);
-    pen.fillStyle = themeColour(mark.kind === "outlier" ? "attention" : "accent");
+    pen.fillStyle = this.colour[mark.kind === "outlier" ? "attention" : "accent"];
     pen.globalAlpha = loud === 2 ? 1 : loud ? 0.8 : this.highlight.brushed.size ? 0.22 : 0.6;
     pen.fillRect(left + 0.5, top, Math.max(1, right - left - 1), floor - top);
     pen.globalAlpha = 1;
@@ -167,7 +170,7 @@ export class Plot {
   /** The expected distribution, and the limit above which a residual should be checked. */
   drawCurve() {
     const { pen, content } = this;
-    pen.strokeStyle = themeColour("ink");
+    pen.strokeStyle = this.colour.ink;
     pen.lineWidth = 1.3;
     pen.beginPath();
     content.curve.forEach(([x, y], index) => (index ? pen.lineTo(...this.place(x, y)) : pen.moveTo(...this.place(x, y))));
@@ -175,7 +178,7 @@ export class Plot {
     if (content.limit === null || content.limit > content.y.high) return;
     pen.setLineDash([4, 3]);
     pen.lineWidth = 1;
-    pen.strokeStyle = themeColour("attention");
+    pen.strokeStyle = this.colour.attention;
     for (const limit of content.y.low < 0 ? [content.limit, -content.limit] : [content.limit]) {
       pen.beginPath();
       pen.moveTo(...this.place(content.x.low, limit));
@@ -189,15 +192,15 @@ export class Plot {
   drawPress() {
     if (!this.press) return;
     const { x, y, toX, toY } = this.press;
-    this.pen.strokeStyle = themeColour("accent");
-    this.pen.fillStyle = themeColour("accent-soft");
+    this.pen.strokeStyle = this.colour.accent;
+    this.pen.fillStyle = this.colour["accent-soft"];
     this.pen.fillRect(x, y, toX - x, toY - y);
     this.pen.strokeRect(x, y, toX - x, toY - y);
   }
 
   /** @param {number} width @param {number} height */
   drawEmpty(width, height) {
-    this.pen.fillStyle = themeColour("muted");
+    this.pen.fillStyle = this.colour.muted;
     this.pen.textAlign = "center";
     this.pen.fillText(this.content.empty, width / 2 + EDGE.left / 2, height / 2);
   }

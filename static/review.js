@@ -47,7 +47,7 @@ let pair = null;
 /** What was asked for last, so that it is asked for once. */
 const asked = { review: "", pair: "" };
 /** @type {Map<string, Plot>} */
-const plots = new Map();
+export const plots = new Map();
 const filters = make("div", "review-filters", []);
 const grid = make("div", "review-plots", []);
 const readout = make("div", "review-readout", "");
@@ -148,7 +148,8 @@ function drawFilters() {
   const segments = make("div", "segmented", parts);
   segments.setAttribute("role", "group");
   segments.setAttribute("aria-label", "Part of the residual");
-  const large = chip("enlarge", "Enlarge", "Use the whole column for this tab.", document.body.classList.contains("review-large"), enlarge);
+  const large = chip("enlarge", "⤢", "Use the whole column for this tab, or give the 3D view its place back.", document.body.classList.contains("review-large"), enlarge);
+  large.setAttribute("aria-label", "Enlarge");
   filters.replaceChildren(...kinds, make("span", "review-range", ["range", limit("low", "from"), "–", limit("high", "to"), "m"]), segments, large);
   if (held) /** @type {HTMLElement|null} */ (filters.querySelector(`[data-filter="${held}"]`))?.focus({ preventScroll: true });
 }
@@ -260,7 +261,9 @@ const count = (number) => `${number} pair${number === 1 ? "" : "s"}`;
 
 /** @param {Mark|null} mark */
 function hovered(mark) {
-  highlight.hovered = new Set(mark?.ids ?? []);
+  const ids = mark?.ids ?? [];
+  if (ids.length === highlight.hovered.size && ids.every((id) => highlight.hovered.has(id))) return;
+  highlight.hovered = new Set(ids);
   readout.textContent = mark?.text ?? brushedText();
   redraw();
 }
@@ -297,7 +300,7 @@ function drawPair() {
     box.dataset.hint = fact.hint;
     return box;
   });
-  const heads = ["", "range", "direction", "score", "SNR", "seen in", "from the click"];
+  const heads = ["", "range", "direction", "score", "SNR", "returns in scans", "from the click"];
   const head = make("tr", "", heads.map((name) => {
     const cell = make("th", "", name);
     cell.scope = "col";

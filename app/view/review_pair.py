@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.view.number_format import plain
+from app.view.reprojections import reprojections
 from calib_core.arrays import Values
 from calib_core.measurements import Candidate
 from calib_core.radar import polar_from_cartesian
@@ -42,7 +43,7 @@ class CandidateRow:
         direction: azimuth and elevation in words.
         score: plausibility before any pose is known.
         snr: mean of its returns; a dash if the radar reports none.
-        seen: how many returns from how many scans.
+        seen: how many returns it averages, and from how many scans.
         distance: from the click to its reprojection.
         u_px: column of its reprojection; None if the camera does not see it.
         v_px: row of its reprojection.
@@ -82,17 +83,29 @@ def pair_review(calibration: Calibration, name: str) -> PairReview:
     if pair is None:
         reason = next((f"{row.reason}; {row.hint}" for row in calibration.unpaired if row.id == name), "not solved yet")
         return PairReview(name, f"{name} has no radar position: {reason}.")
+    facts = _facts(pair, _residual_px(calibration, pair))
     candidates = pair.measured.candidates if pair.measured is not None else ()
     if not candidates:
-        return PairReview(name, "The radar positions that this pair could have used were not kept.", _facts(pair))
+        return PairReview(name, "The radar positions that this pair could have used were not kept.", facts)
     points = np.array([candidate.position_radar_m for candidate in candidates])
     pixels = calibration.reproject(points)
     distances_px = np.linalg.norm(pixels - pair.pixel_px, axis=1)
+    distances_px[pair.candidate] = _residual_px(calibration, pair)
     rows = tuple(
         _row(candidate, pixel, float(distance_px), chosen=i == pair.candidate)
         for i, (candidate, pixel, distance_px) in enumerate(zip(candidates, pixels, distances_px, strict=True))
     )
-    return PairReview(name, _why(pair, candidates, distances_px), _facts(pair, candidates[pair.candidate]), rows)
+    facts = (*facts, *_noise_fact(candidates[pair.candidate]))
+    return PairReview(name, _why(pair, candidates, distances_px), facts, rows)
+
+
+def _residual_px(calibration: Calibration, pair: PairResult) -> float:
+    """Return the length of a residual as all of the page shows it; NaN if there is none."""
+    drawn = reprojections(calibration.pairs)[pair.id]
+    if drawn.projected_px is None:
+        return float("nan")
+    distance_px = float(np.linalg.norm(np.array(drawn.projected_px) - pair.pixel_px))
+    return round(distance_px / drawn.step_px) * drawn.step_px
 
 
 def _row(candidate: Candidate, pixel: Values, distance_px: float, *, chosen: bool) -> CandidateRow:
@@ -104,7 +117,7 @@ def _row(candidate: Candidate, pixel: Values, distance_px: float, *, chosen: boo
         direction=f"{_side(azimuth_rad, 'left', 'right')}, {_side(elevation_rad, 'up', 'down')}",
         score=plain(candidate.score, 2),
         snr=f"{candidate.snr_db:.0f} dB" if np.isfinite(candidate.snr_db) else "–",
-        seen=f"{_count(candidate.returns, 'return')}, {_count(candidate.scans, 'scan')}",
+        seen=f"{candidate.returns} in {candidate.scans}",
         distance=f"{plain(distance_px)} px" if np.isfinite(distance_px) else "not in the picture",
         u_px=round(float(pixel[0]), 2) if seen else None,
         v_px=round(float(pixel[1]), 2) if seen else None,
@@ -115,10 +128,6 @@ def _side(angle_rad: float, positive: str, negative: str) -> str:
     """Say an angle as people do: "1.8° down"."""
     degrees = round(float(np.degrees(angle_rad)), 1)
     return f"{abs(degrees):.1f}° {positive if degrees >= 0 else negative}"
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'s' if number != 1 else ''}"
 
 
 def _why(pair: PairResult, candidates: Sequence[Candidate], distances_px: Values) -> str:
@@ -151,9 +160,9 @@ def _why(pair: PairResult, candidates: Sequence[Candidate], distances_px: Values
     )
 
 
-def _facts(pair: PairResult, candidate: Candidate | None = None) -> tuple[PairFact, ...]:
-    facts = [
-        PairFact("residual", _px(pair.distance_px), "Distance between the click and the reprojection under the pose."),
+def _facts(pair: PairResult, residual_px: float) -> tuple[PairFact, ...]:
+    return (
+        PairFact("residual", _px(residual_px), "Distance between the click and the reprojection under the pose."),
         PairFact("held out", _px(pair.held_out_px), "The same under the pose that the other pairs give."),
         PairFact(
             "outlier probability",
@@ -165,17 +174,17 @@ def _facts(pair: PairResult, candidate: Candidate | None = None) -> tuple[PairFa
             f"{plain(pair.influence, 2)} sigma" if np.isfinite(pair.influence) else "–",
             "How far leaving the pair out moves the pose, in standard deviations of the pose.",
         ),
-    ]
-    if candidate is not None and np.isfinite(candidate.sigma_polar).all():
-        range_m, azimuth_rad, elevation_rad = candidate.sigma_polar.tolist()
-        facts.append(
-            PairFact(
-                "radar noise",
-                f"± {plain(100 * range_m, 2)} cm, {plain(np.degrees(azimuth_rad), 2)}°, {plain(np.degrees(elevation_rad), 2)}°",
-                "One standard deviation of the radar position: range, azimuth, elevation.",
-            )
-        )
-    return tuple(facts)
+    )
+
+
+def _noise_fact(candidate: Candidate) -> tuple[PairFact, ...]:
+    """Return how uncertain a radar position is; nothing if it is not known."""
+    if not np.isfinite(candidate.sigma_polar).all():
+        return ()
+    range_m, azimuth_rad, elevation_rad = candidate.sigma_polar.tolist()
+    azimuth, elevation = (plain(np.degrees(angle), 2) for angle in (azimuth_rad, elevation_rad))
+    hint = "One standard deviation of the radar position: range, azimuth, elevation."
+    return (PairFact("radar noise", f"± {plain(100 * range_m, 2)} cm, {azimuth}°, {elevation}°", hint),)
 
 
 def _px(length_px: float) -> str:
