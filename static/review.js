@@ -2,6 +2,7 @@
 /** The review of all pairs: linked plots of the residuals with a filter, and why the selected pair uses its return. */
 
 import { comeTo } from "./arriving.js";
+import { showTab } from "./layout.js";
 import { make } from "./notices.js";
 import { Plot } from "./plots.js";
 import { tell } from "./socket.js";
@@ -121,7 +122,7 @@ function rows() {
 
 /** @param {Click} click @returns {Kind} */
 function kindOf(click) {
-  if (/** @type {any} */ (click).mark === "untouched") return "untouched";
+  if (click.mark === "untouched") return "untouched";
   return click.state === "inlier" ? "agreeing" : click.state === "outlier" ? "outlier" : "excluded";
 }
 
@@ -148,7 +149,7 @@ function drawFilters() {
   const segments = make("div", "segmented", parts);
   segments.setAttribute("role", "group");
   segments.setAttribute("aria-label", "Part of the residual");
-  const large = chip("enlarge", "⤢", "Use the whole column for this tab, or give the 3D view its place back.", document.body.classList.contains("review-large"), enlarge);
+  const large = chip("enlarge", "⤢", "Use the whole column for this tab, or give the 3D view its place back.", document.body.classList.contains("review-large"), enlargeReview);
   large.setAttribute("aria-label", "Enlarge");
   filters.replaceChildren(...kinds, make("span", "review-range", ["range", limit("low", "from"), "–", limit("high", "to"), "m"]), segments, large);
   if (held) /** @type {HTMLElement|null} */ (filters.querySelector(`[data-filter="${held}"]`))?.focus({ preventScroll: true });
@@ -187,8 +188,11 @@ function change(what) {
   draw();
 }
 
-function enlarge() {
+/** Give the tab the whole column, or the 3D view its place back. */
+export function enlargeReview() {
+  if (!visible()) showTab("tab-review");
   document.body.classList.toggle("review-large");
+  draw();
 }
 
 function drawPlots() {

@@ -1,10 +1,12 @@
 """Which return a pair uses and why: all its candidates under the pose, with what speaks for each."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from app.view.direction import direction_words
 from app.view.number_format import plain
 from app.view.reprojections import reprojections
 from calib_core.arrays import Values
@@ -12,7 +14,7 @@ from calib_core.measurements import Candidate
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration, PairResult
 
-__all__ = ["CandidateRow", "PairFact", "PairReview", "pair_review"]
+__all__ = ["PairFact", "PairReview", "ReviewedReturn", "pair_review"]
 
 _MUCH_CLOSER = 3.0
 """From this ratio of distances on, the pose alone decides between two candidates."""
@@ -34,7 +36,7 @@ class PairFact:
 
 
 @dataclass(frozen=True, slots=True)
-class CandidateRow:
+class ReviewedReturn:
     """One radar position that may be the reflector, as final text.
 
     Attributes:
@@ -74,7 +76,7 @@ class PairReview:
     id: str
     why: str
     facts: tuple[PairFact, ...] = ()
-    candidates: tuple[CandidateRow, ...] = ()
+    candidates: tuple[ReviewedReturn, ...] = ()
 
 
 def pair_review(calibration: Calibration, name: str) -> PairReview:
@@ -84,7 +86,8 @@ def pair_review(calibration: Calibration, name: str) -> PairReview:
         reason = next((f"{row.reason}; {row.hint}" for row in calibration.unpaired if row.id == name), "not solved yet")
         return PairReview(name, f"{name} has no radar position: {reason}.")
     facts = _facts(pair, _residual_px(calibration, pair))
-    candidates = pair.measured.candidates if pair.measured is not None else ()
+    measured = pair.measured
+    candidates = (*measured.candidates, *measured.set_aside) if measured is not None else ()
     if not candidates:
         return PairReview(name, "The radar positions that this pair could have used were not kept.", facts)
     points = np.array([candidate.position_radar_m for candidate in candidates])
@@ -108,13 +111,14 @@ def _residual_px(calibration: Calibration, pair: PairResult) -> float:
     return round(distance_px / drawn.step_px) * drawn.step_px
 
 
-def _row(candidate: Candidate, pixel: Values, distance_px: float, *, chosen: bool) -> CandidateRow:
-    range_m, azimuth_rad, elevation_rad = polar_from_cartesian(candidate.position_radar_m[None])[0].tolist()
+def _row(candidate: Candidate, pixel: Values, distance_px: float, *, chosen: bool) -> ReviewedReturn:
+    range_m, azimuth, elevation = polar_from_cartesian(candidate.position_radar_m[None])[0].tolist()
+    side, height = direction_words(math.degrees(azimuth), "left", "right"), math.degrees(elevation)
     seen = bool(np.isfinite(pixel).all())
-    return CandidateRow(
+    return ReviewedReturn(
         chosen=chosen,
         range=f"{range_m:.2f} m",
-        direction=f"{_side(azimuth_rad, 'left', 'right')}, {_side(elevation_rad, 'up', 'down')}",
+        direction=f"{side}, {direction_words(height, 'up', 'down')}",
         score=plain(candidate.score, 2),
         snr=f"{candidate.snr_db:.0f} dB" if np.isfinite(candidate.snr_db) else "–",
         seen=f"{candidate.returns} in {candidate.scans}",
@@ -124,16 +128,12 @@ def _row(candidate: Candidate, pixel: Values, distance_px: float, *, chosen: boo
     )
 
 
-def _side(angle_rad: float, positive: str, negative: str) -> str:
-    """Say an angle as people do: "1.8° down"."""
-    degrees = round(float(np.degrees(angle_rad)), 1)
-    return f"{abs(degrees):.1f}° {positive if degrees >= 0 else negative}"
-
-
 def _why(pair: PairResult, candidates: Sequence[Candidate], distances_px: Values) -> str:
     """Say what decided between the candidates."""
     chosen = pair.candidate
     place = f"{np.linalg.norm(candidates[chosen].position_radar_m):.2f} m"
+    if pair.measured is not None and pair.measured.chosen is not None:
+        return f"Uses the return at {place} because it was chosen by hand, {plain(distances_px[chosen])} px from the click."
     if len(candidates) == 1:
         return f"Uses the return at {place}, the only static one that stands out in its window."
     others = [i for i in range(len(candidates)) if i != chosen]

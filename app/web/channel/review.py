@@ -163,6 +163,8 @@ class ReviewDesk:
         click = next((click for click in session.clicks if click.id == name), None)
         if click is None:
             raise InputError("no pair is selected; select the one to leave out")
+        if click.mark == "untouched" and not click.excluded:
+            raise InputError(f"{click.id} is an untouched guess, which has no weight; select another pair")
         others = tuple(replace(one, excluded=not one.excluded) if one is click else one for one in session.clicks)
         label = f"{'with' if click.excluded else 'without'} {click.id}"
         return solution_of(label, self._solved(replace(session, clicks=others), session.options))

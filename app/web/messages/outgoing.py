@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import msgspec
 
 from app.option_changes import OptionGroup, option_groups
-from app.view import FollowState, View
+from app.view import FollowState, PairCandidates, View
 from app.view.review import Review
 from app.view.review_pair import PairReview
 from app.view.review_solutions import Compared
@@ -271,6 +271,7 @@ Outgoing: TypeAlias = (
     | RadarLook
     | RadarMap
     | Overlay
+    | PairCandidates
     | Review
     | PairReview
     | Compared
@@ -291,6 +292,7 @@ TYPES: Mapping[type, str] = {
     RadarLook: "radar_look",
     RadarMap: "radar_map",
     Overlay: "overlay",
+    PairCandidates: "candidates",
     Review: "review",
     PairReview: "pair_review",
     Compared: "compared",

@@ -9,9 +9,9 @@ from app.session import ClickPlaced, History, RecordingFacts, Solved, advance
 from app.view.review import review_of
 from app.view.review_pair import pair_review
 from app.view.review_solutions import compared, previous_calibration, solution_of
-from calib_core.calibration import calibrate_pairs
+from calib_core.calibration import calibrate_pairs, preview_pairs
 from calib_core.interchange import CalibrationFile, check, imported
-from calib_core.measurements import TimeNs
+from calib_core.measurements import ChosenReturn, TimeNs
 from calib_core.results import Calibration
 from calib_core.synthetic import SimulatedPairs, simulate_pairs
 
@@ -37,7 +37,8 @@ def test_influence_orders_the_pairs_as_leaving_each_out_does(drawn: SimulatedPai
     information = np.linalg.inv(solved.covariance)
     moved = []
     for pair in inliers:
-        without = solve(drawn, frozenset({pair.id}))
+        without = preview_pairs([other for other in drawn.pairs if other.id != pair.id], drawn.camera)
+        assert isinstance(without, Calibration)
         error = without.camera_from_radar.error_from(solved.camera_from_radar)
         moved.append(float(np.sqrt(error @ information @ error)))
     stated = np.array([pair.influence for pair in inliers])
@@ -152,3 +153,15 @@ def test_the_answer_before_the_last_change_is_found(solved: Calibration) -> None
     history = advance(history, Solved(history.present.revision, solved), facts)
 
     assert previous_calibration(history) is earlier
+
+
+def test_a_return_chosen_by_hand_is_told_and_the_others_are_still_listed(solved: Calibration) -> None:
+    pair = next(pair for pair in solved.pairs if pair.inlier and pair.measured is not None and pair.candidate == 0)
+    assert pair.measured is not None
+    first, *rest = pair.measured.candidates
+    chosen = ChosenReturn(tuple(first.position_radar_m.tolist()))
+    by_hand = replace(pair, measured=replace(pair.measured, candidates=(first,), set_aside=tuple(rest), chosen=chosen))
+    told = pair_review(replace(solved, pairs=(by_hand,)), pair.id)
+
+    assert "because it was chosen by hand" in told.why
+    assert [row.chosen for row in told.candidates] == [True] + [False] * len(rest)
