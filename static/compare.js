@@ -30,6 +30,8 @@ const chosen = { a: "now", b: "" };
 let file = null;
 let fileSent = false;
 let asked = "";
+/** Whether the tab was shown when it was looked at last. */
+let open = false;
 /** @type {Compared|null} */
 let answer = null;
 /** 0 shows A, 1 shows B. */
@@ -65,7 +67,8 @@ export function startCompare() {
   blending.append(make("span", "", "in the picture: A"), slider, make("span", "", "B"));
   document.getElementById("page-review")?.append(box);
   listenToDrops();
-  on(["view", "selected", "box"], refresh);
+  on(["view", "selected"], refresh);
+  on(["box"], () => void (visible() !== open && refresh()));
   on(["connection"], () => {
     fileSent = false;
     asked = "";
@@ -78,6 +81,7 @@ export function startCompare() {
 function side(which, name) {
   const menu = selects[which];
   menu.dataset.side = which;
+  menu.setAttribute("aria-label", `Solution ${name}`);
   menu.onchange = () => {
     chosen[which] = /** @type {Kind} */ (menu.value);
     if (menu.value === "file" && !file) picker.click();
@@ -109,6 +113,7 @@ function toggledLabel() {
 
 /** Ask for the comparison, once per answer and choice. */
 function refresh() {
+  open = visible();
   if (!state.view) return;
   if (visible() && document.activeElement !== selects.a && document.activeElement !== selects.b) drawMenus();
   if (!chosen.b || !state.connected || !visible() || state.view.solving) return draw();

@@ -49,6 +49,10 @@ let pair = null;
 const asked = { review: "", pair: "" };
 /** @type {Map<string, Plot>} */
 export const plots = new Map();
+/** Whether the tab was shown when it was looked at last. */
+let open = false;
+/** The drawing that comes with the next screen frame. */
+let pending = 0;
 const filters = make("div", "review-filters", []);
 const grid = make("div", "review-plots", []);
 const readout = make("div", "review-readout", "");
@@ -68,7 +72,8 @@ export function startReview() {
   page.append(filters, wordsLine, grid, readout, why);
   drawFilters();
   new ResizeObserver(() => visible() && drawPlots()).observe(grid);
-  on(["view", "selected", "theme", "box", "recording"], refresh);
+  on(["view", "selected", "theme", "recording"], refresh);
+  on(["box"], () => void (visible() !== open && refresh())); // a tab was shown; the box also changes while the picture is moved
   on(["connection"], () => {
     asked.review = asked.pair = "";
     refresh();
@@ -91,6 +96,7 @@ export function takePair(message) {
 }
 
 function refresh() {
+  open = visible();
   if (!visible() || !state.view || !state.connected) return;
   const answer = `${state.view.solved_revision} ${state.view.checking}`;
   if (asked.review !== answer) tell({ type: "review" });
@@ -100,7 +106,13 @@ function refresh() {
   draw();
 }
 
+/** Draw everything with the next screen frame: a mark that is dragged changes the view many times. */
 function draw() {
+  pending ||= requestAnimationFrame(drawAll);
+}
+
+function drawAll() {
+  pending = 0;
   if (!visible()) return;
   highlight.selected = state.selected;
   wordsLine.textContent = review?.words ?? "";
