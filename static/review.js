@@ -221,9 +221,10 @@ function histogram(drawn) {
   const { edges_px: edges, expected } = review?.histogram ?? { edges_px: [0, 1], expected: [] };
   const width = edges[1] - edges[0];
   const last = edges[edges.length - 1];
-  const agreeing = drawn.filter((row) => row.kind === "agreeing").length;
+  const judged = drawn.filter((row) => row.kind === "agreeing" || row.kind === "outlier");
+  const agreeing = judged.filter((row) => row.kind === "agreeing").length;
   const bins = [...edges.slice(0, -1), last].map((edge, index) => {
-    const inside = drawn.filter((row) => row.length >= edge && (edge === last || row.length < edge + width));
+    const inside = judged.filter((row) => row.length >= edge && (edge === last || row.length < edge + width));
     const between = edge === last ? `longer than ${digits(last)} px` : `from ${digits(edge)} to ${digits(edge + width)} px`;
     const model = expected[index] === undefined ? "" : `, ${digits(expected[index] * agreeing)} expected`;
     const kind = /** @type {Kind} */ (edge === last ? "outlier" : "agreeing");
