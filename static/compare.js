@@ -46,7 +46,7 @@ const blending = make("div", "blend", []);
 const picker = make("input", "", []);
 
 export function startCompare() {
-  const head = make("h3", "", "Compare two solutions");
+  const head = make("h2", "", "Compare two solutions");
   const choose = make("button", "", "File…");
   choose.dataset.hint = "Compare with a calibration file of any format, also by dropping it on the page.";
   choose.onclick = () => picker.click();

@@ -311,13 +311,13 @@ function redraw() {
 function drawPair() {
   why.hidden = !state.selected;
   if (!state.selected) return;
-  if (pair?.id !== state.selected) return why.replaceChildren(make("h3", "", state.selected));
+  if (pair?.id !== state.selected) return why.replaceChildren(make("h2", "", state.selected));
   const facts = pair.facts.map((fact) => {
     const box = make("div", "", [make("dt", "", fact.label), make("dd", "", fact.value)]);
     box.dataset.hint = fact.hint;
     return box;
   });
-  const heads = ["", "range", "direction", "score", "SNR", "returns in scans", "from the click"];
+  const heads = ["used", "range", "direction", "score", "SNR", "returns in scans", "from the click"];
   const head = make("tr", "", heads.map((name) => {
     const cell = make("th", "", name);
     cell.scope = "col";
@@ -328,6 +328,9 @@ function drawPair() {
     mark.setAttribute("aria-label", one.chosen ? "used" : "not used");
     return make("tr", one.chosen ? "chosen" : "", [mark, ...[one.range, one.direction, one.score, one.snr, one.seen, one.distance].map((text) => make("td", "", text))]);
   });
-  const table = pair.candidates.length ? [make("div", "review-scroll", [make("table", "review-candidates", [make("thead", "", [head]), make("tbody", "", lines)])])] : [];
-  why.replaceChildren(make("h3", "", `Pair ${pair.id}`), make("p", "", pair.why), make("dl", "", facts), ...table);
+  const scroll = make("div", "review-scroll", [make("table", "review-candidates", [make("thead", "", [head]), make("tbody", "", lines)])]);
+  scroll.tabIndex = 0; // a narrow panel scrolls it
+  scroll.setAttribute("role", "region");
+  scroll.setAttribute("aria-label", `Returns that ${pair.id} may use`);
+  why.replaceChildren(make("h2", "", `Pair ${pair.id}`), make("p", "", pair.why), make("dl", "", facts), ...(pair.candidates.length ? [scroll] : []));
 }
