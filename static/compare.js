@@ -4,7 +4,7 @@
 import { make, toast } from "./notices.js";
 import { toDevice, viewport } from "./geometry.js";
 import { tell } from "./socket.js";
-import { clickIn, emit, on, state } from "./state.js";
+import { clicksIn, emit, on, state } from "./state.js";
 import { visible } from "./review.js";
 
 /** @typedef {import("./messages.js").CompareForm["a"]} Kind */
@@ -180,9 +180,9 @@ async function takeFile(given) {
 /** Draw where A and B put the pairs: circles and squares, joined by a line; those of the frame on screen stand out. @param {CanvasRenderingContext2D} pen */
 export function drawCompared(pen) {
   if (!answer || !chosen.b || !visible()) return;
-  const here = clickIn(state.shown?.index ?? -1)?.id;
+  const here = new Set(clicksIn(state.shown?.index ?? -1).map((click) => click.id));
   for (const [id, a, b] of answer.marks) {
-    const strong = id === here || id === state.selected;
+    const strong = here.has(id) || id === state.selected;
     if (!strong && !state.layers.others) continue;
     const size = (strong ? 8 : 4.5) * viewport.ratio;
     pen.lineWidth = (strong ? 2 : 1.4) * viewport.ratio;

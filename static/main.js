@@ -3,9 +3,11 @@
 
 import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
+import { startCandidates, take as takeCandidates } from "./candidates.js";
 import { startClicking } from "./clicking.js";
 import { startCompare, takeCompared } from "./compare.js";
 import { startContours, takeUncertainty } from "./contours.js";
+import { startCross } from "./cross.js";
 import { setFormats, startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
@@ -25,7 +27,7 @@ import { plots, startReview, takePair, takeReview } from "./review.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace } from "./space.js";
-import { clickIn, clicks, emit, on, select, selectedClick, state } from "./state.js";
+import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
 import { startTimeline } from "./timeline.js";
@@ -70,6 +72,9 @@ const readers = {
   radar_map(message) {
     state.radarMap = message;
     emit("radar_map");
+  },
+  candidates(message) {
+    takeCandidates(message);
   },
   progress(message) {
     state.progress = message;
@@ -136,6 +141,8 @@ startLayers();
 startLoupe();
 startLive();
 startClicking();
+startCandidates();
+startCross();
 startTimeline();
 startPairs();
 startFigures();
@@ -166,5 +173,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, goTo, unconfirmed, follower, plots },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots },
 });
