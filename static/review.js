@@ -4,6 +4,7 @@
 import { comeTo } from "./arriving.js";
 import { showTab } from "./layout.js";
 import { make } from "./notices.js";
+import { pairParts } from "./review_pair.js";
 import { Plot } from "./plots.js";
 import { tell } from "./socket.js";
 import { clicks, on, select, state } from "./state.js";
@@ -299,8 +300,8 @@ function go(mark) {
   const met = clicks().filter((click) => mark.ids.includes(click.id)).sort((a, b) => (b.residual_px ?? 0) - (a.residual_px ?? 0));
   if (!met.length) return;
   if (met.length > 1) brush(mark.ids);
-  comeTo(met[0].frame);
   select(met[0].id);
+  comeTo(met[0].frame);
 }
 
 function redraw() {
@@ -312,25 +313,5 @@ function drawPair() {
   why.hidden = !state.selected;
   if (!state.selected) return;
   if (pair?.id !== state.selected) return why.replaceChildren(make("h2", "", state.selected));
-  const facts = pair.facts.map((fact) => {
-    const box = make("div", "", [make("dt", "", fact.label), make("dd", "", fact.value)]);
-    box.dataset.hint = fact.hint;
-    return box;
-  });
-  const heads = ["used", "range", "direction", "score", "SNR", "returns in scans", "from the click"];
-  const head = make("tr", "", heads.map((name) => {
-    const cell = make("th", "", name);
-    cell.scope = "col";
-    return cell;
-  }));
-  const lines = pair.candidates.map((one) => {
-    const mark = make("td", "", one.chosen ? "●" : "○");
-    mark.setAttribute("aria-label", one.chosen ? "used" : "not used");
-    return make("tr", one.chosen ? "chosen" : "", [mark, ...[one.range, one.direction, one.score, one.snr, one.seen, one.distance].map((text) => make("td", "", text))]);
-  });
-  const scroll = make("div", "review-scroll", [make("table", "review-candidates", [make("thead", "", [head]), make("tbody", "", lines)])]);
-  scroll.tabIndex = 0; // a narrow panel scrolls it
-  scroll.setAttribute("role", "region");
-  scroll.setAttribute("aria-label", `Returns that ${pair.id} may use`);
-  why.replaceChildren(make("h2", "", `Pair ${pair.id}`), make("p", "", pair.why), make("dl", "", facts), ...(pair.candidates.length ? [scroll] : []));
+  why.replaceChildren(...pairParts(pair));
 }
