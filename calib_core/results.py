@@ -98,6 +98,7 @@ class PairResult:
         excluded: the user left it out.
         outlier_probability: 0 to 1; NaN if the method has none.
         influence: how far leaving it out moves the pose, in standard deviations; NaN if not computed.
+        held_out_px: distance from the click to where the other pairs predict it; NaN if not computed, and in files.
         candidate: which of the pair's candidates was chosen.
         expected_covariance_px2: (2, 2) covariance of the residual under the noise model; NaN if there is none.
         image_time: stamp of the clicked frame; None for pairs from a pairs file.
@@ -116,6 +117,7 @@ class PairResult:
     expected_covariance_px2: Points2 = field(default_factory=lambda: frozen_array([[float("nan")] * 2] * 2, (2, 2)))
     image_time: TimeNs | None = None
     measured: Pair | None = None
+    held_out_px: float = float("nan")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))

@@ -63,6 +63,11 @@ def take_all(browser: Browser, server: RunningServer, clicks: list[dict[str, Any
     driver.press("f", "j")
     driver.page.click("#tab-pose")
     shoot(driver, "pose")
+    driver.page.click("#tab-review")
+    driver.page.click("[data-filter=enlarge]")
+    driver.press("5")
+    driver.until("document.querySelectorAll('.review-candidates tr').length > 1")
+    shoot(driver, "review")
     driver.page.close()
     shoot(opened(browser, server, "light"), "light")
 

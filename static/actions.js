@@ -4,6 +4,7 @@
 import { fitEye, zoomEye } from "./birdseye.js";
 import { choose, nextCandidate, withoutCandidates } from "./candidates.js";
 import { nudgeBy, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
+import { toggleContours } from "./contours.js";
 import { enterCross, toggleCross } from "./cross.js";
 import { dismissHere, withoutPlacement } from "./dismissing.js";
 import { loadClicks, openExport } from "./exporting.js";
@@ -15,6 +16,7 @@ import { goLive } from "./live.js";
 import { nextWorst } from "./pairs.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
+import { enlargeReview } from "./review.js";
 import { tell } from "./socket.js";
 import { clickIn, clicks, selectedClick, state } from "./state.js";
 
@@ -98,6 +100,7 @@ export const ACTIONS = [
   { id: "show-clicks", words: "Show or hide the clicks of other frames", keys: ["2"], also: "overlay layer marks all", run: () => toggleLayer("others"), ...OVERLAY },
   { id: "show-ellipses", words: "Show or hide the 95 % ellipses", keys: ["3"], also: "overlay layer uncertainty covariance", run: () => toggleLayer("ellipses"), ...OVERLAY },
   { id: "show-predictions", words: "Show or hide the expected positions", keys: ["4"], also: "overlay layer predicted guess next placement", run: () => toggleLayer("predictions"), ...OVERLAY },
+  { id: "show-uncertainty", words: "Show or hide the uncertainty in the picture", keys: ["5"], also: "overlay layer contours map 95 % lines", run: toggleContours, ...OVERLAY },
 
   { id: "view-behind", words: "3D: look from behind the radar", also: "viewpoint", run: lookFrom("behind"), ...SPACE },
   { id: "view-above", words: "3D: look down from above", also: "viewpoint top bird", run: lookFrom("above"), ...SPACE },
@@ -106,6 +109,8 @@ export const ACTIONS = [
 
   { id: "tab-pairs", group: "Panel", words: "Show the pairs", also: "tab table list clicks placements", run: () => showTab("tab-pairs") },
   { id: "tab-pose", group: "Panel", words: "Show the pose", also: "tab transform extrinsics rotation translation errors advice", run: () => showTab("tab-pose"), when: withPictures },
+  { id: "tab-review", group: "Panel", words: "Show the review", also: "tab plots residuals histogram influence compare solutions a b", run: () => showTab("tab-review"), when: withPictures },
+  { id: "enlarge-review", group: "Panel", words: "Enlarge the review, or give the 3D view its place back", also: "tab plots large column", run: enlargeReview, when: withPictures },
   { id: "tab-options", group: "Panel", words: "Show the options", also: "tab settings parameters method", run: () => showTab("tab-options"), when: withPictures },
   { id: "theme", group: "Panel", words: "Light or dark theme", also: "colours colors bright night mode", run: press("theme") },
 

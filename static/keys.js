@@ -39,6 +39,7 @@ function typing(event) {
   if (ANYWHERE.includes(combination(event))) return false;
   if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
   const presses = event.key === " " || event.key === "Enter";
+  if (target.matches(".plot")) return presses || event.key.startsWith("Arrow") || event.key === "Escape";
   if (target.matches("button, a, summary, label, input") && presses) return !target.matches("#play");
   if (target.matches("tr") && ["Enter", "Home", "End"].includes(event.key)) return true;
   return target.closest("[role=tablist], .divider") !== null && event.key.startsWith("Arrow");

@@ -33,7 +33,7 @@ export function toggleLayer(layer) {
 }
 
 function draw() {
-  for (const chip of group.querySelectorAll("button")) {
+  for (const chip of /** @type {NodeListOf<HTMLElement>} */ (group.querySelectorAll("button[data-layer]"))) {
     chip.setAttribute("aria-pressed", String(state.layers[/** @type {Layer} */ (chip.dataset.layer)]));
   }
 }

@@ -5,6 +5,8 @@ import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
 import { startCandidates, take as takeCandidates } from "./candidates.js";
 import { startClicking } from "./clicking.js";
+import { startCompare, takeCompared } from "./compare.js";
+import { startContours, takeUncertainty } from "./contours.js";
 import { startCross } from "./cross.js";
 import { setFormats, startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
@@ -21,6 +23,7 @@ import { startOptions } from "./options.js";
 import { startPairs } from "./pairs.js";
 import { startPicture } from "./picture.js";
 import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./player.js";
+import { plots, startReview, takePair, takeReview } from "./review.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace } from "./space.js";
@@ -77,6 +80,10 @@ const readers = {
     state.progress = message;
     emit("progress");
   },
+  review: takeReview,
+  pair_review: takePair,
+  compared: takeCompared,
+  uncertainty: takeUncertainty,
   error(message) {
     toast(message.message, message.hint);
     frameFailed(message.request);
@@ -140,6 +147,9 @@ startTimeline();
 startPairs();
 startFigures();
 startScatter();
+startReview();
+startCompare();
+startContours();
 startOptions();
 startExporting();
 startGuide();
@@ -163,5 +173,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots },
 });

@@ -6,6 +6,8 @@
 
 import { drawCandidates } from "./candidates.js";
 import { ink, residualColour } from "./colours.js";
+import { drawCompared } from "./compare.js";
+import { drawContours } from "./contours.js";
 import { drawCross } from "./cross.js";
 import { toCss, toDevice, viewport, zoom } from "./geometry.js";
 import { clicks, clicksIn, isOffered, placementsAt, state } from "./state.js";
@@ -21,6 +23,7 @@ const CLOSE_ZOOM = 2;
 /** Draw all marks of the frame on screen. @param {Ink} pen */
 export function drawMarks(pen) {
   const index = state.shown?.index ?? -1;
+  drawContours(pen);
   const overlay = state.overlay?.index === index ? state.overlay : null;
   if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
   if (state.layers.predictions && overlay) for (const [u, v, range] of overlay.guesses) if (isOpen(index, range)) drawGuess(pen, u, v);
@@ -30,6 +33,7 @@ export function drawMarks(pen) {
   for (const click of clicksIn(index)) drawClick(pen, click);
   drawCandidates(pen);
   drawCross(pen);
+  drawCompared(pen);
 }
 
 /** Whether a placement in a frame still wants a click. @param {number} index @param {number} range its own [m] */

@@ -402,6 +402,95 @@ export interface PairCandidates {
   suggestion: string;
 }
 
+/** What a review shows of one pair beyond its row; written as an array. */
+export type ReviewRow = [id: string, influence: number | null, held_out_px: number | null, sigmas: number | null];
+
+/** The bins of a histogram of residual lengths. */
+export interface ResidualHistogram {
+  edges_px: number[];
+  expected: number[];
+}
+
+/** The review of all pairs of an answer. */
+export interface Review {
+  type: "review";
+  revision: number;
+  rows: ReviewRow[];
+  histogram: ResidualHistogram | null;
+  words: string;
+}
+
+/** One line about a pair, as final text. */
+export interface PairFact {
+  label: string;
+  value: string;
+  hint: string;
+}
+
+/** One radar position that may be the reflector, as final text. */
+export interface ReviewedReturn {
+  chosen: boolean;
+  range: string;
+  direction: string;
+  score: string;
+  snr: string;
+  seen: string;
+  distance: string;
+  u_px: number | null;
+  v_px: number | null;
+}
+
+/** One pair under the pose. */
+export interface PairReview {
+  type: "pair_review";
+  id: string;
+  why: string;
+  facts: PairFact[];
+  candidates: ReviewedReturn[];
+}
+
+/** One figure of the comparison, as `cocalib check --against` prints it. */
+export interface ComparedRow {
+  label: string;
+  text: string;
+}
+
+/** Where both solutions draw the radar position of one pair; written as an array. */
+export type ComparedMark = [id: string, a_px: [number, number] | null, b_px: [number, number] | null];
+
+/** Two solutions compared. */
+export interface Compared {
+  type: "compared";
+  revision: number;
+  a: string;
+  b: string;
+  rows: ComparedRow[];
+  verdict: string;
+  marks: ComparedMark[];
+  problem: string;
+}
+
+/** One line of equal uncertainty. */
+export interface Contour {
+  label: string;
+  points_px: [number, number][];
+}
+
+/** Where points at one distance may appear. */
+export interface ContourMap {
+  label: string;
+  distance_m: number;
+  words: string;
+  contours: Contour[];
+}
+
+/** Where points at several distances may appear in the picture. */
+export interface Uncertainty {
+  type: "uncertainty";
+  revision: number;
+  maps: ContourMap[];
+}
+
 /** Progress of a long operation. */
 export interface Progress {
   type: "progress";
@@ -613,6 +702,36 @@ export interface ImportForm {
   request?: number;
 }
 
+/** The review of all pairs is requested. */
+export interface ReviewForm {
+  type: "review";
+  request?: number;
+}
+
+/** The review of one pair is requested. */
+export interface PairReviewForm {
+  type: "review_pair";
+  id: string;
+  request?: number;
+}
+
+/** Two solutions are to be compared; the content of a file is sent once, and kept for later requests of the page. */
+export interface CompareForm {
+  type: "compare";
+  a: "now" | "default" | "paper" | "toggled" | "before" | "reference" | "file";
+  b: "now" | "default" | "paper" | "toggled" | "before" | "reference" | "file";
+  pair?: string | null;
+  file_name?: string;
+  file_base64?: string;
+  request?: number;
+}
+
+/** The contours of the uncertainty in the picture are requested. */
+export interface UncertaintyForm {
+  type: "uncertainty";
+  request?: number;
+}
+
 export type FromServer =
   | View
   | ViewChange
@@ -625,6 +744,10 @@ export type FromServer =
   | RadarMap
   | Overlay
   | PairCandidates
+  | Review
+  | PairReview
+  | Compared
+  | Uncertainty
   | Progress
   | Problem
   | Done;
@@ -649,4 +772,8 @@ export type FromPage =
   | FrameForm
   | CursorForm
   | ViewpointForm
-  | ImportForm;
+  | ImportForm
+  | ReviewForm
+  | PairReviewForm
+  | CompareForm
+  | UncertaintyForm;

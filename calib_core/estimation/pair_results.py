@@ -53,6 +53,7 @@ def used_pair_results(
             inlier=bool(inliers[i]),
             outlier_probability=float(1.0 - refined.weights[i]),
             influence=float(left_out.influence[i]),
+            held_out_px=float(left_out.distance_px[i]),
             candidate=chosen,
             expected_covariance_px2=expected[i],
             image_time=pair.image_time,

@@ -8,23 +8,26 @@ from typing import Protocol
 import numpy as np
 
 from app.error_boundary import error_boundary
+from app.session import Step
 from app.view import sentence
 from app.web.channel.click_candidates import candidates_of
 from app.web.channel.hub import Hub
 from app.web.channel.newest import NewestWins
 from app.web.channel.outbox import Outbox
 from app.web.channel.radar_survey import placements_at
+from app.web.channel.review import ReviewDesk
 from app.web.channel.view_feed import Shown
 from app.web.frames import Frame
 from app.web.messages import (
+    Command,
     CursorMoved,
     Done,
     FrameHeader,
     FrameWanted,
     Hello,
     ImportWanted,
-    Incoming,
     Problem,
+    ReviewRequest,
     ViewpointWanted,
     ViewWanted,
     encode,
@@ -69,6 +72,7 @@ class Channel:
         self._frames = NewestWins(self._send_frame, self._report)
         self._overlay = NewestWins(self._send_overlay, self._report)
         self._space = NewestWins(self._draw_space, self._report)
+        self._review = ReviewDesk(hub.workspace, hub.recording, hub.camera, self.outbox, self._report)
         self._candidates = NewestWins(self._send_candidates, self._report)
         self._forward = True
         self._has_candidates = False
@@ -86,6 +90,7 @@ class Channel:
             self._hub.tabs.discard(self)
             for worker in (self._greetings, self._views, self._frames, self._overlay, self._space, self._candidates):
                 worker.close()
+            self._review.close()
             for task in (sending, reading):
                 task.cancel()
             await asyncio.gather(sending, reading, return_exceptions=True)
@@ -106,7 +111,10 @@ class Channel:
             text = await socket.recv()
             with error_boundary("a page's message", partial(self._refuse, text)):
                 try:
-                    await self._obey(parse(text))
+                    incoming = parse(text)
+                    await self._obey(incoming.command)
+                    if incoming.request is not None:
+                        self.outbox.put(encode(Done(incoming.request)))
                 except CalibrationError as error:
                     self._refuse(text, str(error))
 
@@ -116,13 +124,12 @@ class Channel:
     def _refuse(self, text: str | bytes, reason: str) -> None:
         self.outbox.put(encode(Problem(sentence(reason), request=request_of(text))))
 
-    async def _obey(self, incoming: Incoming) -> None:
+    async def _obey(self, command: Command) -> None:
         """Carry out a command of the page.
 
         Raises:
             CalibrationError: it cannot be done; nothing changed.
         """
-        command = incoming.command
         if isinstance(command, FrameWanted):
             self._frames.give(command)
         elif isinstance(command, CursorMoved):
@@ -131,19 +138,23 @@ class Channel:
             self._greetings.give(command)
         elif isinstance(command, ViewWanted):
             self._views.give(command)
+        elif isinstance(command, ReviewRequest):
+            self._review.give(command)
         elif isinstance(command, ViewpointWanted):
             if self.scene is not None:
                 self.scene.look_from(command.viewpoint)
         else:
-            workspace = self._hub.workspace
-            change = (
-                partial(workspace.import_clicks, command.text, command.name)
-                if isinstance(command, ImportWanted)
-                else partial(workspace.dispatch, command)
-            )
-            await asyncio.get_running_loop().run_in_executor(self._hub.steps, change)
-        if incoming.request is not None:
-            self.outbox.put(encode(Done(incoming.request)))
+            await self._change(command)
+
+    async def _change(self, command: Step | ImportWanted) -> None:
+        """Carry out a change of the session, in the order in which all pages sent them."""
+        workspace = self._hub.workspace
+        change = (
+            partial(workspace.import_clicks, command.text, command.name)
+            if isinstance(command, ImportWanted)
+            else partial(workspace.dispatch, command)
+        )
+        await asyncio.get_running_loop().run_in_executor(self._hub.steps, change)
 
     def _view_text(self) -> str:
         """Write the message that makes the page show the newest View; called when the page can take it."""

@@ -39,6 +39,7 @@ from app.web.messages.outgoing import (
     encode_frame,
 )
 from app.web.messages.radar_messages import PlacementRow, Placements, RadarLook, RadarMap, RadarReturn
+from app.web.messages.review_messages import ReviewRequest, Uncertainty
 from app.web.messages.view_changes import ClickChange, RowValues, ViewChange, change_between
 
 __all__ = [
@@ -68,10 +69,12 @@ __all__ = [
     "RadarReturn",
     "RecordingNote",
     "ReturnColour",
+    "ReviewRequest",
     "RowValues",
     "SensorNote",
     "SessionNote",
     "StampColumns",
+    "Uncertainty",
     "ViewChange",
     "ViewWanted",
     "Viewpoint",

@@ -11,6 +11,7 @@ from msgspec import Meta
 from app.option_changes import changes_from_tree
 from app.session import ClickPlaced, OptionsEdited, Step
 from app.session.file import step_json as forms
+from app.web.messages.review_messages import ReviewRequest
 from calib_core.errors import InputError
 
 __all__ = [
@@ -117,7 +118,9 @@ class ImportWanted:
     name: str
 
 
-Command: TypeAlias = Step | Hello | ViewWanted | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted
+Command: TypeAlias = (
+    Step | Hello | ViewWanted | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted | ReviewRequest
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +182,9 @@ class ImportForm(_Form, frozen=True, tag="import_clicks"):
     name: Annotated[str, Meta(max_length=300)] = "the file"
 
 
-MessageForm: TypeAlias = forms.StepForm | HelloForm | ViewForm | FrameForm | CursorForm | ViewpointForm | ImportForm
+MessageForm: TypeAlias = (
+    forms.StepForm | HelloForm | ViewForm | FrameForm | CursorForm | ViewpointForm | ImportForm | ReviewRequest
+)
 
 
 _TYPES = {str(form.__struct_config__.tag): form for form in get_args(MessageForm)}
@@ -274,6 +279,11 @@ def _cursor(form: CursorForm) -> Command:
 @_command.register
 def _viewpoint(form: ViewpointForm) -> Command:
     return ViewpointWanted(form.viewpoint)
+
+
+@_command.register
+def _review(form: ReviewRequest) -> Command:
+    return form
 
 
 @_command.register

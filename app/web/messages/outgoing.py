@@ -9,7 +9,11 @@ import msgspec
 
 from app.option_changes import OptionGroup, option_groups
 from app.view import FollowState, PairCandidates, View
+from app.view.review import Review
+from app.view.review_pair import PairReview
+from app.view.review_solutions import Compared
 from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
+from app.web.messages.review_messages import Uncertainty
 from app.web.messages.view_changes import ViewChange
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, Stamp
@@ -283,6 +287,10 @@ Outgoing: TypeAlias = (
     | RadarMap
     | Overlay
     | PairCandidates
+    | Review
+    | PairReview
+    | Compared
+    | Uncertainty
     | Progress
     | Problem
     | Done
@@ -300,6 +308,10 @@ TYPES: Mapping[type, str] = {
     RadarMap: "radar_map",
     Overlay: "overlay",
     PairCandidates: "candidates",
+    Review: "review",
+    PairReview: "pair_review",
+    Compared: "compared",
+    Uncertainty: "uncertainty",
     Progress: "progress",
     Problem: "error",
     Done: "done",

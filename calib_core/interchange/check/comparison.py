@@ -9,7 +9,7 @@ from calib_core.camera import Camera
 from calib_core.geometry import skew
 from calib_core.interchange.imported import ImportedCalibration
 
-__all__ = ["Comparison", "PixelDifference", "compare", "shown"]
+__all__ = ["ComparedFigure", "Comparison", "PixelDifference", "compare", "shown"]
 
 DISTANCES_M = (5.0, 20.0, 60.0)
 _GRID = 7
@@ -34,6 +34,19 @@ class PixelDifference:
 
 
 @dataclass(frozen=True, slots=True)
+class ComparedFigure:
+    """One line of a comparison, the same in every report.
+
+    Attributes:
+        label: what differs.
+        text: by how much, with its standard deviation if that is known.
+    """
+
+    label: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Comparison:
     """The difference between two calibrations.
 
@@ -46,6 +59,7 @@ class Comparison:
         chi2: squared Mahalanobis distance under the known covariances, 6 degrees of freedom; NaN if neither is known.
         p_value: probability of a chi2 this large if the two are independent and right; NaN if chi2 is.
         covariances: how many of the two covariances are known.
+        beyond: for each of the two, whether the other's pose is outside its 95 % ellipsoid; None if it states no uncertainty.
     """
 
     rotation_deg: float
@@ -56,20 +70,46 @@ class Comparison:
     chi2: float
     p_value: float
     covariances: int
+    beyond: tuple[bool | None, bool | None]
 
-    def lines(self) -> tuple[str, ...]:
-        """Return the comparison as readable lines."""
+    @property
+    def figures(self) -> tuple[ComparedFigure, ...]:
+        """The differences as final text; every report shows these."""
         rows = [
-            f"rotation: {shown(self.rotation_deg)} deg apart{_plus_minus(self.rotation_sigma_deg, 'deg')}",
-            f"camera position: {shown(self.position_cm)} cm apart{_plus_minus(self.position_sigma_cm, 'cm')}",
+            ComparedFigure(
+                "rotation", f"{shown(self.rotation_deg)} deg apart{_plus_minus(self.rotation_sigma_deg, 'deg')}"
+            ),
+            ComparedFigure(
+                "camera position", f"{shown(self.position_cm)} cm apart{_plus_minus(self.position_sigma_cm, 'cm')}"
+            ),
         ]
         for at in self.pixels:
             expected = "" if np.isnan(at.sigma_px) else f", expected {at.sigma_px:.3g} px from the covariances"
-            rows.append(f"at {at.distance_m:g} m: {shown(at.rms_px)} px rms, {shown(at.max_px)} px max{expected}")
+            rms_and_max = f"{shown(at.rms_px)} px rms, {shown(at.max_px)} px max{expected}"
+            rows.append(ComparedFigure(f"at {at.distance_m:g} m", rms_and_max))
         if np.isfinite(self.chi2):
-            rows.append(
-                f"overall: chi2 {shown(self.chi2)} for 6 degrees of freedom (p = {self.p_value:.2g} if the two are independent)"
-            )
+            independent = f"(p = {self.p_value:.2g} if the two are independent)"
+            rows.append(ComparedFigure("overall", f"chi2 {shown(self.chi2)} for 6 degrees of freedom {independent}"))
+        return tuple(rows)
+
+    def verdict(self, a: str, b: str) -> str:
+        """Say whether the difference exceeds what the two state about themselves, with these names for them."""
+        parts = {True: "exceeds", False: "is within", None: "cannot be judged by"}
+        of_a, of_b = (parts[beyond] for beyond in self.beyond)
+        what = "the stated 95 % uncertainty of"
+        if self.beyond == (None, None):
+            return "neither of the two states an uncertainty"
+        if self.beyond[0] == self.beyond[1]:
+            return f"the difference {of_a} {what} both"
+        if None in self.beyond:
+            (part, name), silent = ((of_a, a), b) if self.beyond[1] is None else ((of_b, b), a)
+            return f"the difference {part} {what} {name}; {silent} states none"
+        return f"the difference {of_a} {what} {a} and {of_b} that of {b}"
+
+    def lines(self) -> tuple[str, ...]:
+        """Return the comparison as readable lines; the first of the two is called the other."""
+        rows = [f"{row.label}: {row.text}" for row in self.figures]
+        rows.append(self.verdict("the other", "this one"))
         if self.covariances == 1:
             rows.append("only one of the two uncertainties is known; the standard deviations come from that one alone")
         return tuple(rows)
@@ -110,7 +150,17 @@ def compare(a: ImportedCalibration, b: ImportedCalibration, *, camera: Camera | 
         chi2=chi2,
         p_value=p_value,
         covariances=len(known),
+        beyond=(_beyond(a, error), _beyond(b, a_pose.error_from(b_pose))),
     )
+
+
+def _beyond(side: ImportedCalibration, error: np.ndarray) -> bool | None:
+    """Return whether an error (6,) of a pose is outside its 95 % ellipsoid; None if it states none."""
+    if side.file is None:
+        return None
+    squared = _chi2(error, side.file.calibration.covariance)[0]
+    quantile = side.file.calibration.covariance_quantile
+    return squared > quantile if np.isfinite(squared) and np.isfinite(quantile) else None
 
 
 def _known_covariances(a: ImportedCalibration, b: ImportedCalibration) -> list[Matrix66]:

@@ -1,0 +1,98 @@
+"""The uncertainty in the picture as a map: how far from the drawn place a point may really appear, over all of the image."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Values, frozen_array
+from calib_core.geometry import RigidTransform
+from calib_core.results import Calibration
+
+__all__ = ["MAP_DISTANCES_M", "UncertaintyMap", "pixel_quantile", "uncertainty_map"]
+
+MAP_DISTANCES_M = (5.0, 20.0, 60.0)
+"""The distances from the camera that are shown; those at which two calibrations are compared as well."""
+
+_CHI2_95_2D = 5.991464547107979
+_CHI2_95_6D = 12.591587243743977
+_SAME_PX = 1e-3
+"""A ray that does not project to its own pixel lies where the lens folds back."""
+_FEWEST_DEGREES, _MANY_DEGREES = 1.0, 1e7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UncertaintyMap:
+    """Where a point at one distance may appear, for a grid of places in the picture.
+
+    Attributes:
+        distance_m: of the point from the camera.
+        columns_px: (c,) of the grid, ascending, from the left edge of the image to the right.
+        rows_px: (r,) of the grid, ascending.
+        semi_major_px: (r, c) semi-major axis of the ellipse that contains the point with 95 % probability; NaN where the lens
+            has no ray, or the method no noise model.
+    """
+
+    distance_m: float
+    columns_px: Values
+    rows_px: Values
+    semi_major_px: np.ndarray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "columns_px", frozen_array(self.columns_px, (None,)))
+        object.__setattr__(self, "rows_px", frozen_array(self.rows_px, (None,)))
+        shape = (len(self.rows_px), len(self.columns_px))
+        object.__setattr__(self, "semi_major_px", frozen_array(self.semi_major_px, shape))
+
+
+def uncertainty_map(calibration: Calibration, distance_m: float, *, columns: int = 49) -> UncertaintyMap:
+    """Map the 95 % uncertainty of a reprojection over the image, for points at one distance from the camera.
+
+    Each pixel of the grid is carried along its ray to the distance, and the covariance of the pose from there into the picture.
+    It covers the pose; for a radar without elevation, what the pairs determine of it. The noise of a single radar position is
+    not included.
+
+    Args:
+        calibration: of any method; without a covariance the map is NaN.
+        distance_m: from the camera's centre, along the ray.
+        columns: of the grid; rows follow from the shape of the image.
+    """
+    camera = calibration.camera
+    rows = max(2, round((columns - 1) * camera.height_px / camera.width_px) + 1)
+    columns_px = np.linspace(-0.5, camera.width_px - 0.5, columns)
+    rows_px = np.linspace(-0.5, camera.height_px - 0.5, rows)
+    grid_px = np.stack(np.meshgrid(columns_px, rows_px), axis=-1).reshape(-1, 2)
+    points_camera_m = camera.rays(grid_px) * distance_m
+    semi_major_px = np.full(len(grid_px), np.nan)
+    seen = np.asarray(np.isfinite(points_camera_m).all(axis=1))
+    seen[seen] = np.linalg.norm(camera.project(points_camera_m[seen]) - grid_px[seen], axis=1) < _SAME_PX
+    radar_from_camera: RigidTransform = calibration.camera_from_radar.inverse()
+    covariances_px2 = calibration.pixel_covariance(radar_from_camera @ points_camera_m[seen])
+    quantile = pixel_quantile(calibration.covariance_quantile)
+    semi_major_px[seen] = np.sqrt(quantile * _largest_eigenvalues(covariances_px2))
+    return UncertaintyMap(distance_m, columns_px, rows_px, semi_major_px.reshape(rows, columns))
+
+
+def pixel_quantile(covariance_quantile: float) -> float:
+    """Return the factor on a pixel covariance (2, 2) that gives its 95 % ellipse, from that of the pose's (6, 6).
+
+    The pose's is the 95 % quantile of 6 F(6, nu): chi-square with 6 degrees of freedom if the noise is known, larger if few pairs
+    had to show it. The pixel has 2 dimensions, so the quantile is that of 2 F(2, nu) with the same nu, at least 5.99.
+
+    Args:
+        covariance_quantile: of `Calibration`.
+    """
+    if not covariance_quantile > _CHI2_95_6D:
+        return _CHI2_95_2D
+    from scipy.special import fdtri
+
+    low, high = np.log(_FEWEST_DEGREES), np.log(_MANY_DEGREES)
+    for _ in range(60):  # 6 F(6, nu) falls with nu
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if 6.0 * fdtri(6.0, np.exp(middle), 0.95) > covariance_quantile else (low, middle)
+    return max(_CHI2_95_2D, 2.0 * float(fdtri(2.0, np.exp(high), 0.95)))
+
+
+def _largest_eigenvalues(covariances_px2: np.ndarray) -> Values:
+    """Return the larger eigenvalue (n,) of symmetric matrices (n, 2, 2); NaN stays NaN."""
+    first, second = covariances_px2[:, 0, 0], covariances_px2[:, 1, 1]
+    return np.asarray(0.5 * (first + second) + np.hypot(0.5 * (first - second), covariances_px2[:, 0, 1]))

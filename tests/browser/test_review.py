@@ -1,0 +1,166 @@
+"""The tab Review: linked plots, contours of the uncertainty, two solutions compared."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.session import ClickExcluded, ClicksImported
+from app.web.port.server import RunningServer
+from app.workspace import Workspace
+from calib_core.measurements import ReflectorClick, time_from_parts
+from tests.browser.driving import Driver
+
+pytestmark = pytest.mark.browser
+
+
+def clicks_of(truth: Any) -> list[ReflectorClick]:
+    """Return a click where each reflector was rendered; that of the seventh is far off."""
+    clicks = [
+        ReflectorClick(time_from_parts(**placement["best_image_time"]), f"c{number + 1}", *placement["pixel_px"])
+        for number, placement in enumerate(truth["placements"])
+    ]
+    clicks[6] = replace(clicks[6], u_px=clicks[6].u_px + 120)
+    return clicks
+
+
+@pytest.fixture
+def reviewing(open_page: Callable[..., Driver], server: RunningServer, workspace: Workspace, truth: Any) -> Driver:
+    """Open the review of twenty clicks."""
+    page = open_page(server.url)
+    workspace.dispatch(ClicksImported(tuple(clicks_of(truth))))
+    page.until("__cocalib.state.view.has_calibration")
+    page.settle()
+    page.page.click("#tab-review")
+    page.until("document.querySelector('.review-words').textContent.includes('leans most on')")
+    page.drawn()
+    return page
+
+
+def on_plot(page: Driver, plot: str, name: str) -> tuple[float, float]:
+    """Return where a pair is drawn in a plot [CSS px of the page]."""
+    page.page.locator(f"[data-plot={plot}]").scroll_into_view_if_needed()
+    page.drawn()
+    x, y = page.value(
+        f"""(() => {{
+            const plot = __cocalib.plots.get('{plot}');
+            const mark = plot.content.marks.find((one) => one.ids.includes('{name}'));
+            const box = plot.canvas.getBoundingClientRect();
+            const [x, y] = plot.place(mark.x, mark.y);
+            return [box.left + x, box.top + y];
+        }})()"""
+    )
+    return float(x), float(y)
+
+
+def image_of(page: Driver, selector: str) -> str:
+    page.drawn()
+    return str(page.value(f"document.querySelector('{selector}').toDataURL()"))
+
+
+def download(page: Driver) -> str:
+    return str(page.page.evaluate("async () => (await fetch('api/calibration.json')).text()"))
+
+
+def figures(page: Driver) -> list[str]:
+    """Return the figures of the comparison on the page, a line each."""
+    rows = page.value(
+        "[...document.querySelectorAll('.compare tr')].map((row) => [...row.cells].map((cell) => cell.textContent))"
+    )
+    return [": ".join(row) for row in rows]
+
+
+def printed(calibration: Path, against: Path) -> list[str]:
+    """Return the figures that `cocalib check` prints."""
+    command = [sys.executable, "-m", "app", "check", str(calibration), "--against", str(against)]
+    lines = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60).stdout.splitlines()
+    told = [line.strip().removeprefix("compared with the other: ") for line in lines]
+    return [line for line in told if line.startswith(("rotation:", "camera position:", "at ", "overall:"))]
+
+
+def test_a_dot_is_the_same_pair_in_every_plot_and_leads_to_it_and_contours_are_labelled(
+    reviewing: Driver, truth: Any
+) -> None:
+    page = reviewing
+    page.page.click("[data-filter=enlarge]")
+    at = on_plot(page, "column", "c3")
+    page.page.mouse.move(5, 5)
+    quiet = {plot: image_of(page, f"[data-plot={plot}]") for plot in ("range", "influence", "histogram")}
+    page.page.mouse.move(*at)
+    page.until("document.getElementById('review-readout').textContent.startsWith('c3: ')")
+    assert all(image_of(page, f"[data-plot={plot}]") != quiet[plot] for plot in quiet)
+    page.page.mouse.move(5, 5)
+    page.until("document.getElementById('review-readout').textContent === ''")
+    assert all(image_of(page, f"[data-plot={plot}]") == quiet[plot] for plot in quiet)
+
+    page.page.mouse.click(*on_plot(page, "range", "c5"))
+    page.until("__cocalib.state.selected === 'c5'")
+    assert page.value("__cocalib.state.cursor") == page.frame_at(truth["placements"][4]["best_image_time"])
+    page.until("document.querySelector('.review-pair h2').textContent === 'Pair c5'")
+    assert "Uses the return at 6.41 m" in page.text(".review-pair")
+    assert page.page.locator(".review-candidates tbody tr").count() > 1
+
+    page.page.focus("[data-plot=time]")
+    page.press("ArrowRight", "ArrowRight")
+    assert page.text("#review-readout").startswith("c2: ")
+    assert page.value("__cocalib.state.selected") == "c5"
+    page.press("Enter")
+    page.until("__cocalib.state.selected === 'c2'")
+    assert len(page.view["clicks"]) == 20  # Enter went to the pair, and placed nothing
+
+    page.page.click("[data-filter=agreeing]")
+    page.until("__cocalib.plots.get('range').content.marks.every((mark) => mark.kind === 'outlier')")
+    assert page.value("__cocalib.plots.get('range').content.marks.map((mark) => mark.ids[0])") == ["c7"]
+    check_contours(page)
+
+
+def check_contours(page: Driver) -> None:
+    """Lines and their labels come with the key, follow the distance, and go with the key."""
+    before = image_of(page, "#marks")
+    page.press("5")
+    page.until("document.getElementById('contour-chips').getAttribute('aria-label').endsWith(' px')")
+    at_20 = page.value("document.getElementById('contour-chips').getAttribute('aria-label')")
+    drawn = image_of(page, "#marks")
+    assert drawn != before
+    page.page.click("[data-contours='5 m']")
+    assert image_of(page, "#marks") != drawn
+    assert page.value("document.getElementById('contour-chips').getAttribute('aria-label')") != at_20
+    assert "95 %" in page.page.get_attribute("[data-contours='60 m']", "data-hint")
+    page.press("5")
+    page.until("document.getElementById('contour-chips').getAttribute('aria-label') === 'Uncertainty in the picture'")
+
+
+def test_two_solutions_have_the_figures_of_the_check_command_and_both_are_drawn(
+    reviewing: Driver, workspace: Workspace, tmp_path: Path
+) -> None:
+    page = reviewing
+    now, other = tmp_path / "now.json", tmp_path / "other.json"
+    now.write_text(download(page))
+    page.value("__cocalib.goTo(0)")
+    page.page.select_option("[data-side=b]", "before")
+    page.until("document.querySelector('.compare .verdict').textContent.startsWith('There is no earlier answer')")
+    workspace.dispatch(ClickExcluded("c2", excluded=True))
+    page.settle()
+    page.until("document.querySelectorAll('.compare td').length > 8")
+    other.write_text(download(page))
+    assert figures(page) == printed(now, against=other)
+
+    page.page.set_input_files(".compare input[type=file]", now)
+    page.until("document.querySelector('.compare .verdict').textContent.includes('B: now.json')")
+    assert figures(page) == printed(now, against=other)
+    assert "95 % uncertainty of both" in page.text(".compare .verdict")
+    both = image_of(page, "#marks")
+    page.value(
+        "(() => { const blend = document.querySelector('.blend input'); blend.value = '1'; blend.oninput(); })()"
+    )
+    assert image_of(page, "#marks") != both
+
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text("{}")
+    page.page.set_input_files(".compare input[type=file]", wrong)
+    page.until("document.querySelector('.compare .verdict').textContent.includes('wrong.json')")
+    assert page.page.locator(".compare td").count() == 0

@@ -1,0 +1,116 @@
+"""What a page's review desk answers: two solutions, why one is missing, and only the newest request."""
+
+import asyncio
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.session import History, Session
+from app.web.channel.outbox import Outbox
+from app.web.channel.review import ReviewDesk
+from app.web.messages.review_messages import CompareForm, ReviewForm, ReviewRequest, UncertaintyForm
+from calib_core.calibration import calibrate_pairs
+from calib_core.measurements import RadarScans, ReflectorClick, TimeNs
+from calib_core.results import Calibration
+from calib_core.synthetic import simulate_pairs
+
+
+@dataclass
+class FakeWorkspace:
+    """A session with its answer."""
+
+    history: History
+    reference: None = None
+
+    @property
+    def session(self) -> Session:
+        return self.history.present
+
+
+class EmptyRecording:
+    """A radar that saw nothing."""
+
+    def radar_scans_around(self, times: Sequence[TimeNs], half_window_s: float, /) -> RadarScans:
+        return RadarScans()
+
+
+@pytest.fixture(scope="module")
+def solved() -> Calibration:
+    drawn = simulate_pairs(8, rng=np.random.default_rng(1))
+    outcome = calibrate_pairs(drawn.pairs, drawn.camera)
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+def answers(session: Session, *requests: ReviewRequest, camera: Any = None) -> list[Any]:
+    """Return what the desk sends, in order."""
+
+    async def ask() -> list[Any]:
+        outbox, sent, reports = Outbox(), [], []
+        desk = ReviewDesk(FakeWorkspace(History(session)), EmptyRecording(), camera, outbox, reports.append)
+
+        async def take(message: str | bytes) -> None:
+            sent.append(json.loads(message))
+
+        delivering = asyncio.create_task(outbox.deliver(take))
+        for request in requests:
+            desk.give(request)
+        kinds = {type(request) for request in requests}
+        async with asyncio.timeout(30):
+            while len(sent) < len(kinds):
+                await asyncio.sleep(0)
+        desk.close()
+        delivering.cancel()
+        assert reports == []
+        return sent
+
+    return asyncio.run(ask())
+
+
+def test_now_and_the_method_in_use_are_the_same_answer(solved: Calibration) -> None:
+    session = Session(revision=3, outcome=solved, outcome_revision=3)
+    (both,) = answers(session, CompareForm("now", "default"))
+
+    assert both["type"] == "compared"
+    assert both["problem"] == ""
+    assert [row["text"].split()[0] for row in both["rows"][:5]] == ["0"] * 5
+
+
+@pytest.mark.parametrize(
+    ("request_", "words"),
+    [
+        (CompareForm("now", "before"), "no earlier answer"),
+        (CompareForm("now", "reference"), "--calibration FILE"),
+        (CompareForm("now", "file"), "drop one here"),
+        (CompareForm("now", "toggled"), "no pair is selected"),
+        (CompareForm("now", "toggled", pair="c1"), "c1 is an untouched guess"),
+        (CompareForm("now", "file", file_name="a.json", file_base64="!"), "a.json"),
+        (CompareForm("now", "paper"), "intrinsics are missing"),
+    ],
+)
+def test_a_solution_that_does_not_exist_is_explained(solved: Calibration, request_: CompareForm, words: str) -> None:
+    guess = ReflectorClick(TimeNs(1), "c1", 1.0, 1.0, mark="untouched")
+    (both,) = answers(Session(clicks=(guess,), revision=3, outcome=solved, outcome_revision=3), request_)
+
+    assert words.lower() in both["problem"].lower()
+    assert both["rows"] == []
+
+
+def test_without_an_answer_nothing_is_compared_and_nothing_drawn(solved: Calibration) -> None:
+    for outcome in (None, replace(solved, checking=True)):
+        (both,) = answers(Session(outcome=outcome), CompareForm("now", "now"))
+        assert "no checked calibration yet" in both["problem"]
+    review, uncertainty = answers(Session(), ReviewForm(), UncertaintyForm())
+
+    assert (review["rows"], uncertainty["maps"]) == ([], [])
+
+
+def test_only_the_newest_of_several_requests_is_answered(solved: Calibration) -> None:
+    session = Session(revision=3, outcome=solved, outcome_revision=3)
+    (both,) = answers(session, CompareForm("now", "before"), CompareForm("now", "default"))
+
+    assert both["b"] == "default method"
