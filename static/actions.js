@@ -12,6 +12,7 @@ import { goLive } from "./live.js";
 import { nextWorst } from "./pairs.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
+import { snap, withoutSnappable } from "./snapping.js";
 import { tell } from "./socket.js";
 import { clickIn, clicks, selectedClick, state } from "./state.js";
 
@@ -33,6 +34,7 @@ const withFrames = () => opened() || (state.seconds.length > 1 ? "" : "There is 
 const withPlacements = () => opened() || (state.placements.length ? "" : "No placement was found in the radar data");
 const withMark = () => withPictures() || (clickIn(state.cursor) ? "" : "There is no mark in this frame");
 const withoutMark = () => withPictures() || (clickIn(state.cursor) ? "This frame has a mark already: move or delete it" : "");
+const withSnappable = () => withPictures() || withoutSnappable();
 const withSelected = () => withPictures() || (selectedClick() ? "" : "No pair is selected: go to one first");
 const withResiduals = () => withPictures() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
 const undoable = () => withPictures() || (state.view?.can_undo ? "" : "There is nothing to undo");
@@ -71,6 +73,7 @@ export const ACTIONS = [
   { id: "live", group: "Time", words: "Show the newest frame as it comes", also: "live follow recording now", run: goLive, when: following },
 
   { id: "place-mark", group: "Mark", words: "Place a mark where the reflector is expected, or in the middle", keys: ["Enter"], also: "click set add cross", run: placeByKey, when: withoutMark },
+  { id: "snap", group: "Mark", words: "Snap the mark, or the keyboard's cross, to the reflector's apex", keys: ["S"], also: "corner magnet refine subpixel image", run: snap, when: withSnappable },
   { id: "mark-left", words: "Move the mark left by 0.1 px", keys: ["Alt+ArrowLeft"], run: nudge(-0.1, 0), ...FINE },
   { id: "mark-right", words: "Move the mark right by 0.1 px", keys: ["Alt+ArrowRight"], run: nudge(0.1, 0), ...FINE },
   { id: "mark-up", words: "Move the mark up by 0.1 px", keys: ["Alt+ArrowUp"], run: nudge(0, -0.1), ...FINE },

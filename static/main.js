@@ -25,6 +25,7 @@ import { startSpace } from "./space.js";
 import { clickIn, clicks, emit, on, select, selectedClick, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
+import { takeSnapped } from "./snapping.js";
 import { startTimeline } from "./timeline.js";
 import { Follower } from "./view_changes.js";
 
@@ -72,6 +73,7 @@ const readers = {
     state.progress = message;
     emit("progress");
   },
+  snapped: takeSnapped,
   error(message) {
     toast(message.message, message.hint);
     frameFailed(message.request);

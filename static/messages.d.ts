@@ -407,6 +407,15 @@ export interface Progress {
   total: number;
 }
 
+/** The reflector's apex near a pixel, or why there is none; nothing was changed. */
+export interface Snapped {
+  type: "snapped";
+  pixel_px: [number, number] | null;
+  sigma_px: number | null;
+  words: string;
+  id: string | null;
+}
+
 /** A request of the user could not be carried out. */
 export interface Problem {
   type: "error";
@@ -610,6 +619,15 @@ export interface ImportForm {
   request?: number;
 }
 
+/** The reflector's apex near a pixel is requested; one message `snapped` answers. */
+export interface SnapForm {
+  type: "snap_wanted";
+  image_time: StampForm;
+  pixel_px: [number, number];
+  id?: string | null;
+  request?: number;
+}
+
 export type FromServer =
   | View
   | ViewChange
@@ -623,6 +641,7 @@ export type FromServer =
   | Overlay
   | PairCandidates
   | Progress
+  | Snapped
   | Problem
   | Done;
 
@@ -646,4 +665,5 @@ export type FromPage =
   | FrameForm
   | CursorForm
   | ViewpointForm
-  | ImportForm;
+  | ImportForm
+  | SnapForm;

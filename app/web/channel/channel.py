@@ -8,12 +8,14 @@ from typing import Protocol
 import numpy as np
 
 from app.error_boundary import error_boundary
+from app.session import Step
 from app.view import sentence
 from app.web.channel.click_candidates import candidates_of
 from app.web.channel.hub import Hub
 from app.web.channel.newest import NewestWins
 from app.web.channel.outbox import Outbox
 from app.web.channel.radar_survey import placements_at
+from app.web.channel.snapping import snapped
 from app.web.channel.view_feed import Shown
 from app.web.frames import Frame
 from app.web.messages import (
@@ -25,6 +27,7 @@ from app.web.messages import (
     ImportWanted,
     Incoming,
     Problem,
+    SnapWanted,
     ViewpointWanted,
     ViewWanted,
     encode,
@@ -123,27 +126,43 @@ class Channel:
             CalibrationError: it cannot be done; nothing changed.
         """
         command = incoming.command
-        if isinstance(command, FrameWanted):
-            self._frames.give(command)
+        if isinstance(command, FrameWanted | Hello | ViewWanted):
+            self._give(command)
         elif isinstance(command, CursorMoved):
             self._move(command)
-        elif isinstance(command, Hello):
-            self._greetings.give(command)
-        elif isinstance(command, ViewWanted):
-            self._views.give(command)
         elif isinstance(command, ViewpointWanted):
             if self.scene is not None:
                 self.scene.look_from(command.viewpoint)
+        elif isinstance(command, SnapWanted):
+            hub = self._hub
+            self.outbox.put(encode(await snapped(command, hub.moments, hub.frames, hub.executor)))
         else:
-            workspace = self._hub.workspace
-            change = (
-                partial(workspace.import_clicks, command.text, command.name)
-                if isinstance(command, ImportWanted)
-                else partial(workspace.dispatch, command)
-            )
-            await asyncio.get_running_loop().run_in_executor(self._hub.steps, change)
+            await self._change(command)
         if incoming.request is not None:
             self.outbox.put(encode(Done(incoming.request)))
+
+    def _give(self, command: FrameWanted | Hello | ViewWanted) -> None:
+        """Hand over what a newer request of the same kind supersedes."""
+        if isinstance(command, FrameWanted):
+            self._frames.give(command)
+        elif isinstance(command, Hello):
+            self._greetings.give(command)
+        else:
+            self._views.give(command)
+
+    async def _change(self, command: Step | ImportWanted) -> None:
+        """Change the session, off the event loop.
+
+        Raises:
+            CalibrationError: it cannot be done; nothing changed.
+        """
+        workspace = self._hub.workspace
+        change = (
+            partial(workspace.import_clicks, command.text, command.name)
+            if isinstance(command, ImportWanted)
+            else partial(workspace.dispatch, command)
+        )
+        await asyncio.get_running_loop().run_in_executor(self._hub.steps, change)
 
     def _view_text(self) -> str:
         """Write the message that makes the page show the newest View; called when the page can take it."""

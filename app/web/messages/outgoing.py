@@ -30,6 +30,7 @@ __all__ = [
     "RecordingNote",
     "SensorNote",
     "SessionNote",
+    "Snapped",
     "StampColumns",
     "encode",
     "encode_frame",
@@ -214,6 +215,23 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
+class Snapped:
+    """The reflector's apex near a pixel, or why there is none; nothing was changed.
+
+    Attributes:
+        pixel_px: column and row; None if no apex was found.
+        sigma_px: its standard deviation per axis; None if no apex was found.
+        words: what was found, in one sentence.
+        id: of the click for which it was searched; None for the keyboard's cross.
+    """
+
+    pixel_px: tuple[float, float] | None
+    sigma_px: float | None
+    words: str
+    id: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Problem:
     """A request of the user could not be carried out.
 
@@ -269,6 +287,7 @@ Outgoing: TypeAlias = (
     | Overlay
     | PairCandidates
     | Progress
+    | Snapped
     | Problem
     | Done
 )
@@ -286,6 +305,7 @@ TYPES: Mapping[type, str] = {
     Overlay: "overlay",
     PairCandidates: "candidates",
     Progress: "progress",
+    Snapped: "snapped",
     Problem: "error",
     Done: "done",
 }
