@@ -1,10 +1,10 @@
 // @ts-check
 /** S: the mark, or the keyboard's cross, goes to the reflector's apex that the picture shows within 15 px; the server finds it. */
 
-import { flushNudge } from "./clicking.js";
+import { flushNudge, moveTo, place } from "./clicking.js";
 import { toast } from "./notices.js";
 import { send } from "./socket.js";
-import { clickIn, emit, select, stampOf, state } from "./state.js";
+import { clickIn, stampOf, state } from "./state.js";
 
 /** The server's last answer, until it is used. @type {import("./messages.js").Snapped|null} */
 let answer = null;
@@ -17,7 +17,7 @@ export function takeSnapped(message) {
 
 /** Where to search: at the cross, or else at the mark. @returns {{id: string|null, u: number, v: number}|null} */
 function start() {
-  const cross = /** @type {{frame: number, u: number, v: number}|null} */ (Reflect.get(state, "cross") ?? null);
+  const cross = state.cross;
   if (cross && cross.frame === state.cursor) return { id: null, u: cross.u, v: cross.v };
   const here = clickIn(state.cursor);
   return here ? { id: here.id, u: here.u_px, v: here.v_px } : null;
@@ -48,14 +48,9 @@ async function snapFrom(index) {
   const found = /** @type {import("./messages.js").Snapped|null} */ (answer);
   if (refusal || !found) return toast(refusal ?? "The server did not answer.", "The mark stays where it is.");
   if (!found.pixel_px) return toast(found.words, "The mark stays where it is: move it closer, or set it by hand.", "snap");
-  const how = { pixel_px: found.pixel_px, mark: "snapped", sigma_px: found.sigma_px };
-  const before = new Set(state.view?.clicks.map((click) => click.id));
-  const refused = await send(from.id ? { type: "click_moved", id: from.id, ...how } : { type: "click_placed", image_time, ...how });
-  if (refused) return toast(refused, "The mark stays where it is.");
-  const added = state.view?.clicks.find((click) => !before.has(click.id));
-  if (added) select(added.id);
-  if (!from.id && Reflect.get(state, "cross")) {
-    Reflect.set(state, "cross", null);
-    emit("view");
-  }
+  const [u, v] = found.pixel_px;
+  const how = /** @type {const} */ ({ mark: "snapped", sigma_px: found.sigma_px });
+  const here = clickIn(index);
+  if (!from.id) return place(u, v, how);
+  if (here?.id === from.id) return moveTo(here, u, v, how);
 }
