@@ -12,6 +12,7 @@ else:  # to type checkers jaxtyping's names are Annotated too, and importing it 
 __all__ = [
     "Flags",
     "Indices",
+    "Matrix22",
     "Matrix23",
     "Matrix33",
     "Matrix66",
@@ -26,6 +27,7 @@ __all__ = [
 
 Vector2: TypeAlias = Float64[np.ndarray, "2"]
 Vector3: TypeAlias = Float64[np.ndarray, "3"]
+Matrix22: TypeAlias = Float64[np.ndarray, "2 2"]
 Matrix23: TypeAlias = Float64[np.ndarray, "2 3"]
 Matrix33: TypeAlias = Float64[np.ndarray, "3 3"]
 Matrix66: TypeAlias = Float64[np.ndarray, "6 6"]

@@ -17,6 +17,7 @@ import { nextWorst } from "./pairs.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
 import { enlargeReview } from "./review.js";
+import { snap, withoutSnappable } from "./snapping.js";
 import { tell } from "./socket.js";
 import { clickIn, clicks, selectedClick, state } from "./state.js";
 
@@ -37,6 +38,7 @@ const withPictures = () => opened() || (state.looking ? "There are no pictures i
 const withFrames = () => opened() || (state.seconds.length > 1 ? "" : "There is only one frame");
 const withPlacements = () => opened() || (state.placements.length ? "" : "No placement was found in the radar data");
 const withMark = () => withPictures() || (clickIn(state.cursor) ? "" : "There is no mark in this frame");
+const withSnappable = () => withPictures() || withoutSnappable();
 const withSelected = () => withPictures() || (selectedClick() ? "" : "No pair is selected: go to one first");
 const withResiduals = () => withPictures() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
 const undoable = () => withPictures() || (state.view?.can_undo ? "" : "There is nothing to undo");
@@ -78,6 +80,7 @@ export const ACTIONS = [
   { id: "cross", group: "Mark", words: "Keyboard's cross: 1 to 9 zoom into a field, arrows move it, Backspace zooms out, Esc ends", keys: ["G"], also: "grid nine fields marking without mouse", run: toggleCross, when: withPictures },
   { id: "next-candidate", group: "Mark", words: "Take the return that fits better, or the next one", keys: ["C"], also: "candidate choose radar association", run: nextCandidate, when: () => withPictures() || withoutCandidates() },
   { id: "free-candidate", group: "Mark", words: "Leave the choice of the return to the program", keys: ["Shift+C"], also: "candidate automatic unchoose", run: () => choose(-1), when: () => withPictures() || (selectedClick()?.chosen ? "" : "No return was chosen for this mark") },
+  { id: "snap", group: "Mark", words: "Snap the mark, or the keyboard's cross, to the reflector's apex", keys: ["S"], also: "corner magnet refine subpixel image", run: snap, when: withSnappable },
   { id: "mark-left", words: "Move the mark left by 0.1 px", keys: ["Alt+ArrowLeft"], run: nudge(-0.1, 0), ...FINE },
   { id: "mark-right", words: "Move the mark right by 0.1 px", keys: ["Alt+ArrowRight"], run: nudge(0.1, 0), ...FINE },
   { id: "mark-up", words: "Move the mark up by 0.1 px", keys: ["Alt+ArrowUp"], run: nudge(0, -0.1), ...FINE },

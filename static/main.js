@@ -30,6 +30,7 @@ import { startSpace } from "./space.js";
 import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
+import { takeSnapped } from "./snapping.js";
 import { startTimeline } from "./timeline.js";
 import { Follower } from "./view_changes.js";
 
@@ -84,6 +85,7 @@ const readers = {
   pair_review: takePair,
   compared: takeCompared,
   uncertainty: takeUncertainty,
+  snapped: takeSnapped,
   error(message) {
     toast(message.message, message.hint);
     frameFailed(message.request);

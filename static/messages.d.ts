@@ -499,6 +499,15 @@ export interface Progress {
   total: number;
 }
 
+/** The reflector's apex near a pixel, or why there is none; nothing was changed. */
+export interface Snapped {
+  type: "snapped";
+  pixel_px: [number, number] | null;
+  sigma_px: number | null;
+  words: string;
+  id: string | null;
+}
+
 /** A request of the user could not be carried out. */
 export interface Problem {
   type: "error";
@@ -732,6 +741,15 @@ export interface UncertaintyForm {
   request?: number;
 }
 
+/** The reflector's apex near a pixel is requested; one message `snapped` answers. */
+export interface SnapForm {
+  type: "snap_wanted";
+  image_time: StampForm;
+  pixel_px: [number, number];
+  id?: string | null;
+  request?: number;
+}
+
 export type FromServer =
   | View
   | ViewChange
@@ -749,6 +767,7 @@ export type FromServer =
   | Compared
   | Uncertainty
   | Progress
+  | Snapped
   | Problem
   | Done;
 
@@ -776,4 +795,5 @@ export type FromPage =
   | ReviewForm
   | PairReviewForm
   | CompareForm
-  | UncertaintyForm;
+  | UncertaintyForm
+  | SnapForm;

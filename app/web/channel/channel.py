@@ -16,6 +16,7 @@ from app.web.channel.newest import NewestWins
 from app.web.channel.outbox import Outbox
 from app.web.channel.radar_survey import placements_at
 from app.web.channel.review import ReviewDesk
+from app.web.channel.snapping import snapped
 from app.web.channel.view_feed import Shown
 from app.web.frames import Frame
 from app.web.messages import (
@@ -28,6 +29,7 @@ from app.web.messages import (
     ImportWanted,
     Problem,
     ReviewRequest,
+    SnapWanted,
     ViewpointWanted,
     ViewWanted,
     encode,
@@ -130,24 +132,36 @@ class Channel:
         Raises:
             CalibrationError: it cannot be done; nothing changed.
         """
-        if isinstance(command, FrameWanted):
-            self._frames.give(command)
+        if isinstance(command, FrameWanted | Hello | ViewWanted | ReviewRequest):
+            self._give(command)
         elif isinstance(command, CursorMoved):
             self._move(command)
+        elif isinstance(command, ViewpointWanted):
+            if self.scene is not None:
+                self.scene.look_from(command.viewpoint)
+        elif isinstance(command, SnapWanted):
+            hub = self._hub
+            self.outbox.put(encode(await snapped(command, hub.moments, hub.frames, hub.executor)))
+        else:
+            await self._change(command)
+
+    def _give(self, command: FrameWanted | Hello | ViewWanted | ReviewRequest) -> None:
+        """Hand over what a newer request of the same kind supersedes."""
+        if isinstance(command, FrameWanted):
+            self._frames.give(command)
         elif isinstance(command, Hello):
             self._greetings.give(command)
         elif isinstance(command, ViewWanted):
             self._views.give(command)
-        elif isinstance(command, ReviewRequest):
-            self._review.give(command)
-        elif isinstance(command, ViewpointWanted):
-            if self.scene is not None:
-                self.scene.look_from(command.viewpoint)
         else:
-            await self._change(command)
+            self._review.give(command)
 
     async def _change(self, command: Step | ImportWanted) -> None:
-        """Carry out a change of the session, in the order in which all pages sent them."""
+        """Change the session, off the event loop.
+
+        Raises:
+            CalibrationError: it cannot be done; nothing changed.
+        """
         workspace = self._hub.workspace
         change = (
             partial(workspace.import_clicks, command.text, command.name)

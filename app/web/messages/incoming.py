@@ -13,6 +13,7 @@ from app.session import ClickPlaced, OptionsEdited, Step
 from app.session.file import step_json as forms
 from app.web.messages.review_messages import ReviewRequest
 from calib_core.errors import InputError
+from calib_core.measurements import TimeNs
 
 __all__ = [
     "MAX_TEXT_BYTES",
@@ -24,6 +25,7 @@ __all__ = [
     "Incoming",
     "MessageForm",
     "ReturnColour",
+    "SnapWanted",
     "ViewWanted",
     "Viewpoint",
     "ViewpointWanted",
@@ -118,8 +120,23 @@ class ImportWanted:
     name: str
 
 
+@dataclass(frozen=True, slots=True)
+class SnapWanted:
+    """A page wants the reflector's apex near a pixel of a frame; nothing is changed.
+
+    Attributes:
+        image_time: stamp of the frame.
+        pixel_px: column and row.
+        id: of the click that stands there; None for the keyboard's cross.
+    """
+
+    image_time: TimeNs
+    pixel_px: tuple[float, float]
+    id: str | None = None
+
+
 Command: TypeAlias = (
-    Step | Hello | ViewWanted | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted | ReviewRequest
+    Step | Hello | ViewWanted | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted | ReviewRequest | SnapWanted
 )
 
 
@@ -182,8 +199,24 @@ class ImportForm(_Form, frozen=True, tag="import_clicks"):
     name: Annotated[str, Meta(max_length=300)] = "the file"
 
 
+class SnapForm(_Form, frozen=True, tag="snap_wanted"):
+    """The reflector's apex near a pixel is requested; one message `snapped` answers."""
+
+    image_time: forms.StampForm
+    pixel_px: forms.PixelForm
+    id: forms.ClickId | None = None
+
+
 MessageForm: TypeAlias = (
-    forms.StepForm | HelloForm | ViewForm | FrameForm | CursorForm | ViewpointForm | ImportForm | ReviewRequest
+    forms.StepForm
+    | HelloForm
+    | ViewForm
+    | FrameForm
+    | CursorForm
+    | ViewpointForm
+    | ImportForm
+    | ReviewRequest
+    | SnapForm
 )
 
 
@@ -289,3 +322,8 @@ def _review(form: ReviewRequest) -> Command:
 @_command.register
 def _import(form: ImportForm) -> Command:
     return ImportWanted(form.text, form.name)
+
+
+@_command.register
+def _snap(form: SnapForm) -> Command:
+    return SnapWanted(form.image_time.stamp.time, form.pixel_px, form.id)

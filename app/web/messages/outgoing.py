@@ -35,6 +35,7 @@ __all__ = [
     "RecordingNote",
     "SensorNote",
     "SessionNote",
+    "Snapped",
     "StampColumns",
     "encode",
     "encode_frame",
@@ -233,6 +234,23 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
+class Snapped:
+    """The reflector's apex near a pixel, or why there is none; nothing was changed.
+
+    Attributes:
+        pixel_px: column and row; None if no apex was found.
+        sigma_px: its standard deviation per axis; None if no apex was found.
+        words: what was found, in one sentence.
+        id: of the click for which it was searched; None for the keyboard's cross.
+    """
+
+    pixel_px: tuple[float, float] | None
+    sigma_px: float | None
+    words: str
+    id: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Problem:
     """A request of the user could not be carried out.
 
@@ -292,6 +310,7 @@ Outgoing: TypeAlias = (
     | Compared
     | Uncertainty
     | Progress
+    | Snapped
     | Problem
     | Done
 )
@@ -313,6 +332,7 @@ TYPES: Mapping[type, str] = {
     Compared: "compared",
     Uncertainty: "uncertainty",
     Progress: "progress",
+    Snapped: "snapped",
     Problem: "error",
     Done: "done",
 }

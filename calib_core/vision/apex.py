@@ -1,0 +1,270 @@
+"""The apex of a trihedral corner reflector near a given pixel, with its own covariance, or the reason why there is none.
+
+Three sheets meet in the apex, so the picture shows three sectors of different brightness, each below 180 deg. Discs of several
+sizes propose pixels that look so (`sectors`), a fit with blurred boundaries gives the apex below a pixel (`sector_fit`), and
+the disc grows while the fit holds. The given pixel limits the search and enters no estimate.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Matrix22, Vector2, Vector3, frozen_array
+from calib_core.vision.corner_checks import half_turn_correlation, has_angles_of_corner, is_corner, may_be_corner
+from calib_core.vision.sector_fit import SectorFit, fit_sectors
+from calib_core.vision.sectors import score_sectors
+
+__all__ = ["Apex", "NoApex", "find_apex"]
+
+_PROPOSING = ((1, 3.5), (1, 5.0), (1, 7.0), (2, 5.0), (2, 7.0), (4, 5.0), (4, 7.0))
+"""How much the picture is reduced, and the radius of the disc there [px]."""
+_GROWING = ((1, 3.5), (1, 5.0), (1, 7.0), (1, 10.0), (1, 14.0), (2, 10.0), (2, 14.0))
+_MARGIN_PX = 48
+_LEAST_SCORE = 0.5
+_TRIED = 3
+"""How many places are fitted."""
+_WORSE = 1.3
+"""A larger disc may leave this much more than the one before."""
+_RIVAL = 0.6
+"""A second corner with this share of the first one's contrast makes the choice open."""
+_FITTED, _BLUR, _MOVED, _FLOOR_PX2 = 3.4, 0.009, 0.14, 0.015
+"""How the covariance follows from the fit's, the blur's square, the square of the last move, and what is always added: fitted
+once to 560 simulated pictures (`python -m benchmarks.apex` measures the coverage on others)."""
+_FEW_PIXELS_PX, _FEW_PIXELS_PX2 = 4.0, 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Apex:
+    """The apex of a reflector in a picture.
+
+    Attributes:
+        pixel_px: (2,) column and row; (0, 0) is the centre of the top-left pixel.
+        covariance_px2: (2, 2) of that pixel.
+        contrast: the smallest step of brightness between two sheets, in standard deviations of what the fit leaves.
+        radius_px: of the disc in which the three sheets were seen.
+    """
+
+    pixel_px: Vector2
+    covariance_px2: Matrix22
+    contrast: float
+    radius_px: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
+        object.__setattr__(self, "covariance_px2", frozen_array(self.covariance_px2, (2, 2)))
+
+    @property
+    def sigma_px(self) -> float:
+        """Standard deviation per axis, the root mean square of both."""
+        return float(np.sqrt(0.5 * np.trace(self.covariance_px2)))
+
+
+@dataclass(frozen=True, slots=True)
+class NoApex:
+    """No apex, or none that can be told from another.
+
+    Attributes:
+        reason: what was seen instead.
+    """
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Reduced:
+    """A part of the picture, reduced: its pixel (0, 0) is at `corner_px` of the full one."""
+
+    grey: np.ndarray
+    factor: int
+    corner_px: Vector2
+
+    def of_full(self, pixel_px: Vector2) -> Vector2:
+        return np.asarray((np.asarray(pixel_px) - self.corner_px) / self.factor)
+
+    def to_full(self, pixel_px: Vector2) -> Vector2:
+        return np.asarray(self.corner_px + self.factor * np.asarray(pixel_px))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Proposal:
+    score: float
+    pixel_px: Vector2
+    starts_rad: Vector3
+    factor: int
+    radius_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """A fit in pixels of the full picture, and how far the apex moved when the disc last grew."""
+
+    fit: SectorFit
+    pixel_px: Vector2
+    factor: int
+    moved_px: float
+
+
+def find_apex(
+    image: np.ndarray, near_px: Vector2, *, reach_px: float = 15.0, size_px: float | None = None
+) -> Apex | NoApex:
+    """Find the reflector's apex within reach of a pixel.
+
+    Args:
+        image: (h, w) grey levels or (h, w, 3) blue, green, red; uint8.
+        near_px: (2,) where to search; it does not pull the answer.
+        reach_px: how far from it the apex may be.
+        size_px: width of the reflector, if known, about; corners of larger things are then refused.
+    """
+    near_px = np.asarray(near_px, dtype=np.float64)
+    if not (np.all(near_px >= -reach_px) and np.all(near_px <= np.array(image.shape[1::-1]) + reach_px)):
+        return NoApex("the given pixel lies outside the picture")
+    levels = _reduced(image, near_px, reach_px)
+    proposals = _proposals(levels, near_px, reach_px)
+    found = [one for proposal in proposals if (one := _grown(levels, proposal)) is not None]
+    inside = [one for one in found if float(np.hypot(*(one.pixel_px - near_px))) <= reach_px]
+    inside.sort(key=lambda one: -one.fit.contrast)
+    if not inside:
+        return NoApex(_what_was_seen(proposals, reach_px))
+    best, *others = inside
+    apart_px = max((float(np.hypot(*(one.pixel_px - best.pixel_px))) for one in _rivals(best, others)), default=0.0)
+    if apart_px > 0.0:
+        return NoApex(f"two corners of three sheets, {apart_px:.0f} px apart, fit equally well")
+    radius_px = best.factor * best.fit.radius_px
+    if size_px is not None and radius_px > size_px:
+        return NoApex(f"the corner reaches {radius_px:.0f} px far, beyond a reflector of {size_px:.0f} px")
+    return Apex(best.pixel_px, _covariance(best), best.fit.contrast, radius_px)
+
+
+def _reduced(image: np.ndarray, near_px: Vector2, reach_px: float) -> dict[int, _Reduced]:
+    """Cut out what the search can need, on a grid that does not depend on where it begins, and reduce it."""
+    import cv2
+
+    height, width = image.shape[:2]
+    side = 4 * int(np.ceil((2.0 * (reach_px + _MARGIN_PX)) / 4.0)) + 4
+    left, top = (4 * int((float(v) - reach_px - _MARGIN_PX) // 4) for v in near_px)
+    rows = np.clip(np.arange(top, top + side), 0, height - 1)
+    columns = np.clip(np.arange(left, left + side), 0, width - 1)
+    part = image[rows[:, None], columns]
+    grey = (part if part.ndim == 2 else cv2.cvtColor(part, cv2.COLOR_BGR2GRAY)).astype(np.float32)
+    corner_px = np.array([left, top], dtype=np.float64)
+    grey = grey * grey / np.float32(255.0)
+    reduced = {1: _Reduced(grey, 1, corner_px)}
+    for factor in (2, 4):
+        small = cv2.resize(grey, (side // factor, side // factor), interpolation=cv2.INTER_AREA)
+        reduced[factor] = _Reduced(small, factor, corner_px + 0.5 * (factor - 1))
+    return reduced
+
+
+def _proposals(levels: dict[int, _Reduced], near_px: Vector2, reach_px: float) -> list[_Proposal]:
+    """Return the best places, best first, each at the size at which it scores most."""
+    every = [one for factor, radius_px in _PROPOSING for one in _peaks(levels[factor], near_px, reach_px, radius_px)]
+    every.sort(key=lambda one: -one.score)
+    chosen: list[_Proposal] = []
+    for one in every:
+        if len(chosen) == _TRIED:
+            break
+        if all(_apart(one, other) for other in chosen):
+            chosen.append(one)
+    return chosen
+
+
+def _apart(one: _Proposal, other: _Proposal) -> bool:
+    distance_px = float(np.hypot(*(one.pixel_px - other.pixel_px)))
+    return distance_px > max(2.5, 0.4 * max(one.factor * one.radius_px, other.factor * other.radius_px))
+
+
+def _peaks(level: _Reduced, near_px: Vector2, reach_px: float, radius_px: float) -> Iterator[_Proposal]:
+    import cv2
+
+    half = int(np.ceil(radius_px))
+    near = level.of_full(near_px)
+    reach = reach_px / level.factor + 1.5
+    first, last = np.floor(near - reach).astype(int), np.ceil(near + reach).astype(int) + 1
+    part = level.grey[first[1] - half : last[1] + half, first[0] - half : last[0] + half]
+    scores = score_sectors(part, radius_px)
+    highest = cv2.dilate(scores.score, np.ones((3, 3), np.uint8))
+    for row, column in np.argwhere((scores.score >= highest) & (scores.score > _LEAST_SCORE)):
+        pixel_px = level.to_full(np.array([column + first[0], row + first[1]], dtype=np.float64))
+        if float(np.hypot(*(pixel_px - near_px))) <= reach_px + level.factor:
+            starts_rad = scores.starts_rad[row, column]
+            yield _Proposal(float(scores.score[row, column]), pixel_px, starts_rad, level.factor, radius_px)
+
+
+def _grown(levels: dict[int, _Reduced], proposal: _Proposal) -> _Found | None:
+    """Fit at the proposed size, then with larger discs as long as three sectors explain them as well.
+
+    Returns:
+        The largest that shows a corner; None if none does.
+    """
+    at = _fitted(levels, proposal.factor, proposal.pixel_px, proposal.starts_rad, proposal.radius_px, None)
+    found = _checked(levels, proposal, at)
+    size_px = proposal.factor * proposal.radius_px
+    for factor, radius_px in _GROWING:
+        if at is None or not may_be_corner(at.fit):
+            break
+        if factor * radius_px <= size_px:
+            continue
+        larger = _fitted(levels, factor, at.pixel_px, at.fit.starts_rad, radius_px, at)
+        if larger is None or larger.fit.residual_grey > _WORSE * at.fit.residual_grey + 0.3:
+            break
+        if not has_angles_of_corner(larger.fit):
+            return None  # it fits as well, and knows the angles better
+        if larger.moved_px > max(0.5, 4.0 * _sigma_px(at)):
+            break
+        at = larger
+        found = _checked(levels, proposal, at) or found
+    return found
+
+
+def _checked(levels: dict[int, _Reduced], proposal: _Proposal, at: _Found | None) -> _Found | None:
+    """Return a fit that shows a corner, else None."""
+    if at is None:
+        return None
+    half_turn = half_turn_correlation(levels[at.factor].grey, at.fit)
+    return at if is_corner(at.fit, proposal.score, half_turn) else None
+
+
+def _fitted(
+    levels: dict[int, _Reduced],
+    factor: int,
+    pixel_px: Vector2,
+    starts_rad: Vector3,
+    radius_px: float,
+    before: _Found | None,
+) -> _Found | None:
+    level = levels[factor]
+    blur_px = {} if before is None else {"blur_px": max(0.35, before.fit.blur_px * before.factor / factor)}
+    fit = fit_sectors(level.grey, level.of_full(pixel_px), starts_rad, radius_px, **blur_px)
+    if fit is None:
+        return None
+    full_px = level.to_full(fit.apex_px)
+    return _Found(fit, full_px, factor, 0.0 if before is None else float(np.hypot(*(full_px - before.pixel_px))))
+
+
+def _rivals(best: _Found, others: list[_Found]) -> list[_Found]:
+    """Return other corners that fit about as well, and are not the same one."""
+    return [
+        one
+        for one in others
+        if one.fit.contrast >= _RIVAL * best.fit.contrast and float(np.hypot(*(one.pixel_px - best.pixel_px))) > 1.5
+    ]
+
+
+def _sigma_px(found: _Found) -> float:
+    return found.factor * float(np.sqrt(0.5 * np.trace(found.fit.covariance_px2)))
+
+
+def _covariance(found: _Found) -> Matrix22:
+    """Widen the fit's covariance by what sheets, lens and compression add."""
+    fit, factor = found.fit, found.factor
+    added_px2 = _FLOOR_PX2 + _BLUR * (factor * fit.blur_px) ** 2 + _MOVED * found.moved_px**2
+    if fit.radius_px < _FEW_PIXELS_PX:
+        added_px2 += _FEW_PIXELS_PX2
+    return np.asarray(_FITTED * factor**2 * fit.covariance_px2 + added_px2 * np.eye(2))
+
+
+def _what_was_seen(proposals: list[_Proposal], reach_px: float) -> str:
+    if not proposals:
+        return f"nothing with three sheets within {reach_px:.0f} px"
+    return f"no three sheets that meet in one point within {reach_px:.0f} px"
