@@ -26,6 +26,7 @@ import { clickIn, clicks, emit, on, select, selectedClick, state } from "./state
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
 import { startTimeline } from "./timeline.js";
+import { startVerdict } from "./verdict.js";
 import { Follower } from "./view_changes.js";
 
 const follower = new Follower();
@@ -136,6 +137,7 @@ startLive();
 startClicking();
 startTimeline();
 startPairs();
+startVerdict();
 startFigures();
 startScatter();
 startOptions();

@@ -172,6 +172,15 @@ export interface SystematicErrorTable {
   sentences: string[];
 }
 
+/** How far the calibration can be trusted, in one line, and what to do. */
+export interface VerdictRow {
+  level: "good" | "usable" | "weak" | "contradictory" | "nothing";
+  line: string;
+  action: string;
+  key: "" | "N" | "E" | "J";
+  done: boolean;
+}
+
 /** Everything a client draws about the session. */
 export interface View {
   type: "view";
@@ -198,6 +207,7 @@ export interface View {
   pose_assumed: Figure[];
   assumptions: AssumptionRow[];
   systematic_errors: SystematicErrorTable;
+  verdict: VerdictRow;
 }
 
 /** New values of some fields in some rows. */

@@ -2,7 +2,7 @@
 /** The table of pairs, one row per click, sorted by time, range or residual; click a row to go there, its checkbox to exclude it. */
 
 import { comeTo } from "./arriving.js";
-import { residualColour } from "./colours.js";
+import { LARGE_PX, residualColour } from "./colours.js";
 import { toggleExcluded } from "./clicking.js";
 import { make } from "./notices.js";
 import { drawSteps } from "./steps.js";
@@ -95,7 +95,7 @@ function drawRows(rows) {
   let next = body.firstElementChild;
   for (const click of rows) {
     const before = made.get(keyOf(click));
-    const from = [click, click.id === state.selected, state.view?.residual_limit_px, state.placements, state.seconds];
+    const from = [click, click.id === state.selected, state.placements, state.seconds];
     let row = before?.row;
     if (!row || from.some((value, index) => value !== before?.from[index])) {
       row = line(click);
@@ -132,10 +132,9 @@ function heading(column) {
 
 /** @param {Click} click */
 function line(click) {
-  const limit = state.view?.residual_limit_px ?? null;
-  const colour = residualColour(click.residual_px, limit);
+  const colour = residualColour(click.residual_px);
   const bar = make("b", "", "");
-  bar.style.width = `${Math.min(100, (100 * (click.residual_px ?? 0)) / (1.5 * (limit ?? 20)))}%`;
+  bar.style.width = `${Math.min(100, (100 * (click.residual_px ?? 0)) / LARGE_PX)}%`;
   bar.style.background = colour;
   const residual = click.residual_px === null ? word(click) : `${digits(click.residual_px)} px`;
   const excluded = click.state === "excluded";
@@ -169,11 +168,14 @@ const word = (click) => (click.state === "unpaired" ? "no return" : click.state 
 function explain(click) {
   const lines = [`${click.id}: click at ${click.u_px.toFixed(1)}, ${click.v_px.toFixed(1)} px`];
   if (click.projected_px) lines.push(`reprojected at ${click.projected_px.map((value) => value.toFixed(1)).join(", ")} px`);
-  if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${click.azimuth_deg?.toFixed(1)}° left, ${click.elevation_deg?.toFixed(1)}° up`);
+  if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${towards(click.azimuth_deg, "left", "right")}, ${towards(click.elevation_deg, "up", "down")}`);
   if (rangeApart(click)) lines.push(`${rangeApart(click)}: wrong target, or the reflector was being moved. Check the frame, or exclude the pair.`);
   if (click.note) lines.push(click.note);
   return lines.join("\n");
 }
+
+/** An angle in words: "1.8° down", not "-1.8° up". @param {number|null} degrees @param {string} positive @param {string} negative */
+const towards = (degrees, positive, negative) => `${Math.abs(degrees ?? 0).toFixed(1)}° ${(degrees ?? 0) < 0 ? negative : positive}`;
 
 /** The shape shows the state, in addition to the colour. @param {string} clickState @param {string} colour */
 function glyph(clickState, colour) {

@@ -74,37 +74,28 @@ function advice(index) {
 function afterClick(click) {
   const apart = rangeApart(click);
   if (apart) return { text: [`${apart}. Correct the mark, or press `, { key: "X" }, " to exclude the pair"], act: true };
+  const blamed = click.note.startsWith("Disagrees"); // otherwise the method or an option sets the pair aside: the note says which
+  if (click.state === "outlier" && !blamed) return { text: [click.note], act: true };
   if (click.state === "outlier") return { text: ["This pair does not agree with the others. Correct the mark, or press ", { key: "X" }, " to exclude it"], act: true };
   if (click.state === "unpaired") return { text: ["No radar position here. Click another frame of this placement, or press ", { key: "N" }, " for the next one"], act: true };
   const next = nextAction();
   return next ? { text: next, act: false } : null;
 }
 
-/** The next thing to do with the placements; null when there is nothing to say. @returns {Words|null} */
+/** The next thing to do: the verdict's action, with its key; null when there is nothing to say. @returns {Words|null} */
 export function nextAction() {
   const view = state.view;
-  if (view?.stage === "unsolvable") return null; // the orange box says what to do
-  const wrong = clicks().filter((click) => click.state === "outlier").length;
-  if (view?.stage === "solved" && wrong) {
-    const used = clicks().filter((click) => click.state === "inlier").length + wrong;
-    return [`${used - wrong} of ${used} pairs agree. Press `, { key: "J" }, wrong === 1 ? " to see the outlier" : ` to see the ${wrong} outliers one by one`];
-  }
-  const left = state.placements.filter((placement) => !isClicked(placement)).length;
-  if (left) return [`${left} placement${left > 1 ? "s" : ""} left. Press `, { key: "N" }, " for the next one"];
-  if (!state.placements.length || !view?.has_calibration || view.warnings.length) return null;
-  return ["Every placement has a click. Press ", { key: "E" }, " to export the calibration"];
+  if (!view || view.stage === "unsolvable") return null; // the orange box says what to do
+  const { action, key, done } = view.verdict;
+  if (done) return ["Done. Press ", { key: "E" }, " to export the calibration"];
+  return key ? [`${action} Press `, { key }] : null; // others are longer than a line: the verdict shows them
 }
 
-/** The same for the status line, after the server's status where that does not say it. @returns {string} */
+/** The same for the status line, after the server's status, and how to find the pairs that disagree. @returns {string} */
 export function nextWords() {
   const view = state.view;
   if (!view || view.stage === "unsolvable" || view.stage === "solving") return "";
-  const lost = clicks().some((click) => click.state === "unpaired");
-  if (lost || (view.reference && !view.has_calibration)) return view.hint;
-  const action = view.stage === "solved" || view.clicks.length ? nextAction() : null;
-  if (!action) return view.hint;
-  const words = action.map((word) => (typeof word === "string" ? word : word.key)).join("");
-  if (view.stage !== "solved") return words;
-  const rest = view.status.includes("pairs agree") ? words.replace(/^\d+ of \d+ pairs agree\. /, "") : words;
-  return [rest, view.warnings.length || words.startsWith("Every") ? view.hint : ""].filter(Boolean).join("  ·  ");
+  const wrong = clicks().filter((click) => click.state === "outlier").length;
+  const outliers = view.stage === "solved" && wrong ? `Press J to see the ${wrong === 1 ? "outlier" : `${wrong} outliers one by one`}` : "";
+  return [outliers, view.hint].filter(Boolean).join("  ·  ");
 }

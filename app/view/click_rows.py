@@ -1,6 +1,7 @@
 """One row per click: its state, its reprojection, its ellipse and a note."""
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -11,23 +12,58 @@ from app.view.number_format import plain
 from app.view.reprojections import Reprojection, reprojections
 from app.view.wording import sentence
 from calib_core.measurements import ReflectorClick, Stamp, Unpaired
+from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.results import Calibration
 
-__all__ = ["click_rows"]
+__all__ = ["Disagreement", "click_rows", "disagreement"]
+
+_STRICT = 1.0 / 3.0
+_NOISE = {"sigma_px": "click noise", "sigma_range_m": "range noise", "sigma_azimuth_deg": "azimuth noise"}
 
 
 def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
     """Return one row per click, in order of image time; a row that is as before is the same object."""
     calibration = session.outcome if isinstance(session.outcome, Calibration) else None
     pairs = reprojections(calibration.pairs if calibration else session.checked)
+    cause = disagreement(calibration.options) if calibration else disagreement(session.options)
     unpaired = {row.id: row for row in session.outcome.unpaired} if session.outcome else {}
     times_ns = np.array([click.image_time for click in session.clicks], dtype=np.int64)
     rows = zip(session.clicks, facts.frames_at(times_ns).tolist(), strict=True)
-    return tuple(_row(click, frame, pairs.get(click.id), unpaired.get(click.id)) for click, frame in rows)
+    return tuple(_row(click, frame, pairs.get(click.id), unpaired.get(click.id), cause) for click, frame in rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """What it means that a pair is an outlier under some options, and what to do about it."""
+
+    what: str
+    action: str
+
+
+_BY_DEFAULT = Disagreement("Disagrees with the other pairs", "Check the click, or exclude it.")
+
+
+def disagreement(options: CalibrationOptions) -> Disagreement:
+    """Say what makes a pair an outlier: the pair itself, the paper's method, or options that allow too little noise."""
+    if options.method == "paper":
+        return Disagreement(
+            f"Outside the {options.paper.ransac_threshold_px:g} px of Algorithm 1's RANSAC, which uses it all the same",
+            "The default method tells whether it is wrong.",
+        )
+    usual, given = NoiseOptions(), options.noise
+    strict = [text for name, text in _NOISE.items() if getattr(given, name) < _STRICT * getattr(usual, name)]
+    if not strict:
+        return _BY_DEFAULT
+    return Disagreement(
+        f"Does not fit the noise that the options state ({' and '.join(strict)} far below the default)",
+        "Check these options before the click.",
+    )
 
 
 @lru_cache(maxsize=1 << 15)
-def _row(click: ReflectorClick, frame: int, pair: Reprojection | None, lone: Unpaired | None) -> ClickRow:
+def _row(
+    click: ReflectorClick, frame: int, pair: Reprojection | None, lone: Unpaired | None, cause: Disagreement
+) -> ClickRow:
     stamp = Stamp.of(click.image_time)
     if pair is None:
         state: ClickState = "excluded" if click.excluded else "unpaired" if lone else "pending"
@@ -49,7 +85,7 @@ def _row(click: ReflectorClick, frame: int, pair: Reprojection | None, lone: Unp
         azimuth_deg=pair.azimuth_deg,
         elevation_deg=pair.elevation_deg,
         outlier_probability=pair.outlier_probability,
-        note=_note(state, residual_px, pair),
+        note=_note(state, residual_px, pair, cause),
     )
 
 
@@ -69,7 +105,7 @@ def _state(click: ReflectorClick, pair: Reprojection) -> ClickState:
     return "inlier" if pair.inlier else "outlier"
 
 
-def _note(state: ClickState, residual_px: float | None, pair: Reprojection) -> str:
+def _note(state: ClickState, residual_px: float | None, pair: Reprojection, cause: Disagreement) -> str:
     if state not in ("outlier", "excluded"):
         return ""
     where = "is behind the camera" if residual_px is None else f"reprojects {plain(residual_px)} px from the click"
@@ -77,4 +113,4 @@ def _note(state: ClickState, residual_px: float | None, pair: Reprojection) -> s
         return f"Excluded; its radar position {where}."
     probability = pair.outlier_probability
     chance = "" if probability is None else f" (outlier probability {plain(100 * probability, 2)} %)"
-    return f"Disagrees with the other pairs{chance}: its radar position {where}. Check the click, or exclude it."
+    return f"{cause.what}{chance}: its radar position {where}. {cause.action}"
