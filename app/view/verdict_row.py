@@ -7,9 +7,9 @@ from app.session import RecordingFacts, Session
 from app.view.model import VerdictRow
 from app.view.wording import sentence
 from calib_core.association.placements import Placement
+from calib_core.diagnostics.consequence import by_consequence
 from calib_core.measurements import Unsolvable
 from calib_core.results import Calibration
-from calib_core.diagnostics.consequence import by_consequence
 from calib_core.verdict import ALL_CLICKED, DONE, Verdict, verdict_on
 
 __all__ = ["placements_left", "shown_verdict", "verdict_row"]
