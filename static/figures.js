@@ -44,7 +44,7 @@ function draw() {
   figures.classList.toggle("stale", view.solving && !view.checking && view.has_calibration);
   if (state.looking) {
     figures.replaceChildren(...state.placementFigures.map(cell));
-    return drawWarnings([{ code: "no-camera", message: view.status, hint: view.hint }], state.recording?.warnings ?? [], view.assumptions);
+    return drawWarnings([{ code: "no-camera", message: view.status, hint: view.hint }], state.recording?.warnings ?? [], view.assumptions, view.acknowledged);
   }
   const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Available after the first calibration.", level: "none" }));
   figures.replaceChildren(...shown.map(cell));
@@ -55,7 +55,7 @@ function draw() {
   adviceLine.textContent = view.advice?.words ?? "";
   drawReference(view);
   const failure = view.stage === "unsolvable" ? [{ code: "unsolvable", message: view.status, hint: view.hint }] : [];
-  drawWarnings([...failure, ...view.warnings], state.recording?.warnings ?? [], view.assumptions);
+  drawWarnings([...failure, ...view.warnings], state.recording?.warnings ?? [], view.assumptions, view.acknowledged);
 }
 
 /** Name the file that the pose comes from, or show how far the solved pose is from the one in it. @param {import("./messages.js").View} view */

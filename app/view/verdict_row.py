@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import Literal
 
+import numpy as np
+
 from app.session import RecordingFacts, Session
 from app.view.model import VerdictRow
 from app.view.wording import sentence
@@ -14,15 +16,26 @@ from calib_core.verdict import ALL_CLICKED, DONE, Verdict, verdict_on
 
 __all__ = ["placements_left", "shown_verdict", "verdict_row"]
 
+_SAME_M = 0.5
 _OF_PAIRS = ("doubtful-pair", "agreeing-outliers", "many-outliers")
 
 
 def placements_left(session: Session, placements: Sequence[Placement] | None) -> int | None:
-    """Return how many placements have no click, excluded clicks included; None if no placement is known."""
+    """Return how many placements have no click; None if no placement is known.
+
+    An excluded click counts, since its placement was looked at; a mark that nobody has touched does not. A dismissed placement
+    is not the reflector.
+    """
     if not placements:
         return None
-    times = sorted(click.image_time for click in session.clicks)
-    return sum(not any(one.start <= time <= one.end for time in times) for one in placements)
+    times = [click.image_time for click in session.clicks if click.counts or click.excluded]
+    clicked = (any(one.start <= time <= one.end for time in times) for one in placements)
+    return sum(not (done or _is_dismissed(one, session)) for one, done in zip(placements, clicked, strict=True))
+
+
+def _is_dismissed(placement: Placement, session: Session) -> bool:
+    at = [one for one in session.dismissed if placement.start <= one.time <= placement.end]
+    return any(float(np.linalg.norm(placement.position_radar_m - one.position_m)) < _SAME_M for one in at)
 
 
 def shown_verdict(session: Session, facts: RecordingFacts, placements: Sequence[Placement] | None) -> Verdict:

@@ -28,7 +28,7 @@ from calib_core.verdict import VerdictLevel, verdict_on
 
 __all__ = ["ROWS", "Verdicts", "measure_recording", "measure_verdict", "section", "share_inside"]
 
-_TRIALS, _RECORDINGS = 60, 12
+_TRIALS, _RECORDINGS = 30, 6
 _UNSEEN = 20
 """Placements that are not used, but reprojected."""
 _AIM = 95.0

@@ -37,6 +37,7 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
     ),
     "limited": (
         "flat-radar",
+        "choices-unused",
         "uncertain-association",
         "smooth-angle-errors",
         "angle-scale",
