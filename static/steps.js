@@ -95,7 +95,9 @@ export function nextAction() {
 export function nextWords() {
   const view = state.view;
   if (!view || view.stage === "unsolvable" || view.stage === "solving") return "";
-  const wrong = clicks().filter((click) => click.state === "outlier").length;
+  const wrong = view.method === "paper" ? 0 : clicks().filter((click) => click.state === "outlier").length;
   const outliers = view.stage === "solved" && wrong ? `Press J to see the ${wrong === 1 ? "outlier" : `${wrong} outliers one by one`}` : "";
-  return [outliers, view.hint].filter(Boolean).join("  ·  ");
+  const action = view.hint === view.verdict.action && !view.verdict.done ? nextAction() : null;
+  const words = action ? action.map((word) => (typeof word === "string" ? word : word.key)).join("") : view.hint;
+  return [outliers, words].filter(Boolean).join("  ·  ");
 }
