@@ -1,7 +1,7 @@
 """The verdict on a calibration: how far to trust it, in one line, and the one action that helps most.
 
-A good or usable calibration states its error, which holds in 95 % of such calibrations: `python -m benchmarks.accuracy --only
-verdict` measures that. The limits below and the consequence of each warning decide the level; docs/warnings.md lists both.
+A good or usable calibration states its error, which holds in 95 % of such calibrations. The limits below and the consequence of
+each warning decide the level; docs/warnings.md lists both, and the measured shares.
 """
 
 from dataclasses import dataclass
