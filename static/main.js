@@ -3,7 +3,9 @@
 
 import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
+import { startCandidates, take as takeCandidates } from "./candidates.js";
 import { startClicking } from "./clicking.js";
+import { startCross } from "./cross.js";
 import { setFormats, startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
@@ -22,7 +24,7 @@ import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./pla
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace } from "./space.js";
-import { clickIn, clicks, emit, on, select, selectedClick, state } from "./state.js";
+import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
 import { startTimeline } from "./timeline.js";
@@ -68,6 +70,9 @@ const readers = {
   radar_map(message) {
     state.radarMap = message;
     emit("radar_map");
+  },
+  candidates(message) {
+    takeCandidates(message);
   },
   progress(message) {
     state.progress = message;
@@ -130,6 +135,8 @@ startLayers();
 startLoupe();
 startLive();
 startClicking();
+startCandidates();
+startCross();
 startTimeline();
 startPairs();
 startVerdict();
@@ -158,5 +165,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, goTo, unconfirmed, follower },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower },
 });

@@ -1,24 +1,22 @@
 """One row per click: its state, its reprojection, its ellipse and a note."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from app.session import RecordingFacts, Session
+from app.view.disagreement import Disagreement, disagreement
 from app.view.model import ClickRow, ClickState
 from app.view.number_format import plain
 from app.view.reprojections import Reprojection, reprojections
 from app.view.wording import sentence
-from calib_core.measurements import ReflectorClick, Stamp, Unpaired
-from calib_core.options import CalibrationOptions, NoiseOptions
+from calib_core.measurements import Pair, ReflectorClick, Stamp, Unpaired, Unsolvable
+from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration
 
-__all__ = ["Disagreement", "click_rows", "disagreement"]
-
-_STRICT = 1.0 / 3.0
-_NOISE = {"sigma_px": "click noise", "sigma_range_m": "range noise", "sigma_azimuth_deg": "azimuth noise"}
+__all__ = ["click_rows"]
 
 _GUESS = (
     "It stands where the radar expects the reflector, and nobody has looked: it does not count. "
@@ -32,36 +30,23 @@ def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
     pairs = reprojections(calibration.pairs if calibration else session.checked)
     cause = disagreement(calibration.options) if calibration else disagreement(session.options)
     unpaired = {row.id: row for row in session.outcome.unpaired} if session.outcome else {}
+    likely = {pair.id: pair for pair in session.outcome.pairs} if isinstance(session.outcome, Unsolvable) else {}
     times_ns = np.array([click.image_time for click in session.clicks], dtype=np.int64)
     rows = zip(session.clicks, facts.frames_at(times_ns).tolist(), strict=True)
-    return tuple(_row(click, frame, pairs.get(click.id), unpaired.get(click.id), cause) for click, frame in rows)
+    made = (_row(click, frame, pairs.get(click.id), unpaired.get(click.id), cause) for click, frame in rows)
+    return tuple(_with_likely_return(row, likely[row.id]) if row.id in likely else row for row in made)
 
 
-@dataclass(frozen=True, slots=True)
-class Disagreement:
-    """What it means that a pair is an outlier under some options, and what to do about it."""
-
-    what: str
-    action: str
-
-
-_BY_DEFAULT = Disagreement("Disagrees with the other pairs", "Check the click, or exclude it.")
-
-
-def disagreement(options: CalibrationOptions) -> Disagreement:
-    """Say what makes a pair an outlier: the pair itself, the paper's method, or options that allow too little noise."""
-    if options.method == "paper":
-        return Disagreement(
-            f"Outside the {options.paper.ransac_threshold_px:g} px of Algorithm 1's RANSAC, which uses it all the same",
-            "The default method tells whether it is wrong.",
-        )
-    usual, given = NoiseOptions(), options.noise
-    strict = [text for name, text in _NOISE.items() if getattr(given, name) < _STRICT * getattr(usual, name)]
-    if not strict:
-        return _BY_DEFAULT
-    return Disagreement(
-        f"Does not fit the noise that the options state ({' and '.join(strict)} far below the default)",
-        "Check these options before the click.",
+def _with_likely_return(row: ClickRow, pair: Pair) -> ClickRow:
+    """Add where the most plausible radar return is, while there is no pose yet."""
+    if row.range_m is not None:
+        return row
+    range_m, azimuth, elevation = polar_from_cartesian(pair.candidates[0].position_radar_m[None])[0].tolist()
+    return replace(
+        row,
+        range_m=round(range_m, 4),
+        azimuth_deg=round(math.degrees(azimuth), 4),
+        elevation_deg=round(math.degrees(elevation), 4),
     )
 
 

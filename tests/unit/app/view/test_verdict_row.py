@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.session import ClickPlaced, History, PlacementDismissed, RecordingFacts, Session, advance
-from app.view.click_rows import disagreement
+from app.view.disagreement import disagreement
 from app.view.verdict_row import placements_left, verdict_row
 from calib_core.association.placements import Placement
 from calib_core.measurements import ReflectorClick, TimeNs
