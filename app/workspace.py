@@ -25,6 +25,7 @@ from app.session.file import Closed, Restored, open_session_file
 from app.solver_worker import SolverWorker
 from app.view import Reference, View, view
 from calib_core.arrays import TimesNs
+from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import read_clicks, write_clicks
@@ -102,6 +103,7 @@ class Workspace:
         self.restored = restored
         self.reference = reference
         self._history = restored.history
+        self._placements: tuple[Placement, ...] | None = None
         self._journal = journal
         self._solver = solver
         self._lock = threading.Lock()
@@ -123,7 +125,17 @@ class Workspace:
     @property
     def view(self) -> View:
         """The current View."""
-        return view(self._history, self.facts, self.reference)
+        return self._view_of(self._history)
+
+    def _view_of(self, history: History) -> View:
+        return view(history, self.facts, self.reference, self._placements)
+
+    def show_placements(self, placements: Sequence[Placement]) -> None:
+        """Take in the placements that were found in the radar data, so that the View says how many have no click."""
+        with self._lock:
+            self._placements = tuple(placements)
+            self._pending.append((self._view_of(self._history), self._subscribers))
+        self._notify()
 
     def dispatch(self, step: Step) -> None:
         """Apply one step, journal it, then notify the subscribers.
@@ -141,7 +153,7 @@ class Workspace:
             if not isinstance(step, Solved | ScansAdded):
                 self._journal.append(step, after)
             self._history = after
-            self._pending.append((view(after, self.facts, self.reference), self._subscribers))
+            self._pending.append((self._view_of(after), self._subscribers))
         self._ask_for_answer(after.present)
         self._notify()
 
@@ -176,7 +188,7 @@ class Workspace:
         """
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
-            self._pending.append((view(self._history, self.facts, self.reference), (subscriber,)))
+            self._pending.append((self._view_of(self._history), (subscriber,)))
         self._notify()
 
         def end() -> None:

@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from calib_core.recordings import Recording, RecordingOptions, open_recording
     from calib_core.results import Calibration, DataWarning, Metrics, NextPlacement, PairResult
     from calib_core.systematic_errors import SystematicErrorResult
+    from calib_core.verdict import Verdict, verdict_on
 
 __all__ = [
     "AngleMap",
@@ -95,6 +96,7 @@ __all__ = [
     "Unpaired",
     "Unsolvable",
     "UnsolvableError",
+    "Verdict",
     "acc",
     "aed",
     "calibrate",
@@ -110,6 +112,7 @@ __all__ = [
     "read_clicks",
     "read_pairs",
     "solve_again",
+    "verdict_on",
     "write_calibration",
     "write_clicks",
     "write_pairs",
@@ -138,6 +141,7 @@ _MODULES = {
     "recordings": ("Recording", "RecordingOptions", "open_recording"),
     "results": ("Calibration", "DataWarning", "Metrics", "NextPlacement", "PairResult"),
     "systematic_errors": ("SystematicErrorResult",),
+    "verdict": ("Verdict", "verdict_on"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

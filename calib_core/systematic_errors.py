@@ -23,6 +23,7 @@ __all__ = [
 
 _DOMINANT_SHARE = 1.0 / 3.0
 _UNDETERMINED = 0.97  # of the prior's sigma: the pairs say nothing
+_WOULD_REDUCE = " would reduce it"
 _SHARES = (
     (0.9, "nearly all"),
     (0.71, "about three quarters"),
@@ -69,12 +70,14 @@ class DominantError:
         rotation_share: the same of the rotation.
         label: a few words: which error it is, and what is known of it.
         sentence: its part in the uncertainty, what is known of it, and what would reduce it.
+        action: what would reduce it, as a sentence of its own without a full stop.
     """
 
     position_share: float
     rotation_share: float
     label: str
     sentence: str
+    action: str
 
 
 def dominant_errors(
@@ -140,11 +143,13 @@ def _dominant(
     label, name = words.family or (words.label, words.text)
     come = "come" if len(parts) > 1 else "comes"
     remedy = (words.remedy_with_tape if measured else "") or words.remedy
+    whole = f"{remedy[:1].upper()}{remedy[1:].removesuffix(_WOULD_REDUCE)}"
     return DominantError(
         position_share=position_share,
         rotation_share=rotation_share,
         label=f"{label} {_value_text(largest) if is_determined(largest) else known.partition(' assumed')[0]}",
         sentence=f"{' and '.join(parts)} {come} from {name}: {known}; {remedy}",
+        action=f"{whole} would help most: {parts[0]} comes from {name}",
     )
 
 

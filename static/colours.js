@@ -21,10 +21,13 @@ export const ink = {
   grey: "#9aa6b2",
 };
 
-/** Colour of a residual. @param {number|null} residual px @param {number|null} limit px @returns {string} */
-export function residualColour(residual, limit) {
+/** Residuals from here on have the last colour of the ramp [px]. The scale is fixed, so that a colour means the same after every click. */
+export const LARGE_PX = 30;
+
+/** Colour of a residual. @param {number|null} residual px @returns {string} */
+export function residualColour(residual) {
   if (residual === null || !Number.isFinite(residual)) return ink.grey;
-  return rampColour(residual / Math.max(limit ?? 20, 1e-9));
+  return rampColour(residual / LARGE_PX);
 }
 
 /** @param {number} position on the ramp, 0 to 1 */

@@ -1,24 +1,21 @@
 // @ts-check
-/** Metrics, pose and warnings, with the server's text. */
+/** Metrics and pose, with the server's text. */
 
-import { icon, make, toast } from "./notices.js";
-import { send } from "./socket.js";
+import { make } from "./notices.js";
 import { on, state } from "./state.js";
+import { drawWarnings } from "./warnings.js";
 
 /** @typedef {import("./messages.js").Figure} Figure */
 const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));
-const warnings = /** @type {HTMLElement} */ (document.getElementById("warnings"));
 const posePage = /** @type {HTMLElement} */ (document.getElementById("page-pose"));
 /** Placeholders before the first calibration, so that the layout does not jump. @type {[string, string][]} */
 const EMPTY = [
-  ["aed", "AED"],
-  ["held_out_aed", "held-out AED"],
-  ["cdsd", "CDSD"],
-  ["rms", "RMS"],
+  ["aed", "mean residual"],
+  ["held_out_aed", "held-out mean"],
+  ["cdsd", "spread"],
+  ["rms", "RMS residual"],
   ["inliers", "pairs that agree"],
 ];
-/** Warnings that the user has opened stay open. @type {Set<string>} */
-const openCodes = new Set(["unsolvable", "no-camera", "assumed"]);
 export const poseTable = make("table", "", []);
 const poseHead = make("div", "pose-head", "");
 const apartTable = make("table", "", []);
@@ -31,7 +28,6 @@ const systematicNote = make("p", "note", "");
 const systematic = make("div", "systematic", []);
 const adviceLine = make("p", "advice", "");
 const axesLine = make("p", "advice axes", "Relative to the radar's axes: x forward, y left, z up. With all angles at 0, the camera looks along x.");
-let warningText = "";
 
 export function startFigures() {
   const pose = make("div", "pose", [make("div", "", [poseTable, assumedHead, assumedTable]), axesLine, adviceLine]);
@@ -48,7 +44,7 @@ function draw() {
   figures.classList.toggle("stale", view.solving && !view.checking && view.has_calibration);
   if (state.looking) {
     figures.replaceChildren(...state.placementFigures.map(cell));
-    return drawWarnings([{ code: "no-camera", message: view.status, hint: view.hint }, ...(state.recording?.warnings ?? [])], view.assumptions);
+    return drawWarnings([{ code: "no-camera", message: view.status, hint: view.hint }], state.recording?.warnings ?? [], view.assumptions, view.acknowledged);
   }
   const shown = view.metrics.length ? view.metrics : EMPTY.map(([key, label]) => ({ key, label, value: "–", unit: "", hint: "Available after the first calibration.", level: "none" }));
   figures.replaceChildren(...shown.map(cell));
@@ -59,7 +55,7 @@ function draw() {
   adviceLine.textContent = view.advice?.words ?? "";
   drawReference(view);
   const failure = view.stage === "unsolvable" ? [{ code: "unsolvable", message: view.status, hint: view.hint }] : [];
-  drawWarnings([...failure, ...(state.recording?.warnings ?? []), ...view.warnings], view.assumptions);
+  drawWarnings([...failure, ...view.warnings], state.recording?.warnings ?? [], view.assumptions, view.acknowledged);
 }
 
 /** Name the file that the pose comes from, or show how far the solved pose is from the one in it. @param {import("./messages.js").View} view */
@@ -119,41 +115,4 @@ function row(figure) {
   line.dataset.key = figure.key;
   line.dataset.hint = figure.hint;
   return line;
-}
-
-/** What the recording does not state, with a button that confirms all of it. @param {import("./messages.js").AssumptionRow[]} rows */
-function assumptionBox(rows) {
-  const confirm = make("button", "", "Confirm");
-  confirm.id = "confirm-assumptions";
-  confirm.onclick = async () => {
-    const refusal = await send({ type: "assumptions_confirmed", texts: rows.map((row) => row.text) });
-    if (refusal) toast(refusal);
-  };
-  const title = rows.length === 1 ? "One assumption about the recording is unconfirmed" : `${rows.length} assumptions about the recording are unconfirmed`;
-  const items = rows.map((row) => make("li", "", [row.words, make("div", "hint", row.hint)]));
-  const box = make("details", "warning", [make("summary", "", [icon("warning"), make("span", "", title)]), confirm, make("ul", "", items)]);
-  box.dataset.code = "assumed";
-  box.open = openCodes.has("assumed");
-  box.ontoggle = () => (box.open ? openCodes.add("assumed") : openCodes.delete("assumed"));
-  return box;
-}
-
-/** @param {import("./messages.js").WarningRow[]} rows @param {import("./messages.js").AssumptionRow[]} assumptions */
-function drawWarnings(rows, assumptions) {
-  const text = JSON.stringify([rows, assumptions]);
-  if (text === warningText) return;
-  warningText = text;
-  warnings.replaceChildren(
-    ...(assumptions.length ? [assumptionBox(assumptions)] : []),
-    ...rows.map((warning) => {
-      const box = make("details", "warning", [
-        make("summary", "", [icon("warning"), make("span", "", warning.message)]),
-        make("div", "hint", warning.hint),
-      ]);
-      box.dataset.code = warning.code;
-      box.open = openCodes.has(warning.code);
-      box.ontoggle = () => (box.open ? openCodes.add(warning.code) : openCodes.delete(warning.code));
-      return box;
-    }),
-  );
 }

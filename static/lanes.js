@@ -99,7 +99,7 @@ function drawStem(pen, click, x, base) {
   const limit = state.view?.residual_limit_px ?? 20;
   const room = base - lanes.ruler - 8;
   const tall = click.residual_px === null ? 6 : Math.min(room, Math.max(6, (click.residual_px / (1.5 * limit)) * room));
-  const colour = click.state === "pending" || click.state === "unpaired" ? ink.grey : residualColour(click.residual_px, limit);
+  const colour = click.state === "pending" || click.state === "unpaired" ? ink.grey : residualColour(click.residual_px);
   const chosen = click.id !== "" && click.id === state.selected;
   pen.strokeStyle = pen.fillStyle = colour;
   pen.lineWidth = chosen ? 2.5 : 1.5;

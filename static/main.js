@@ -32,6 +32,7 @@ import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
 import { takeSnapped } from "./snapping.js";
 import { startTimeline } from "./timeline.js";
+import { startVerdict } from "./verdict.js";
 import { Follower } from "./view_changes.js";
 
 const follower = new Follower();
@@ -147,6 +148,7 @@ startCandidates();
 startCross();
 startTimeline();
 startPairs();
+startVerdict();
 startFigures();
 startScatter();
 startReview();

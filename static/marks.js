@@ -100,7 +100,7 @@ function drawOther(pen, click) {
   const [x, y] = toDevice(click.u_px, click.v_px);
   const arm = 4 * viewport.ratio;
   pen.globalAlpha = click.id !== "" && click.id === state.selected ? 1 : 0.65;
-  const colour = residualColour(click.residual_px, state.view?.residual_limit_px ?? null);
+  const colour = residualColour(click.residual_px);
   outlined(pen, colour, 1.3, () => cross(pen, x, y, arm, 0), isHollow(click) ? [2 * viewport.ratio, 2 * viewport.ratio] : []);
   pen.globalAlpha = 1;
 }
@@ -133,9 +133,9 @@ function looksClosely(click) {
 
 /** @param {Ink} pen @param {Click} click @param {number} x @param {number} y @param {boolean} closeUp */
 function drawReprojection(pen, click, x, y, closeUp) {
-  const [ring, limit] = [/** @type {[number, number]} */ (click.projected_px), state.view?.residual_limit_px ?? null];
+  const ring = /** @type {[number, number]} */ (click.projected_px);
   const [px, py] = toDevice(ring[0], ring[1]);
-  const colour = residualColour(click.residual_px, limit);
+  const colour = residualColour(click.residual_px);
   if (state.layers.ellipses && click.ellipse) {
     const [major, minor, angle] = click.ellipse;
     const ellipse = () => pen.ellipse(px, py, major * viewport.scale, minor * viewport.scale, angle, 0, 2 * Math.PI);

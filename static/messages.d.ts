@@ -181,6 +181,15 @@ export interface SystematicErrorTable {
   sentences: string[];
 }
 
+/** How far the calibration can be trusted, in one line, and what to do. */
+export interface VerdictRow {
+  level: "good" | "usable" | "weak" | "contradictory" | "nothing";
+  line: string;
+  action: string;
+  key: "" | "N" | "E" | "J";
+  done: boolean;
+}
+
 /** Everything a client draws about the session. */
 export interface View {
   type: "view";
@@ -209,6 +218,7 @@ export interface View {
   dismissed: DismissedRow[];
   acknowledged: string[];
   systematic_errors: SystematicErrorTable;
+  verdict: VerdictRow;
 }
 
 /** New values of some fields in some rows. */

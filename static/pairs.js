@@ -3,7 +3,7 @@
 
 import { comeTo } from "./arriving.js";
 import { candidatesOf, choose } from "./candidates.js";
-import { residualColour } from "./colours.js";
+import { LARGE_PX, residualColour } from "./colours.js";
 import { toggleExcluded } from "./clicking.js";
 import { make } from "./notices.js";
 import { drawSteps } from "./steps.js";
@@ -99,7 +99,7 @@ function drawRows(rows) {
   let next = body.firstElementChild;
   for (const click of rows) {
     const before = made.get(keyOf(click));
-    const from = [click, click.id === state.selected, state.view?.residual_limit_px, state.placements, state.seconds];
+    const from = [click, click.id === state.selected, state.placements, state.seconds];
     let row = before?.row;
     if (!row || from.some((value, index) => value !== before?.from[index])) {
       row = line(click);
@@ -177,10 +177,9 @@ function heading(column) {
 
 /** @param {Click} click */
 function line(click) {
-  const limit = state.view?.residual_limit_px ?? null;
-  const colour = residualColour(click.residual_px, limit);
+  const colour = residualColour(click.residual_px);
   const bar = make("b", "", "");
-  bar.style.width = `${Math.min(100, (100 * (click.residual_px ?? 0)) / (1.5 * (limit ?? 20)))}%`;
+  bar.style.width = `${Math.min(100, (100 * (click.residual_px ?? 0)) / LARGE_PX)}%`;
   bar.style.background = colour;
   const residual = click.residual_px === null || click.state === "untouched" ? word(click) : `${digits(click.residual_px)} px`;
   const excluded = click.state === "excluded";

@@ -68,7 +68,7 @@ function draw() {
 /** @param {import("./messages.js").ClickRow} click @param {number} most */
 function mark(click, most) {
   const [x, y] = place(click, most);
-  const colour = click.state === "excluded" ? ink.grey : residualColour(click.residual_px, state.view?.residual_limit_px ?? null);
+  const colour = click.state === "excluded" ? ink.grey : residualColour(click.residual_px);
   const chosen = click.id === state.selected;
   pen.beginPath();
   pen.arc(x, y, chosen ? 5 : 3.2, 0, 2 * Math.PI);

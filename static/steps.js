@@ -98,6 +98,8 @@ function afterClick(click) {
   if (state.placements.length && !placementsAt(click.frame).length) return { text: ["The radar saw no reflector put down at this time. If it was being carried, press ", { key: "Del" }], act: true };
   const apart = rangeApart(click);
   if (apart) return { text: [`${apart}. Correct the mark, or press `, { key: "X" }, " to exclude the pair"], act: true };
+  const blamed = click.note.startsWith("Disagrees"); // otherwise the method or an option sets the pair aside: the note says which
+  if (click.state === "outlier" && !blamed) return { text: [click.note], act: true };
   if (click.state === "outlier") return { text: outlierWords(click), act: true };
   if (click.state === "unpaired") return { text: ["No radar position here. Click another frame of this placement, or press ", { key: "N" }, " for the next one"], act: true };
   const next = nextAction();
@@ -111,33 +113,24 @@ function outlierWords(click) {
   return ["This pair does not agree with the others. Is the mark on the inner corner? If so, ", { key: "X" }, " excludes it"];
 }
 
-/** The next thing to do with the placements; null when there is nothing to say. @returns {Words|null} */
+/** The next thing to do: the verdict's action, with its key; null when there is nothing to say. @returns {Words|null} */
 export function nextAction() {
   const view = state.view;
-  if (view?.stage === "unsolvable") return null; // the orange box says what to do
-  const wrong = clicks().filter((click) => click.state === "outlier").length;
-  if (view?.stage === "solved" && wrong) {
-    const used = clicks().filter((click) => click.state === "inlier").length + wrong;
-    return [`${used - wrong} of ${used} pairs agree. Press `, { key: "J" }, wrong === 1 ? " to see the outlier" : ` to see the ${wrong} outliers one by one`];
-  }
+  if (!view || view.stage === "unsolvable") return null; // the orange box says what to do
+  const { action, key, done } = view.verdict;
   const guesses = clicks().filter((click) => click.state === "untouched").length;
-  const left = state.placements.filter(isOffered).length;
-  if (!left && guesses) return [`${guesses} ${guesses > 1 ? "marks are guesses that do" : "mark is a guess that does"} not count: move each to the reflector`];
-  if (left) return [`${left} placement${left > 1 ? "s" : ""} left. Press `, { key: "N" }, " for the next one"];
-  if (!state.placements.length || !view?.has_calibration || view.warnings.length) return null;
-  return ["Every placement has a click. Press ", { key: "E" }, " to export the calibration"];
+  if (guesses && !state.placements.some(isOffered)) return [`${guesses} ${guesses > 1 ? "marks are guesses that do" : "mark is a guess that does"} not count: move each to the reflector`];
+  if (done) return ["Done. Press ", { key: "E" }, " to export the calibration"];
+  return key ? [`${action} Press `, { key }] : null; // others are longer than a line: the verdict shows them
 }
 
-/** The same for the status line, after the server's status where that does not say it. @returns {string} */
+/** The same for the status line, after the server's status, and how to find the pairs that disagree. @returns {string} */
 export function nextWords() {
   const view = state.view;
   if (!view || view.stage === "unsolvable" || view.stage === "solving") return "";
-  const lost = clicks().some((click) => click.state === "unpaired");
-  if (lost || (view.reference && !view.has_calibration)) return view.hint;
-  const action = view.stage === "solved" || view.clicks.length ? nextAction() : null;
-  if (!action) return view.hint;
-  const words = action.map((word) => (typeof word === "string" ? word : word.key)).join("");
-  if (view.stage !== "solved") return words;
-  const rest = view.status.includes("pairs agree") ? words.replace(/^\d+ of \d+ pairs agree\. /, "") : words;
-  return [rest, view.warnings.length || words.startsWith("Every") ? view.hint : ""].filter(Boolean).join("  ·  ");
+  const wrong = view.method === "paper" ? 0 : clicks().filter((click) => click.state === "outlier").length;
+  const outliers = view.stage === "solved" && wrong ? `Press J to see the ${wrong === 1 ? "outlier" : `${wrong} outliers one by one`}` : "";
+  const action = view.hint === view.verdict.action && !view.verdict.done ? nextAction() : null;
+  const words = action ? action.map((word) => (typeof word === "string" ? word : word.key)).join("") : view.hint;
+  return [outliers, words].filter(Boolean).join("  ·  ");
 }

@@ -1,5 +1,7 @@
 """Build the View of a session, in one pure call."""
 
+from collections.abc import Sequence
+
 from app.session import History, RecordingFacts, Session
 from app.view.advice import advice_for
 from app.view.click_rows import click_rows
@@ -7,9 +9,13 @@ from app.view.figures import assumed_figures, firm_text, metric_figures, pose_fi
 from app.view.model import AssumptionRow, DismissedRow, Stage, SystematicErrorTable, View
 from app.view.reference import Reference, comparison_figures, reference_words, shown_calibration
 from app.view.systematic_errors import systematic_errors
+from app.view.verdict_row import shown_verdict, verdict_row
 from app.view.wording import sentence, warning_in_sentences
+from calib_core.association.placements import Placement
+from calib_core.diagnostics.consequence import by_consequence
 from calib_core.measurements import MIN_PAIRS, Stamp, Unpaired, Unsolvable
 from calib_core.results import Calibration, DataWarning
+from calib_core.verdict import Verdict
 
 __all__ = ["view"]
 
@@ -19,20 +25,27 @@ _WITHOUT_PICTURES = (
 )
 
 
-def view(history: History, facts: RecordingFacts, reference: Reference | None = None) -> View:
+def view(
+    history: History,
+    facts: RecordingFacts,
+    reference: Reference | None = None,
+    placements: Sequence[Placement] | None = None,
+) -> View:
     """Return everything there is to draw about the current session.
 
     Args:
         history: the session with what can be undone and redone.
         facts: the recording's frames.
         reference: a calibration to review; None if there is none.
+        placements: found in the radar data; None before they have been looked for.
     """
     session = history.present
     outcome = session.outcome
     calibration = outcome if isinstance(outcome, Calibration) else None
     shown = shown_calibration(session, reference)
     stage = _stage(session)
-    status, hint = _words(session, stage, reference) if facts.has_pictures else _WITHOUT_PICTURES
+    verdict = shown_verdict(session, facts, placements)
+    status, hint = _words(session, stage, reference, verdict) if facts.has_pictures else _WITHOUT_PICTURES
     if stage == "solved" and facts.unconfirmed(session):
         status += "; unconfirmed assumptions"
     return View(
@@ -55,10 +68,11 @@ def view(history: History, facts: RecordingFacts, reference: Reference | None = 
         warnings=_warnings(calibration) if calibration else (),
         options=session.options,
         residual_limit_px=residual_limit_px(calibration) if calibration else None,
-        advice=advice_for(calibration) if calibration else None,
+        advice=advice_for(calibration, verdict) if calibration else None,
         reference=reference.name if reference else "",
         comparison=comparison_figures(reference, calibration) if reference and calibration else (),
         assumptions=_assumptions(session, facts),
+        verdict=verdict_row(verdict, session, placements),
         dismissed=tuple(DismissedRow(Stamp.of(one.time), one.position_m) for one in session.dismissed),
         acknowledged=session.acknowledged,
     )
@@ -97,13 +111,13 @@ def _waits_for_clicks(session: Session) -> bool:
     return _missing(session) > 0 and not blocked
 
 
-def _words(session: Session, stage: Stage, reference: Reference | None) -> tuple[str, str]:
+def _words(session: Session, stage: Stage, reference: Reference | None, verdict: Verdict) -> tuple[str, str]:
     """Return the status line and the next thing to do."""
     missing, outcome = _missing(session), session.outcome
     if reference is not None and _waits_for_clicks(session) and not isinstance(outcome, Calibration):
-        return reference_words(session, reference), _still_missing(session, missing)
+        return reference_words(session, reference), _still_missing(session, missing, verdict)
     if _waits_for_clicks(session):
-        return f"{missing} more placement{'s' if missing > 1 else ''} needed", _next_click(session)
+        return f"{missing} more placement{'s' if missing > 1 else ''} needed", _next_click(session, verdict)
     if session.is_checking and isinstance(outcome, Calibration):
         return _agreement(outcome, "Checking…"), ""
     if stage == "solving":
@@ -111,37 +125,26 @@ def _words(session: Session, stage: Stage, reference: Reference | None) -> tuple
     if isinstance(outcome, Unsolvable):
         return sentence(outcome.reason), sentence(outcome.hint)
     if isinstance(outcome, Calibration):
-        return _agreement(outcome), _next_step(outcome)
+        return _agreement(outcome, f"{verdict.level.capitalize()}:"), sentence(verdict.action)
     return "", ""
 
 
-def _still_missing(session: Session, missing: int) -> str:
+def _still_missing(session: Session, missing: int, verdict: Verdict) -> str:
     """Return what a new calibration still needs, once there is a click."""
     if _unpaired(session):
-        return _next_click(session)
+        return _next_click(session, verdict)
     return f"{missing} more placement{'s' if missing > 1 else ''} for a new calibration." if session.clicks else ""
 
 
-def _next_step(calibration: Calibration) -> str:
-    """Return the hint of the first warning; without warnings, the best next placement."""
-    if calibration.warnings:
-        return sentence(calibration.warnings[0].hint)
-    advice = advice_for(calibration)
-    return advice.words if advice else ""
-
-
-def _next_click(session: Session) -> str:
+def _next_click(session: Session, verdict: Verdict) -> str:
     unpaired = _unpaired(session)
     if not unpaired:
-        return (
-            "Go to a frame in which the reflector stands still and click its centre: "
-            "the inner corner, where its three sheets meet."
-        )
+        return sentence(verdict.action)
     count = "The click has" if len(session.clicks) == 1 else f"{len(unpaired)} of {len(session.clicks)} clicks have"
     return f"{count} no radar position: {unpaired[0].reason}. {sentence(unpaired[0].hint)}"
 
 
-def _agreement(calibration: Calibration, word: str = "Solved:") -> str:
+def _agreement(calibration: Calibration, word: str) -> str:
     used = [pair for pair in calibration.pairs if not pair.excluded]
     agreeing = sum(pair.inlier for pair in used)
     agreed = f"all {len(used)}" if agreeing == len(used) else f"{agreeing} of {len(used)}"
@@ -150,4 +153,4 @@ def _agreement(calibration: Calibration, word: str = "Solved:") -> str:
 
 
 def _warnings(calibration: Calibration) -> tuple[DataWarning, ...]:
-    return tuple(map(warning_in_sentences, calibration.warnings))
+    return tuple(map(warning_in_sentences, by_consequence(calibration.warnings)))

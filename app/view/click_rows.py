@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from app.session import RecordingFacts, Session
+from app.view.disagreement import Disagreement, disagreement
 from app.view.model import ClickRow, ClickState
 from app.view.number_format import plain
 from app.view.reprojections import Reprojection, reprojections
@@ -27,11 +28,12 @@ def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
     """Return one row per click, in order of image time; a row that is as before is the same object."""
     calibration = session.outcome if isinstance(session.outcome, Calibration) else None
     pairs = reprojections(calibration.pairs if calibration else session.checked)
+    cause = disagreement(calibration.options) if calibration else disagreement(session.options)
     unpaired = {row.id: row for row in session.outcome.unpaired} if session.outcome else {}
     likely = {pair.id: pair for pair in session.outcome.pairs} if isinstance(session.outcome, Unsolvable) else {}
     times_ns = np.array([click.image_time for click in session.clicks], dtype=np.int64)
     rows = zip(session.clicks, facts.frames_at(times_ns).tolist(), strict=True)
-    made = (_row(click, frame, pairs.get(click.id), unpaired.get(click.id)) for click, frame in rows)
+    made = (_row(click, frame, pairs.get(click.id), unpaired.get(click.id), cause) for click, frame in rows)
     return tuple(_with_likely_return(row, likely[row.id]) if row.id in likely else row for row in made)
 
 
@@ -49,7 +51,9 @@ def _with_likely_return(row: ClickRow, pair: Pair) -> ClickRow:
 
 
 @lru_cache(maxsize=1 << 15)
-def _row(click: ReflectorClick, frame: int, pair: Reprojection | None, lone: Unpaired | None) -> ClickRow:
+def _row(
+    click: ReflectorClick, frame: int, pair: Reprojection | None, lone: Unpaired | None, cause: Disagreement
+) -> ClickRow:
     stamp = Stamp.of(click.image_time)
     if pair is None:
         state: ClickState = _uncounted(click) or ("unpaired" if lone else "pending")
@@ -82,7 +86,7 @@ def _row(click: ReflectorClick, frame: int, pair: Reprojection | None, lone: Unp
         azimuth_deg=pair.azimuth_deg,
         elevation_deg=pair.elevation_deg,
         outlier_probability=pair.outlier_probability,
-        note=_note(state, residual_px, pair),
+        note=_note(state, residual_px, pair, cause),
         mark=click.mark,
         sigma_px=click.sigma_px,
         chosen=click.chosen is not None,
@@ -111,7 +115,7 @@ def _uncounted(click: ReflectorClick) -> ClickState | None:
     return "excluded" if click.excluded else None if click.counts else "untouched"
 
 
-def _note(state: ClickState, residual_px: float | None, pair: Reprojection) -> str:
+def _note(state: ClickState, residual_px: float | None, pair: Reprojection, cause: Disagreement) -> str:
     if state == "untouched":
         return _GUESS
     if state not in ("outlier", "excluded"):
@@ -121,4 +125,4 @@ def _note(state: ClickState, residual_px: float | None, pair: Reprojection) -> s
         return f"Excluded; its radar position {where}."
     probability = pair.outlier_probability
     chance = "" if probability is None else f" (outlier probability {plain(100 * probability, 2)} %)"
-    return f"Disagrees with the other pairs{chance}: its radar position {where}. Check the click, or exclude it."
+    return f"{cause.what}{chance}: its radar position {where}. {cause.action}"

@@ -25,13 +25,21 @@ def metric_figures(calibration: Calibration) -> tuple[Figure, ...]:
     agreeing = sum(pair.inlier and not pair.excluded for pair in calibration.pairs)
     over = f"over {metrics.n} pairs"
     return (
-        _figure("aed", "AED", metrics.aed_px, f"Mean distance between click and reprojection {over} (paper: AED)."),
+        _figure(
+            "aed", "mean residual", metrics.aed_px, f"Mean distance between click and reprojection {over} (paper: AED)."
+        ),
         _held_out_figure(calibration),
         _figure(
-            "cdsd", "CDSD", metrics.cdsd_px, "Standard deviation of these distances, with divisor N - 1 (paper: CDSD)."
+            "cdsd",
+            "spread",
+            metrics.cdsd_px,
+            "Standard deviation of these distances, with divisor N - 1 (paper: CDSD).",
         ),
         _figure(
-            "rms", "RMS", metrics.rms_px, "Root mean square of these distances: large ones count more than in AED."
+            "rms",
+            "RMS residual",
+            metrics.rms_px,
+            "Root mean square of these distances: large ones count more than in the mean.",
         ),
         Figure(
             "inliers",
@@ -51,10 +59,10 @@ def _figure(key: str, label: str, value_px: float, hint: str) -> Figure:
 def _held_out_figure(calibration: Calibration) -> Figure:
     """Return the held-out error, with a warning if it is far above the fitted one."""
     metrics = calibration.metrics
-    hint = "Mean distance when each pair is predicted from all the others: the error to expect at a new placement."
-    figure = _figure("held_out_aed", "held-out AED", metrics.held_out_aed_px, hint)
+    hint = "Mean distance when each pair is predicted from all the others (held-out AED): the error to expect at a new placement."
+    figure = _figure("held_out_aed", "held-out mean", metrics.held_out_aed_px, hint)
     if metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px:
-        warning = "It is well above AED, so the pose depends on single pairs: add placements."
+        warning = "It is well above the mean residual, so the pose depends on single pairs: add placements."
         return replace(figure, hint=f"{hint} {warning}", level="warning")
     return figure
 
@@ -94,16 +102,20 @@ def _mounting_figures(calibration: Calibration) -> tuple[Figure, ...]:
         "".join(f" {sentence(one.sentence)}" for one in causes if getattr(one, f"{part}_share"))
         for part in ("position", "rotation")
     )
-    figures = [
-        Figure(key, label, with_sigma(100 * float(value), 100 * float(sigma)), "cm", hint + of_position)
-        for (key, label, hint), value, sigma in zip(_POSITION, mounting.position_m, position_sigma_m, strict=True)
-    ]
-    degrees, sigmas = np.rad2deg(mounting.roll_pitch_yaw_rad), np.rad2deg(angle_sigma_rad)
-    figures += [
-        Figure(key, label, with_sigma(float(value), float(sigma)), "deg", hint + of_rotation)
-        for (key, label, hint), value, sigma in zip(_ANGLES, degrees, sigmas, strict=True)
-    ]
-    return tuple(figures)
+    centimetres, sigmas_cm = 100 * mounting.position_m, 100 * position_sigma_m
+    degrees, sigmas_deg = np.rad2deg(mounting.roll_pitch_yaw_rad), np.rad2deg(angle_sigma_rad)
+    return (
+        *(_directed(*row, "cm", of_position) for row in zip(_POSITION, centimetres, sigmas_cm, strict=True)),
+        *(_directed(*row, "deg", of_rotation) for row in zip(_ANGLES, degrees, sigmas_deg, strict=True)),
+    )
+
+
+def _directed(what: tuple[str, str, str, str], value: float, sigma: float, unit: str, causes: str) -> Figure:
+    """Return a value without its sign, which its label says: "camera down 4.0", not "camera up -4.0"."""
+    key, positive, negative, hint = what
+    return Figure(
+        key, negative if value < 0 else positive, with_sigma(abs(float(value)), float(sigma)), unit, hint + causes
+    )
 
 
 def _picture_figures(calibration: Calibration) -> tuple[Figure, ...]:
@@ -125,7 +137,7 @@ def _radar_figures(calibration: Calibration) -> tuple[Figure, ...]:
         return ()
     hint = (
         "The radar's angle errors vary smoothly with direction, so no pose can remove them. Correcting them with the map "
-        f"in calibration.json (radar_angle_map) reduces AED from {plain(angle_map.raw_aed_px)} to "
+        f"in calibration.json (radar_angle_map) reduces the mean residual from {plain(angle_map.raw_aed_px)} to "
         f"{plain(angle_map.corrected_aed_px)} px, each pair being corrected from the other pairs only."
     )
     return (
@@ -148,29 +160,21 @@ def residual_limit_px(calibration: Calibration) -> float | None:
 _FIRM = ("camera_x", "camera_y", "yaw")
 """What a radar without elevation determines."""
 
+_SIGMA = "± one standard deviation."
+_AHEAD = "relative to looking along the radar's x axis"
 _POSITION = (
     (
         "camera_x",
         "camera forward",
-        "Camera centre ahead of the radar, along the radar's x axis, ± one standard deviation.",
+        "camera back",
+        f"Camera centre ahead of the radar or behind it, along its x axis, {_SIGMA}",
     ),
-    (
-        "camera_y",
-        "camera left",
-        "Camera centre to the left of the radar, along the radar's y axis, ± one standard deviation.",
-    ),
-    ("camera_z", "camera up", "Camera centre above the radar, along the radar's z axis, ± one standard deviation."),
+    ("camera_y", "camera left", "camera right", f"Camera centre to the side of the radar, along its y axis, {_SIGMA}"),
+    ("camera_z", "camera up", "camera down", f"Camera centre above or below the radar, along its z axis, {_SIGMA}"),
 )
 _ANGLES = (
-    (
-        "roll",
-        "roll",
-        "Camera tilted to its right, relative to looking along the radar's x axis, ± one standard deviation.",
-    ),
-    (
-        "pitch",
-        "pitch",
-        "Camera looking down, relative to looking along the radar's x axis, ± one standard deviation.",
-    ),
-    ("yaw", "yaw", "Camera looking left, relative to looking along the radar's x axis, ± one standard deviation."),
+    ("roll", "roll to the right", "roll to the left", f"Camera tilted to its side, {_AHEAD}, {_SIGMA}"),
+    ("pitch", "pitch down", "pitch up", f"Camera looking down or up, {_AHEAD}, {_SIGMA}"),
+    ("yaw", "yaw left", "yaw right", f"Camera looking to the side, {_AHEAD}, {_SIGMA}"),
 )
+"""Key, label of a positive value, label of a negative one, explanation."""

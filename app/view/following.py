@@ -5,6 +5,7 @@ from typing import Literal
 
 from calib_core.advice.coverage import ENOUGH_PLACEMENTS, Coverage, Place
 from calib_core.results import NextPlacement
+from calib_core.verdict import placement_words
 
 __all__ = ["FollowState", "Pace", "advice_words", "pace_words"]
 
@@ -60,9 +61,7 @@ def advice_words(coverage: Coverage, best: NextPlacement | None) -> str:
     if best is not None and best.may_stop:
         return f"{_count(coverage.placements)}: no further one would reduce the pose uncertainty noticeably."
     if best is not None:
-        x, y, _ = best.position_radar_m
-        side = "straight ahead" if abs(y) < 0.1 * abs(x) else f"{abs(y):.1f} m to the {'left' if y > 0 else 'right'}"
-        return f"{_count(coverage.placements)}; next: {x:.1f} m ahead, {side}."
+        return f"{_count(coverage.placements)}; next: {placement_words(best)}."
     if coverage.next is not None:
         total = f"{coverage.placements} of {ENOUGH_PLACEMENTS} placements"
         few = total if coverage.placements < ENOUGH_PLACEMENTS else _count(coverage.placements)

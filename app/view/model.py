@@ -8,6 +8,7 @@ import msgspec
 from calib_core.measurements import Mark, Stamp
 from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning
+from calib_core.verdict import VerdictLevel
 
 __all__ = [
     "Advice",
@@ -20,6 +21,7 @@ __all__ = [
     "Stage",
     "SystematicErrorRow",
     "SystematicErrorTable",
+    "VerdictRow",
     "View",
 ]
 
@@ -187,6 +189,25 @@ class Advice:
 
 
 @dataclass(frozen=True, slots=True)
+class VerdictRow:
+    """How far the calibration can be trusted, in one line, and what to do.
+
+    Attributes:
+        level: decides word, colour and shape.
+        line: level and reason: "usable to 0.5 deg, 6 cm (95 %); 7 px at 20 m".
+        action: the one thing that helps most, as a sentence.
+        key: of the page, that does or begins it; "" if there is none.
+        done: nothing more is needed.
+    """
+
+    level: VerdictLevel
+    line: str
+    action: str
+    key: Literal["", "N", "E", "J"] = ""
+    done: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class AssumptionRow:
     """An assumption about the recording that waits for the user's confirmation.
 
@@ -208,7 +229,7 @@ class View:
     Attributes:
         revision: of the session; grows with every change.
         stage: how far the session has come.
-        status: the same in a few words: "4 more placements needed", "solving…", "solved: 18 of 20 pairs agree".
+        status: the same in a few words: "4 more placements needed", "Solving…", "Usable: 18 of 20 pairs agree".
         hint: the next thing to do; "" when there is none.
         solving: this revision is being solved; what is shown belongs to an older one, unless it is being checked.
         checking: what is shown is a preview of this revision's answer; warnings and advice are still the previous ones.
@@ -222,13 +243,14 @@ class View:
         pose: the camera's position and angles relative to the radar, and the uncertainty in the picture.
         pose_assumed: the part of the pose that a radar without elevation does not show; empty for others.
         systematic_errors: the errors that all pairs share, and their parts in the uncertainty.
-        warnings: of the latest outcome.
+        warnings: of the latest outcome, the gravest first.
         options: the current ones; changes are sent as a part of this tree.
         residual_limit_px: residuals above this should be checked; None without a calibration.
         advice: where to put the reflector next; None without a calibration.
         reference: file name of the calibration under review; "" if there is none.
         comparison: how far the solved calibration is from the reference; empty if either is missing.
         assumptions: what the recording does not state, reading it takes for granted, and nobody has confirmed.
+        verdict: how far the calibration can be trusted, and what to do next.
         dismissed: the placements that the user dismissed.
         acknowledged: the codes of the warnings that the user has read.
     """
@@ -258,3 +280,4 @@ class View:
     dismissed: tuple[DismissedRow, ...] = ()
     acknowledged: tuple[str, ...] = ()
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)
+    verdict: VerdictRow = VerdictRow("nothing", "nothing yet", "")

@@ -5,7 +5,7 @@ import os
 import sys
 from pathlib import Path
 
-from benchmarks.accuracy import advice, clutter, coverage, efficiency, many, mirrored, real, smooth
+from benchmarks.accuracy import advice, clutter, coverage, efficiency, many, mirrored, real, smooth, verdicts
 from benchmarks.accuracy.defects import (
     adversarial,
     crying_wolf,
@@ -32,6 +32,7 @@ TABLES: dict[str, tuple[Row, ...]] = {
     "placements": two_reflectors.ROWS,
     "topics": several_topics.ROWS,
     "wolf": crying_wolf.ROWS,
+    "verdict": verdicts.ROWS,
     "shared": shared_errors.ROWS,
     "clean": shared_errors.CLEAN_ROWS,
     "flat": flat_radars.ROWS,
@@ -51,6 +52,7 @@ TABLES: dict[str, tuple[Row, ...]] = {
 def sections(kept: Kept) -> tuple[Section, ...]:
     """Return the sections in the order of the page."""
     return (
+        verdicts.section(kept),
         shared_errors.section(kept),
         shared_errors.clean_section(kept),
         adversarial.section(kept),

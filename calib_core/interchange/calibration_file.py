@@ -6,6 +6,7 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.results import Calibration, CheckPoint, InputFile, PairResult
+from calib_core.verdict import Verdict
 
 __all__ = [
     "EQUATION",
@@ -139,6 +140,7 @@ class CalibrationFile:
         check_point: a radar point and the pixel it must project to; None if a file from another tool has none.
         provenance: where it comes from.
         unknown: results written by a later version and unknown to this one; kept when the file is rewritten.
+        verdict: how far to trust it, as it was judged when it was solved; None in files of older versions and other tools.
     """
 
     calibration: Calibration
@@ -146,6 +148,7 @@ class CalibrationFile:
     check_point: CheckPoint | None = None
     provenance: Provenance = field(default_factory=Provenance)
     unknown: tuple[UnknownResult, ...] = ()
+    verdict: Verdict | None = None
 
 
 def choose_check_point(calibration: Calibration) -> CheckPoint | None:

@@ -27,7 +27,7 @@ def test_a_new_user_is_told_what_to_do_and_led_to_the_first_click(page: Driver) 
     assert page.text("#guide").startswith("Placement 1 of")
     u, v = page.value("[__cocalib.viewport.imageWidth / 2, __cocalib.viewport.imageHeight / 2]")
     page.click(u, v)
-    assert page.text("#guide").endswith("placements left. Press N for the next one")
+    assert page.text("#guide").endswith("placements that are left. Press N")
     assert page.text("#guide") in page.text("#status-text")
     assert page.page.locator(".steps li.done").count() == 1
     assert page.page.locator(".pairs .row").count() == 1

@@ -116,6 +116,7 @@ class Hub:
     def surveyed(self, survey: Survey) -> None:
         """Show what the radar alone says, as far as it is known."""
         before, self.survey = self.survey, survey
+        self.workspace.show_placements(survey.placements)
         for kind, message in self._found(survey):
             self.broadcast(message, kind)
         if before is None:
@@ -146,6 +147,8 @@ class Hub:
                 )
             except CalibrationError as error:
                 _log.warning("the radar could not be searched for placements: %s", error)
+        if self.survey is not None:
+            self.workspace.show_placements(self.survey.placements)
         self.broadcast(Progress(_SEARCHING, 1, 1), "progress")
         for kind, message in self._found(self.survey):
             self.broadcast(message, kind)

@@ -47,6 +47,7 @@ _VIEWPOINTS = {
     "side": ((7.0, -20.0, 4.0), (7.0, 0.0, 0.0)),
 }
 _MOST_ELLIPSOIDS = 200
+_LARGE_PX = 30.0  # as in static/colours.js: a colour means the same after every click
 """More would be a cloud in which none can be told from the others, and 2 kB each for every answer."""
 _RINGS_EVERY_M, _RINGS_UP_TO_M = 5.0, 30.0
 _DIM, _ORANGE = (112, 124, 136), (255, 180, 84)
@@ -200,7 +201,7 @@ class TabScene:
 
     def _show_pairs(self, sight: Sight) -> None:
         calibration = sight.session.outcome
-        drawn = (calibration, sight.selected, sight.view.residual_limit_px)
+        drawn = (calibration, sight.selected)
         if drawn == self._paired:  # a Calibration equals only itself; moving through the frames changes none of these
             return
         self._paired = drawn
@@ -210,7 +211,7 @@ class TabScene:
             return
         points = _true_positions(calibration, calibration.pairs)
         residuals = np.array([pair.distance_px for pair in calibration.pairs])
-        fill_cloud(self._chosen, points, residual_colours(residuals, sight.view.residual_limit_px or 20.0))
+        fill_cloud(self._chosen, points, residual_colours(residuals, _LARGE_PX))
         chosen = tuple(pair for pair in calibration.pairs if pair.id == sight.selected)
         others = tuple(pair for pair in calibration.pairs if pair.inlier and pair.id != sight.selected)
         fill_lines(self._rays, rays_to(calibration, others))

@@ -37,6 +37,7 @@ from calib_core.interchange.syntax.strict_json import json_object, parse_documen
 from calib_core.measurements import ReflectorClick, Unpaired
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
+from calib_core.verdict import Verdict, verdict_on
 
 __all__ = [
     "AGREEMENT",
@@ -90,11 +91,13 @@ def calibration_file(
         for pair in calibration.pairs
     )
     stamped = dataclasses.replace(calibration, pairs=pairs)
+    unconfirmed = sum(not one.confirmed for one in provenance.assumptions) if provenance else 0
     return CalibrationFile(
         calibration=stamped,
         frames=frames or FrameNames(),
         check_point=choose_check_point(stamped),
         provenance=provenance or Provenance(),
+        verdict=verdict_on(stamped, unconfirmed=unconfirmed),
     )
 
 
@@ -120,6 +123,7 @@ def write_calibration(file: CalibrationFile) -> str:
         systematic_errors=[systematic_error_document(error) for error in calibration.systematic_errors],
         radar_angle_map=angle_map_document(calibration.angle_map),
         paper=documents.PaperDocument(finite_or_none(calibration.iterative_px), finite_or_none(calibration.sqpnp_px)),
+        verdict=_verdict_document(file.verdict),
         warnings=[documents.WarningDocument(c.code, c.message, c.hint) for c in calibration.warnings],
         unpaired=[documents.UnpairedDocument(u.id, u.code, u.reason, u.hint) for u in calibration.unpaired],
         pairs=[solved_pair_document(pair) for pair in calibration.pairs],
@@ -135,6 +139,7 @@ def write_calibration(file: CalibrationFile) -> str:
             for key in SOLVED_FROM_KEYS:
                 del pair[key]
     absent = set() if calibration.angle_map is not None else {"radar_angle_map"}
+    absent |= {"verdict"} if file.verdict is None else set()
     if not calibration.systematic_errors and calibration.radar_errors == RadarErrors():
         absent |= {"radar_errors", "systematic_errors"}
     known = encodable({key: content[key] for key in _KEY_ORDER if key not in absent})
@@ -142,7 +147,17 @@ def write_calibration(file: CalibrationFile) -> str:
 
 
 _KEY_ORDER = (
-    *("schema", "equation", "frames", "camera_from_radar", "radar_from_camera", "check_point", "sigma", "covariance"),
+    *(
+        "schema",
+        "equation",
+        "frames",
+        "camera_from_radar",
+        "radar_from_camera",
+        "check_point",
+        "verdict",
+        "sigma",
+        "covariance",
+    ),
     *("covariance_convention", "covariance_quantile", "metrics", "noise_scale", "radar_errors", "systematic_errors"),
     *("radar_angle_map", "paper", "warnings", "unpaired", "pairs", "camera", "options", "provenance"),
 )
@@ -210,6 +225,7 @@ def calibration_file_of(
         frames=frames,
         check_point=CheckPoint(np.array(check.radar_m), np.array(check.pixel_px)) if check else None,
         provenance=provenance_of(document.provenance),
+        verdict=_verdict_of(document.verdict),
     )
 
 
@@ -244,6 +260,14 @@ def _transform_document(transform: RigidTransform) -> documents.TransformDocumen
         translation_m=nested(transform.translation_m + 0.0),
         quaternion_wxyz=nested(quaternion_wxyz_from_matrix(transform.rotation) + 0.0),
     )
+
+
+def _verdict_document(verdict: Verdict | None) -> documents.VerdictDocument | None:
+    return documents.VerdictDocument(verdict.level, verdict.reason, verdict.action) if verdict else None
+
+
+def _verdict_of(document: documents.VerdictDocument | None) -> Verdict | None:
+    return Verdict(document.level, document.reason, document.action) if document else None
 
 
 def _metrics_document(metrics: Metrics) -> documents.MetricsDocument:

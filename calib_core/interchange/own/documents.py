@@ -11,6 +11,7 @@ from msgspec import UNSET, Meta, Struct, UnsetType, field
 from calib_core.camera import CameraModel
 from calib_core.measurements import Mark
 from calib_core.options import CalibrationOptions
+from calib_core.verdict import VerdictLevel
 
 __all__ = [
     "CALIBRATION_SCHEMA",
@@ -260,6 +261,14 @@ class WarningDocument(Struct, frozen=True):
     hint: str
 
 
+class VerdictDocument(Struct, frozen=True):
+    """How far to trust the result: a word, the stated error or what is wrong, and the one action that helps most."""
+
+    level: VerdictLevel
+    reason: str
+    action: str
+
+
 class InputDocument(Struct, frozen=True):
     """An input file."""
 
@@ -381,6 +390,7 @@ class CalibrationDocument(Struct, frozen=True):
     systematic_errors: list[SystematicErrorDocument] = []
     radar_angle_map: AngleMapDocument | None = None
     paper: PaperDocument = field(default_factory=PaperDocument)
+    verdict: VerdictDocument | None = None
     warnings: list[WarningDocument] = []
     unpaired: list[UnpairedDocument] = []
     pairs: list[SolvedPairDocument] = []

@@ -10,6 +10,8 @@ import pytest
 from calib_core.calibration import calibrate_pairs
 from calib_core.errors import InputError
 from calib_core.interchange import (
+    AssumptionNote,
+    Provenance,
     calibration_text,
     check,
     export,
@@ -18,11 +20,13 @@ from calib_core.interchange import (
     read_pairs,
     write_calibration,
 )
+from calib_core.interchange.own.calibration_json import calibration_file
 from calib_core.measurements import time_from_parts
 from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration
 from calib_core.synthetic import NoiseProfile, simulate_pairs
+from calib_core.verdict import verdict_on
 
 
 @pytest.fixture
@@ -57,6 +61,9 @@ def test_solved_pairs_become_a_file_that_passes_its_check(truth, method):
 
     report = check(read_any(text))
     assert report.ok, report.lines()
+    verdict = verdict_on(outcome)
+    assert json.loads(text)["verdict"] == dataclasses.asdict(verdict)
+    assert read_calibration(text).verdict == verdict
     assert write_calibration(read_calibration(text)) == text
     content = json.loads(text)
     assert content["options"]["method"] == method
@@ -64,6 +71,18 @@ def test_solved_pairs_become_a_file_that_passes_its_check(truth, method):
     assert [pair["id"] for pair in content["pairs"] if pair["excluded"]] == ["p3"]
     assert content["check_point"]["radar_m"] == [round(value, 3) for value in content["check_point"]["radar_m"]]
     assert check(read_any(export(read_calibration(text), "tf2").data)).ok
+
+
+def test_a_file_without_a_verdict_stays_without_one(project_root: Path):
+    text = (project_root / "tests/golden/calibration-1-earlier.json").read_text(encoding="utf-8")
+    assert read_calibration(text).verdict is None
+    assert "verdict" not in json.loads(write_calibration(read_calibration(text)))
+
+
+def test_an_unconfirmed_assumption_makes_the_verdict_in_the_file_weak(truth: Calibration):
+    for confirmed, level in ((False, "weak"), (True, verdict_on(truth).level)):
+        provenance = Provenance(assumptions=(AssumptionNote("/radar: z in metres", confirmed),))
+        assert calibration_file(truth, provenance=provenance).verdict.level == level
 
 
 def test_results_of_a_later_version_are_kept_and_settings_are_not(project_root: Path):

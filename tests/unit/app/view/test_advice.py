@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from app.view.advice import advice_for
+from app.view.model import Advice
 from calib_core.calibration import calibrate_pairs
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
 from calib_core.synthetic import simulate_pairs
+from calib_core.verdict import verdict_on
 
 
 def solved(count: int, options: CalibrationOptions | None = None) -> Calibration:
@@ -17,9 +19,13 @@ def solved(count: int, options: CalibrationOptions | None = None) -> Calibration
     return outcome
 
 
+def advised(calibration: Calibration) -> Advice | None:
+    return advice_for(calibration, verdict_on(calibration))
+
+
 def test_the_advised_place_is_in_the_picture_and_in_the_text() -> None:
     calibration = solved(6)
-    advice = advice_for(calibration)
+    advice = advised(calibration)
     assert advice is not None
     assert not advice.may_stop
     assert calibration.camera.in_image(np.array([[advice.u_px, advice.v_px]]))[0]
@@ -29,7 +35,7 @@ def test_the_advised_place_is_in_the_picture_and_in_the_text() -> None:
 
 
 def test_the_side_is_named_as_the_radar_sees_it() -> None:
-    advice = advice_for(solved(6))
+    advice = advised(solved(6))
     assert advice is not None
     y = advice.position_radar_m[1]
     expected = "straight ahead" if abs(y) < 0.1 * advice.position_radar_m[0] else ("left" if y > 0 else "right")
@@ -37,11 +43,19 @@ def test_the_side_is_named_as_the_radar_sees_it() -> None:
 
 
 def test_many_placements_are_enough() -> None:
-    advice = advice_for(solved(400))
+    advice = advised(solved(400))
     assert advice is not None
     assert advice.may_stop
-    assert "No further placement is needed" in advice.words
+    assert "No further placement would" in advice.words
+
+
+def test_the_advice_begins_with_the_action_of_the_verdict() -> None:
+    calibration = solved(30)
+    advice, verdict = advised(calibration), verdict_on(calibration)
+    assert advice is not None
+    assert "A tape-measured camera position" in verdict.action
+    assert advice.words.startswith(f"{verdict.action}. A placement ")
 
 
 def test_the_papers_method_gives_no_advice_since_it_has_no_covariance() -> None:
-    assert advice_for(solved(30, CalibrationOptions(method="paper"))) is None
+    assert advised(solved(30, CalibrationOptions(method="paper"))) is None

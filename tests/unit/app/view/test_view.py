@@ -21,6 +21,7 @@ from calib_core.options import CalibrationOptions, NoiseOptions
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 from calib_core.results import Calibration, DataWarning, Metrics, PairResult
 from calib_core.synthetic import NoiseProfile, simulate_pairs
+from calib_core.verdict import verdict_on
 
 FACTS = RecordingFacts("drive", 1_700_000_000_123_456_789 + 100_000_000 * np.arange(50), width_px=640, height_px=480)
 TIMES = [TimeNs(int(time)) for time in FACTS.image_times]
@@ -86,17 +87,18 @@ def test_excluded_clicks_do_not_count_towards_the_first_solve() -> None:
 def test_before_the_first_click_the_hint_says_what_to_do() -> None:
     seen = view(History(), FACTS)
     assert (seen.stage, seen.solving, seen.has_calibration, seen.solved_revision) == ("collecting", False, False, -1)
-    assert "click its centre" in seen.hint
+    assert "click the reflector's inner corner" in seen.hint
+    assert (seen.verdict.level, seen.verdict.action) == ("nothing", seen.hint)
 
 
 def test_a_solved_session_says_how_many_pairs_agree() -> None:
     four_agree = (*FIVE[:4], pair("c5", inlier=False))
-    assert shown(5, calibration(*FIVE)).status == "Solved: all 5 pairs agree"
-    assert shown(5, calibration(*four_agree)).status == "Solved: 4 of 5 pairs agree"
+    assert shown(5, calibration(*FIVE)).status == "Weak: all 5 pairs agree"
+    assert shown(5, calibration(*four_agree)).status == "Weak: 4 of 5 pairs agree"
 
 
 def test_an_excluded_pair_is_not_among_those_that_could_agree() -> None:
-    assert shown(5, calibration(*FIVE[:4], pair("c5", excluded=True))).status == "Solved: all 4 pairs agree"
+    assert shown(5, calibration(*FIVE[:4], pair("c5", excluded=True))).status == "Weak: all 4 pairs agree"
 
 
 def test_an_unsolvable_session_shows_reason_and_hint() -> None:
@@ -149,7 +151,7 @@ def test_a_preview_is_shown_as_being_checked() -> None:
     assert drawn.status == "Checking… 4 of 5 pairs agree"
     checked = shown(5, replace(preview, checking=False))
     assert (checked.checking, checked.solving) == (False, False)
-    assert checked.status == "Solved: 4 of 5 pairs agree"
+    assert checked.status == "Weak: 4 of 5 pairs agree"
 
 
 def test_the_view_says_what_can_be_undone_and_redone() -> None:
@@ -253,7 +255,14 @@ def test_a_pose_that_depends_on_single_pairs_stands_out() -> None:
 
 def test_a_pose_without_covariance_is_shown_without_one() -> None:
     seen = shown(5, calibration(*FIVE, covariance=np.full((6, 6), NAN)))
-    assert [figure.value for figure in seen.pose] == ["5.00", "-10.0", "30.0", "0", "0", "0"]
+    assert [figure.value for figure in seen.pose] == ["5.00", "10.0", "30.0", "0", "0", "0"]
+
+
+def test_a_direction_is_a_word_and_not_a_sign() -> None:
+    seen = shown(5, calibration(*FIVE))
+    assert [one.label for one in seen.pose][:3] == ["camera forward", "camera right", "camera up"]
+    assert not any(one.value.startswith("-") for one in seen.pose)
+    assert all(one.hint for one in (*seen.pose, *seen.metrics))
 
 
 def test_warnings_are_shown_as_sentences_and_the_first_is_the_next_thing_to_do() -> None:
@@ -276,7 +285,9 @@ def test_the_summary_for_the_command_line_has_the_same_figures_and_all_warnings(
         unpaired=(Unpaired("c9", "no-scan", "no scan", "click elsewhere"),),
     )
     lines = summary_lines(outcome)
-    assert lines[0] == "AED               12.4 px"
+    assert lines[0] == f"verdict: {verdict_on(outcome).line}"
+    assert lines[1] == f"next: {verdict_on(outcome).action}."
+    assert lines[2] == "AED                12.4 px"
     assert lines[-2:] == ("warning: B. C.", "unpaired: c9: No scan. Click elsewhere.")
 
 

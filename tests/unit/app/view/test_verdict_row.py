@@ -1,0 +1,64 @@
+"""The verdict on the page: its key, when it says done, and how many placements are left."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.session import ClickPlaced, History, PlacementDismissed, RecordingFacts, Session, advance
+from app.view.disagreement import disagreement
+from app.view.verdict_row import placements_left, verdict_row
+from calib_core.association.placements import Placement
+from calib_core.measurements import ReflectorClick, TimeNs
+from calib_core.options import CalibrationOptions, NoiseOptions
+from calib_core.verdict import DONE, Verdict
+
+FACTS = RecordingFacts("drive", 1_000_000_000 * np.arange(50), width_px=640, height_px=480)
+
+
+def placement(start_s: int, x_m: float = 5.0) -> Placement:
+    start, end = TimeNs(start_s * 10**9), TimeNs((start_s + 4) * 10**9)
+    values = {"start": start, "end": end, "position_radar_m": np.array([x_m, 0.0, 0.0])}
+    others = {name: 1.0 for name in Placement.__dataclass_fields__ if name not in values}
+    return Placement(**(others | values))
+
+
+def test_a_placement_is_left_until_it_is_clicked_or_dismissed() -> None:
+    found = [placement(1), placement(11), placement(21), placement(31)]
+    history = advance(History(), ClickPlaced(TimeNs(12 * 10**9), 1.0, 1.0), FACTS)
+    assert placements_left(history.present, found) == 3
+    history = advance(history, PlacementDismissed(TimeNs(32 * 10**9), (5.0, 0.0, 0.0)), FACTS)
+    assert placements_left(history.present, found) == 2
+    assert placements_left(history.present, ()) is None
+    assert placements_left(history.present, None) is None
+
+
+def test_of_two_placements_at_once_only_the_dismissed_one_is_gone() -> None:
+    history = advance(History(), PlacementDismissed(TimeNs(2 * 10**9), (5.0, 0.0, 0.0)), FACTS)
+    assert placements_left(history.present, [placement(1), placement(1, 9.0)]) == 1
+
+
+def test_a_mark_that_nobody_has_touched_leaves_its_placement_to_be_clicked() -> None:
+    click = ReflectorClick(TimeNs(2 * 10**9), "c1", 1.0, 1.0)
+    assert placements_left(Session(clicks=(click,)), [placement(1)]) == 0
+    assert placements_left(Session(clicks=(replace(click, excluded=True),)), [placement(1)]) == 0
+    assert placements_left(Session(clicks=(replace(click, mark="untouched"),)), [placement(1)]) == 1
+
+
+def test_done_is_said_with_the_key_that_exports() -> None:
+    row = verdict_row(Verdict("good", "0.3 deg, 3 cm (95 %)", DONE), Session(), None)
+    assert (row.done, row.key, row.action) == (True, "E", f"{DONE}.")
+    assert row.line == "good to 0.3 deg, 3 cm (95 %)"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (CalibrationOptions(), "Check the click"),
+        (CalibrationOptions(method="paper"), "Algorithm 1"),
+        (CalibrationOptions(noise=NoiseOptions(sigma_px=0.1)), "click noise far below the default"),
+    ],
+)
+def test_the_mark_is_not_blamed_for_the_method_or_the_options(options: CalibrationOptions, words: str) -> None:
+    cause = disagreement(options)
+    assert words in f"{cause.what}. {cause.action}"

@@ -1,0 +1,154 @@
+"""The verdict: its limits, the consequence of each warning, and the one action."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.accuracy.cases import tape_measured
+from calib_core.calibration import calibrate_pairs
+from calib_core.diagnostics.consequence import by_consequence, consequence_of
+from calib_core.measurements import Unpaired, Unsolvable
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration, DataWarning, NextPlacement
+from calib_core.stated_error import stated_error
+from calib_core.synthetic import simulate_pairs
+from calib_core.verdict import ALL_CLICKED, DONE, verdict_on
+
+FEW = Unsolvable("too-few-pairs", "2 of at least 4 required pairs", "click the reflector at more placements")
+
+
+def solved(
+    count: int = 20, *, tape_m: float | None = 0.01, method: str = "default", noise: str = "imaging"
+) -> Calibration:
+    simulated = simulate_pairs(count, rng=np.random.default_rng(8), noise=noise)
+    options = replace(CalibrationOptions(solving=tape_measured(tape_m)), method=method)
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, options)
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+@pytest.fixture(scope="module")
+def good() -> Calibration:
+    calibration = solved()
+    assert verdict_on(calibration).level == "good"
+    return calibration
+
+
+def warned(calibration: Calibration, *codes: str) -> Calibration:
+    return replace(calibration, warnings=tuple(DataWarning(code, f"about {code}", f"mend {code}") for code in codes))
+
+
+def test_before_any_click_there_is_nothing_and_an_action() -> None:
+    verdict = verdict_on(None)
+    assert verdict.level == "nothing"
+    assert verdict.line.startswith("nothing yet: ")
+    assert "click the reflector's inner corner" in verdict.action
+
+
+def test_too_few_pairs_are_nothing_and_the_placements_left_are_the_action() -> None:
+    assert verdict_on(FEW).action == "Click the reflector at more placements"
+    assert verdict_on(FEW, left=7).action == "Click the 7 placements that are left"
+    lost = replace(FEW, unpaired=(Unpaired("c1", "no-scan", "no scan", "click elsewhere"),))
+    assert verdict_on(lost, left=7).action == verdict_on(lost).action
+
+
+def test_pairs_that_agree_on_no_pose_are_contradictory() -> None:
+    assert verdict_on(Unsolvable("no-pose", "they disagree", "check them")).line == "contradictory: they disagree"
+
+
+def test_a_good_calibration_states_its_error_and_is_done(good: Calibration) -> None:
+    verdict = verdict_on(good)
+    assert re.fullmatch(r"good to [\d.]+ deg, [\d.]+ cm \(95 %\); [\d.]+ px at \d+ m", verdict.line)
+    assert verdict.reason == stated_error(good).text
+    assert verdict.action == DONE
+    assert verdict_on(good, left=0).action == DONE
+
+
+def test_a_larger_stated_error_is_usable_then_weak(good: Calibration) -> None:
+    levels = [verdict_on(replace(good, covariance=good.covariance * factor**2)).level for factor in (1, 2, 20)]
+    assert levels == ["good", "usable", "weak"]
+
+
+def test_the_stated_error_is_larger_than_one_sigma_and_grows_with_the_quantile(good: Calibration) -> None:
+    sigma_deg = np.rad2deg(np.sqrt(np.trace(good.covariance[3:, 3:])))
+    stated = stated_error(good)
+    assert sigma_deg < stated.rotation_deg < 3.5 * sigma_deg
+    assert stated_error(replace(good, covariance_quantile=40.0)).rotation_deg > 1.3 * stated.rotation_deg
+
+
+def test_each_consequence_has_its_level(good: Calibration) -> None:
+    for code, level in (
+        ("two-poses", "contradictory"),
+        ("intrinsics-suspected", "weak"),
+        ("handedness-assumed", "usable"),
+    ):
+        verdict = verdict_on(warned(good, code))
+        assert verdict.level == level
+        assert verdict.action == f"Mend {code}"
+    assert verdict_on(warned(good, "clock-chosen-early")).level == "good"
+
+
+def test_the_gravest_warning_decides_whatever_the_order(good: Calibration) -> None:
+    codes = ("not-closed", "handedness-assumed", "few-pairs", "doubtful-pair")
+    assert verdict_on(warned(good, *codes)).reason == "about doubtful-pair"
+    ordered = by_consequence(warned(good, *codes).warnings)
+    assert [warning.code for warning in ordered] == list(reversed(codes))
+
+
+def test_every_documented_warning_of_a_calibration_has_a_consequence(project_root: Path) -> None:
+    text = (project_root / "docs" / "warnings.md").read_text(encoding="utf-8")
+    table = text.partition("## Of a solved calibration")[2].partition("\n## ")[0]
+    codes = re.findall(r"^\| `([a-z0-9-]+)` \|", table, flags=re.MULTILINE)
+    assert len(codes) > 20
+    assert [code for code in codes if consequence_of(code) == "note"] == []
+
+
+def test_few_pairs_are_weak_before_they_are_checked() -> None:
+    calibration = replace(solved(6), warnings=())
+    verdict = verdict_on(calibration)
+    assert verdict.level == "weak"
+    assert verdict.reason.endswith(", from only 6 pairs")
+
+
+def test_the_papers_method_is_never_good_and_blames_no_mark() -> None:
+    verdict = verdict_on(solved(30, method="paper"))
+    assert verdict.level == "weak"
+    assert "states no error" in verdict.reason
+    assert "default method" in verdict.action
+    contradicted = verdict_on(warned(solved(30, method="paper"), "many-outliers"))
+    assert (contradicted.level, contradicted.action) == ("contradictory", verdict.action)
+
+
+def test_what_is_assumed_of_the_recording_must_be_confirmed_first(good: Calibration) -> None:
+    verdict = verdict_on(good, unconfirmed=2)
+    assert verdict.level == "weak"
+    assert verdict.action.startswith("Confirm")
+
+
+def test_the_action_is_what_gains_most_a_placement_or_a_tape() -> None:
+    calibration = solved(tape_m=None)
+    near = NextPlacement(np.array([3.0, 1.0, 0.0]), np.array([10.0, 10.0]), 1.05, may_stop=False)
+    shared = verdict_on(replace(calibration, next_placement=near))
+    assert shared.action == calibration.dominant_errors()[0].action
+    placed = verdict_on(replace(calibration, next_placement=replace(near, gain=9.0)))
+    assert placed.action.startswith("Put the reflector 3.0 m ahead, 1.0 m to the left")
+
+
+def test_placements_without_a_click_come_first_and_the_end_is_said() -> None:
+    calibration = solved(tape_m=None)
+    assert verdict_on(calibration, left=3).action == "Click the 3 placements that are left"
+    assert verdict_on(calibration, left=1).action == "Click the placement that is left"
+    assert verdict_on(calibration, left=0).action.startswith(f"{ALL_CLICKED}. ")
+
+
+def test_the_documented_consequences_are_those_of_the_table(project_root: Path) -> None:
+    text = (project_root / "docs" / "warnings.md").read_text(encoding="utf-8")
+    for consequence, name in (("contradictory", "contradictory"), ("weak", "weak"), ("limited", "not good")):
+        [row] = re.findall(rf"^\| {name} \| (`.*) \|$", text, flags=re.MULTILINE)
+        codes = re.findall(r"`([a-z-]+)`", row)
+        assert {consequence_of(code) for code in codes} == {consequence}
+        warnings = [DataWarning(code, "", "") for code in reversed(codes)]
+        assert [warning.code for warning in by_consequence(warnings)] == codes
