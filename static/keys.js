@@ -10,6 +10,7 @@ import { toggleLayer } from "./layers.js";
 import { nextWorst } from "./pairs.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
+import { toggleHidden, toggleLarge } from "./space.js";
 import { isClicked, placementAt, state } from "./state.js";
 
 /** Keys and what they do, in the order of the help dialog. @type {{keys: string[], does: string}[]} */
@@ -29,6 +30,8 @@ export const KEYS = [
   { keys: ["F"], does: "fit the picture" },
   { keys: ["+", "−"], does: "zoom" },
   { keys: ["1", "–", "4"], does: "toggle overlays" },
+  { keys: ["V"], does: "hide or show the 3D view" },
+  { keys: ["B"], does: "enlarge the 3D view" },
   { keys: ["E"], does: "export" },
   { keys: ["?"], does: "this help" },
 ];
@@ -42,6 +45,8 @@ const PLAIN = {
   x: toggleExcluded,
   f: fit,
   e: openExport,
+  v: () => toggleHidden(),
+  b: () => toggleLarge(),
   "+": () => zoomBy(1.25),
   "=": () => zoomBy(1.25),
   "-": () => zoomBy(0.8),
@@ -62,6 +67,8 @@ const LOOKING = {
   n: PLAIN.n,
   p: PLAIN.p,
   f: fitEye,
+  v: PLAIN.v,
+  b: PLAIN.b,
   "+": () => zoomEye(1.25),
   "=": () => zoomEye(1.25),
   "-": () => zoomEye(0.8),

@@ -21,7 +21,7 @@ import { startPicture } from "./picture.js";
 import { frameFailed, goTo, pause, play, receiveFrame, requestAgain, step, tellCursor } from "./player.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
-import { startSpace } from "./space.js";
+import { startSpace, takeSpace } from "./space.js";
 import { clickIn, clicks, emit, on, select, selectedClick, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
@@ -68,6 +68,7 @@ const readers = {
     state.radarMap = message;
     emit("radar_map");
   },
+  space: takeSpace,
   progress(message) {
     state.progress = message;
     emit("progress");

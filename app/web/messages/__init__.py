@@ -38,6 +38,15 @@ from app.web.messages.outgoing import (
     encode_frame,
 )
 from app.web.messages.radar_messages import PlacementRow, Placements, RadarLook, RadarMap, RadarReturn
+from app.web.messages.space_messages import (
+    PlacementState,
+    SpaceLabel,
+    SpaceLegend,
+    SpaceLook,
+    SpacePlacement,
+    SpaceReflector,
+    SpaceReturn,
+)
 from app.web.messages.view_changes import ClickChange, RowValues, ViewChange, change_between
 
 __all__ = [
@@ -58,6 +67,7 @@ __all__ = [
     "Overlay",
     "OverlayReturn",
     "PlacementRow",
+    "PlacementState",
     "Placements",
     "Problem",
     "Progress",
@@ -69,6 +79,12 @@ __all__ = [
     "RowValues",
     "SensorNote",
     "SessionNote",
+    "SpaceLabel",
+    "SpaceLegend",
+    "SpaceLook",
+    "SpacePlacement",
+    "SpaceReflector",
+    "SpaceReturn",
     "StampColumns",
     "ViewChange",
     "ViewWanted",

@@ -10,6 +10,7 @@ import msgspec
 from app.option_changes import OptionGroup, option_groups
 from app.view import FollowState, View
 from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
+from app.web.messages.space_messages import SpaceLook
 from app.web.messages.view_changes import ViewChange
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, Stamp
@@ -266,6 +267,7 @@ Outgoing: TypeAlias = (
     | Placements
     | RadarLook
     | RadarMap
+    | SpaceLook
     | Overlay
     | Progress
     | Problem
@@ -282,6 +284,7 @@ TYPES: Mapping[type, str] = {
     Placements: "placements",
     RadarLook: "radar_look",
     RadarMap: "radar_map",
+    SpaceLook: "space",
     Overlay: "overlay",
     Progress: "progress",
     Problem: "error",
