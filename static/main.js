@@ -1,13 +1,13 @@
 // @ts-check
 /** The page: wires the modules together and passes the server's messages to those that draw them. */
 
+import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
-import { startClicking, turnBack } from "./clicking.js";
+import { startClicking } from "./clicking.js";
 import { setFormats, startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
-import { toggleHelp } from "./help.js";
-import { listen, placement } from "./keys.js";
+import { listen } from "./keys.js";
 import { activity } from "./lanes.js";
 import { startLayers } from "./layers.js";
 import { startLayout } from "./layout.js";
@@ -18,7 +18,7 @@ import { setBanner, startTips, toast } from "./notices.js";
 import { startOptions } from "./options.js";
 import { startPairs } from "./pairs.js";
 import { startPicture } from "./picture.js";
-import { frameFailed, goTo, pause, play, receiveFrame, requestAgain, step, tellCursor } from "./player.js";
+import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./player.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace, takeSpace } from "./space.js";
@@ -67,6 +67,10 @@ const readers = {
   radar_map(message) {
     state.radarMap = message;
     emit("radar_map");
+  },
+  candidates(message) {
+    state.candidates = message;
+    emit("candidates");
   },
   space: takeSpace,
   progress(message) {
@@ -122,11 +126,6 @@ async function loadActivity() {
   emit("cursor");
 }
 
-/** @param {string} id @param {() => unknown} action */
-function press(id, action) {
-  /** @type {HTMLElement} */ (document.getElementById(id)).addEventListener("click", action);
-}
-
 startLayout();
 startTips();
 startStatus();
@@ -145,14 +144,7 @@ startGuide();
 startArriving();
 startLooking();
 listen(window);
-press("undo", () => turnBack("undo"));
-press("redo", () => turnBack("redo"));
-press("help", toggleHelp);
-press("play", () => (state.playing ? pause() : play()));
-press("step-back", () => step(-1));
-press("step-forward", () => step(1));
-press("previous-placement", () => placement(-1));
-press("next-placement", () => placement(1));
+for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-action]"))) button.addEventListener("click", () => act(actionNamed(button.dataset.action ?? "")));
 on(["cursor"], () => sessionStorage.setItem("cocalib-frame", String(state.cursor)));
 on(["selected", "theme"], tellCursor);
 connect({

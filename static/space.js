@@ -3,10 +3,10 @@
 
 import { comeTo } from "./arriving.js";
 import { listen } from "./keys.js";
-import { icon, make } from "./notices.js";
+import { icon, make, toast } from "./notices.js";
 import { tellCursor } from "./player.js";
-import { tab, tell } from "./socket.js";
-import { frameShown, itemAt, lookShown, mark, onDrawn, pickable, pickedWords, pictureBox, redraw, startLayer, takeLook } from "./space_layer.js";
+import { send, tab, tell } from "./socket.js";
+import { candidates, frameShown, itemAt, lookShown, mark, onDrawn, pickable, pickedWords, pictureBox, redraw, startLayer, takeLook } from "./space_layer.js";
 import { changeSpace, spaceColour, spaceOptions } from "./space_options.js";
 import { clicks, on, select, state } from "./state.js";
 
@@ -69,7 +69,7 @@ export const takeSpace = (look) => takeLook(look);
 
 function startChips() {
   for (const [viewpoint, label, hint] of VIEWPOINTS) {
-    const made = chip(label, hint, () => (setCamera(false), tell({ type: "viewpoint", viewpoint })));
+    const made = chip(label, hint, () => lookFrom(viewpoint));
     made.dataset.viewpoint = viewpoint;
     group.append(made);
   }
@@ -110,8 +110,14 @@ export function toggleLarge() {
   change({ large: !spaceOptions.large, hidden: false });
 }
 
-/** @param {boolean} camera */
-function setCamera(camera) {
+/** Move the 3D view's camera. @param {string} viewpoint */
+export function lookFrom(viewpoint) {
+  setCamera(false);
+  tell({ type: "viewpoint", viewpoint });
+}
+
+/** Show the page's own picture with the returns in front, or the 3D view. @param {boolean} camera */
+export function setCamera(camera) {
   if (spaceOptions.camera === camera) return;
   changeSpace({ camera });
   arrange();
@@ -201,11 +207,19 @@ function pick(item) {
   drawReadout(item);
   const look = lookShown();
   if (item.kind === "placement" && state.placements[item.index]) comeTo(state.placements[item.index].frame);
+  const candidate = item.kind === "candidate" ? candidates()[item.index] : undefined;
+  if (candidate && !candidate.chosen) choose(candidate);
   const id = item.kind === "reflector" ? look?.reflectors[item.index].id : undefined;
   const click = id === undefined ? undefined : clicks().find((one) => one.id === id);
   if (!click) return;
   comeTo(click.frame);
   select(click.id);
+}
+
+/** Fix which return the selected click belongs to. @param {import("./messages.js").CandidateRow} candidate */
+async function choose({ position_m }) {
+  const refusal = await send({ type: "return_chosen", id: state.selected, return: { position_m } });
+  if (refusal) toast(refusal);
 }
 
 /** Apply the theme to the 3D view. */

@@ -33,7 +33,7 @@ export function startLayer(frame) {
   frame.after(canvas);
   frame.addEventListener("load", () => hookUp(frame));
   new ResizeObserver(() => (drawAgain(), redraw())).observe(pane);
-  on(["theme", "selected", "view", "placements"], redraw);
+  on(["theme", "selected", "view", "placements", "candidates"], redraw);
   on(["shown", "overlay"], () => spaceOptions.camera && redraw());
 }
 
@@ -107,7 +107,17 @@ export function pickable() {
   look.placements.forEach(({ position_m, pixel_px, state: known }, index) =>
     add("placement", index, place(position_m, pixel_px), `placement ${index}`, () => `Placement ${index + 1}: ${describePlace(position_m)}${known === "open" ? ", not clicked yet" : `, ${known}`}`));
   look.reflectors.forEach(({ id, position_m, pixel_px }, index) => add("reflector", index, place(position_m, pixel_px), `reflector ${id}`, () => `Reflector of ${id}: ${describePlace(position_m)}${residualOf(id)}`));
+  candidates().forEach((row, index) => add("candidate", index, place(row.position_m, [row.u_px, row.v_px]), `candidate ${row.position_m}`, () => describeCandidate(row)));
   return (items = made);
+}
+
+/** The returns that may belong to the selected click. */
+export const candidates = () => (state.candidates && state.candidates.click === state.selected && !state.playing ? state.candidates.rows : []);
+
+/** @param {import("./messages.js").CandidateRow} row */
+function describeCandidate({ words, snr_db: snr, probability, used, chosen }) {
+  const fits = probability === null ? "" : `, ${(100 * probability).toFixed(0)} % likely`;
+  return `Candidate: ${words}${snr === null ? "" : `, SNR ${snr.toFixed(0)} dB`}${fits}, ${chosen ? "chosen" : used ? "in use" : "click to choose it"}`;
 }
 
 /** While playing, the Camera view is ahead of the returns that were sent. @param {Look} look */
@@ -166,6 +176,10 @@ function drawLook(look, place, board) {
     if (spaceOptions.camera) ring(at[0], at[1], RING, themeColour(known === "open" ? "accent" : "faint"), 1.2, known === "clicked" ? [] : [3, 3]);
     label(board, String(index + 1), at[0] + 11, at[1] - 10, known === "open" ? "accent" : "faint");
   });
+  for (const row of candidates()) {
+    const at = place(row.position_m, [row.u_px, row.v_px]);
+    if (at) ring(at[0], at[1], row.used ? RING + 2 : RING, themeColour(row.used ? "attention" : "ink"), row.used ? 2 : 1.2, row.used ? [] : [3, 2]);
+  }
   if (spaceOptions.camera) return;
   const words = (/** @type {number} */ range) => `${Number(range.toPrecision(3))} m`;
   pen.font = `10.5px ${themeColour("mono")}`;

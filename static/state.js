@@ -4,7 +4,7 @@
 /** @typedef {import("./messages.js").View} View */
 /** @typedef {import("./messages.js").ClickRow} Click */
 /** A decoded frame. @typedef {{index: number, bitmap: ImageBitmap, scale: number, width: number, height: number}} Shown */
-/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"} Topic */
+/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"candidates"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"} Topic */
 
 export const state = {
   /** While the recording is being opened. @type {import("./messages.js").Opening|null} */ opening: null,
@@ -19,6 +19,7 @@ export const state = {
   /** @type {import("./messages.js").RadarMap|null} */ radarMap: null,
   /** What is shown without pictures. @type {{trail_s: number, colour: "speed"|"amplitude", map: boolean, whole: boolean}} */
   lookOptions: { trail_s: 2, colour: "amplitude", map: true, whole: true },
+  /** The returns that may belong to the selected click. @type {import("./messages.js").PairCandidates|null} */ candidates: null,
   placementSummary: "",
   /** @type {import("./messages.js").Figure[]} */ placementFigures: [],
   /** @type {Shown|null} */ shown: null,

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import msgspec
 
 from app.option_changes import OptionGroup, option_groups
-from app.view import FollowState, View
+from app.view import FollowState, PairCandidates, View
 from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
 from app.web.messages.space_messages import SpaceLook
 from app.web.messages.view_changes import ViewChange
@@ -269,6 +269,7 @@ Outgoing: TypeAlias = (
     | RadarMap
     | SpaceLook
     | Overlay
+    | PairCandidates
     | Progress
     | Problem
     | Done
@@ -286,6 +287,7 @@ TYPES: Mapping[type, str] = {
     RadarMap: "radar_map",
     SpaceLook: "space",
     Overlay: "overlay",
+    PairCandidates: "candidates",
     Progress: "progress",
     Problem: "error",
     Done: "done",

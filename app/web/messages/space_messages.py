@@ -76,7 +76,7 @@ class SpacePlacement:
     Attributes:
         position_m: (x, y, z) where it is drawn.
         pixel_px: (u, v) in the picture; None if it is not in it, or without a calibration.
-        state: whether it has a click.
+        state: whether it has a click, or was dismissed.
     """
 
     position_m: tuple[float, float, float]

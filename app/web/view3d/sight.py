@@ -12,13 +12,16 @@ from app.web.messages import PlacementState, RadarMap, ReturnColour
 from app.web.view3d.colouring import Colouring
 from app.web.view3d.extent import Extent
 from app.web.view3d.returns import Returns
-from calib_core.arrays import Points3
+from calib_core.arrays import Points3, Vector3
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, PairResult
 
 __all__ = ["Sight", "true_positions"]
+
+_SAME_PLACE_M = 1.0
+"""Of two placements at one time, a pair belongs to the one this close to its return."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,12 +86,25 @@ class Sight:
         return Colouring(self.colour, self.extent, self.snr_db, self.fastest_mps, self.light)
 
     def placement_states(self) -> tuple[PlacementState, ...]:
-        """Say of each placement whether it has a click."""
-        times = sorted(int(click.image_time) for click in self.session.clicks)
+        """Say of each placement whether it has a click, or was dismissed."""
+        outcome = self.session.outcome
+        pairs = outcome.pairs if isinstance(outcome, Calibration) else ()
+        points = {pair.id: pair.point_radar_m for pair in pairs}
+        clicks = [(int(click.image_time), points.get(click.id)) for click in self.session.clicks]
+        dismissed = [(int(one.time), np.array(one.position_m)) for one in self.session.dismissed]
         return tuple(
-            "clicked" if any(placement.start <= time <= placement.end for time in times) else "open"
+            "dismissed" if _is_any(dismissed, placement) else "clicked" if _is_any(clicks, placement) else "open"
             for placement in self.placements
         )
+
+
+def _is_any(seen: Sequence[tuple[int, Vector3 | None]], placement: Placement) -> bool:
+    """Return whether any of some moments lies in a placement, and its position, if known, at the placement's."""
+    return any(
+        placement.start <= time <= placement.end
+        and (point is None or np.linalg.norm(point - placement.position_radar_m) < _SAME_PLACE_M)
+        for time, point in seen
+    )
 
 
 def true_positions(calibration: Calibration, pairs: Sequence[PairResult]) -> Points3:
