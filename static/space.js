@@ -21,15 +21,18 @@ const VIEWPOINTS = [
   ["side", "Side", "Look from the right-hand side."],
 ];
 /** @type {[NonNullable<Colour>, string][]} */
-const COLOURS = [["speed", "Static or moving"], ["range", "Range"], ["doppler", "Doppler"], ["amplitude", "SNR"], ["height", "Height"]];
+const COLOURS = [["speed", "Still"], ["range", "Range"], ["doppler", "Doppler"], ["amplitude", "SNR"], ["height", "Height"]];
 const TRAILS_S = [0, 2, 10];
 /** A press that moves farther than this turns the view [CSS px]. */
 const THRESHOLD = 4;
 /** How long the 3D view waits after input on the page, so that mark and overlay are painted first [ms]. */
 const HOLD = 250;
 
+/** Time between two drawings while playing, with and without pictures [ms]. */
+const [PLAYING_EVERY, LOOKING_EVERY] = [1000, 340];
+
 /** What static/pace.js reads in the 3D view's frame. */
-const pace = { playing: false, holdUntil: 0 };
+const pace = { playing: false, every: 1000, holdUntil: 0 };
 const cameraChip = chip("Camera", "The page's own picture with the radar returns in front of it, through the same lens.", () => setCamera(!spaceOptions.camera));
 const largeChip = chip("", "Enlarge the 3D view (B)", toggleLarge);
 const hideChip = chip("Hide 3D", "Hide the 3D view; it then costs nothing (V)", toggleHidden);
@@ -43,7 +46,7 @@ let press = null;
 
 export function startSpace() {
   Object.assign(window, { cocalibPace: pace, __cocalibSpace: { lookShown, pickable, pictureBox, frameShown, itemAt } });
-  on(["playing"], () => (pace.playing = state.playing));
+  on(["playing"], () => Object.assign(pace, { playing: state.playing, every: state.looking ? LOOKING_EVERY : PLAYING_EVERY }));
   for (const type of ["pointerdown", "pointerup", "keydown", "wheel"])
     addEventListener(type, () => (pace.holdUntil = performance.now() + HOLD), { capture: true, passive: true });
   startChips();

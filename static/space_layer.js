@@ -173,7 +173,7 @@ function drawLook(look, place, board) {
   look.placements.forEach(({ position_m, pixel_px, state: known }, index) => {
     const at = place(position_m, pixel_px);
     if (!at) return;
-    if (spaceOptions.camera) ring(at[0], at[1], RING, themeColour(known === "open" ? "accent" : "faint"), 1.2, known === "clicked" ? [] : [3, 3]);
+    if (spaceOptions.camera && known !== "clicked") ring(at[0], at[1], RING, themeColour(known === "open" ? "accent" : "faint"), 1.2, [3, 3]);
     label(board, String(index + 1), at[0] + 11, at[1] - 10, known === "open" ? "accent" : "faint");
   });
   for (const row of candidates()) {

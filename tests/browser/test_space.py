@@ -61,6 +61,7 @@ def test_viser_still_has_the_private_parts_that_labels_and_picking_use(solved: D
     )
     assert missing == [], CHANGED + ", ".join(missing)
     picking(solved)
+    choosing(solved)
     hidden_and_enlarged(solved)
 
 
@@ -87,6 +88,21 @@ def picking(page: Driver) -> None:
     )
     words = items(page, "return")[0]["words"]
     assert all(unit in words for unit in (" m, ", "°", "SNR", " dB", " m/s")), words
+
+
+def choosing(page: Driver) -> None:
+    """A candidate of the selected click can be chosen; undo takes the choice back."""
+    page.press("j")
+    page.until(
+        "__cocalib.state.candidates?.click === __cocalib.state.selected && __cocalib.state.candidates.rows.length > 0"
+    )
+    page.until(SETTLED)
+    page.until("__cocalibSpace.pickable().some((item) => item.kind === 'candidate')")
+    candidate = items(page, "candidate")[0]
+    page.page.mouse.click(candidate["x"], candidate["y"])
+    page.until("__cocalib.state.candidates.rows.filter((row) => row.chosen).length === 1")
+    page.press("Control+z")
+    page.until("__cocalib.state.candidates.rows.every((row) => !row.chosen)")
 
 
 def hidden_and_enlarged(page: Driver) -> None:

@@ -26,8 +26,9 @@ from calib_core.radar import RadarErrors
 
 __all__ = ["SpaceFeed"]
 
-_PLAYING_EVERY_S = 1.0
-"""Minimum time between two drawings while playing: the 3D view shares the page's main thread, and the picture comes first [s]."""
+_PLAYING_EVERY_S, _LOOKING_EVERY_S = 1.0, 0.34
+"""Minimum time between two drawings while playing, with and without pictures: the 3D view shares the page's main thread, and the
+picture comes first [s]."""
 
 _MOST_RETURNS = 20_000
 _SLOWEST_MPS = 1.0
@@ -49,14 +50,14 @@ class SpaceFeed:
     async def draw(self, cursor: CursorMoved, scene: TabScene) -> SpaceLook | None:
         """Draw a frame; return what the page draws over it, None if nothing was drawn.
 
-        While playing, nothing is drawn more often than once a second; the frame at which the page stops is always drawn.
+        While playing, it is drawn once a second, or thrice without pictures; the frame at which the page stops is always drawn.
         """
-        if cursor.hidden or (cursor.playing and time.monotonic() < self._drawn_at_s + _PLAYING_EVERY_S):
+        every_s = _PLAYING_EVERY_S if self._hub.workspace.facts.has_pictures else _LOOKING_EVERY_S
+        if cursor.hidden or (cursor.playing and time.monotonic() < self._drawn_at_s + every_s):
             return None
         self._number += 1
         sight = await self._sight(cursor)
-        drawing = asyncio.get_running_loop().run_in_executor(self._hub.executor, _drawn, scene, sight)
-        look = await drawing
+        look = await asyncio.get_running_loop().run_in_executor(self._hub.executor, _drawn, scene, sight)
         self._drawn_at_s = time.monotonic()
         return look
 

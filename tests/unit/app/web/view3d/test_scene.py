@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.session import History, RecordingFacts, Session
+from app.session import DismissedPlacement, History, RecordingFacts, Session
 from app.view import Advice, view
 from app.web.frames import Frame
 from app.web.messages import Viewpoint
@@ -28,6 +28,7 @@ from app.web.view3d.shapes import (
 )
 from app.web.view3d.sight import Sight
 from app.web.view3d.space_look import space_look
+from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import RadarScan, ReflectorClick, TimeNs
@@ -246,3 +247,34 @@ def test_once_the_extent_is_known_the_viewpoint_fits_it_unless_the_user_has_move
     drawn.camera.position = moved = (1.0, 2.0, 3.0)
     drawn.scene.show(replace(sight(), extent=replace(road, range_m=50.0)))
     assert drawn.camera.position == moved
+
+
+def test_a_placement_is_open_clicked_or_dismissed() -> None:
+    apart = [(5.0, 1.0, -0.5), (5.0, -4.0, 0.0), (8.0, -2.0, 0.3), (9.0, 0.0, 0.0)]
+    spans = [(0, 500), (0, 500), (1000, 1500), (9000, 9500)]
+    placements = tuple(
+        Placement(TimeNs(start), TimeNs(end), np.array(place), 1.0)
+        for (start, end), place in zip(spans, apart, strict=True)
+    )
+    seen = replace(sight(calibration()), placements=placements)
+    assert seen.placement_states() == ("clicked", "open", "clicked", "open"), (
+        "two at once: the pair's is the clicked one"
+    )
+    dismissed = replace(seen.session, dismissed=(DismissedPlacement(TimeNs(9100), (9.0, 0.0, 0.0)),))
+    states = replace(seen, session=dismissed).placement_states()
+    assert states == ("clicked", "open", "clicked", "dismissed")
+    assert [one.state for one in space_look(seen).placements] == list(seen.placement_states())
+
+
+def test_what_can_be_picked_is_where_the_lens_shows_it() -> None:
+    solved = calibration()
+    look = space_look(sight(solved, selected="c2"))
+    assert look.projected
+    pixels = solved.camera.project(solved.camera_from_radar @ np.array([[4.0, 0.0, 0.0]]))
+    assert (look.returns[0].u_px, look.returns[0].v_px) == pytest.approx(pixels[0], abs=0.01)
+    assert [one.id for one in look.reflectors] == ["c1", "c2", "c3", "c4"]
+    assert [label.kind for label in look.labels] == ["selected"]
+    before = space_look(sight())
+    assert not before.projected
+    assert before.returns[0].u_px is None
+    assert before.rings_m[-1] >= UNKNOWN.range_m
