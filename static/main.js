@@ -3,7 +3,9 @@
 
 import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
+import { startCandidates, take as takeCandidates } from "./candidates.js";
 import { startClicking } from "./clicking.js";
+import { startCross } from "./cross.js";
 import { setFormats, startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
@@ -22,7 +24,7 @@ import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./pla
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace, takeSpace } from "./space.js";
-import { clickIn, clicks, emit, on, select, selectedClick, state } from "./state.js";
+import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
 import { startTimeline } from "./timeline.js";
@@ -69,8 +71,7 @@ const readers = {
     emit("radar_map");
   },
   candidates(message) {
-    state.candidates = message;
-    emit("candidates");
+    takeCandidates(message);
   },
   space: takeSpace,
   progress(message) {
@@ -134,6 +135,8 @@ startLayers();
 startLoupe();
 startLive();
 startClicking();
+startCandidates();
+startCross();
 startTimeline();
 startPairs();
 startFigures();
@@ -161,5 +164,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, goTo, unconfirmed, follower },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower },
 });

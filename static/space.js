@@ -2,10 +2,11 @@
 /** The 3D view: viser's own page in an iframe. It has its own connection to the server; the name of this tab links the two. */
 
 import { comeTo } from "./arriving.js";
+import { choose } from "./candidates.js";
 import { listen } from "./keys.js";
-import { icon, make, toast } from "./notices.js";
+import { icon, make } from "./notices.js";
 import { tellCursor } from "./player.js";
-import { send, tab, tell } from "./socket.js";
+import { tab, tell } from "./socket.js";
 import { candidates, frameShown, itemAt, lookShown, mark, onDrawn, pickable, pickedWords, pictureBox, redraw, startLayer, takeLook } from "./space_layer.js";
 import { changeSpace, spaceColour, spaceOptions } from "./space_options.js";
 import { clicks, on, select, state } from "./state.js";
@@ -211,18 +212,12 @@ function pick(item) {
   const look = lookShown();
   if (item.kind === "placement" && state.placements[item.index]) comeTo(state.placements[item.index].frame);
   const candidate = item.kind === "candidate" ? candidates()[item.index] : undefined;
-  if (candidate && !candidate.chosen) choose(candidate);
+  if (candidate && !candidate.chosen) choose(item.index);
   const id = item.kind === "reflector" ? look?.reflectors[item.index].id : undefined;
   const click = id === undefined ? undefined : clicks().find((one) => one.id === id);
   if (!click) return;
   comeTo(click.frame);
   select(click.id);
-}
-
-/** Fix which return the selected click belongs to. @param {import("./messages.js").CandidateRow} candidate */
-async function choose({ position_m }) {
-  const refusal = await send({ type: "return_chosen", id: state.selected, return: { position_m } });
-  if (refusal) toast(refusal);
 }
 
 /** Apply the theme to the 3D view. */
