@@ -18,7 +18,7 @@ import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
 import { enlargeReview } from "./review.js";
 import { snap, withoutSnappable } from "./snapping.js";
-import { tell } from "./socket.js";
+import { lookFrom, setCamera, toggleHidden, toggleLarge } from "./space.js";
 import { clickIn, clicks, selectedClick, state } from "./state.js";
 
 /**
@@ -47,8 +47,6 @@ const following = () => (state.following && !["complete", "ended"].includes(stat
 
 /** @param {number} du @param {number} dv image px */
 const nudge = (du, dv) => () => nudgeBy(du, dv);
-/** @param {string} viewpoint */
-const lookFrom = (viewpoint) => () => tell({ type: "viewpoint", viewpoint });
 /** @param {string} id of a button on the page */
 const press = (id) => () => document.getElementById(id)?.click();
 const zoom = (/** @type {number} */ factor) => (state.looking ? zoomEye(factor) : zoomBy(factor));
@@ -105,10 +103,12 @@ export const ACTIONS = [
   { id: "show-predictions", words: "Show or hide the expected positions", keys: ["4"], also: "overlay layer predicted guess next placement", run: () => toggleLayer("predictions"), ...OVERLAY },
   { id: "show-uncertainty", words: "Show or hide the uncertainty in the picture", keys: ["5"], also: "overlay layer contours map 95 % lines", run: toggleContours, ...OVERLAY },
 
-  { id: "view-behind", words: "3D: look from behind the radar", also: "viewpoint", run: lookFrom("behind"), ...SPACE },
-  { id: "view-above", words: "3D: look down from above", also: "viewpoint top bird", run: lookFrom("above"), ...SPACE },
-  { id: "view-side", words: "3D: look from the side", also: "viewpoint right", run: lookFrom("side"), ...SPACE },
-  { id: "view-camera", words: "3D: look from the camera", also: "viewpoint", run: lookFrom("camera"), group: "3D view", when: withPictures },
+  { id: "view-behind", words: "3D: look from behind the radar", also: "viewpoint", run: () => lookFrom("behind"), ...SPACE },
+  { id: "view-above", words: "3D: look down from above", also: "viewpoint top bird", run: () => lookFrom("above"), ...SPACE },
+  { id: "view-side", words: "3D: look from the side", also: "viewpoint right", run: () => lookFrom("side"), ...SPACE },
+  { id: "view-camera", words: "3D: look from the camera, over its picture", also: "viewpoint overlay reprojection", run: () => setCamera(true), group: "3D view", when: withPictures },
+  { id: "space-hide", words: "Hide or show the 3D view", keys: ["V"], also: "3D close", run: () => toggleHidden(), ...SPACE },
+  { id: "space-large", words: "Enlarge the 3D view, or give the picture its place back", keys: ["B"], also: "3D big maximize full", run: () => toggleLarge(), ...SPACE },
 
   { id: "tab-pairs", group: "Panel", words: "Show the pairs", also: "tab table list clicks placements", run: () => showTab("tab-pairs") },
   { id: "tab-pose", group: "Panel", words: "Show the pose", also: "tab transform extrinsics rotation translation errors advice", run: () => showTab("tab-pose"), when: withPictures },

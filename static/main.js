@@ -26,7 +26,7 @@ import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./pla
 import { plots, startReview, takePair, takeReview } from "./review.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
-import { startSpace } from "./space.js";
+import { startSpace, takeSpace } from "./space.js";
 import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
@@ -78,6 +78,7 @@ const readers = {
   candidates(message) {
     takeCandidates(message);
   },
+  space: takeSpace,
   progress(message) {
     state.progress = message;
     emit("progress");

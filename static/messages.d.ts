@@ -370,6 +370,56 @@ export interface RadarMap {
   high_db: number | null;
 }
 
+/** A return that can be picked; written as an array, since there are many. */
+export type SpaceReturn = [x_m: number, y_m: number, z_m: number, range_m: number, azimuth_deg: number, elevation_deg: number, doppler_mps: number | null, snr_db: number | null, static: boolean, age_s: number, u_px: number | null, v_px: number | null, colour: string, size: number];
+
+/** The true position of a pair's reflector, as estimated. */
+export interface SpaceReflector {
+  id: string;
+  position_m: [number, number, number];
+  pixel_px: [number, number] | null;
+}
+
+/** A placement, in the order of the message about placements. */
+export interface SpacePlacement {
+  position_m: [number, number, number];
+  pixel_px: [number, number] | null;
+  state: "open" | "clicked" | "dismissed";
+}
+
+/** Words at a point. */
+export interface SpaceLabel {
+  words: string;
+  position_m: [number, number, number];
+  kind: "selected" | "next" | "camera";
+}
+
+/** What the colours of returns mean. */
+export interface SpaceLegend {
+  title: string;
+  low: string;
+  high: string;
+  colours: string[];
+  ramp: boolean;
+}
+
+/** What the 3D view shows, for the layer that the page draws over it. */
+export interface SpaceLook {
+  type: "space";
+  number: number;
+  index: number;
+  returns: SpaceReturn[];
+  window: SpaceReturn[];
+  reflectors: SpaceReflector[];
+  placements: SpacePlacement[];
+  labels: SpaceLabel[];
+  rings_m: number[];
+  ground_m: number;
+  range_m: number;
+  legend: SpaceLegend;
+  projected: boolean;
+}
+
 /** One radar return on the picture; written as an array, since there are many. */
 export type OverlayReturn = [u_px: number, v_px: number, range_m: number, doppler_mps: number | null, snr_db: number | null, static: boolean];
 
@@ -701,15 +751,16 @@ export interface CursorForm {
   selected?: string | null;
   light?: boolean;
   trail_s?: number;
-  colour?: "speed" | "amplitude";
+  colour?: "speed" | "range" | "doppler" | "amplitude" | "height";
   whole?: boolean;
+  hidden?: boolean;
   request?: number;
 }
 
 /** Another viewpoint is requested for the 3D view. */
 export interface ViewpointForm {
   type: "viewpoint";
-  viewpoint: "behind" | "above" | "side" | "camera";
+  viewpoint: "behind" | "above" | "side";
   request?: number;
 }
 
@@ -770,6 +821,7 @@ export type FromServer =
   | Placements
   | RadarLook
   | RadarMap
+  | SpaceLook
   | Overlay
   | PairCandidates
   | Review

@@ -7,7 +7,7 @@
 {
   /** Minimum time between two drawings [ms]. */
   const QUIET = 125;
-  const PLAYING = 500;
+  const PLAYING = 1000;
   /** How long after the last input the view counts as being moved [ms]. */
   const TOUCH = 1200;
 
@@ -21,9 +21,9 @@
 
   /** When the next drawing may happen. @param {number} now */
   function next(now) {
-    const page = /** @type {{playing?: boolean, holdUntil?: number}} */ (/** @type {any} */ (window.parent).cocalibPace ?? {});
+    const page = /** @type {{playing?: boolean, every?: number, holdUntil?: number}} */ (/** @type {any} */ (window.parent).cocalibPace ?? {});
     if (now - touched < TOUCH) return now;
-    return Math.max(drawn + (page.playing ? PLAYING : QUIET), page.holdUntil ?? 0);
+    return Math.max(drawn + (page.playing ? (page.every ?? PLAYING) : QUIET), page.holdUntil ?? 0);
   }
 
   /** Draw when it is time, with all callbacks in one frame. */

@@ -3,6 +3,7 @@
 
 import { clicks, emit, select, state } from "./state.js";
 import { requestNumber, tell } from "./socket.js";
+import { cursorOptions } from "./space_options.js";
 
 const KEPT = 12;
 /** Maximum number of requests in flight while playing. */
@@ -190,7 +191,5 @@ function selectHere(index) {
 
 /** Tell the server which frame this tab shows; it answers with the overlay and updates the 3D view. */
 export function tellCursor() {
-  const cursor = { type: "cursor", index: state.cursor, playing: state.playing, selected: state.selected, light: document.documentElement.dataset.theme === "light" };
-  const { trail_s, colour, whole } = state.lookOptions;
-  tell(state.looking ? { ...cursor, trail_s, colour, whole } : cursor);
+  tell({ type: "cursor", index: state.cursor, playing: state.playing, selected: state.selected, light: document.documentElement.dataset.theme === "light", ...cursorOptions() });
 }

@@ -9,7 +9,7 @@ from app.session import Session
 from app.solving import RadarSource
 from app.view import Reference, shown_calibration
 from app.web.messages import Overlay, OverlayGuess, OverlayReturn, RadarLook, RadarReturn
-from calib_core.arrays import Flags, Indices, Points3
+from calib_core.arrays import Flags, Indices
 from calib_core.association.gating import static_returns
 from calib_core.association.placements import Placement
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
@@ -42,10 +42,10 @@ class RadarSight:
         around = self.recording.radar_scans_around([middle], half_s + _MARGIN_S)
         return around.between(TimeNs(time - round(length_s * NS_PER_S)), time)
 
-    def window(self, time: TimeNs, options: CalibrationOptions) -> Points3:
-        """Return the static returns (n, 3) [m] of the window around a click."""
+    def window(self, time: TimeNs, options: CalibrationOptions) -> RadarScans:
+        """Return the static returns of the window around a click."""
         scans = self.recording.radar_scans_around([time], options.locating.window_s / 2)
-        return static_returns(scans, options.gating).points_radar_m
+        return static_returns(scans, options.gating)
 
 
 def still_returns(scan: RadarScan, options: GatingOptions) -> Flags:

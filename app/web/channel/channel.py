@@ -1,11 +1,8 @@
 """One page's channel: reads its messages and answers them in order, without waiting for other pages."""
 
 import asyncio
-import time
 from functools import partial
 from typing import Protocol
-
-import numpy as np
 
 from app.error_boundary import error_boundary
 from app.session import Step
@@ -17,8 +14,8 @@ from app.web.channel.outbox import Outbox
 from app.web.channel.radar_survey import placements_at
 from app.web.channel.review import ReviewDesk
 from app.web.channel.snapping import snapped
+from app.web.channel.space_feed import SpaceFeed
 from app.web.channel.view_feed import Shown
-from app.web.frames import Frame
 from app.web.messages import (
     Command,
     CursorMoved,
@@ -38,16 +35,11 @@ from app.web.messages import (
     request_of,
 )
 from app.web.radar_sight import look_of, overlay_of
-from app.web.view3d.looking import Look
-from app.web.view3d.scene import Sight, TabScene
-from calib_core.arrays import Points3
+from app.web.view3d.scene import TabScene
 from calib_core.errors import CalibrationError
 from calib_core.measurements import RadarScan, RadarScans, TimeNs
 
 __all__ = ["Channel", "Socket"]
-
-_SPACE_EVERY_S = 0.34
-"""Minimum time between two drawings of the 3D view while playing: it shares the page's main thread [s]."""
 
 _GREET_EVERY_S = 0.25
 """Minimum time between two greetings of one page, and between two whole Views that it asks for [s]."""
@@ -75,6 +67,7 @@ class Channel:
         self._overlay = NewestWins(self._send_overlay, self._report)
         self._space = NewestWins(self._draw_space, self._report)
         self._review = ReviewDesk(hub.workspace, hub.recording, hub.camera, self.outbox, self._report)
+        self._space_feed = SpaceFeed(hub)
         self._candidates = NewestWins(self._send_candidates, self._report)
         self._forward = True
         self._has_candidates = False
@@ -236,27 +229,12 @@ class Channel:
         self.outbox.put(encode(found), kind="candidates")
 
     async def _draw_space(self, cursor: CursorMoved) -> None:
-        """Draw the 3D view; while playing, pause afterwards. The last frame is always drawn."""
+        """Draw the 3D view, and send what the page draws over it."""
         if self.scene is None:
             return
-        started = time.monotonic()
-        hub, stamp = self._hub, TimeNs(int(self._hub.moments[cursor.index]))
-        has_pictures = hub.workspace.facts.has_pictures
-        sight = Sight(
-            session=hub.workspace.session,
-            view=hub.view,
-            selected=cursor.selected,
-            scan=await self._scan(stamp),
-            window=await self._window(cursor),
-            picture=await self._thumbnail(cursor.index) if has_pictures else None,
-            camera=hub.camera,
-            reference=hub.workspace.reference,
-            light=cursor.light,
-            look=None if has_pictures else await self._look(cursor, stamp),
-        )
-        await asyncio.get_running_loop().run_in_executor(hub.executor, self.scene.show, sight)
-        if cursor.playing:
-            await asyncio.sleep(max(0.0, started + _SPACE_EVERY_S - time.monotonic()))
+        look = await self._space_feed.draw(cursor, self.scene)
+        if look is not None:
+            self.outbox.put(encode(look), kind="space")
 
     async def _scan(self, stamp: TimeNs) -> RadarScan | None:
         """Return the scan at a time; None if it cannot be read."""
@@ -272,31 +250,3 @@ class Channel:
             return await asyncio.get_running_loop().run_in_executor(self._hub.executor, look)
         except CalibrationError:
             return RadarScans()
-
-    async def _look(self, cursor: CursorMoved, stamp: TimeNs) -> Look:
-        survey = self._hub.survey
-        return Look(
-            time=stamp,
-            trail=await self._trail(stamp, cursor.trail_s),
-            placements=survey.placements if survey else (),
-            map=survey.map if survey else None,
-            whole=cursor.whole,
-            colour=cursor.colour,
-        )
-
-    async def _window(self, cursor: CursorMoved) -> Points3:
-        session = self._hub.workspace.session
-        click = next((click for click in session.clicks if click.id == cursor.selected), None)
-        if click is None or cursor.playing:
-            return np.zeros((0, 3))
-        look = partial(self._hub.radar.window, click.image_time, session.options)
-        try:
-            return await asyncio.get_running_loop().run_in_executor(self._hub.executor, look)
-        except CalibrationError:
-            return np.zeros((0, 3))
-
-    async def _thumbnail(self, index: int) -> Frame | None:
-        try:
-            return await self._hub.frames.get(index, "thumbnail")
-        except (CalibrationError, ValueError):
-            return None

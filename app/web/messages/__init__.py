@@ -42,6 +42,15 @@ from app.web.messages.outgoing import (
 )
 from app.web.messages.radar_messages import PlacementRow, Placements, RadarLook, RadarMap, RadarReturn
 from app.web.messages.review_messages import ReviewRequest, Uncertainty
+from app.web.messages.space_messages import (
+    PlacementState,
+    SpaceLabel,
+    SpaceLegend,
+    SpaceLook,
+    SpacePlacement,
+    SpaceReflector,
+    SpaceReturn,
+)
 from app.web.messages.view_changes import ClickChange, RowValues, ViewChange, change_between
 
 __all__ = [
@@ -63,6 +72,7 @@ __all__ = [
     "OverlayGuess",
     "OverlayReturn",
     "PlacementRow",
+    "PlacementState",
     "Placements",
     "Problem",
     "Progress",
@@ -77,6 +87,12 @@ __all__ = [
     "SessionNote",
     "SnapWanted",
     "Snapped",
+    "SpaceLabel",
+    "SpaceLegend",
+    "SpaceLook",
+    "SpacePlacement",
+    "SpaceReflector",
+    "SpaceReturn",
     "StampColumns",
     "Uncertainty",
     "ViewChange",

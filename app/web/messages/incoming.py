@@ -67,7 +67,7 @@ class FrameWanted:
     size: Literal["full", "half"] = "full"
 
 
-ReturnColour: TypeAlias = Literal["speed", "amplitude"]
+ReturnColour: TypeAlias = Literal["speed", "range", "doppler", "amplitude", "height"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +79,10 @@ class CursorMoved:
         playing: frames follow one another quickly.
         selected: id of the selected click; None if there is none.
         light: the page uses its light theme, and the 3D view follows.
-        trail_s: without pictures, for how long returns stay [s].
-        colour: without pictures, what the colours of returns mean.
-        whole: without pictures, the 3D view shows the static returns of the whole recording.
+        trail_s: for how long returns stay [s].
+        colour: what the colours of returns mean in the 3D view; "speed" says static or moving.
+        whole: the 3D view shows the static returns of the whole recording.
+        hidden: the 3D view is hidden, and nothing needs to be sent to it.
     """
 
     index: int
@@ -91,9 +92,10 @@ class CursorMoved:
     trail_s: float = 0.0
     colour: ReturnColour = "speed"
     whole: bool = False
+    hidden: bool = False
 
 
-Viewpoint: TypeAlias = Literal["behind", "above", "side", "camera"]
+Viewpoint: TypeAlias = Literal["behind", "above", "side"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,7 @@ class ViewpointWanted:
     """A page wants another viewpoint for its 3D view.
 
     Attributes:
-        viewpoint: behind, above or to the side of the radar, or the position of the camera.
+        viewpoint: behind, above or to the side of the radar.
     """
 
     viewpoint: Viewpoint
@@ -184,6 +186,7 @@ class CursorForm(_Form, frozen=True, tag="cursor"):
     trail_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
     colour: ReturnColour = "speed"
     whole: bool = False
+    hidden: bool = False
 
 
 class ViewpointForm(_Form, frozen=True, tag="viewpoint"):
@@ -306,7 +309,9 @@ def _frame(form: FrameForm) -> Command:
 
 @_command.register
 def _cursor(form: CursorForm) -> Command:
-    return CursorMoved(form.index, form.playing, form.selected, form.light, form.trail_s, form.colour, form.whole)
+    return CursorMoved(
+        form.index, form.playing, form.selected, form.light, form.trail_s, form.colour, form.whole, form.hidden
+    )
 
 
 @_command.register

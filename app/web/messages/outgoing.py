@@ -14,6 +14,7 @@ from app.view.review_pair import PairReview
 from app.view.review_solutions import Compared
 from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
 from app.web.messages.review_messages import Uncertainty
+from app.web.messages.space_messages import SpaceLook
 from app.web.messages.view_changes import ViewChange
 from calib_core.arrays import TimesNs
 from calib_core.measurements import NS_PER_S, Stamp
@@ -303,6 +304,7 @@ Outgoing: TypeAlias = (
     | Placements
     | RadarLook
     | RadarMap
+    | SpaceLook
     | Overlay
     | PairCandidates
     | Review
@@ -325,6 +327,7 @@ TYPES: Mapping[type, str] = {
     Placements: "placements",
     RadarLook: "radar_look",
     RadarMap: "radar_map",
+    SpaceLook: "space",
     Overlay: "overlay",
     PairCandidates: "candidates",
     Review: "review",

@@ -1,5 +1,6 @@
 """Shapes of the 3D view as arrays: rings, rays, ellipsoids, colours. All in the radar frame, all pure."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -19,7 +20,6 @@ __all__ = [
     "ellipsoids",
     "next_place",
     "nominal_camera_from_radar",
-    "range_numbers",
     "range_rings",
     "rays_to",
     "residual_colours",
@@ -68,19 +68,6 @@ _RAMP = np.array([[74, 170, 235], [143, 200, 226], [236, 214, 150], [240, 158, 6
 _CHI2_95_3D = 7.814727903251178  # 95 % quantile of chi-squared with 3 degrees of freedom
 _CIRCLE = 28
 _DASH_STEPS = 3
-_SEGMENTS = {  # strokes of a seven-segment digit: (right, up) of both ends, in units of its height
-    "a": ((0.0, 1.0), (0.5, 1.0)),
-    "b": ((0.5, 1.0), (0.5, 0.5)),
-    "c": ((0.5, 0.5), (0.5, 0.0)),
-    "d": ((0.0, 0.0), (0.5, 0.0)),
-    "e": ((0.0, 0.5), (0.0, 0.0)),
-    "f": ((0.0, 1.0), (0.0, 0.5)),
-    "g": ((0.0, 0.5), (0.5, 0.5)),
-}
-_STROKES = {
-    "0": "abcdef", "1": "bc", "2": "abged", "3": "abgcd", "4": "fgbc",
-    "5": "afgcd", "6": "afgedc", "7": "abc", "8": "abcdefg", "9": "abcdfg",
-}  # fmt: skip
 
 
 def residual_colours(residuals_px: Values, limit_px: float) -> np.ndarray:
@@ -91,27 +78,15 @@ def residual_colours(residuals_px: Values, limit_px: float) -> np.ndarray:
     return np.rint(colours).astype(np.uint8)
 
 
-def range_rings(*, every_m: float, up_to_m: float, half_angle_rad: float = np.deg2rad(70.0)) -> np.ndarray:
+def range_rings(ranges_m: Sequence[float], *, half_angle_rad: float = np.deg2rad(70.0)) -> np.ndarray:
     """Return arcs of equal range around the radar, forward side: segments (n, 2, 3)."""
     azimuths = np.linspace(-half_angle_rad, half_angle_rad, 49)
     arcs = []
-    for range_m in np.arange(every_m, up_to_m + 1e-9, every_m):
+    for range_m in ranges_m:
         polar = np.stack([np.full_like(azimuths, range_m), azimuths, np.zeros_like(azimuths)], axis=1)
         arc = cartesian_from_polar(polar)
         arcs.append(np.stack([arc[:-1], arc[1:]], axis=1))
     return np.concatenate(arcs)
-
-
-def range_numbers(*, every_m: float, up_to_m: float, height_m: float = 0.5) -> np.ndarray:
-    """Write the ranges flat on the ground at the left ends of their rings, as strokes: segments (n, 2, 3)."""
-    strokes = []
-    for range_m in np.arange(every_m, up_to_m + 1e-9, every_m):
-        for place, digit in enumerate(f"{range_m:.0f}"):
-            segments = np.array([_SEGMENTS[name] for name in _STROKES[digit]], dtype=np.float64) * height_m
-            ahead, right = segments[..., 1], segments[..., 0] + 0.8 * height_m * place
-            corner = cartesian_from_polar(np.array([range_m, np.deg2rad(24.0), 0.0]))
-            strokes.append(np.stack([corner[0] + 0.1 + ahead, corner[1] - right, np.zeros_like(ahead)], axis=-1))
-    return np.concatenate(strokes)
 
 
 def rays_to(calibration: Calibration, pairs: tuple[PairResult, ...]) -> np.ndarray:

@@ -6,9 +6,8 @@ import pytest
 from app.web.channel.placement_words import placement_figures, placement_note, placement_summary
 from app.web.channel.radar_map import RadarMapSum
 from app.web.channel.radar_survey import survey_of
-from app.web.messages import PlacementRow, RadarMap
+from app.web.messages import PlacementRow
 from app.web.radar_sight import RadarSight, look_of, shown_rows
-from app.web.view3d.looking import Look, amplitude_colours, map_colours, trail_colours
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 
@@ -140,21 +139,3 @@ def test_returns_of_the_last_seconds_are_shown_with_their_age() -> None:
     assert (walker.static, walker.doppler_mps, walker.snr_db) == (False, 1.0, 25.0)
     assert len(sight.trail(now, 0.0)) == 1, "one scan"
     assert len(shown_rows(trail, 10)) <= 10 < len(shown_rows(trail, 1000)) == len(trail.points_radar_m)
-
-
-def test_colours_fade_with_age_and_follow_the_amplitude() -> None:
-    now = TimeNs(6 * NS_PER_S)
-    trail = RadarSight(Radar()).trail(now, 2.0)  # type: ignore[arg-type]
-    cells = RadarMap(0.2, (1.0, 2.0), (0.0, 0.0), (0.0, 0.0), (1.0, 0.01), (12.0, 30.0), 10.0, 30.0)
-    look = Look(now, trail, (), cells, True, "amplitude")
-    for light in (False, True):
-        weak, strong, unknown = amplitude_colours(np.array([10.0, 30.0, NAN]), cells, light=light)
-        assert not np.allclose(weak, strong)
-        assert np.isfinite(unknown).all()
-        drawn = trail_colours(look, GatingOptions(), light=light).astype(int)
-        wall = drawn[trail.snr_db == 15.0]
-        background = np.array([233, 236, 240] if light else [13, 16, 20])
-        assert np.abs(wall[-1] - background).sum() > 2 * np.abs(wall[0] - background).sum()
-        assert map_colours(cells, "amplitude", light=light).shape == (2, 3)
-        stays, came = map_colours(cells, "speed", light=light).astype(int)
-        assert np.abs(stays - background).sum() > np.abs(came - background).sum()

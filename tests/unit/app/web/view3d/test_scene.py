@@ -10,20 +10,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.session import History, RecordingFacts, Session
+from app.session import DismissedPlacement, History, RecordingFacts, Session
 from app.view import Advice, view
 from app.web.frames import Frame
-from app.web.view3d.scene import Sight, TabScene
+from app.web.messages import Viewpoint
+from app.web.view3d.extent import UNKNOWN, Extent
+from app.web.view3d.returns import Returns
+from app.web.view3d.scene import TabScene
 from app.web.view3d.shapes import (
     ellipsoids,
     next_place,
     nominal_camera_from_radar,
-    range_numbers,
     range_rings,
     rays_to,
     residual_colours,
     vertical_field_of_view_rad,
 )
+from app.web.view3d.sight import Sight
+from app.web.view3d.space_look import space_look
+from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import RadarScan, ReflectorClick, TimeNs
@@ -71,12 +76,9 @@ def reported(errors: RadarErrors, point_radar_m: np.ndarray) -> np.ndarray:
     return cartesian_from_polar(polar)[0]
 
 
-def test_rings_are_at_their_ranges_and_numbers_on_the_ground_next_to_them() -> None:
-    ranges = polar_from_cartesian(range_rings(every_m=5, up_to_m=30).reshape(-1, 3))[:, 0]
-    assert set(np.round(ranges, 9)) == {5, 10, 15, 20, 25, 30}
-    numbers = range_numbers(every_m=10, up_to_m=20)
-    assert np.all(numbers[..., 2] == 0)
-    assert len(numbers) == (2 + 6) + (5 + 6), "strokes of 1 and 0, of 2 and 0"
+def test_rings_are_at_their_ranges() -> None:
+    ranges = polar_from_cartesian(range_rings((5.0, 10.0, 50.0)).reshape(-1, 3))[:, 0]
+    assert set(np.round(ranges, 9)) == {5, 10, 50}
 
 
 def test_an_ellipsoid_holds_its_point_and_reaches_as_far_as_the_noise_says() -> None:
@@ -109,7 +111,7 @@ class Drawn:
     """A 3D view over a real viser server, with the client's camera recorded."""
 
     def __init__(self, server: Any) -> None:
-        self.camera = SimpleNamespace()
+        self.camera = SimpleNamespace(position=(-5.0, 0.0, 3.6), image_width=1600, image_height=1000)
         client = SimpleNamespace(scene=server.scene, camera=self.camera, atomic=server.atomic, flush=server.flush)
         self.scene = TabScene(client)  # type: ignore[arg-type]
         self.node = server.scene.get_handle_by_name
@@ -117,7 +119,7 @@ class Drawn:
     def names(self) -> list[str]:
         return sorted(
             name
-            for name in ("/scan", "/window", "/chosen", "/rays", "/ray", "/gap", "/selected", "/next", "/next_name")
+            for name in ("/returns_2", "/window", "/chosen", "/rays", "/ray", "/gap", "/next")
             if self.node(name).visible
         )
 
@@ -137,9 +139,22 @@ def sight(outcome: Calibration | None = None, *, selected: str | None = None, in
     session = Session(clicks=clicks, outcome=outcome, outcome_revision=0 if outcome else -1)
     points, none = np.array([[4.0, 0.0, 0.0], [9.0, 1.0, 0.2]]), np.full(2, np.nan)
     scan = RadarScan(TimeNs(0), points, np.array([0.0, 1.5]), none, np.full((2, 3), np.nan))
+    returns = Returns.of_scan(scan, session.options.gating, lambda reported: reported)
     picture = Frame(index, b"jpeg", "jpeg", 640, 480, 1.0)
-    shown = view(History(session), FACTS)
-    return Sight(session, shown, selected, scan, points[:1], picture, CAMERA)
+    return Sight(
+        number=index + 1,
+        index=index,
+        session=session,
+        view=view(History(session), FACTS),
+        selected=selected,
+        returns=returns,
+        trail_s=0.0,
+        window=returns.rows(np.array([0])),
+        picture=picture,
+        camera=CAMERA,
+        has_pictures=True,
+        extent=UNKNOWN,
+    )
 
 
 def test_before_a_calibration_the_camera_stands_dimmed_at_the_radar_and_carries_the_picture(drawn: Drawn) -> None:
@@ -147,8 +162,9 @@ def test_before_a_calibration_the_camera_stands_dimmed_at_the_radar_and_carries_
     frustum = drawn.node("/camera")
     assert frustum.position == pytest.approx([0, 0, 0])
     assert frustum._image_data == b"jpeg"
-    assert drawn.names() == ["/scan", "/window"]
-    assert drawn.node("/scan").colors.tolist()[0] != drawn.node("/scan").colors.tolist()[1], "moving and still differ"
+    assert drawn.names() == ["/returns_2", "/window"], "without SNR, all returns have the middle size"
+    still, moving = drawn.node("/returns_2").colors.tolist()
+    assert still != moving
 
 
 def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear(drawn: Drawn) -> None:
@@ -159,22 +175,20 @@ def test_with_a_calibration_the_camera_moves_to_its_place_and_the_pairs_appear(d
     frustum = drawn.node("/camera")
     assert frustum.position == pytest.approx(solved.camera_from_radar.inverse().translation_m)
     assert frustum.color != dimmed
-    assert drawn.names() == ["/chosen", "/gap", "/ray", "/rays", "/scan", "/selected", "/window"]
+    assert drawn.names() == ["/chosen", "/gap", "/ray", "/rays", "/returns_2", "/window"]
     assert len(drawn.node("/chosen").points) == 4
-    assert drawn.node("/selected").text.startswith("c2: ")
     drawn.scene.show(sight(solved))
-    assert "/selected" not in drawn.names()
+    assert "/gap" not in drawn.names()
 
 
 def test_the_best_next_placement_is_ringed_until_no_more_are_needed(drawn: Drawn) -> None:
     seen = sight(calibration())
     advice = Advice(10.0, 20.0, 5.0, 1.4, False, (4.0, 3.0, 0.0), "There.")
     drawn.scene.show(replace(seen, view=replace(seen.view, advice=advice)))
-    assert {"/next", "/next_name"} <= set(drawn.names())
+    assert "/next" in drawn.names()
     assert drawn.node("/next").points.reshape(-1, 3).mean(axis=0) == pytest.approx([4.0, 3.0, 0.0], abs=0.05)
-    assert drawn.node("/next_name").text == "next 5.0 m"
     drawn.scene.show(replace(seen, view=replace(seen.view, advice=replace(advice, may_stop=True))))
-    assert not {"/next", "/next_name"} & set(drawn.names())
+    assert "/next" not in drawn.names()
 
 
 def test_in_the_light_theme_nothing_is_white_on_white(drawn: Drawn) -> None:
@@ -183,7 +197,7 @@ def test_in_the_light_theme_nothing_is_white_on_white(drawn: Drawn) -> None:
     dark = drawn.node("/camera").color
     drawn.scene.show(replace(sight(solved, selected="c2"), light=True))
     assert drawn.node("/camera").color != dark
-    for name in ("/ray", "/scan", "/window", "/ground/rings"):
+    for name in ("/ray", "/returns_2", "/window", "/ground/rings"):
         assert np.asarray(drawn.node(name).colors).reshape(-1, 3).mean(axis=1).max() < 170
     drawn.scene.show(sight(solved, selected="c2"))
     assert drawn.node("/camera").color == dark
@@ -202,15 +216,65 @@ def test_the_ring_of_the_next_place_is_level_and_half_gaps() -> None:
 def test_after_an_undo_to_nothing_the_pairs_are_gone(drawn: Drawn) -> None:
     drawn.scene.show(sight(calibration(), selected="c1"))
     drawn.scene.show(sight())
-    assert drawn.names() == ["/scan", "/window"]
+    assert drawn.names() == ["/returns_2", "/window"]
     assert drawn.node("/camera").position == pytest.approx([0, 0, 0])
 
 
-@pytest.mark.parametrize("viewpoint", ["behind", "above", "side", "camera"])
-def test_every_viewpoint_looks_at_what_lies_before_the_radar(drawn: Drawn, viewpoint: str) -> None:
+def test_the_page_can_tell_which_frame_the_3d_view_has_drawn(drawn: Drawn) -> None:
+    drawn.scene.show(sight(index=312))
+    assert drawn.node("/shown").position == pytest.approx((312, 313, 0))
+    assert space_look(sight(index=312)).number == 313
+
+
+@pytest.mark.parametrize("viewpoint", ["behind", "above", "side"])
+def test_every_viewpoint_looks_at_what_lies_before_the_radar(drawn: Drawn, viewpoint: Viewpoint) -> None:
     drawn.scene.show(sight(calibration()))
     drawn.scene.look_from(viewpoint)
     direction = np.subtract(drawn.camera.look_at, drawn.camera.position)
     to_reflector = np.subtract((6.0, 0.0, 0.0), drawn.camera.position)
     cosine = direction @ to_reflector / np.linalg.norm(direction) / np.linalg.norm(to_reflector)
     assert cosine > 0.95
+
+
+def test_once_the_extent_is_known_the_viewpoint_fits_it_unless_the_user_has_moved_it(drawn: Drawn) -> None:
+    drawn.scene.show(sight())
+    before = np.array(drawn.camera.position)
+    road = Extent(200.0, 0.8, -0.8, -1.0, 4.0)
+    drawn.scene.show(replace(sight(), extent=road))
+    stands = np.array(drawn.camera.position)
+    assert np.linalg.norm(stands) > 5 * np.linalg.norm(before)
+    assert polar_from_cartesian(drawn.node("/ground/rings").points.reshape(-1, 3))[:, 0].max() == pytest.approx(200)
+    drawn.camera.position = moved = (1.0, 2.0, 3.0)
+    drawn.scene.show(replace(sight(), extent=replace(road, range_m=50.0)))
+    assert drawn.camera.position == moved
+
+
+def test_a_placement_is_open_clicked_or_dismissed() -> None:
+    apart = [(5.0, 1.0, -0.5), (5.0, -4.0, 0.0), (8.0, -2.0, 0.3), (9.0, 0.0, 0.0)]
+    spans = [(0, 500), (0, 500), (1000, 1500), (9000, 9500)]
+    placements = tuple(
+        Placement(TimeNs(start), TimeNs(end), np.array(place), 1.0)
+        for (start, end), place in zip(spans, apart, strict=True)
+    )
+    seen = replace(sight(calibration()), placements=placements)
+    assert seen.placement_states() == ("clicked", "open", "clicked", "open"), (
+        "two at once: the pair's is the clicked one"
+    )
+    dismissed = replace(seen.session, dismissed=(DismissedPlacement(TimeNs(9100), (9.0, 0.0, 0.0)),))
+    states = replace(seen, session=dismissed).placement_states()
+    assert states == ("clicked", "open", "clicked", "dismissed")
+    assert [one.state for one in space_look(seen).placements] == list(seen.placement_states())
+
+
+def test_what_can_be_picked_is_where_the_lens_shows_it() -> None:
+    solved = calibration()
+    look = space_look(sight(solved, selected="c2"))
+    assert look.projected
+    pixels = solved.camera.project(solved.camera_from_radar @ np.array([[4.0, 0.0, 0.0]]))
+    assert (look.returns[0].u_px, look.returns[0].v_px) == pytest.approx(pixels[0], abs=0.01)
+    assert [one.id for one in look.reflectors] == ["c1", "c2", "c3", "c4"]
+    assert [label.kind for label in look.labels] == ["selected"]
+    before = space_look(sight())
+    assert not before.projected
+    assert before.returns[0].u_px is None
+    assert before.rings_m[-1] >= UNKNOWN.range_m

@@ -1,0 +1,151 @@
+"""What is sent to a page about its 3D view: what can be picked and read there, and where in the picture it is."""
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import msgspec
+
+__all__ = [
+    "PlacementState",
+    "SpaceLabel",
+    "SpaceLegend",
+    "SpaceLook",
+    "SpacePlacement",
+    "SpaceReflector",
+    "SpaceReturn",
+]
+
+PlacementState: TypeAlias = Literal["open", "clicked", "dismissed"]
+
+
+class SpaceReturn(msgspec.Struct, frozen=True, array_like=True):
+    """A return that can be picked; written as an array, since there are many.
+
+    Attributes:
+        x_m: forward, where it is drawn.
+        y_m: to the left.
+        z_m: up.
+        range_m: as the radar reports it.
+        azimuth_deg: positive to the left.
+        elevation_deg: positive upwards.
+        doppler_mps: positive moving away; None if the radar has none.
+        snr_db: None if the radar has none.
+        static: slow enough to be the reflector.
+        age_s: how long before the shown moment.
+        u_px: column in the picture; None if it is not in it, or without a calibration.
+        v_px: row in the picture.
+        colour: as it is drawn, "#rrggbb".
+        size: as it is drawn, relative to the middle size.
+    """
+
+    x_m: float
+    y_m: float
+    z_m: float
+    range_m: float
+    azimuth_deg: float
+    elevation_deg: float
+    doppler_mps: float | None
+    snr_db: float | None
+    static: bool
+    age_s: float
+    u_px: float | None
+    v_px: float | None
+    colour: str
+    size: float
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceReflector:
+    """The true position of a pair's reflector, as estimated.
+
+    Attributes:
+        id: of the click.
+        position_m: (x, y, z).
+        pixel_px: (u, v) in the picture; None if it is not in it.
+    """
+
+    id: str
+    position_m: tuple[float, float, float]
+    pixel_px: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class SpacePlacement:
+    """A placement, in the order of the message about placements.
+
+    Attributes:
+        position_m: (x, y, z) where it is drawn.
+        pixel_px: (u, v) in the picture; None if it is not in it, or without a calibration.
+        state: whether it has a click, or was dismissed.
+    """
+
+    position_m: tuple[float, float, float]
+    pixel_px: tuple[float, float] | None
+    state: PlacementState
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceLabel:
+    """Words at a point.
+
+    Attributes:
+        words: to write.
+        position_m: (x, y, z).
+        kind: what it is about.
+    """
+
+    words: str
+    position_m: tuple[float, float, float]
+    kind: Literal["selected", "next", "camera"]
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceLegend:
+    """What the colours of returns mean.
+
+    Attributes:
+        title: the quantity; "" if returns are static or moving.
+        low: words for the first colour.
+        high: words for the last colour, with the unit.
+        colours: "#rrggbb" each.
+        ramp: they go over into each other.
+    """
+
+    title: str
+    low: str
+    high: str
+    colours: tuple[str, ...]
+    ramp: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SpaceLook:
+    """What the 3D view shows, for the layer that the page draws over it.
+
+    Attributes:
+        number: rises by one with every drawing of the 3D view, whose node "/shown" carries the same number.
+        index: of the frame.
+        returns: of the scan, or of the last seconds.
+        window: static returns around the selected click.
+        reflectors: of the pairs.
+        placements: of the recording.
+        labels: to write in the view.
+        rings_m: ranges of the rings.
+        ground_m: height of the rings.
+        range_m: how far the data reach.
+        legend: of the colours.
+        projected: whether there is a calibration that says where things are in the picture.
+    """
+
+    number: int
+    index: int
+    returns: tuple[SpaceReturn, ...]
+    window: tuple[SpaceReturn, ...]
+    reflectors: tuple[SpaceReflector, ...]
+    placements: tuple[SpacePlacement, ...]
+    labels: tuple[SpaceLabel, ...]
+    rings_m: tuple[float, ...]
+    ground_m: float
+    range_m: float
+    legend: SpaceLegend
+    projected: bool

@@ -1,0 +1,83 @@
+"""The 3D view fits the data: rings end where they end, and from every viewpoint all of them are in sight."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.web.messages import Viewpoint
+from app.web.view3d.extent import UNKNOWN, Extent, extent_of, fitted_stand, ring_ranges_m
+
+NO_POINTS = np.zeros((0, 3))
+
+
+def test_two_ghosts_of_a_hundred_returns_do_not_stretch_a_room_but_a_far_reflector_does() -> None:
+    room = np.column_stack([np.linspace(1.0, 6.0, 198), np.linspace(-2.0, 2.0, 198), np.zeros(198)])
+    ghosts = np.array([[180.0, 0.0, 0.0], [0.0, -190.0, 20.0]])
+    points, weights = np.concatenate([room, ghosts]), np.ones(200)
+    assert 6.0 < extent_of(points, weights, NO_POINTS).range_m < 7.5
+    reached = extent_of(points, weights, np.array([[30.0, 30.0, 1.5]]))
+    assert 43.0 < reached.range_m < 48.0
+    assert reached.high_m == 1.5
+    assert reached.left_rad == pytest.approx(np.pi / 4)
+
+
+def test_what_was_seen_all_the_time_counts_more_than_what_was_seen_once() -> None:
+    points = np.array([[5.0, 0.0, 0.0], [100.0, 0.0, 0.0]])
+    assert extent_of(points, np.array([1.0, 0.001]), NO_POINTS).range_m == pytest.approx(5.5)
+    assert extent_of(points, np.array([0.5, 0.5]), NO_POINTS).range_m == pytest.approx(110.0)
+
+
+def test_without_data_the_usual_extent_is_assumed() -> None:
+    assert extent_of(NO_POINTS, np.zeros(0), NO_POINTS) == UNKNOWN
+    assert extent_of(np.full((1, 3), np.nan), np.ones(1), NO_POINTS) == UNKNOWN
+
+
+@pytest.mark.parametrize(
+    ("range_m", "rings_m"),
+    [
+        (6.0, (1, 2, 3, 4, 5, 6)),
+        (6.6, (2, 4, 6, 8)),
+        (13.0, (5, 10, 15)),
+        (30.0, (5, 10, 15, 20, 25, 30)),
+        (200.0, (50, 100, 150, 200)),
+        (2.0, (0.5, 1.0, 1.5, 2.0)),
+    ],
+)
+def test_rings_reach_as_far_as_the_data(range_m: float, rings_m: tuple[float, ...]) -> None:
+    assert ring_ranges_m(range_m) == pytest.approx(rings_m)
+
+
+@given(st.floats(0.5, 2000.0))
+def test_there_are_two_to_six_rings_and_the_last_holds_everything(range_m: float) -> None:
+    rings_m = ring_ranges_m(range_m)
+    assert 2 <= len(rings_m) <= 6
+    assert rings_m[-1] >= range_m * (1 - 1e-6)
+    assert rings_m[-2] < range_m
+    step = float(f"{rings_m[0]:.3e}")
+    assert f"{step:e}"[0] in "125"
+    assert np.diff(rings_m) == pytest.approx(rings_m[0])
+
+
+extents = st.builds(
+    Extent,
+    range_m=st.floats(2.0, 300.0),
+    left_rad=st.floats(0.26, 3.0),
+    right_rad=st.floats(-3.0, -0.26),
+    low_m=st.floats(-5.0, 0.0),
+    high_m=st.floats(0.0, 20.0),
+)
+
+
+@given(extents, st.sampled_from(["behind", "above", "side"]), st.floats(0.4, 3.0))
+def test_from_every_viewpoint_all_of_the_data_is_in_sight_and_fills_the_view(
+    extent: Extent, viewpoint: Viewpoint, aspect: float
+) -> None:
+    stand, angle_rad = fitted_stand(extent, viewpoint, 0.75, aspect), 0.75
+    ahead = (stand.look_at_m - stand.position_m) / np.linalg.norm(stand.look_at_m - stand.position_m)
+    right = np.cross(ahead, stand.up) / np.linalg.norm(np.cross(ahead, stand.up))
+    seen = (extent.corners() - stand.position_m) @ np.stack([right, np.cross(right, ahead), ahead]).T
+    assert seen[:, 2].min() > 0, "nothing is behind the viewer"
+    tangent = np.tan(angle_rad / 2.0)
+    shares = np.abs(seen[:, :2] / seen[:, 2:]) / [tangent * aspect, tangent]
+    assert shares.max() == pytest.approx(0.9, abs=1e-6)
