@@ -10,6 +10,7 @@ import { toggleLayer } from "./layers.js";
 import { showTab } from "./layout.js";
 import { goLive } from "./live.js";
 import { nextWorst } from "./pairs.js";
+import { togglePalette } from "./palette.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
 import { tell } from "./socket.js";
@@ -47,14 +48,14 @@ const lookFrom = (viewpoint) => () => tell({ type: "viewpoint", viewpoint });
 const press = (id) => () => document.getElementById(id)?.click();
 const zoom = (/** @type {number} */ factor) => (state.looking ? zoomEye(factor) : zoomBy(factor));
 
-const FRAMES = { help: "step one frame", when: withFrames };
-const TENS = { help: "step ten frames", when: withFrames };
-const ENDS = { help: "first or last frame", when: withFrames };
-const PLACES = { help: "next or previous placement", when: withPlacements };
-const FINE = { group: "Mark", help: "move the mark by 0.1 px", also: "nudge shift subpixel fine", when: withMark };
-const COARSE = { group: "Mark", help: "move the mark by 1 px", also: "nudge shift", when: withMark };
-const ZOOM = { group: "Picture", help: "zoom", when: opened };
-const OVERLAY = { group: "Picture", help: "toggle overlays", when: withPictures };
+const FRAMES = { help: "Step one frame", when: withFrames };
+const TENS = { help: "Step ten frames", when: withFrames };
+const ENDS = { help: "First or last frame", when: withFrames };
+const PLACES = { help: "Next or previous placement", when: withPlacements };
+const FINE = { group: "Mark", help: "Move the mark by 0.1 px", also: "nudge shift subpixel fine", when: withMark };
+const COARSE = { group: "Mark", help: "Move the mark by 1 px", also: "nudge shift", when: withMark };
+const ZOOM = { group: "Picture", help: "Zoom", when: opened };
+const OVERLAY = { group: "Picture", help: "Toggle overlays", when: withPictures };
 const SPACE = { group: "3D view", when: opened };
 
 /** In the order of the help. @type {Action[]} */
@@ -107,6 +108,7 @@ export const ACTIONS = [
   { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: openExport, when: withPictures },
   { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withPictures },
 
+  { id: "palette", group: "Help", words: "Search for an action, placement, pair or option", keys: ["Ctrl+K"], also: "command palette find go to", run: togglePalette },
   { id: "help", group: "Help", words: "Keys, mouse and marks", keys: ["?"], also: "help shortcuts legend manual", run: () => toggleHelp() },
 ];
 
@@ -128,7 +130,7 @@ export function act(action) {
 }
 
 /** @type {Record<string, string>} */
-const NAMES = { ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", Delete: "Del", Escape: "Esc", "-": "−" };
+const NAMES = { ...(/Mac|iP/.test(navigator.platform) ? { Ctrl: "⌘" } : {}), ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", Delete: "Del", Escape: "Esc", "-": "−" };
 
 /** The names of the keys that are pressed together. @param {string} keys such as "Ctrl+Shift+Z" */
 export const keyNames = (keys) => keys.split(/(?<=.)\+(?=.)/).map((key) => NAMES[key] ?? key);
