@@ -3,12 +3,14 @@
 
 import { fitEye, zoomEye } from "./birdseye.js";
 import { nudgeBy, placeByKey, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
-import { loadClicks, openExport } from "./exporting.js";
+import { openExport } from "./exporting.js";
 import { toggleHelp } from "./help.js";
+import { loadClicks } from "./importing.js";
 import { placement } from "./keys.js";
 import { toggleLayer } from "./layers.js";
 import { showTab } from "./layout.js";
 import { goLive } from "./live.js";
+import { magnify, stretchContrast } from "./loupe.js";
 import { nextWorst } from "./pairs.js";
 import { togglePalette } from "./palette.js";
 import { fit, zoomBy } from "./picture.js";
@@ -94,6 +96,9 @@ export const ACTIONS = [
   { id: "show-clicks", words: "Show or hide the clicks of other frames", keys: ["2"], also: "overlay layer marks all", run: () => toggleLayer("others"), ...OVERLAY },
   { id: "show-ellipses", words: "Show or hide the 95 % ellipses", keys: ["3"], also: "overlay layer uncertainty covariance", run: () => toggleLayer("ellipses"), ...OVERLAY },
   { id: "show-predictions", words: "Show or hide the expected positions", keys: ["4"], also: "overlay layer predicted guess next placement", run: () => toggleLayer("predictions"), ...OVERLAY },
+  { id: "loupe-more", group: "Picture", words: "Loupe: magnify more", keys: ["]"], help: "Loupe: 4 to 16 times", also: "zoom magnifier larger", run: () => magnify(1), when: withPictures },
+  { id: "loupe-less", group: "Picture", words: "Loupe: magnify less", keys: ["["], help: "Loupe: 4 to 16 times", also: "zoom magnifier smaller", run: () => magnify(-1), when: withPictures },
+  { id: "loupe-contrast", group: "Picture", words: "Loupe: stretch the contrast, or not", keys: ["L"], also: "magnifier brightness enhance dark", run: stretchContrast, when: withPictures },
 
   { id: "view-behind", words: "3D: look from behind the radar", also: "viewpoint", run: lookFrom("behind"), ...SPACE },
   { id: "view-above", words: "3D: look down from above", also: "viewpoint top bird", run: lookFrom("above"), ...SPACE },

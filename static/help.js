@@ -13,6 +13,7 @@ const MOUSE = [
   ["drag", "Pan the picture"],
   ["click", "Place the mark for this frame"],
   ["drag a mark", "Move it"],
+  ["Alt wheel", "Loupe: 4 to 16 times"],
   ["wheel", "On the timeline: zoom; with Shift: pan"],
   ["double click", "On the timeline: show all of it"],
 ];

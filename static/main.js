@@ -3,8 +3,10 @@
 
 import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
+import { ask, content } from "./asking.js";
 import { startClicking } from "./clicking.js";
-import { setFormats, startExporting } from "./exporting.js";
+import { startDescribing } from "./describing.js";
+import { startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
 import { listen } from "./keys.js";
@@ -20,6 +22,7 @@ import { startPairs } from "./pairs.js";
 import { startPalette } from "./palette.js";
 import { startPicture } from "./picture.js";
 import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./player.js";
+import { startRoving } from "./roving.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace } from "./space.js";
@@ -98,7 +101,6 @@ function takeRecording(message) {
   document.title = `${message.name} · cocalib`;
   emit("opening");
   emit("recording");
-  loadFormats();
   if (message.session.note) toast(message.session.note);
   if (same) requestAgain();
   else goTo(firstFrame());
@@ -110,15 +112,11 @@ function firstFrame() {
   return Number.isInteger(kept) && kept < state.seconds.length ? kept : 0;
 }
 
-async function loadFormats() {
-  const answer = await fetch("api/formats.json");
-  if (answer.ok) setFormats(await answer.json());
-}
-
 async function loadActivity() {
-  const answer = await fetch("api/activity.json");
-  if (!answer.ok) return;
-  Object.assign(activity, await answer.json());
+  const { answer } = await ask("api/activity.json");
+  const found = answer && (await content(answer.json()));
+  if (!found) return;
+  Object.assign(activity, found);
   emit("cursor");
 }
 
@@ -138,6 +136,8 @@ startOptions();
 startExporting();
 startGuide();
 startPalette();
+startRoving();
+startDescribing();
 startArriving();
 startLooking();
 listen(window);

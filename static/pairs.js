@@ -169,11 +169,14 @@ const word = (click) => (click.state === "unpaired" ? "no return" : click.state 
 function explain(click) {
   const lines = [`${click.id}: click at ${click.u_px.toFixed(1)}, ${click.v_px.toFixed(1)} px`];
   if (click.projected_px) lines.push(`reprojected at ${click.projected_px.map((value) => value.toFixed(1)).join(", ")} px`);
-  if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${click.azimuth_deg?.toFixed(1)}° left, ${click.elevation_deg?.toFixed(1)}° up`);
+  if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${turned(click.azimuth_deg, "left", "right")}, ${turned(click.elevation_deg, "up", "down")}`);
   if (rangeApart(click)) lines.push(`${rangeApart(click)}: wrong target, or the reflector was being moved. Check the frame, or exclude the pair.`);
   if (click.note) lines.push(click.note);
   return lines.join("\n");
 }
+
+/** An angle in words. @param {number|null} degrees @param {string} positive @param {string} negative */
+const turned = (degrees, positive, negative) => (degrees === null ? "–" : `${Math.abs(degrees).toFixed(1)}° ${degrees < 0 ? negative : positive}`);
 
 /** The shape shows the state, in addition to the colour. @param {string} clickState @param {string} colour */
 function glyph(clickState, colour) {
