@@ -35,7 +35,7 @@ function typing(event) {
   if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
   const presses = event.key === " " || event.key === "Enter";
   if (target.matches("button, a, summary, label, input") && presses) return !target.matches("#play");
-  if (target.matches("tr") && ["Enter", "Home", "End"].includes(event.key)) return true;
+  if (target.dataset.roves?.split(" ").includes(event.key)) return !event.altKey;
   return target.closest("[role=tablist], .divider") !== null && event.key.startsWith("Arrow");
 }
 

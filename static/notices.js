@@ -7,6 +7,7 @@ import { clickIn, on, state } from "./state.js";
 const toasts = /** @type {HTMLElement} */ (document.getElementById("toasts"));
 const banner = /** @type {HTMLElement} */ (document.getElementById("banner"));
 const tip = /** @type {HTMLElement} */ (document.getElementById("tip"));
+const main = /** @type {HTMLElement} */ (document.getElementById("work"));
 const TOAST_MS = 9000;
 const TIP_MS = 280;
 /** Room between an explanation and what it explains, and around a mark [CSS px]. */
@@ -85,9 +86,15 @@ export function startTips() {
   document.addEventListener("focusout", hideTip);
   document.addEventListener("pointerdown", hideTip);
   document.addEventListener("keydown", hideTip, { capture: true });
-  document.addEventListener("close", () => document.body.append(tip, toasts), { capture: true }); // of a dialog that they were in
+  document.addEventListener("close", bringBack, { capture: true });
   addEventListener("resize", placeToasts);
   on(["shown", "view", "box"], placeToasts);
+}
+
+/** Bring the notices back from a dialog that was closed. */
+function bringBack() {
+  if (tip.closest("dialog")) main.append(tip);
+  if (toasts.closest("dialog")) document.body.append(toasts);
 }
 
 /** @param {EventTarget|null} target @param {number} x CSS px where it is pointed at */
@@ -105,7 +112,7 @@ function offer(target, x) {
 function explain(owner, x) {
   if (!owner.isConnected) return;
   hideTip();
-  (owner.closest("dialog") ?? document.body).append(tip);
+  (owner.closest("dialog") ?? main).append(tip);
   tip.textContent = owner.dataset.hint ?? "";
   tip.hidden = false;
   const [box, around] = [tip.getBoundingClientRect(), owner.getBoundingClientRect()];
@@ -120,7 +127,7 @@ function explain(owner, x) {
 /** Show words at a point of a canvas immediately. @param {string} text @param {number} x @param {number} y CSS px of the page; they appear below, or above near the bottom */
 export function showTip(text, x, y) {
   hideTip();
-  document.body.append(tip);
+  main.append(tip);
   tip.textContent = text;
   tip.hidden = false;
   const box = tip.getBoundingClientRect();

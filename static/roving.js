@@ -31,7 +31,7 @@ function rove(group) {
   const draw = () => {
     const all = items();
     const current = all.find((item) => nameOf(item) === last) ?? all.find((item) => item.getAttribute("aria-selected") === "true") ?? all[0];
-    for (const item of all) offer(item, item === current);
+    for (const item of all) offer(item, item === current, group);
     for (const table of box.querySelectorAll("table.pairs")) nameTable(table);
     if (held && current && nameOf(current) === last && document.activeElement === document.body) current.focus({ preventScroll: true });
   };
@@ -50,8 +50,9 @@ function rove(group) {
   draw();
 }
 
-/** @param {HTMLElement} item @param {boolean} isCurrent */
-function offer(item, isCurrent) {
+/** @param {HTMLElement} item @param {boolean} isCurrent @param {Group} group */
+function offer(item, isCurrent, group) {
+  item.dataset.roves = `${group.back} ${group.on} Home End Enter`;
   item.tabIndex = isCurrent ? 0 : -1;
   for (const control of /** @type {NodeListOf<HTMLElement>} */ (item.querySelectorAll(CONTROLS))) control.tabIndex = isCurrent ? 0 : -1;
 }

@@ -25,13 +25,24 @@ def metric_figures(calibration: Calibration) -> tuple[Figure, ...]:
     agreeing = sum(pair.inlier and not pair.excluded for pair in calibration.pairs)
     over = f"over {metrics.n} pairs"
     return (
-        _figure("aed", "average distance (AED)", metrics.aed_px, f"Mean distance between click and reprojection {over} (paper: AED)."),
+        _figure(
+            "aed",
+            "average distance (AED)",
+            metrics.aed_px,
+            f"Mean distance between click and reprojection {over} (paper: AED).",
+        ),
         _held_out_figure(calibration),
         _figure(
-            "cdsd", "spread (CDSD)", metrics.cdsd_px, "Standard deviation of these distances, with divisor N - 1 (paper: CDSD)."
+            "cdsd",
+            "spread (CDSD)",
+            metrics.cdsd_px,
+            "Standard deviation of these distances, with divisor N - 1 (paper: CDSD).",
         ),
         _figure(
-            "rms", "root mean square (RMS)", metrics.rms_px, "Root mean square of these distances: large ones count more than in AED."
+            "rms",
+            "root mean square (RMS)",
+            metrics.rms_px,
+            "Root mean square of these distances: large ones count more than in AED.",
         ),
         Figure(
             "inliers",
