@@ -101,10 +101,7 @@ function bringBack() {
 function offer(target, x) {
   const owner = target instanceof Element ? target.closest("[data-hint]") : null;
   clearTimeout(tipTimer);
-  if (!(owner instanceof HTMLElement) || !owner.dataset.hint) {
-    if (!(target instanceof HTMLCanvasElement)) hideTip();
-    return;
-  }
+  if (!(owner instanceof HTMLElement) || !owner.dataset.hint) return hideTip();
   tipTimer = window.setTimeout(() => explain(owner, x), TIP_MS);
 }
 

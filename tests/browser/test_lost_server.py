@@ -37,6 +37,7 @@ def test_the_export_says_that_the_server_is_gone_and_tries_again(page: Driver, t
     with user.expect_download() as saving:
         save.click()
     assert saving.value.suggested_filename == "sample_calibration.json"
+    page.drawn()
     page.forget_lost_connections()
     page.complaints[:] = [text for text in page.complaints if "ERR_CONNECTION_RESET" not in text]
 
@@ -66,8 +67,11 @@ def test_a_page_whose_formats_did_not_come_asks_for_them_again(
     page.until("__cocalib.state.shown")
     user.keyboard.press("e")
     expect(user.locator(f"{DIALOG} .formats [role=option]")).to_have_count(1)
+    expect(user.locator(f"{DIALOG} .reason")).not_to_contain_text("Asking")
     user.unroute_all()
     user.keyboard.press("Escape")
+    expect(user.locator(DIALOG)).to_be_hidden()
     user.keyboard.press("e")
     page.until(f"document.querySelectorAll('{DIALOG} .formats [role=option]').length > 10")
+    page.drawn()
     page.forget_lost_connections()
