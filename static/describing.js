@@ -1,7 +1,7 @@
 // @ts-check
 /** The page in words, for those who do not see it: the picture with its marks, and where the dividers are. */
 
-import { on, clickIn, isClicked, placementAt, state } from "./state.js";
+import { on, clicksIn, isClicked, placementAt, state } from "./state.js";
 
 const words = /** @type {HTMLElement} */ (document.getElementById("picture-words"));
 /** The picture is described once nothing has changed for this long [ms], so that a screen reader can finish. */
@@ -11,7 +11,7 @@ const STATES = { inlier: "agrees with the others", outlier: "does not agree with
 let timer = 0;
 
 export function startDescribing() {
-  on(["shown", "view", "overlay", "look", "placements", "playing", "cursor"], () => {
+  on(["shown", "view", "overlay", "look", "selected", "placements", "playing", "cursor"], () => {
     clearTimeout(timer);
     if (!state.playing) timer = window.setTimeout(draw, REST_MS);
   });
@@ -54,13 +54,18 @@ function placementWords(index) {
 
 /** @param {number} index @returns {string[]} */
 function markWords(index) {
-  const click = clickIn(index);
-  if (click) {
-    const residual = click.residual_px === null ? "" : `, ${click.residual_px.toFixed(1)} px from where the radar expects it`;
-    return [`Mark ${click.id} at column ${click.u_px.toFixed(1)}, row ${click.v_px.toFixed(1)}: ${STATES[click.state] ?? click.state}${residual}`, click.note];
-  }
+  const here = clicksIn(index);
+  if (here.length) return here.flatMap((click) => [oneMark(click), click.note]);
   const guess = state.overlay?.index === index ? state.overlay.guesses[0] : undefined;
   return [guess ? `No mark in this frame; the reflector is expected at column ${guess[0].toFixed(0)}, row ${guess[1].toFixed(0)}` : "No mark in this frame"];
+}
+
+/** @param {import("./messages.js").ClickRow} click */
+function oneMark(click) {
+  const residual = click.residual_px === null ? "" : `, ${click.residual_px.toFixed(1)} px from where the radar expects it`;
+  const guessed = click.mark === "untouched" ? "a guess that does not count" : (STATES[click.state] ?? click.state);
+  const selected = click.id !== "" && click.id === state.selected ? ", selected" : "";
+  return `Mark ${click.id} at column ${click.u_px.toFixed(1)}, row ${click.v_px.toFixed(1)}${selected}: ${guessed}${residual}`;
 }
 
 /** @param {number} count @param {string} one @param {string} many */

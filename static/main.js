@@ -4,7 +4,9 @@
 import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
 import { ask, content } from "./asking.js";
+import { startCandidates, take as takeCandidates } from "./candidates.js";
 import { startClicking } from "./clicking.js";
+import { startCross } from "./cross.js";
 import { startDescribing } from "./describing.js";
 import { startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
@@ -26,7 +28,7 @@ import { startRoving } from "./roving.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace } from "./space.js";
-import { clickIn, clicks, emit, on, select, selectedClick, state } from "./state.js";
+import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
 import { startTimeline } from "./timeline.js";
@@ -71,6 +73,9 @@ const readers = {
   radar_map(message) {
     state.radarMap = message;
     emit("radar_map");
+  },
+  candidates(message) {
+    takeCandidates(message);
   },
   progress(message) {
     state.progress = message;
@@ -128,6 +133,8 @@ startLayers();
 startLoupe();
 startLive();
 startClicking();
+startCandidates();
+startCross();
 startTimeline();
 startPairs();
 startFigures();
@@ -158,5 +165,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, goTo, unconfirmed, follower },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower },
 });

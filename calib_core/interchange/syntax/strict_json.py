@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import re
+import threading
 import types
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
@@ -56,6 +57,7 @@ def checked(content: Mapping[str, Any], document: type[Document], *, source: str
     """
     for where, fault in _faults(content, document, place):
         raise InputError(f"{source}: {where or 'the file'}: {fault}")
+    _prepare(document)
     try:
         return msgspec.convert(content, document)
     except UnicodeEncodeError as error:
@@ -63,6 +65,18 @@ def checked(content: Mapping[str, Any], document: type[Document], *, source: str
         raise InputError(f"{source}: {place or 'the file'}: contains half a character ({half}); remove it") from None
     except (msgspec.ValidationError, OverflowError) as error:
         raise InputError(f"{source}: {_from_msgspec(str(error), place)}") from None
+
+
+_prepared: set[type] = set()
+_preparing = threading.Lock()
+
+
+def _prepare(document: type) -> None:
+    """Let msgspec learn a document type, one thread at a time: two that do so at once can crash the process (0.22.0)."""
+    with _preparing:
+        if document not in _prepared:
+            msgspec.json.Decoder(document)
+            _prepared.add(document)
 
 
 def json_object(text: str, *, source: str) -> dict[str, Any]:
