@@ -35,7 +35,7 @@ function pressed(event) {
 function typing(event) {
   const target = event.target;
   if (!(target instanceof HTMLElement)) return false;
-  if (target.closest("dialog")) return event.key !== "?" || !target.closest("#help-dialog");
+  if (target.closest("dialog[open]")) return event.key !== "?" || !target.closest("#help-dialog");
   if (ANYWHERE.includes(combination(event))) return false;
   if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
   const presses = event.key === " " || event.key === "Enter";
