@@ -7,13 +7,16 @@ import { nudgeBy, removeSelected, toggleExcluded, turnBack } from "./clicking.js
 import { toggleContours } from "./contours.js";
 import { enterCross, toggleCross } from "./cross.js";
 import { dismissHere, withoutPlacement } from "./dismissing.js";
-import { loadClicks, openExport } from "./exporting.js";
+import { openExport } from "./exporting.js";
 import { toggleHelp } from "./help.js";
+import { loadClicks } from "./importing.js";
 import { placement } from "./keys.js";
 import { toggleLayer } from "./layers.js";
 import { showTab } from "./layout.js";
 import { goLive } from "./live.js";
+import { magnify, stretchContrast } from "./loupe.js";
 import { nextWorst } from "./pairs.js";
+import { togglePalette } from "./palette.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
 import { enlargeReview } from "./review.js";
@@ -51,14 +54,14 @@ const nudge = (du, dv) => () => nudgeBy(du, dv);
 const press = (id) => () => document.getElementById(id)?.click();
 const zoom = (/** @type {number} */ factor) => (state.looking ? zoomEye(factor) : zoomBy(factor));
 
-const FRAMES = { help: "step one frame", when: withFrames };
-const TENS = { help: "step ten frames", when: withFrames };
-const ENDS = { help: "first or last frame", when: withFrames };
-const PLACES = { help: "next or previous placement", when: withPlacements };
-const FINE = { group: "Mark", help: "move the mark by 0.1 px", also: "nudge shift subpixel fine", when: withMark };
-const COARSE = { group: "Mark", help: "move the mark by 1 px", also: "nudge shift", when: withMark };
-const ZOOM = { group: "Picture", help: "zoom", when: opened };
-const OVERLAY = { group: "Picture", help: "toggle overlays", when: withPictures };
+const FRAMES = { help: "Step one frame", when: withFrames };
+const TENS = { help: "Step ten frames", when: withFrames };
+const ENDS = { help: "First or last frame", when: withFrames };
+const PLACES = { help: "Next or previous placement", when: withPlacements };
+const FINE = { group: "Mark", help: "Move the mark by 0.1 px", also: "nudge shift subpixel fine", when: withMark };
+const COARSE = { group: "Mark", help: "Move the mark by 1 px", also: "nudge shift", when: withMark };
+const ZOOM = { group: "Picture", help: "Zoom", when: opened };
+const OVERLAY = { group: "Picture", help: "Toggle overlays", when: withPictures };
 const SPACE = { group: "3D view", when: opened };
 
 /** In the order of the help. @type {Action[]} */
@@ -102,6 +105,9 @@ export const ACTIONS = [
   { id: "show-ellipses", words: "Show or hide the 95 % ellipses", keys: ["3"], also: "overlay layer uncertainty covariance", run: () => toggleLayer("ellipses"), ...OVERLAY },
   { id: "show-predictions", words: "Show or hide the expected positions", keys: ["4"], also: "overlay layer predicted guess next placement", run: () => toggleLayer("predictions"), ...OVERLAY },
   { id: "show-uncertainty", words: "Show or hide the uncertainty in the picture", keys: ["5"], also: "overlay layer contours map 95 % lines", run: toggleContours, ...OVERLAY },
+  { id: "loupe-more", group: "Picture", words: "Loupe: magnify more", keys: ["]"], help: "Loupe: 4 to 16 times", also: "zoom magnifier larger", run: () => magnify(1), when: withPictures },
+  { id: "loupe-less", group: "Picture", words: "Loupe: magnify less", keys: ["["], help: "Loupe: 4 to 16 times", also: "zoom magnifier smaller", run: () => magnify(-1), when: withPictures },
+  { id: "loupe-contrast", group: "Picture", words: "Loupe: stretch the contrast, or not", keys: ["L"], also: "magnifier brightness enhance dark", run: stretchContrast, when: withPictures },
 
   { id: "view-behind", words: "3D: look from behind the radar", also: "viewpoint", run: () => lookFrom("behind"), ...SPACE },
   { id: "view-above", words: "3D: look down from above", also: "viewpoint top bird", run: () => lookFrom("above"), ...SPACE },
@@ -120,6 +126,7 @@ export const ACTIONS = [
   { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: openExport, when: withPictures },
   { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withPictures },
 
+  { id: "palette", group: "Help", words: "Search for an action, placement, pair or option", keys: ["Ctrl+K"], also: "command palette find go to", run: togglePalette },
   { id: "help", group: "Help", words: "Keys, mouse and marks", keys: ["?"], also: "help shortcuts legend manual", run: () => toggleHelp() },
 ];
 
@@ -141,7 +148,7 @@ export function act(action) {
 }
 
 /** @type {Record<string, string>} */
-const NAMES = { ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", Delete: "Del", Escape: "Esc", "-": "−" };
+const NAMES = { ...(/Mac|iP/.test(navigator.platform) ? { Ctrl: "⌘" } : {}), ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", Delete: "Del", Escape: "Esc", "-": "−" };
 
 /** The names of the keys that are pressed together. @param {string} keys such as "Ctrl+Shift+Z" */
 export const keyNames = (keys) => keys.split(/(?<=.)\+(?=.)/).map((key) => NAMES[key] ?? key);

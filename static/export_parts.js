@@ -22,10 +22,16 @@ export function numbers(preview) {
   const table = make("table", "pose-numbers", [
     make("caption", "", "camera_from_radar"),
     row("translation_m", [x, y, z, ""]),
-    row("quaternion_xyzw", preview.quaternion_xyzw.map((/** @type {number} */ value) => value.toFixed(4))),
+    row(...quaternion(preview)),
   ]);
   table.dataset.hint = "Rounded here; the file has full precision.";
   return table;
+}
+
+/** The quaternion in the order of the file: x y z w where the file says so, else as in our own. @param {Record<string, any>} preview @returns {[string, string[]]} */
+function quaternion(preview) {
+  const xyzw = preview.quaternion_xyzw.map((/** @type {number} */ value) => value.toFixed(4));
+  return /x,? y,? z,? w/.test(preview.numbers) ? ["quaternion_xyzw", xyzw] : ["quaternion_wxyz", [xyzw[3], ...xyzw.slice(0, 3)]];
 }
 
 /** The warnings of the calibration. @param {import("./messages.js").WarningRow[]} rows */

@@ -1,10 +1,11 @@
 // @ts-check
 /** The export panel: a preview of every format, the direction of its transform, and the clicks. */
 
+import { ask, BROKE_OFF, content } from "./asking.js";
 import { warningBox, lines, numbers, rectifiedBox } from "./export_parts.js";
 import { frameDrawing } from "./frames.js";
-import { icon, make, toast } from "./notices.js";
-import { send } from "./socket.js";
+import { importer } from "./importing.js";
+import { icon, make } from "./notices.js";
 import { on, state } from "./state.js";
 
 /** @typedef {{key: string, label: string, takes_parent: boolean, takes_rectified: boolean}} Format */
@@ -14,6 +15,7 @@ const CLICKS = "clicks";
 const PARENT = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 const IDENTITY = ["0", "0", "0", "0", "0", "0", "1"];
 const TYPING_MS = 250;
+const ASKING = "Asking the server for the file…";
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("export-dialog"));
 const button = /** @type {HTMLButtonElement} */ (document.getElementById("export"));
 /** @type {Format[]} */
@@ -33,7 +35,8 @@ const side = make("aside", "", []);
 const fileName = make("input", "", []);
 const copy = make("button", "second", "Copy");
 const save = make("button", "first", "Download");
-const clicksFile = make("input", "", []);
+const separator = make("hr", "", []);
+const retry = make("button", "second", "Try again");
 
 export function startExporting() {
   try {
@@ -46,22 +49,31 @@ export function startExporting() {
   dialog.addEventListener("click", (event) => {
     if (event.target === dialog) dialog.close();
   });
+  retry.onclick = load;
   on(["view"], () => {
     button.classList.toggle("ready", state.view?.has_calibration ?? false);
     if (dialog.open) load();
   });
+  on(["recording"], loadFormats);
+  on(["connection"], () => {
+    if (dialog.open) load(); // the server is back, or gone
+  });
 }
 
-/** The formats that the server can write. @param {Format[]} given */
-export function setFormats(given) {
+/** Ask for the formats that the server can write. */
+async function loadFormats() {
+  const { answer } = await ask("api/formats.json");
+  const given = answer && (await content(answer.json()));
+  if (!given) return;
   formats = given;
-  if (!given.some((format) => format.key === kept.format) && kept.format !== CLICKS) kept.format = "json";
+  if (!formats.some((format) => format.key === kept.format) && kept.format !== CLICKS) kept.format = "json";
   drawList();
 }
 
 export function openExport() {
   if (dialog.open || !state.recording) return;
   drawList();
+  drawReason(ASKING);
   dialog.showModal();
   /** @type {HTMLElement|null} */ (list.querySelector('[aria-selected="true"]'))?.focus();
   list.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" });
@@ -74,6 +86,7 @@ function build() {
   close.onclick = () => dialog.close();
   const title = make("h2", "", "Export");
   title.id = "export-title";
+  separator.setAttribute("role", "presentation");
   list.setAttribute("role", "listbox");
   list.setAttribute("aria-label", "Format");
   list.addEventListener("keydown", walk);
@@ -88,14 +101,14 @@ function build() {
   copy.onclick = copyText;
   save.onclick = download;
   parent.append(...parentFields());
-  const foot = make("footer", "", [importer(), make("span", "gap", ""), make("label", "name", ["File name", fileName]), copy, save]);
-  dialog.append(make("header", "", [title, close]), list, make("section", "", [head, rectified.row, parent, text, notes]), side, foot);
+  const foot = make("div", "foot", [importer(), make("span", "gap", ""), make("label", "name", ["File name", fileName]), copy, save]);
+  dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, rectified.row, parent, text, notes]), side, foot);
 }
 
 function drawList() {
   list.replaceChildren(
     ...formats.map((format) => option(format.key, format.label)),
-    make("hr", "", []),
+    separator,
     option(CLICKS, "Clicks, to continue elsewhere"),
   );
 }
@@ -103,6 +116,7 @@ function drawList() {
 /** @param {string} key @param {string} label */
 function option(key, label) {
   const item = make("button", "", [make("span", "", label), make("code", "", key)]);
+  item.type = "button";
   item.setAttribute("role", "option");
   item.dataset.export = key;
   const chosen = key === kept.format;
@@ -152,11 +166,13 @@ function trap(event) {
 /** Ask the server for the text of the chosen format; only the newest answer is drawn. */
 async function load() {
   const mine = ++asked;
+  if (!formats.length) await loadFormats();
   const key = kept.format;
-  const answer = await fetch(key === CLICKS ? "api/clicks.json" : address("preview"));
-  const said = answer.ok && key !== CLICKS ? await answer.json() : await answer.text();
+  const { answer, reason, isLost } = await ask(key === CLICKS ? "api/clicks.json" : address("preview"));
+  const said = answer && (await content(key === CLICKS ? answer.text() : answer.json()));
   if (mine !== asked) return;
-  if (!answer.ok || said.reason) drawReason(said.reason ?? said);
+  if (said === null) drawReason(reason || BROKE_OFF, isLost || !reason);
+  else if (said.reason) drawReason(said.reason);
   else if (key === CLICKS) drawClicks(said);
   else drawPreview(said);
 }
@@ -200,13 +216,13 @@ function drawClicks(content) {
   side.replaceChildren();
 }
 
-/** Show why there is nothing to save yet. @param {string} reason */
-function drawReason(reason) {
+/** Show why there is nothing to save yet. @param {string} reason @param {boolean} [canRetry] */
+function drawReason(reason, canRetry = false) {
   head.replaceChildren();
   const inParent = takesParent() && reason.includes("parent");
   parent.hidden = !inParent;
   rectified.row.hidden = !(takesRectified() && reason.includes("rectified"));
-  text.replaceChildren(make("div", "reason", [icon("warning"), make("span", "", reason.trim())]));
+  text.replaceChildren(make("div", "reason", [...(reason === ASKING ? [] : [icon("warning")]), make("span", "", reason.trim()), ...(canRetry ? [retry] : [])]));
   notes.replaceChildren();
   side.replaceChildren();
   fileName.value = "";
@@ -258,35 +274,14 @@ async function copyText() {
 /** Download the file under the name in the field; if the server refuses, show why. */
 async function download() {
   if (save.disabled) return;
-  const answer = await fetch(kept.format === CLICKS ? "api/clicks.json" : address("export"));
-  if (!answer.ok) return drawReason(await answer.text());
-  const url = URL.createObjectURL(await answer.blob());
+  const { answer, reason, isLost } = await ask(kept.format === CLICKS ? "api/clicks.json" : address("export"));
+  const file = answer && (await content(answer.blob()));
+  if (!file) return drawReason(reason || BROKE_OFF, isLost || !reason);
+  const url = URL.createObjectURL(file);
   const anchor = make("a", "", []);
   [anchor.href, anchor.download] = [url, fileName.value.trim() || String(fileName.dataset.suggested)];
   anchor.click();
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
-}
-
-function importer() {
-  clicksFile.type = "file";
-  clicksFile.accept = ".json,application/json";
-  clicksFile.onchange = async () => {
-    const file = clicksFile.files?.[0];
-    if (!file) return;
-    dialog.close();
-    const refusal = await send({ type: "import_clicks", text: await file.text(), name: file.name });
-    if (refusal) toast(refusal);
-    clicksFile.value = "";
-  };
-  const open = make("button", "second", "Load clicks…");
-  open.dataset.hint = "Add the clicks from a clicks.json. In frames that already have a click, they replace it.";
-  open.onclick = loadClicks;
-  return make("span", "", [open, clicksFile]);
-}
-
-/** Ask for a file of clicks, and add them. */
-export function loadClicks() {
-  clicksFile.click();
 }
 
 /** @param {Partial<typeof kept>} change */

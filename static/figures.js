@@ -10,10 +10,10 @@ const figures = /** @type {HTMLElement} */ (document.getElementById("figures"));
 const posePage = /** @type {HTMLElement} */ (document.getElementById("page-pose"));
 /** Placeholders before the first calibration, so that the layout does not jump. @type {[string, string][]} */
 const EMPTY = [
-  ["aed", "mean residual"],
-  ["held_out_aed", "held-out mean"],
-  ["cdsd", "spread"],
-  ["rms", "RMS residual"],
+  ["aed", "average distance (AED)"],
+  ["held_out_aed", "new placement (held-out AED)"],
+  ["cdsd", "spread (CDSD)"],
+  ["rms", "root mean square (RMS)"],
   ["inliers", "pairs that agree"],
 ];
 export const poseTable = make("table", "", []);
@@ -102,11 +102,17 @@ function hinted(element, hint) {
 /** @param {Omit<Figure, "level"> & {level: string}} figure */
 function cell(figure) {
   const value = make("dd", "", [figure.value, make("span", "unit", figure.unit)]);
-  const box = make("dl", `figure ${figure.level}`, [make("dt", "", figure.label), value]);
+  const box = make("dl", `figure ${figure.level}`, [make("dt", "", inTwoLines(figure.label)), value]);
   box.style.margin = "0";
   box.dataset.key = figure.key;
   box.dataset.hint = figure.hint;
   return box;
+}
+
+/** The paper's abbreviation goes below the name. @param {string} label @returns {(string|Node)[]} */
+function inTwoLines(label) {
+  const [name, abbreviation] = label.split(/ (?=\()/);
+  return abbreviation ? [`${name} `, make("span", "abbreviation", abbreviation)] : [name];
 }
 
 /** @param {Figure} figure */

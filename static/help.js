@@ -6,12 +6,16 @@ import { ACTIONS, keyNames } from "./actions.js";
 import { make } from "./notices.js";
 
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("help-dialog"));
+const ARROWS = ["←", "→", "↑", "↓"];
 /** @type {[string, string][]} */
 const MOUSE = [
-  ["wheel", "zoom at the cursor"],
-  ["drag", "pan the picture"],
-  ["click", "place the mark for this frame"],
-  ["drag a mark", "move it"],
+  ["wheel", "Zoom at the cursor"],
+  ["drag", "Pan the picture"],
+  ["click", "Place the mark for this frame"],
+  ["drag a mark", "Move it"],
+  ["Alt wheel", "Loupe: 4 to 16 times"],
+  ["wheel", "On the timeline: zoom; with Shift: pan"],
+  ["double click", "On the timeline: show all of it"],
 ];
 /** @type {[string, string][]} */
 const MARKS = [
@@ -66,7 +70,13 @@ function lines() {
     if (last?.group === group && last.does === help) last.keys.push(...names.filter((name) => !last.keys.includes(name)));
     else made.push({ group, does: help, keys: names });
   }
-  return made;
+  return made.map((line) => ({ ...line, keys: gathered(line.keys) }));
+}
+
+/** All four arrows in one word. @param {string[]} keys */
+function gathered(keys) {
+  const others = keys.filter((key) => !ARROWS.includes(key));
+  return keys.length - others.length === ARROWS.length ? [...others, "arrows"] : keys;
 }
 
 /** @param {string} name @param {[string[], string][]} rows the keys, and what they do */

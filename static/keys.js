@@ -35,13 +35,13 @@ function pressed(event) {
 function typing(event) {
   const target = event.target;
   if (!(target instanceof HTMLElement)) return false;
-  if (target.closest("dialog")) return event.key !== "?" || !target.closest("#help-dialog");
+  if (target.closest("dialog[open]")) return event.key !== "?" || !target.closest("#help-dialog");
   if (ANYWHERE.includes(combination(event))) return false;
   if (target.matches("input:not([type=checkbox]), select, textarea")) return true;
   const presses = event.key === " " || event.key === "Enter";
   if (target.matches(".plot")) return presses || event.key.startsWith("Arrow") || event.key === "Escape";
   if (target.matches("button, a, summary, label, input") && presses) return !target.matches("#play");
-  if (target.matches("tr") && ["Enter", "Home", "End"].includes(event.key)) return true;
+  if (target.dataset.roves?.split(" ").includes(event.key)) return !event.altKey;
   return target.closest("[role=tablist], .divider") !== null && event.key.startsWith("Arrow");
 }
 

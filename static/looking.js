@@ -35,7 +35,7 @@ function enter() {
   for (const id of NEED_PICTURES) {
     const button = /** @type {HTMLButtonElement} */ (document.getElementById(id));
     button.disabled = true;
-    button.title = why;
+    button.dataset.hint = why;
   }
   const tab = /** @type {HTMLElement} */ (document.getElementById("tab-pairs"));
   tab.textContent = "Placements";

@@ -3,12 +3,14 @@
 
 import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
+import { ask, content } from "./asking.js";
 import { startCandidates, take as takeCandidates } from "./candidates.js";
 import { startClicking } from "./clicking.js";
 import { startCompare, takeCompared } from "./compare.js";
 import { startContours, takeUncertainty } from "./contours.js";
 import { startCross } from "./cross.js";
-import { setFormats, startExporting } from "./exporting.js";
+import { startDescribing } from "./describing.js";
+import { startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
 import { listen } from "./keys.js";
@@ -21,9 +23,11 @@ import { startLoupe } from "./loupe.js";
 import { setBanner, startTips, toast } from "./notices.js";
 import { startOptions } from "./options.js";
 import { startPairs } from "./pairs.js";
+import { startPalette } from "./palette.js";
 import { startPicture } from "./picture.js";
 import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./player.js";
 import { plots, startReview, takePair, takeReview } from "./review.js";
+import { startRoving } from "./roving.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace, takeSpace } from "./space.js";
@@ -113,7 +117,6 @@ function takeRecording(message) {
   document.title = `${message.name} · cocalib`;
   emit("opening");
   emit("recording");
-  loadFormats();
   if (message.session.note) toast(message.session.note);
   if (same) requestAgain();
   else goTo(firstFrame());
@@ -125,15 +128,11 @@ function firstFrame() {
   return Number.isInteger(kept) && kept < state.seconds.length ? kept : 0;
 }
 
-async function loadFormats() {
-  const answer = await fetch("api/formats.json");
-  if (answer.ok) setFormats(await answer.json());
-}
-
 async function loadActivity() {
-  const answer = await fetch("api/activity.json");
-  if (!answer.ok) return;
-  Object.assign(activity, await answer.json());
+  const { answer } = await ask("api/activity.json");
+  const found = answer && (await content(answer.json()));
+  if (!found) return;
+  Object.assign(activity, found);
   emit("cursor");
 }
 
@@ -158,6 +157,9 @@ startContours();
 startOptions();
 startExporting();
 startGuide();
+startPalette();
+startRoving();
+startDescribing();
 startArriving();
 startLooking();
 listen(window);

@@ -1,6 +1,7 @@
 // @ts-check
 /** The options, built from the server's descriptions: the most used first, all others below. */
 
+import { showTab } from "./layout.js";
 import { make, settled, toast } from "./notices.js";
 import { send } from "./socket.js";
 import { on, state } from "./state.js";
@@ -222,13 +223,37 @@ function fill() {
   if (!options) return;
   showFieldsOf(options.method);
   for (const [path, set] of writers) {
-    const value = path.split(".").reduce((tree, name) => tree?.[name], /** @type {any} */ (options));
+    const value = valueAt(options, path);
     set(value);
     const field = state.recording?.option_groups.flatMap((group) => group.options).find((other) => other.path === path);
     const same = JSON.stringify(field?.default ?? null) === JSON.stringify(value ?? null);
     page.querySelector(`[data-path="${path}"]`)?.classList.toggle("changed", !same);
   }
 }
+
+/** Every option with its value, for the palette. A method ignores some. @returns {{path: string, label: string, value: string, reason: string, also: string}[]} */
+export function optionRows() {
+  const options = /** @type {Record<string, any>} */ (state.view?.options ?? {});
+  return (state.recording?.option_groups ?? []).flatMap((group) => group.options).map((field) => {
+    const value = valueAt(options, field.path) ?? "off";
+    const reason = IDLE[options.method]?.(field.path) ? `Not used by the method "${METHODS[options.method] ?? options.method}"` : "";
+    const shown = typeof value === "object" ? "given" : typeof value === "boolean" ? (value ? "yes" : "no") : `${value} ${field.unit}`.trim();
+    return { path: field.path, label: labelOf(field), value: shown, reason, also: `option setting ${field.path.replaceAll(/[._]/g, " ")} ${field.label}` };
+  });
+}
+
+/** Show an option in the panel, ready to be changed. @param {string} path */
+export function openOption(path) {
+  showTab("tab-options");
+  const line = /** @type {HTMLElement|null} */ (page.querySelector(`[data-field="${path}"]`));
+  const folded = line?.closest("details");
+  if (folded) folded.open = true;
+  line?.scrollIntoView({ block: "center" });
+  /** @type {HTMLElement|null|undefined} */ (line?.querySelector("input, select, button"))?.focus();
+}
+
+/** @param {Record<string, any>} options @param {string} path */
+const valueAt = (options, path) => path.split(".").reduce((tree, name) => tree?.[name], /** @type {any} */ (options));
 
 /** Show only the fields that a method uses. @param {string} method */
 function showFieldsOf(method) {

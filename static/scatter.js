@@ -15,6 +15,7 @@ export function startScatter() {
   canvas.id = "scatter";
   canvas.tabIndex = -1;
   canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", "Reprojection minus click");
   canvas.dataset.hint = "Reprojection minus click for every pair. An off-centre cloud indicates a bias. Click a mark to go to its frame.";
   document.querySelector("#page-pose .pose")?.append(canvas);
   canvas.addEventListener("click", pressed);
@@ -31,6 +32,12 @@ function reach() {
 
 /** @param {import("./messages.js").ClickRow} click @returns {number[]} */
 const offset = (click) => (click.projected_px ? [click.projected_px[0] - click.u_px, click.projected_px[1] - click.v_px] : []);
+
+/** The plot in words. @param {import("./messages.js").ClickRow[]} shown */
+function describe(shown) {
+  const mean = [0, 1].map((axis) => shown.reduce((sum, click) => sum + offset(click)[axis], 0) / Math.max(shown.length, 1));
+  return `Reprojection minus click: ${shown.length} pairs, on average ${mean[0].toFixed(1)} px right and ${mean[1].toFixed(1)} px down`;
+}
 
 /** Position of a click in the plot; clicks out of range are drawn on its edge. @param {import("./messages.js").ClickRow} click @param {number} most @returns {[number, number]} */
 function place(click, most) {
@@ -62,7 +69,9 @@ function draw() {
   pen.font = `10px ${themeColour("mono")}`;
   pen.textAlign = "right";
   pen.fillText(`${most} px`, side - 5, half - 4);
-  for (const click of clicks()) if (click.projected_px) mark(click, most);
+  const shown = clicks().filter((click) => click.projected_px);
+  for (const click of shown) mark(click, most);
+  canvas.setAttribute("aria-label", describe(shown));
 }
 
 /** @param {import("./messages.js").ClickRow} click @param {number} most */

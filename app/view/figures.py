@@ -26,20 +26,23 @@ def metric_figures(calibration: Calibration) -> tuple[Figure, ...]:
     over = f"over {metrics.n} pairs"
     return (
         _figure(
-            "aed", "mean residual", metrics.aed_px, f"Mean distance between click and reprojection {over} (paper: AED)."
+            "aed",
+            "average distance (AED)",
+            metrics.aed_px,
+            f"Mean distance between click and reprojection {over} (paper: AED).",
         ),
         _held_out_figure(calibration),
         _figure(
             "cdsd",
-            "spread",
+            "spread (CDSD)",
             metrics.cdsd_px,
             "Standard deviation of these distances, with divisor N - 1 (paper: CDSD).",
         ),
         _figure(
             "rms",
-            "RMS residual",
+            "root mean square (RMS)",
             metrics.rms_px,
-            "Root mean square of these distances: large ones count more than in the mean.",
+            "Root mean square of these distances: large ones count more than in AED.",
         ),
         Figure(
             "inliers",
@@ -59,8 +62,8 @@ def _figure(key: str, label: str, value_px: float, hint: str) -> Figure:
 def _held_out_figure(calibration: Calibration) -> Figure:
     """Return the held-out error, with a warning if it is far above the fitted one."""
     metrics = calibration.metrics
-    hint = "Mean distance when each pair is predicted from all the others (held-out AED): the error to expect at a new placement."
-    figure = _figure("held_out_aed", "held-out mean", metrics.held_out_aed_px, hint)
+    hint = "Mean distance when each pair is predicted from all the others: the error to expect at a new placement."
+    figure = _figure("held_out_aed", "new placement (held-out AED)", metrics.held_out_aed_px, hint)
     if metrics.held_out_aed_px > _HELD_OUT_RATIO * metrics.aed_px:
         warning = "It is well above the mean residual, so the pose depends on single pairs: add placements."
         return replace(figure, hint=f"{hint} {warning}", level="warning")

@@ -108,7 +108,7 @@ class Figure:
 
     Attributes:
         key: for programs, such as "aed"; stable.
-        label: for display, such as "AED".
+        label: for display, such as "average distance (AED)".
         value: formatted, with its standard deviation if that is known: "12.4", "0.31 ± 0.08".
         unit: such as "px"; "" if it has none.
         hint: one sentence that explains the number, shown on hover.

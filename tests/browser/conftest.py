@@ -78,6 +78,17 @@ def server(workspace: Workspace, sample: Recording) -> Iterator[RunningServer]:
 
 
 @pytest.fixture
+def radar_only_server(project_root: Path, tmp_path: Path) -> Iterator[RunningServer]:
+    """Serve a recording without pictures."""
+    with open_recording(project_root / "sample_data" / "rooftop" / "radar.bag", require=("radar",)) as recording:
+        opened = open_workspace(recording, camera=None, session_folder=tmp_path / "s", name="radar.bag")
+        running = start(opened, recording, ServerOptions(port=0, token="test"))
+        yield running
+        running.close()
+        opened.close()
+
+
+@pytest.fixture
 def open_page(chromium: Browser) -> Iterator[Callable[..., Driver]]:
     """Open pages; at the end, check that none logged an error or contacted another machine."""
     drivers: list[Driver] = []

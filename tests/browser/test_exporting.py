@@ -78,7 +78,7 @@ def test_the_drawing_says_which_way_the_numbers_of_the_file_go(solved: Driver) -
         expect(solved.page.locator(f"{DIALOG} .frames g.stated")).to_have_count(stated)
         said = solved.page.locator(f"{DIALOG} .frames text.stated")
         expect(said).to_contain_text({"urdf": "its body frame", "tf2": "the camera"}.get(name, "the same R and t"))
-    assert "quaternion_xyzw" in solved.text(f"{DIALOG} .pose-numbers")
+    assert "quaternion_wxyz" in solved.text(f"{DIALOG} .pose-numbers")
 
 
 def test_a_name_given_by_hand_is_the_name_of_the_file(solved: Driver, tmp_path: Path) -> None:

@@ -1,0 +1,77 @@
+"""With a server that is gone, the page says so, offers nothing that cannot work, and goes on when it is back."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import Route, expect
+
+from tests.browser.driving import Driver
+
+pytestmark = pytest.mark.browser
+DIALOG = "#export-dialog"
+GONE = "The server is not responding. Your clicks are safe"
+
+
+def test_the_export_says_that_the_server_is_gone_and_tries_again(page: Driver, truth: Any) -> None:
+    page.click_sample(truth, 4)
+    user = page.page
+    save = user.locator(f"{DIALOG} .first")
+    user.route(re.compile(r"/api/"), lambda route: route.abort("connectionrefused"))
+    user.keyboard.press("e")
+    expect(user.locator(f"{DIALOG} .text")).to_contain_text(GONE)
+    for control in (save, user.get_by_role("button", name="Copy"), user.get_by_label("File name")):
+        expect(control).to_be_disabled()
+    user.unroute_all()
+    user.get_by_role("button", name="Try again").click()
+    expect(user.locator(f"{DIALOG} .text")).to_contain_text("camera_from_radar")
+    expect(save).to_be_enabled()
+    user.route(re.compile(r"/api/export/"), lambda route: route.abort("connectionreset"))
+    save.click()
+    expect(user.locator(f"{DIALOG} .text")).to_contain_text(GONE)
+    expect(save).to_be_disabled()
+    user.unroute_all()
+    user.get_by_role("button", name="Try again").click()
+    expect(save).to_be_enabled()
+    with user.expect_download() as saving:
+        save.click()
+    assert saving.value.suggested_filename == "sample_calibration.json"
+    page.drawn()
+    page.forget_lost_connections()
+    page.complaints[:] = [text for text in page.complaints if "ERR_CONNECTION_RESET" not in text]
+
+
+def test_an_answer_that_is_an_error_is_shown_in_words(page: Driver, truth: Any) -> None:
+    page.click_sample(truth, 4)
+    user = page.page
+
+    def fail(route: Route) -> None:
+        route.fulfill(status=500, body="")
+
+    user.route(re.compile(r"/api/preview/"), fail)
+    user.keyboard.press("e")
+    expect(user.locator(f"{DIALOG} .text")).to_contain_text("The server answered with error 500")
+    expect(user.get_by_role("button", name="Try again")).to_be_visible()
+    expect(user.locator(f"{DIALOG} .first")).to_be_disabled()
+    page.complaints[:] = [text for text in page.complaints if "status of 500" not in text]
+
+
+def test_a_page_whose_formats_did_not_come_asks_for_them_again(
+    open_page: Callable[..., Driver], server: Any, truth: Any
+) -> None:
+    page = open_page(server.url)
+    user = page.page
+    user.route(re.compile(r"/api/formats"), lambda route: route.abort("connectionrefused"))
+    user.reload()
+    page.until("__cocalib.state.shown")
+    user.keyboard.press("e")
+    expect(user.locator(f"{DIALOG} .formats [role=option]")).to_have_count(1)
+    expect(user.locator(f"{DIALOG} .reason")).not_to_contain_text("Asking")
+    user.unroute_all()
+    user.keyboard.press("Escape")
+    expect(user.locator(DIALOG)).to_be_hidden()
+    user.keyboard.press("e")
+    page.until(f"document.querySelectorAll('{DIALOG} .formats [role=option]').length > 10")
+    page.drawn()
+    page.forget_lost_connections()
