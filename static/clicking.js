@@ -53,12 +53,12 @@ function pressed(event) {
   /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
 }
 
-/** The mark of this frame under the pointer. @param {number} x @param {number} y */
-function markNear(x, y) {
+/** The mark of this frame under the pointer. @param {number} x @param {number} y @param {number} [reach] CSS px */
+export function markNear(x, y, reach = REACH) {
   const click = clickIn(state.shown?.index ?? -1);
   if (!click || state.playing) return null;
   const [cx, cy] = toCss(click.u_px, click.v_px);
-  return Math.hypot(cx - x, cy - y) <= REACH ? click : null;
+  return Math.hypot(cx - x, cy - y) <= reach ? click : null;
 }
 
 /** @param {PointerEvent} event */
@@ -133,7 +133,7 @@ function dragMark(click, u, v) {
 }
 
 /** @param {import("./messages.js").ClickRow} click @param {number} u @param {number} v */
-async function moveTo(click, u, v) {
+export async function moveTo(click, u, v) {
   const [inU, inV] = clamped(u, v);
   const key = stampKey(click.image_time);
   draft(key, inU, inV);

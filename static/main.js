@@ -26,6 +26,7 @@ import { clickIn, clicks, emit, on, select, selectedClick, state } from "./state
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
 import { startTimeline } from "./timeline.js";
+import { startTouch } from "./touch.js";
 import { Follower } from "./view_changes.js";
 
 const follower = new Follower();
@@ -134,6 +135,7 @@ startLayers();
 startLoupe();
 startLive();
 startClicking();
+startTouch();
 startTimeline();
 startPairs();
 startFigures();
