@@ -105,12 +105,11 @@ def click_of(page: Driver) -> Any:
 
 
 def too_small_for_a_finger(page: Driver) -> Any:
-    """Return what can be pressed and is less than 40 px high, invisible margins included."""
+    """Return what can be pressed and is not hit 19 px above or below its middle."""
     return page.value(
         "[...document.querySelectorAll('button, summary, select, input')]"
         ".filter((part) => part.checkVisibility({visibilityProperty: true}))"
-        ".map((part) => { const box = part.getBoundingClientRect(); const more = getComputedStyle(part, '::after');"
-        "const grown = more.content !== 'none' && more.position === 'absolute' ? -2 * parseFloat(more.top) : 0;"
-        "return [part.id || part.className || part.textContent, Math.round(box.width), Math.round(box.height + grown)]; })"
-        ".filter(([, width, height]) => height < 40 || width < 30)"
+        ".filter((part) => { const box = part.getBoundingClientRect(); const x = (box.left + box.right) / 2;"
+        "return [-19, 19].some((dy) => !part.contains(document.elementFromPoint(x, (box.top + box.bottom) / 2 + dy))); })"
+        ".map((part) => `${part.id} ${part.className} ${part.textContent}`)"
     )
