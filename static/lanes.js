@@ -8,8 +8,10 @@ import { clicks, isClicked, state } from "./state.js";
 export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
 /** Returns per slice of time, from the server; empty until known. @type {{step_s: number, returns: number[]}} */
 export const activity = { step_s: 1, returns: [] };
-/** How much the picture changes at some moments, from the server: 0 stands still, 1 is the most in this recording. @type {{seconds: number[], change: number[]}} */
-export const stillness = { seconds: [], change: [] };
+/** How much the picture changes after some moments, from the server. @type {import("./picture_changes.js").PictureChanges} */
+export const changes = { seconds: [], grey_levels: [], complete: false };
+/** Changes below this are noise of the camera, at least [grey levels]; so a recording in which nothing moves is not all bright. */
+const MUCH = 12;
 /** @typedef {"placements"|"clicks"|"radar"|"picture"} LaneName */
 /** @typedef {Record<LaneName, {top: number, bottom: number}>} Boxes */
 const NAMES = { placements: "Placements", clicks: "Clicks", radar: "Radar", picture: "Picture" };
@@ -152,20 +154,24 @@ function drawRadar(pen, { top, bottom }, axis) {
   pen.globalAlpha = 1;
 }
 
-/** How much the picture changes: dark where it stands still, bright where something moves. @param {Ink} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
+/** How much the picture changes: low where it stands still. @param {Ink} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
 function drawPicture(pen, { top, bottom }, axis) {
-  const { seconds, change } = stillness;
-  if (bottom === top || !seconds.length) return;
+  if (bottom === top) return;
   pen.fillStyle = themeColour("attention");
-  seconds.forEach((at, index) => {
-    const next = Math.min(seconds[index + 1] ?? at, at + 2 * (seconds[1] - seconds[0] || 1));
+  changes.seconds.forEach((at, index) => {
+    const stretch = axis.folding.stretches.find(({ from, to }) => from <= at && at <= to);
+    const next = Math.min(changes.seconds[index + 1] ?? Infinity, stretch?.to ?? at);
     if (next < axis.from_s || at > axis.to_s) return;
-    const tall = Math.max(1, change[index] * (bottom - top));
-    pen.globalAlpha = 0.25 + 0.6 * change[index];
+    const share = changeShare(index);
+    const tall = Math.max(1, share * (bottom - top));
+    pen.globalAlpha = 0.3 + 0.5 * share;
     pen.fillRect(axis.toX(at), bottom - tall, Math.max(1, axis.toX(next) - axis.toX(at)), tall);
   });
   pen.globalAlpha = 1;
 }
+
+/** A change as a part of the most in the recording. @param {number} index */
+export const changeShare = (index) => Math.min(1, changes.grey_levels[index] / Math.max(MUCH, ...changes.grey_levels));
 
 /** The greatest value in each column of pixels, as [x, value]. @param {Axis} axis @param {number} count @param {(index: number) => number} time @param {(index: number) => number} value @returns {Map<number, number>} */
 function columns(axis, count, time, value) {

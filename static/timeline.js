@@ -2,7 +2,7 @@
 /** The timeline: where a pointer is in time, and what is there; click to go there, wheel or two fingers to zoom. lanes.js draws it. */
 
 import { foldingOf, gapsOf, lengthWords, toFolded, toSeconds as unfolded } from "./folding.js";
-import { drawLanes, fateOf, laneBoxes, lanes, stillness } from "./lanes.js";
+import { changes, drawLanes, fateOf, laneBoxes, lanes } from "./lanes.js";
 import { jump, nearestIndex } from "./player.js";
 import { hideTip, showTip } from "./notices.js";
 import { clicks, on, state } from "./state.js";
@@ -153,10 +153,10 @@ function aboutTime(seconds, event) {
 
 /** @param {number} seconds */
 function aboutPicture(seconds) {
-  const next = stillness.seconds.findIndex((at) => at > seconds);
-  const index = next < 0 ? stillness.seconds.length - 1 : next - 1;
-  if (index < 0) return ["The pictures have not been compared yet"];
-  return [`Height: how much the picture changes from one frame to the next, here ${Math.round(100 * stillness.change[index])} % of the most in this recording`];
+  const next = changes.seconds.findIndex((at) => at > seconds);
+  const index = next < 0 ? changes.seconds.length - 1 : next - 1;
+  if (index < 0) return ["Here will be how much the picture changes"];
+  return [`Height: how much the picture changes from one frame to the next. Here the most changed hundredth of it changes by ${changes.grey_levels[index].toFixed(0)} of 255 grey levels.`];
 }
 
 /** @param {WheelEvent} event */
