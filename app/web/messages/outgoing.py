@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import msgspec
 
 from app.option_changes import OptionGroup, option_groups
-from app.view import FollowState, View
+from app.view import FollowState, PairCandidates, View
 from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
 from app.web.messages.view_changes import ViewChange
 from calib_core.arrays import TimesNs
@@ -267,6 +267,7 @@ Outgoing: TypeAlias = (
     | RadarLook
     | RadarMap
     | Overlay
+    | PairCandidates
     | Progress
     | Problem
     | Done
@@ -283,6 +284,7 @@ TYPES: Mapping[type, str] = {
     RadarLook: "radar_look",
     RadarMap: "radar_map",
     Overlay: "overlay",
+    PairCandidates: "candidates",
     Progress: "progress",
     Problem: "error",
     Done: "done",
