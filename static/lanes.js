@@ -2,7 +2,7 @@
 /** Draws the timeline, lane by lane: ruler, placements, clicks with their residuals as height, radar activity, picture changes, and the current frame. */
 
 import { ink, residualColour, themeColour } from "./colours.js";
-import { drawGaps, drawRuler, pixelsPerSecond, RULER } from "./ruler.js";
+import { drawGaps, drawRuler, pixelsPerSecond, RULER, text } from "./ruler.js";
 import { clicks, isClicked, state } from "./state.js";
 
 export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
@@ -17,15 +17,17 @@ const MUCH = 12;
 const NAMES = { placements: "Placements", clicks: "Clicks", radar: "Radar", picture: "Picture" };
 /** A dismissed placement is one at this place and time [m]. */
 const SAME_PLACE_M = 0.75;
+/** A timeline of this height has larger text [CSS px]. */
+const LARGE = 140;
 
 /** @typedef {CanvasRenderingContext2D} Ink */
 /** What is drawn from: the visible part of the folded axis, and the way from seconds to CSS px. @typedef {{toX: (seconds: number) => number, from_s: number, to_s: number, folding: import("./folding.js").Folding}} Axis */
 
 /** Where each lane is; a low timeline has no room for the last ones. @param {number} height CSS px @returns {Boxes} */
 export function laneBoxes(height) {
-  const picture = height >= 84 ? 9 : 0;
-  const radar = height >= 48 ? Math.min(18, Math.round(height * 0.15)) : 0;
-  const placements = Math.max(9, Math.min(16, Math.round(height * 0.15)));
+  const picture = height >= LARGE ? 15 : height >= 84 ? 9 : 0;
+  const radar = height >= 48 ? Math.min(24, Math.round(height * 0.15)) : 0;
+  const placements = Math.max(9, Math.min(20, Math.round(height * 0.15)));
   const bottom = height - lanes.bottom;
   const radarBottom = bottom - (picture ? picture + lanes.gap : 0);
   const clicksBottom = radarBottom - (radar ? radar + lanes.gap : 0);
@@ -46,6 +48,7 @@ export function drawLanes(pen, width, height, axis, pointer) {
   pen.clearRect(0, 0, width, height);
   if (!state.seconds.length) return;
   const boxes = laneBoxes(height);
+  [text.px, lanes.left] = height >= LARGE ? [13.5, 96] : [10.5, 74];
   pen.save();
   pen.beginPath();
   pen.rect(lanes.left - 8, 0, width - lanes.left + 8, height);
@@ -69,7 +72,7 @@ export function drawLanes(pen, width, height, axis, pointer) {
 
 /** @param {Ink} pen @param {Boxes} boxes */
 function drawNames(pen, boxes) {
-  pen.font = `10.5px ${getComputedStyle(document.body).fontFamily}`;
+  pen.font = `${text.px}px ${getComputedStyle(document.body).fontFamily}`;
   pen.textAlign = "left";
   pen.textBaseline = "middle";
   pen.fillStyle = themeColour("muted");
@@ -89,8 +92,7 @@ export function fateOf(placement) {
 function dismissals() {
   const first = state.recording?.frame_times;
   if (!first?.sec.length) return [];
-  const rows = /** @type {{time: import("./messages.js").Stamp, position_m: number[]}[]} */ (/** @type {any} */ (state.view)?.dismissed ?? []);
-  return rows.map(({ time, position_m }) => ({ seconds: time.sec - first.sec[0] + (time.nanosec - first.nanosec[0]) * 1e-9, at: position_m }));
+  return (state.view?.dismissed ?? []).map(({ time, position_m }) => ({ seconds: time.sec - first.sec[0] + (time.nanosec - first.nanosec[0]) * 1e-9, at: position_m }));
 }
 
 /** @param {number[]} a @param {number[]} b */
@@ -121,10 +123,10 @@ function drawPlacement(pen, placement, { top, bottom }, axis) {
   pen.stroke();
   pen.setLineDash([]);
   if (wide < 15 || height < 9) return;
-  pen.font = `600 10px ${getComputedStyle(document.body).fontFamily}`;
+  pen.font = `600 ${text.px - 0.5}px ${getComputedStyle(document.body).fontFamily}`;
   [pen.textAlign, pen.textBaseline] = ["center", "middle"];
-  pen.fillStyle = themeColour(placement.note ? "attention" : "ink");
-  pen.fillText(String(state.placements.indexOf(placement) + 1), middle, (top + bottom) / 2 + 0.5);
+  pen.fillStyle = themeColour("ink");
+  pen.fillText(`${state.placements.indexOf(placement) + 1}${placement.note ? " !" : ""}`, middle, (top + bottom) / 2 + 0.5);
 }
 
 /** @param {Ink} pen @param {number} left @param {number} right @param {number} y */

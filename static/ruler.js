@@ -9,10 +9,12 @@ import { gapsOf, lengthWords } from "./folding.js";
 
 /** Height of the ruler [CSS px]. */
 export const RULER = 17;
+/** Size of the text in the timeline [CSS px]. */
+export const text = { px: 10.5 };
 
 /** Ticks and times; each stretch after a folded gap begins with its own time. @param {Ink} pen @param {number} left @param {number} width @param {number} height @param {Axis} axis */
 export function drawRuler(pen, left, width, height, axis) {
-  pen.font = "10.5px " + themeColour("mono");
+  pen.font = `${text.px}px ${themeColour("mono")}`;
   pen.textBaseline = "middle";
   pen.textAlign = "center";
   const stretches = axis.folding.stretches.filter(({ from, to }) => to >= axis.from_s && from <= axis.to_s);
@@ -20,7 +22,7 @@ export function drawRuler(pen, left, width, height, axis) {
   const rough = 90 / scale;
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((factor) => factor * power).find((size) => size >= rough) ?? 10 * power;
-  let free = left - 30;
+  let free = left - 8;
   stretches.forEach(({ from, to }, index) => {
     const starts = axis.folding.stretches.length > 1 ? [from] : [];
     const end = index === stretches.length - 1 ? axis.to_s : to;
@@ -89,7 +91,7 @@ export function drawGaps(pen, height, axis) {
 
 /** @param {Ink} pen @param {string} words @param {number} left @param {number} right @param {number} height */
 function drawLength(pen, words, left, right, height) {
-  pen.font = `10.5px ${getComputedStyle(document.body).fontFamily}`;
+  pen.font = `${text.px}px ${getComputedStyle(document.body).fontFamily}`;
   pen.textAlign = "center";
   pen.textBaseline = "middle";
   const long = pen.measureText(words).width + 6;
@@ -98,7 +100,7 @@ function drawLength(pen, words, left, right, height) {
   pen.translate((left + right) / 2, (height + RULER) / 2);
   if (!lying) pen.rotate(-Math.PI / 2);
   pen.fillStyle = themeColour("ground");
-  pen.fillRect(-long / 2, -7, long, 14);
+  pen.fillRect(-long / 2, -text.px / 1.5, long, text.px * 1.33);
   pen.fillStyle = themeColour("muted");
   pen.fillText(words, 0, 0.5);
 }

@@ -76,6 +76,12 @@ def test_placements_in_a_recording_with_long_gaps_are_wide_enough_to_be_hit(isla
     page.page.mouse.move(box["x"] + gap, box["y"] + 50)
     page.until("!document.getElementById('tip').hidden")
     assert page.text("#tip").startswith("No frames for 4 min")
+    known = page.page.evaluate(
+        "async () => { const { changes } = await import('./lanes.js'); const end = performance.now() + 30000;"
+        "while (!changes.seconds.length && performance.now() < end) await new Promise((done) => setTimeout(done, 50));"
+        "return changes; }"
+    )
+    assert len(known["grey_levels"]) == len(known["seconds"]) > 0
 
 
 def test_the_folded_axis_is_monotone_and_has_an_exact_way_back(islands_page: Driver) -> None:
