@@ -126,7 +126,7 @@ function drawPlacement(pen, placement, { top, bottom }, axis) {
   pen.font = `600 ${text.px - 0.5}px ${getComputedStyle(document.body).fontFamily}`;
   [pen.textAlign, pen.textBaseline] = ["center", "middle"];
   pen.fillStyle = themeColour("ink");
-  pen.fillText(`${state.placements.indexOf(placement) + 1}${placement.note ? " !" : ""}`, middle, (top + bottom) / 2 + 0.5);
+  pen.fillText(`${state.placements.indexOf(placement) + 1}${placement.note && wide >= 28 ? " !" : ""}`, middle, (top + bottom) / 2 + 0.5);
 }
 
 /** @param {Ink} pen @param {number} left @param {number} right @param {number} y */
@@ -195,7 +195,7 @@ const barWidth = (axis, step_s) => Math.ceil(pixelsPerSecond(axis) * step_s) - (
 /** @param {Ink} pen @param {import("./messages.js").ClickRow} click @param {number} x @param {{top: number, bottom: number}} box */
 function drawStem(pen, click, x, { top, bottom }) {
   const limit = state.view?.residual_limit_px ?? 20;
-  const size = Math.min(3.5, (bottom - top) / 3);
+  const size = Math.min(text.px / 3, (bottom - top) / 3);
   const room = bottom - top - size - 1;
   const least = Math.min(6, room);
   const tall = click.residual_px === null ? least : Math.min(room, Math.max(least, (click.residual_px / (1.5 * limit)) * room));
