@@ -19,7 +19,7 @@ export function startPictureChanges() {
 
 async function fetchChanges() {
   if (state.looking || changes.complete) return;
-  const answer = await fetch("api/picture_changes.json").catch(() => null); // the server may be gone; the banner says so
+  const answer = state.connected ? await fetch("api/picture_changes.json").catch(() => null) : null; // the banner says that the server is gone
   if (answer?.ok) Object.assign(changes, await answer.json());
   emit("cursor");
   if (!changes.complete && !state.following) timer = window.setTimeout(fetchChanges, EVERY);
