@@ -2,7 +2,10 @@
 /** Every action of the page, once: what it does in words, its keys, and when it can be done. Keys, help and palette are made from this table. */
 
 import { fitEye, zoomEye } from "./birdseye.js";
-import { nudgeBy, placeByKey, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
+import { choose, nextCandidate, withoutCandidates } from "./candidates.js";
+import { nudgeBy, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
+import { enterCross, toggleCross } from "./cross.js";
+import { dismissHere, withoutPlacement } from "./dismissing.js";
 import { loadClicks, openExport } from "./exporting.js";
 import { toggleHelp } from "./help.js";
 import { placement } from "./keys.js";
@@ -32,7 +35,6 @@ const withPictures = () => opened() || (state.looking ? "There are no pictures i
 const withFrames = () => opened() || (state.seconds.length > 1 ? "" : "There is only one frame");
 const withPlacements = () => opened() || (state.placements.length ? "" : "No placement was found in the radar data");
 const withMark = () => withPictures() || (clickIn(state.cursor) ? "" : "There is no mark in this frame");
-const withoutMark = () => withPictures() || (clickIn(state.cursor) ? "This frame has a mark already: move or delete it" : "");
 const withSelected = () => withPictures() || (selectedClick() ? "" : "No pair is selected: go to one first");
 const withResiduals = () => withPictures() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
 const undoable = () => withPictures() || (state.view?.can_undo ? "" : "There is nothing to undo");
@@ -70,7 +72,10 @@ export const ACTIONS = [
   { id: "previous-placement", group: "Time", words: "Previous placement", keys: ["P"], also: "reflector position back", run: () => placement(-1), ...PLACES },
   { id: "live", group: "Time", words: "Show the newest frame as it comes", also: "live follow recording now", run: goLive, when: following },
 
-  { id: "place-mark", group: "Mark", words: "Place a mark where the reflector is expected, or in the middle", keys: ["Enter"], also: "click set add cross", run: placeByKey, when: withoutMark },
+  { id: "place-mark", group: "Mark", words: "Show the keyboard's cross, then set the mark there", keys: ["Enter"], also: "click place add", run: enterCross, when: withPictures },
+  { id: "cross", group: "Mark", words: "Keyboard's cross: 1 to 9 zoom into a field, arrows move it, Backspace zooms out, Esc ends", keys: ["G"], also: "grid nine fields marking without mouse", run: toggleCross, when: withPictures },
+  { id: "next-candidate", group: "Mark", words: "Take the return that fits better, or the next one", keys: ["C"], also: "candidate choose radar association", run: nextCandidate, when: () => withPictures() || withoutCandidates() },
+  { id: "free-candidate", group: "Mark", words: "Leave the choice of the return to the program", keys: ["Shift+C"], also: "candidate automatic unchoose", run: () => choose(-1), when: () => withPictures() || (selectedClick()?.chosen ? "" : "No return was chosen for this mark") },
   { id: "mark-left", words: "Move the mark left by 0.1 px", keys: ["Alt+ArrowLeft"], run: nudge(-0.1, 0), ...FINE },
   { id: "mark-right", words: "Move the mark right by 0.1 px", keys: ["Alt+ArrowRight"], run: nudge(0.1, 0), ...FINE },
   { id: "mark-up", words: "Move the mark up by 0.1 px", keys: ["Alt+ArrowUp"], run: nudge(0, -0.1), ...FINE },
@@ -84,7 +89,7 @@ export const ACTIONS = [
   { id: "redo", group: "Mark", words: "Redo", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], also: "again repeat", run: () => turnBack("redo"), when: redoable },
 
   { id: "worst", group: "Pairs", words: "Next worst pair", keys: ["J"], also: "outlier residual largest wrong bad", run: nextWorst, when: withResiduals },
-  { id: "exclude", group: "Pairs", words: "Exclude the pair, or include it again", keys: ["X"], also: "leave out use ignore disable", run: toggleExcluded, when: withSelected },
+  { id: "exclude", group: "Pairs", words: "Exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
 
   { id: "fit", group: "Picture", words: "Fit the picture", keys: ["F"], also: "zoom reset whole 100", run: () => (state.looking ? fitEye() : fit()), when: opened },
   { id: "zoom-in", words: "Zoom in", keys: ["+", "="], also: "magnify closer larger", run: () => zoom(1.25), ...ZOOM },

@@ -1,7 +1,8 @@
 // @ts-check
-/** Going to another placement or pair: keep the zoom and bring the reflector into view. */
+/** Going to another placement or pair: bring the reflector into view, zoomed in where the radar expects it. */
 
-import { lookAt, viewport } from "./geometry.js";
+import { expectedHere } from "./cross.js";
+import { lookAt, lookInto, viewport, zoom } from "./geometry.js";
 import { fit, redraw } from "./picture.js";
 import { goTo, pause } from "./player.js";
 import { clickIn, emit, on, state } from "./state.js";
@@ -14,10 +15,16 @@ export function startArriving() {
   on(["playing"], () => (awaited = null));
 }
 
-/** Go to a frame. When zoomed in, centre the reflector if a mark or the calibration gives its position. @param {number} frame */
-export function comeTo(frame) {
+/** What is shown around an expected reflector is this part of the picture. */
+const PART = 1 / 6;
+/** Whether to zoom in where the reflector is expected. */
+let closely = false;
+
+/** Go to a frame. When zoomed in, centre the reflector if a mark or the calibration gives its position. @param {number} frame @param {boolean} [near] zoom in there */
+export function comeTo(frame, near = false) {
   pause();
-  awaited = viewport.fitted ? null : frame;
+  awaited = viewport.fitted && !near ? null : frame;
+  closely = near;
   goTo(frame);
   arrive();
 }
@@ -25,12 +32,19 @@ export function comeTo(frame) {
 function arrive() {
   if (awaited === null || state.shown?.index !== awaited) return;
   const mark = clickIn(awaited);
-  if (mark) return centre(mark.u_px, mark.v_px);
+  if (mark && !(closely && viewport.fitted)) return centre(mark.u_px, mark.v_px);
+  if (mark) return settle();
   if (state.view && !state.view.has_calibration && !state.view.reference) return whole();
   if (state.overlay?.index !== awaited) return;
-  const guess = state.overlay.guesses[0];
-  if (guess) centre(guess[0], guess[1]);
-  else whole();
+  const [u, v] = expectedHere() ?? state.overlay.guesses[0] ?? [];
+  if (u === undefined || v === undefined) return whole();
+  const wide = viewport.imageWidth * PART;
+  if (closely && zoom() * wide < viewport.width * 0.8) lookInto(u, v, wide, viewport.imageHeight * PART);
+  centre(u, v);
+}
+
+function settle() {
+  awaited = null;
 }
 
 function whole() {

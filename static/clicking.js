@@ -1,12 +1,14 @@
 // @ts-check
-/** Pointer input on the frame: click to place, drag a mark to move it, drag elsewhere to pan, wheel to zoom at the cursor, arrow keys to nudge. */
+/** Pointer input on the frame: click to place, drag a mark to move it, click a candidate's number to choose it, drag elsewhere to pan, wheel to zoom at the cursor, arrow keys to nudge. */
 
+import { candidateNear, choose } from "./candidates.js";
+import { leaveCross } from "./cross.js";
 import { onImage, pan, toCss, toImage, viewport } from "./geometry.js";
 import { leaveLive } from "./live.js";
 import { hold } from "./loupe.js";
 import { marks, redraw, zoomBy } from "./picture.js";
 import { send } from "./socket.js";
-import { clickIn, clicks, emit, on, select, selectedClick, stampKey, stampOf, state } from "./state.js";
+import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, stampOf, state } from "./state.js";
 import { pause } from "./player.js";
 import { toast } from "./notices.js";
 
@@ -17,10 +19,14 @@ const REACH = 9;
 /** Nudges are sent once no key was pressed for this long [ms], so that they make one change and one undo step. */
 const REST = 250;
 
-/** @type {{x: number, y: number, lastX: number, lastY: number, u: number, v: number, moved: boolean, mark: import("./messages.js").ClickRow|null, pointer: number}|null} */
+/** @type {{x: number, y: number, lastX: number, lastY: number, u: number, v: number, moved: boolean, mark: import("./messages.js").ClickRow|null, candidate: number, pointer: number}|null} */
 let press = null;
 /** @type {{click: import("./messages.js").ClickRow, u: number, v: number, timer: number}|null} */
 let nudge = null;
+/** The frame of a new mark that is to be selected, and the marks that it had before. @type {{index: number, known: Set<string>}|null} */
+let awaited = null;
+/** Number of the next new mark, until the server has given it an id. */
+let nextDraft = 1;
 
 export function startClicking() {
   marks.addEventListener("pointerdown", pressed);
@@ -32,6 +38,7 @@ export function startClicking() {
   marks.addEventListener("contextmenu", (event) => event.preventDefault());
   addEventListener("pagehide", flushNudge);
   on(["cursor", "playing"], flushNudge);
+  on(["view"], selectAwaited);
 }
 
 /** Position of an event in the canvas box. @param {MouseEvent} event @returns {[number, number]} CSS px */
@@ -48,17 +55,21 @@ function pressed(event) {
   const [x, y] = inBox(event);
   const [u, v] = toImage(x, y);
   const mark = event.button === 0 ? markNear(x, y) : null;
-  press = { x, y, lastX: x, lastY: y, u, v, moved: false, mark, pointer: event.button };
+  const candidate = event.button === 0 && !mark && !state.playing ? candidateNear(x, y) : -1;
+  press = { x, y, lastX: x, lastY: y, u, v, moved: false, mark, candidate, pointer: event.button };
   marks.setPointerCapture(event.pointerId);
   /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
 }
 
-/** The mark of this frame under the pointer. @param {number} x @param {number} y @param {number} [reach] CSS px */
+/** The mark of this frame under the pointer, the nearest of several. @param {number} x @param {number} y @param {number} [reach] CSS px @returns {import("./messages.js").ClickRow|null} */
 export function markNear(x, y, reach = REACH) {
-  const click = clickIn(state.shown?.index ?? -1);
-  if (!click || state.playing) return null;
-  const [cx, cy] = toCss(click.u_px, click.v_px);
-  return Math.hypot(cx - x, cy - y) <= reach ? click : null;
+  if (state.playing) return null;
+  const away = (/** @type {import("./messages.js").ClickRow} */ click) => {
+    const [cx, cy] = toCss(click.u_px, click.v_px);
+    return Math.hypot(cx - x, cy - y);
+  };
+  const near = clicksIn(state.shown?.index ?? -1).filter((click) => away(click) <= reach);
+  return near.sort((a, b) => away(a) - away(b))[0] ?? null;
 }
 
 /** @param {PointerEvent} event */
@@ -67,6 +78,7 @@ function moved(event) {
   const [u, v] = toImage(x, y);
   if (!press) {
     marks.classList.toggle("grab", markNear(x, y) !== null);
+    marks.classList.toggle("pick", candidateNear(x, y) >= 0);
     return hover(onImage(u, v) ? { u, v } : null);
   }
   if (!press.moved && Math.hypot(x - press.x, y - press.y) < THRESHOLD) return;
@@ -94,6 +106,7 @@ function released(event) {
     moveTo(done.mark, done.mark.u_px + u - done.u, done.mark.v_px + v - done.v);
     hold(null);
   } else if (done.mark) select(done.mark.id);
+  else if (done.candidate >= 0 && !done.moved) choose(done.candidate);
   else if (!done.moved && done.pointer === 0 && onImage(done.u, done.v)) place(done.u, done.v);
 }
 
@@ -103,52 +116,61 @@ function hover(point) {
   emit("hover");
 }
 
-/** Place a click in the frame on screen. @param {number} u @param {number} v */
-export async function place(u, v) {
+/**
+ * Place a mark in the frame on screen and select it; other marks of the frame stay.
+ * @param {number} u @param {number} v @param {{mark?: import("./messages.js").ClickRow["mark"], sigma_px?: number|null}} [how] clicked by a person, unless said otherwise
+ */
+export async function place(u, v, { mark = "clicked", sigma_px = null } = {}) {
   if (!state.shown) return;
   if (state.playing) return pause();
   flushNudge();
-  const image_time = stampOf(state.shown.index);
-  const key = stampKey(image_time);
-  draft(key, u, v);
-  await settle(key, { type: "click_placed", image_time, pixel_px: [u, v] });
-  const here = clickIn(state.shown.index);
-  if (here?.id) select(here.id);
+  leaveCross();
+  const index = state.shown.index;
+  const image_time = stampOf(index);
+  const known = new Set(clicksIn(index).map((click) => click.id));
+  const key = `new-${nextDraft++}`;
+  draft(key, { u, v, image_time, mark });
+  awaited = { index, known };
+  await settle(key, { type: "click_placed", image_time, pixel_px: [u, v], mark, sigma_px });
+  selectAwaited();
 }
 
-/** Place a click where the reflector is expected, or else in the middle of the view, to be moved with the arrow keys. */
-export function placeByKey() {
-  if (!state.shown || state.shown.index !== state.cursor || state.playing || clickIn(state.cursor)) return;
-  leaveLive();
-  const guess = state.overlay?.index === state.shown.index ? state.overlay.guesses[0] : undefined;
-  const [u, v] = guess ?? toImage(viewport.width / 2, viewport.height / 2);
-  return place(...clamped(u, v));
+/** Select a new mark once the server has given it an id; its view may come after its confirmation. */
+function selectAwaited() {
+  if (!awaited) return;
+  const { index, known } = awaited;
+  const added = clicksIn(index).find((click) => click.id && !known.has(click.id));
+  if (!added) return;
+  awaited = null;
+  if (state.shown?.index === index) select(added.id);
 }
 
 /** @param {import("./messages.js").ClickRow} click @param {number} u @param {number} v */
 function dragMark(click, u, v) {
-  draft(stampKey(click.image_time), ...clamped(u, v));
-  const [heldU, heldV] = clamped(u, v);
-  hold({ u: heldU, v: heldV });
+  const [inU, inV] = clamped(u, v);
+  draft(click.id, { u: inU, v: inV });
+  hold({ u: inU, v: inV });
 }
 
-/** @param {import("./messages.js").ClickRow} click @param {number} u @param {number} v */
-export async function moveTo(click, u, v) {
+/**
+ * Move a mark; it then counts, also if it was a guess.
+ * @param {import("./messages.js").ClickRow} click @param {number} u @param {number} v @param {{mark?: import("./messages.js").ClickRow["mark"], sigma_px?: number|null}} [how] by hand, unless said otherwise
+ */
+export async function moveTo(click, u, v, { mark = "moved", sigma_px = null } = {}) {
   const [inU, inV] = clamped(u, v);
-  const key = stampKey(click.image_time);
-  draft(key, inU, inV);
-  await settle(key, { type: "click_moved", id: click.id, pixel_px: [inU, inV] });
+  draft(click.id, { u: inU, v: inV });
+  await settle(click.id, { type: "click_moved", id: click.id, pixel_px: [inU, inV], mark, sigma_px });
 }
 
 /** Clamp a point to the picture. @param {number} u @param {number} v @returns {[number, number]} */
-function clamped(u, v) {
+export function clamped(u, v) {
   const most = [viewport.imageWidth - 0.5, viewport.imageHeight - 0.5];
   return [Math.min(most[0], Math.max(-0.5, u)), Math.min(most[1], Math.max(-0.5, v))];
 }
 
-/** Show a mark where the user left it, before the server confirms it. @param {string} key @param {number} u @param {number} v */
-function draft(key, u, v) {
-  state.local.set(key, { u, v });
+/** Show a mark where the user left it, before the server confirms it. @param {string} key its id, or a name for a new one @param {import("./state.js").Draft} mark */
+function draft(key, mark) {
+  state.local.set(key, mark);
   emit("view");
 }
 
@@ -169,7 +191,7 @@ export function nudgeBy(du, dv) {
   clearTimeout(from.timer);
   const [u, v] = clamped(from.u + du, from.v + dv);
   nudge = { click, u, v, timer: window.setTimeout(flushNudge, REST) };
-  draft(stampKey(click.image_time), u, v);
+  draft(click.id, { u, v });
   hold({ u, v });
   return true;
 }

@@ -7,6 +7,8 @@
 /** Canvas boxes are multiples of this many CSS px, so that they end on device pixels at 100, 125, 150 and 200 %. */
 const GRID = 4;
 const MAX_SCALE = 64;
+/** A field that is zoomed into fills this part of the box. */
+const FILLS = 0.8;
 
 export const viewport = {
   /** CSS size of the canvas box. */ width: GRID,
@@ -76,6 +78,14 @@ export function lookAt(u, v) {
   viewport.left = (viewport.width * viewport.ratio) / 2 - (u + 0.5) * viewport.scale;
   viewport.top = (viewport.height * viewport.ratio) / 2 - (v + 0.5) * viewport.scale;
   keepInside();
+}
+
+/** Zoom so that a field around an image point fills most of the box. @param {number} u @param {number} v @param {number} wide @param {number} high image px */
+export function lookInto(u, v, wide, high) {
+  const scale = FILLS * Math.min((viewport.width * viewport.ratio) / wide, (viewport.height * viewport.ratio) / high);
+  viewport.fitted = false;
+  viewport.scale = Math.min(MAX_SCALE * viewport.ratio, Math.max(fitScale(), scale));
+  lookAt(u, v);
 }
 
 /** Zoom, keeping the image point under (x, y) in place. @param {number} factor @param {number} x @param {number} y CSS px */

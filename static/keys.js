@@ -4,7 +4,8 @@
 import { ACTIONS, act } from "./actions.js";
 import { comeTo } from "./arriving.js";
 import { flushNudge } from "./clicking.js";
-import { isClicked, placementAt, state } from "./state.js";
+import { crossTakes } from "./cross.js";
+import { clicksOf, isDismissed, isOffered, placementAt, state } from "./state.js";
 
 /** Keys that stay with the page even where a field has the focus. */
 const ANYWHERE = ["Ctrl+K"];
@@ -19,6 +20,10 @@ export function listen(owner) {
 /** @param {KeyboardEvent} event */
 function pressed(event) {
   const inside = event.view !== null && event.view !== window;
+  if (state.cross && !inside && !typing(event) && crossTakes(combination(event))) {
+    event.preventDefault();
+    return event.stopImmediatePropagation();
+  }
   const action = typing(event) && !inside ? undefined : actionOf(event);
   if (!action && !(inside && event.key.startsWith("Arrow"))) return;
   event.preventDefault();
@@ -54,12 +59,15 @@ function actionOf(event) {
   return bound.get(keys) ?? bound.get(keys.replace(/^Shift\+(?!Arrow)/, "")); // N with Shift, or with the capitals lock on
 }
 
-/** Go to the next placement, or the one before. @param {1|-1} direction */
+/** Go to the next placement that wants a click, or to any other once all have one; or to the one before. @param {1|-1} direction */
 export function placement(direction) {
   flushNudge();
-  const done = placementAt(state.cursor);
-  const frames = state.placements.filter((found) => found !== done || !isClicked(found)).map((found) => found.frame);
+  const here = placementAt(state.cursor);
+  const stay = state.placements.filter((found) => !isDismissed(found) && clicksOf(found).every((click) => click.state !== "excluded"));
+  const open = stay.filter(isOffered);
+  const wanted = direction > 0 && open.length ? open : stay.filter((found) => found !== here);
+  const frames = [...new Set(wanted.map((found) => found.frame))].sort((a, b) => a - b);
   const ahead = direction > 0 ? frames.filter((frame) => frame > state.cursor) : frames.filter((frame) => frame < state.cursor).reverse();
   const next = ahead.length ? ahead[0] : direction > 0 ? frames[0] : frames[frames.length - 1];
-  if (next !== undefined) comeTo(next);
+  if (next !== undefined) comeTo(next, true);
 }

@@ -3,7 +3,9 @@
 
 import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
+import { startCandidates, take as takeCandidates } from "./candidates.js";
 import { startClicking } from "./clicking.js";
+import { startCross } from "./cross.js";
 import { setFormats, startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
@@ -23,7 +25,7 @@ import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./pla
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace } from "./space.js";
-import { clickIn, clicks, emit, on, select, selectedClick, state } from "./state.js";
+import { clickIn, clicks, clicksIn, emit, on, select, selectedClick, state } from "./state.js";
 import { startStatus } from "./status.js";
 import { startGuide } from "./steps.js";
 import { startTimeline } from "./timeline.js";
@@ -69,6 +71,9 @@ const readers = {
   radar_map(message) {
     state.radarMap = message;
     emit("radar_map");
+  },
+  candidates(message) {
+    takeCandidates(message);
   },
   progress(message) {
     state.progress = message;
@@ -132,6 +137,8 @@ startLoupe();
 startLive();
 startClicking();
 startTouch();
+startCandidates();
+startCross();
 startTimeline();
 startPictureChanges();
 startPairs();
@@ -160,5 +167,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, goTo, unconfirmed, follower },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower },
 });

@@ -4,9 +4,11 @@
  * 95 % of good residuals = ellipse, radar returns = dots (static) and triangles (moving).
  */
 
+import { drawCandidates } from "./candidates.js";
 import { ink, residualColour } from "./colours.js";
+import { drawCross } from "./cross.js";
 import { toCss, toDevice, viewport, zoom } from "./geometry.js";
-import { clicks, state } from "./state.js";
+import { clicks, clicksIn, isOffered, placementsAt, state } from "./state.js";
 
 /** @typedef {CanvasRenderingContext2D} Ink */
 /** @typedef {import("./messages.js").ClickRow} Click */
@@ -21,13 +23,17 @@ export function drawMarks(pen) {
   const index = state.shown?.index ?? -1;
   const overlay = state.overlay?.index === index ? state.overlay : null;
   if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
-  const clicked = clicks().some((click) => click.frame === index);
-  if (state.layers.predictions && overlay && !clicked) for (const [u, v] of overlay.guesses) drawGuess(pen, u, v);
+  if (state.layers.predictions && overlay) for (const [u, v, range] of overlay.guesses) if (isOpen(index, range)) drawGuess(pen, u, v);
   if (state.layers.predictions && state.view?.advice) drawAdvice(pen, state.view.advice);
   const here = clicks();
   if (state.layers.others) for (const click of here) if (click.frame !== index) drawOther(pen, click);
-  for (const click of here) if (click.frame === index) drawClick(pen, click);
+  for (const click of clicksIn(index)) drawClick(pen, click);
+  drawCandidates(pen);
+  drawCross(pen);
 }
+
+/** Whether a placement in a frame still wants a click. @param {number} index @param {number} range its own [m] */
+const isOpen = (index, range) => placementsAt(index).some((one) => Math.abs(one.range_m - range) < 0.01 && isOffered(one));
 
 /** @param {Ink} pen @param {import("./messages.js").OverlayReturn[]} returns */
 function drawReturns(pen, returns) {
@@ -91,7 +97,7 @@ function drawOther(pen, click) {
   const arm = 4 * viewport.ratio;
   pen.globalAlpha = click.id !== "" && click.id === state.selected ? 1 : 0.65;
   const colour = residualColour(click.residual_px, state.view?.residual_limit_px ?? null);
-  outlined(pen, colour, 1.3, () => cross(pen, x, y, arm, 0), click.state === "excluded" ? [2 * viewport.ratio, 2 * viewport.ratio] : []);
+  outlined(pen, colour, 1.3, () => cross(pen, x, y, arm, 0), isHollow(click) ? [2 * viewport.ratio, 2 * viewport.ratio] : []);
   pen.globalAlpha = 1;
 }
 
@@ -100,7 +106,7 @@ function drawClick(pen, click) {
   const [x, y] = toDevice(click.u_px, click.v_px);
   const closeUp = looksClosely(click);
   if (click.projected_px) drawReprojection(pen, click, x, y, closeUp);
-  const hollow = click.state === "excluded";
+  const hollow = isHollow(click);
   const arm = (closeUp ? 22 : 13) * viewport.ratio;
   const gap = (closeUp ? 10 : 3) * viewport.ratio;
   if (closeUp) pen.globalAlpha = 0.9;
@@ -108,6 +114,9 @@ function drawClick(pen, click) {
   else outlined(pen, ink.click, closeUp ? 1.2 : 1.6, () => cross(pen, x, y, arm, gap), [], closeUp ? 1.4 : 2);
   pen.globalAlpha = 1;
 }
+
+/** Whether a click is not used: excluded, or a guess that nobody has looked at. @param {Click} click */
+const isHollow = (click) => click.state === "excluded" || click.state === "untouched";
 
 /** Whether the user is looking at the reflector itself; the marks then do not cover it. @param {Click} click */
 function looksClosely(click) {

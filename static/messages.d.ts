@@ -363,13 +363,16 @@ export interface RadarMap {
 /** One radar return on the picture; written as an array, since there are many. */
 export type OverlayReturn = [u_px: number, v_px: number, range_m: number, doppler_mps: number | null, snr_db: number | null, static: boolean];
 
+/** Where the reflector of a placement is expected; written as an array. */
+export type OverlayGuess = [u_px: number, v_px: number, range_m: number];
+
 /** The nearest radar scan as the camera would see it. */
 export interface Overlay {
   type: "overlay";
   index: number;
   revision: number;
   returns: OverlayReturn[] | null;
-  guesses: [number, number][];
+  guesses: OverlayGuess[];
 }
 
 /** One radar return that may belong to a click. */

@@ -2,6 +2,7 @@
 /** The table of pairs, one row per click, sorted by time, range or residual; click a row to go there, its checkbox to exclude it. */
 
 import { comeTo } from "./arriving.js";
+import { candidatesOf, choose } from "./candidates.js";
 import { residualColour } from "./colours.js";
 import { toggleExcluded } from "./clicking.js";
 import { make } from "./notices.js";
@@ -9,6 +10,8 @@ import { drawSteps } from "./steps.js";
 import { clicks, on, rangeApart, select, stampKey, state } from "./state.js";
 
 /** @typedef {import("./messages.js").ClickRow} Click */
+/** So many candidates are listed; the others are less probable. */
+const MOST_CHOICES = 8;
 const page = /** @type {HTMLElement} */ (document.getElementById("page-pairs"));
 const count = /** @type {HTMLElement} */ (document.getElementById("pair-count"));
 /** @type {{key: "frame"|"residual_px"|"range_m", descending: boolean}} */
@@ -30,7 +33,7 @@ const made = new Map();
 let drawn = "";
 
 export function startPairs() {
-  on(["opening", "view", "selected", "recording", "placements"], draw);
+  on(["opening", "view", "selected", "recording", "placements", "candidates"], draw);
   page.addEventListener("click", pressed);
 }
 
@@ -45,7 +48,7 @@ let lastVisited = null;
 
 /** Go to the worst pair, outliers first, then by residual; when called again, to the next one. */
 export function nextWorst() {
-  const ranked = clicks().filter((click) => click.residual_px !== null && click.state !== "excluded");
+  const ranked = clicks().filter((click) => click.residual_px !== null && click.state !== "excluded" && click.state !== "untouched");
   const outlier = (/** @type {Click} */ click) => Number(click.state === "outlier");
   ranked.sort((a, b) => outlier(b) - outlier(a) || Number(b.residual_px) - Number(a.residual_px));
   if (!ranked.length) return;
@@ -61,13 +64,14 @@ function draw() {
   const rows = sorted();
   count.textContent = rows.length ? String(rows.length) : "";
   const steps = !rows.length || !state.view?.has_calibration;
-  const used = rows.filter((click) => click.state !== "excluded").length;
+  const used = rows.filter((click) => click.state !== "excluded" && click.state !== "untouched").length;
   const text = JSON.stringify([sorting, rows.length > 0, steps, steps && used, state.placements.length, state.placementsKnown, state.recording === null]);
   const held = document.activeElement?.matches("[data-act]") ? idOf(document.activeElement) : undefined;
   const changed = drawRows(rows);
   if (text !== drawn) drawAround(rows.length > 0, steps);
-  else if (!changed) return;
+  else if (!changed) return drawCandidateRows();
   drawn = text;
+  drawCandidateRows();
   if (held) /** @type {HTMLElement|null|undefined} */ (made.get(held)?.row.querySelector("[data-act]"))?.focus({ preventScroll: true });
   body.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" });
 }
@@ -113,8 +117,49 @@ function drawRows(rows) {
   return changed;
 }
 
+/** The returns that may belong to the selected click, below its row. */
+const choices = make("tr", "choices", []);
+
+function drawCandidateRows() {
+  const id = state.selected ?? "";
+  const rows = candidatesOf(id);
+  const owner = made.get(id)?.row;
+  const text = JSON.stringify([id, rows]);
+  if (!owner?.isConnected || (rows.length < 2 && !rows.some((row) => row.chosen))) {
+    choices.remove();
+    choices.dataset.drawn = "";
+    return;
+  }
+  if (choices.dataset.drawn !== text) {
+    const cell = make("td", "", [make("div", "choices-list", rows.slice(0, MOST_CHOICES).map(candidateRow))]);
+    cell.colSpan = COLUMNS.length;
+    choices.replaceChildren(cell);
+    choices.dataset.drawn = text;
+  }
+  if (owner.nextElementSibling !== choices) owner.after(choices);
+}
+
+/** @param {import("./messages.js").CandidateRow} row @param {number} index */
+function candidateRow(row, index) {
+  const suggested = state.candidates?.suggested === index;
+  const chance = row.probability === null ? "" : `${Math.round(100 * row.probability)} %`;
+  const away = row.distance_px === null ? "" : `${digits(row.distance_px)} px away`;
+  const button = make("button", `choice${row.used ? " used" : ""}${suggested ? " suggested" : ""}`, [
+    make("b", "", row.chosen ? "✓" : String(index + 1)),
+    make("span", "where", row.words),
+    make("span", "", away),
+    make("span", "", row.snr_db === null ? "" : `${row.snr_db.toFixed(0)} dB`),
+    make("span", "", chance),
+  ]);
+  button.dataset.choice = String(index);
+  button.setAttribute("aria-pressed", String(row.used));
+  const why = row.chosen ? "You chose this return. Click again to leave the choice to the program." : row.used ? "This return is used. Click to fix the choice." : suggested ? "This return fits the click better. Click to choose it (C)." : "Click to choose this return for the click.";
+  button.dataset.hint = `${why}\nSeen in ${row.scans} scans. ${row.distance_px === null ? "The percentage says how plausible it is among the others, before there is a pose." : "The percentage says how probable it is, given the click and the pose."}`;
+  return button;
+}
+
 /** A name for a row; a click that is not confirmed has no id yet. @param {Click} click */
-const keyOf = (click) => click.id || stampKey(click.image_time);
+const keyOf = (click) => click.id || `${stampKey(click.image_time)} ${click.u_px} ${click.v_px}`;
 
 /** @param {(typeof COLUMNS)[number]} column */
 function heading(column) {
@@ -137,13 +182,14 @@ function line(click) {
   const bar = make("b", "", "");
   bar.style.width = `${Math.min(100, (100 * (click.residual_px ?? 0)) / (1.5 * (limit ?? 20)))}%`;
   bar.style.background = colour;
-  const residual = click.residual_px === null ? word(click) : `${digits(click.residual_px)} px`;
+  const residual = click.residual_px === null || click.state === "untouched" ? word(click) : `${digits(click.residual_px)} px`;
   const excluded = click.state === "excluded";
   const act = make("input", "act", []);
   act.type = "checkbox";
-  act.checked = !excluded;
+  const guess = click.state === "untouched";
+  act.checked = !excluded && !guess;
   act.setAttribute("aria-label", `Use ${click.id} in the calibration`);
-  act.dataset.hint = excluded ? "Excluded. Click to include it again (X)" : "Used in the calibration. Click to exclude it (X)";
+  act.dataset.hint = guess ? "A guess: it does not count until it is moved to the reflector. Click to exclude it (X)" : excluded ? "Excluded. Click to include it again (X)" : "Used in the calibration. Click to exclude it (X)";
   act.dataset.act = "exclude";
   const range = click.range_m === null ? "–" : `${click.range_m.toFixed(1)} m`;
   const row = make("tr", `row ${click.state}`, [
@@ -163,17 +209,22 @@ function line(click) {
 const digits = (value) => (value < 0.995 ? value.toFixed(2) : value < 999.5 ? value.toPrecision(3) : value.toFixed(0));
 
 /** @param {Click} click */
-const word = (click) => (click.state === "unpaired" ? "no return" : click.state === "pending" ? "…" : "–");
+const word = (click) => ({ unpaired: "no return", pending: "…", untouched: "guess" })[/** @type {string} */ (click.state)] ?? "–";
 
 /** @param {Click} click */
 function explain(click) {
-  const lines = [`${click.id}: click at ${click.u_px.toFixed(1)}, ${click.v_px.toFixed(1)} px`];
+  const how = { clicked: "click", moved: "moved mark", snapped: "mark on the corner found in the picture", untouched: "guess" }[click.mark];
+  const lines = [`${click.id}: ${how} at ${click.u_px.toFixed(1)}, ${click.v_px.toFixed(1)} px`];
   if (click.projected_px) lines.push(`reprojected at ${click.projected_px.map((value) => value.toFixed(1)).join(", ")} px`);
-  if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${click.azimuth_deg?.toFixed(1)}° left, ${click.elevation_deg?.toFixed(1)}° up`);
+  if (click.sigma_px !== null) lines.push(`its own standard deviation: ${click.sigma_px.toFixed(2)} px`);
+  if (click.range_m !== null) lines.push(`radar: ${click.range_m.toFixed(2)} m, ${toSide(click.azimuth_deg, "left", "right")}, ${toSide(click.elevation_deg, "up", "down")}${click.chosen ? ", chosen by you" : ""}`);
   if (rangeApart(click)) lines.push(`${rangeApart(click)}: wrong target, or the reflector was being moved. Check the frame, or exclude the pair.`);
   if (click.note) lines.push(click.note);
   return lines.join("\n");
 }
+
+/** An angle with its side. @param {number|null} angle deg @param {string} positive @param {string} negative */
+const toSide = (angle, positive, negative) => (angle === null ? "" : Math.abs(angle) < 0.05 ? "0.0°" : `${Math.abs(angle).toFixed(1)}° ${angle > 0 ? positive : negative}`);
 
 /** The shape shows the state, in addition to the colour. @param {string} clickState @param {string} colour */
 function glyph(clickState, colour) {
@@ -184,11 +235,11 @@ function glyph(clickState, colour) {
   const shape = document.createElementNS("http://www.w3.org/2000/svg", "path");
   const disc = "M6 2.2a3.8 3.8 0 1 0 .01 0z";
   shape.setAttribute("d", clickState === "outlier" ? "M6 .8 11.2 6 6 11.2.8 6z" : disc);
-  const hollow = clickState === "excluded" || clickState === "unpaired" || clickState === "pending";
+  const hollow = ["excluded", "unpaired", "pending", "untouched"].includes(clickState);
   shape.setAttribute("fill", hollow ? "none" : colour);
   shape.setAttribute("stroke", colour);
   shape.setAttribute("stroke-width", "1.5");
-  if (clickState === "pending") shape.setAttribute("stroke-dasharray", "2 2");
+  if (clickState === "pending" || clickState === "untouched") shape.setAttribute("stroke-dasharray", "2 2");
   svg.append(shape);
   return svg;
 }
@@ -205,6 +256,8 @@ function pressed(event) {
     sorting.key = /** @type {typeof sorting.key} */ (key);
     return draw();
   }
+  const choice = target.closest("[data-choice]")?.getAttribute("data-choice");
+  if (choice) return void choose(candidatesOf(state.selected ?? "")[Number(choice)]?.chosen ? -1 : Number(choice));
   const id = idOf(target);
   const click = clicks().find((row) => row.id === id && id !== "");
   if (!click) return;

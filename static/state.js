@@ -4,7 +4,7 @@
 /** @typedef {import("./messages.js").View} View */
 /** @typedef {import("./messages.js").ClickRow} Click */
 /** A decoded frame. @typedef {{index: number, bitmap: ImageBitmap, scale: number, width: number, height: number}} Shown */
-/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"} Topic */
+/** @typedef {"opening"|"recording"|"view"|"progress"|"placements"|"overlay"|"look"|"radar_map"|"shown"|"selected"|"layers"|"connection"|"playing"|"cursor"|"hover"|"theme"|"box"|"grown"|"following"|"candidates"|"cross"} Topic */
 
 export const state = {
   /** While the recording is being opened. @type {import("./messages.js").Opening|null} */ opening: null,
@@ -32,8 +32,12 @@ export const state = {
   /** @type {{u: number, v: number}|null} */ hover: null,
   layers: { returns: true, others: true, ellipses: true, predictions: true },
   /** Seconds of each frame from the first one. @type {Float64Array} */ seconds: new Float64Array(0),
-  /** Marks as the user left them, until the server's view has them. @type {Map<string, {u: number, v: number}>} */ local: new Map(),
+  /** Marks as the user left them, until the server's view has them: by the click's id, or a name for one that is new. @type {Map<string, Draft>} */ local: new Map(),
+  /** The returns that may belong to the selected click. @type {import("./messages.js").PairCandidates|null} */ candidates: null,
+  /** The cross of the keyboard, while it is used. @type {import("./cross.js").Cross|null} */ cross: null,
 };
+
+/** @typedef {{u: number, v: number, image_time?: import("./messages.js").Stamp, mark?: import("./messages.js").ClickRow["mark"]}} Draft A mark that the server does not have yet; a new one has a time. */
 
 /** @type {Map<string, Set<() => void>>} */
 const listeners = new Map();
@@ -54,7 +58,7 @@ export function emit(topic) {
 
 /**
  * What is derived from the view and the marks as the user left them; made again once either changed.
- * @type {{rows: Click[], byFrame: Map<number, Click>, byId: Map<string, Click>, frames: number[]}|null}
+ * @type {{rows: Click[], byFrame: Map<number, Click[]>, byId: Map<string, Click>, frames: number[]}|null}
  */
 let derived = null;
 
@@ -64,27 +68,29 @@ function drawn() {
   let rows = known;
   if (state.local.size) {
     rows = known.map((click) => {
-      const local = state.local.get(stampKey(click.image_time));
+      const local = state.local.get(click.id);
       return local ? { ...click, u_px: local.u, v_px: local.v } : click;
     });
-    const stamps = new Set(known.map((click) => stampKey(click.image_time)));
-    for (const [key, place] of state.local) if (!stamps.has(key)) rows.push(placedHere(key, place));
+    for (const draft of state.local.values()) if (draft.image_time) rows.push(placedHere(draft.image_time, draft));
   }
   const frames = rows.map((click) => click.frame).filter((frame) => frame >= 0).sort((a, b) => a - b);
-  derived = { rows, byFrame: new Map(rows.map((click) => [click.frame, click])), byId: new Map(rows.map((click) => [click.id, click])), frames };
+  /** @type {Map<number, Click[]>} */
+  const byFrame = new Map();
+  for (const click of rows) byFrame.set(click.frame, [...(byFrame.get(click.frame) ?? []), click]);
+  derived = { rows, byFrame, byId: new Map(rows.map((click) => [click.id, click])), frames };
   return derived;
 }
 
 /** The clicks as they should be drawn now; a row that did not change is the same object as before. @returns {Click[]} */
 export const clicks = () => drawn().rows;
 
-/** A click that the server has not confirmed yet. @param {string} key @param {{u: number, v: number}} place @returns {Click} */
-function placedHere(key, place) {
-  const [sec, nanosec] = key.split(".").map(Number);
+/** A click that the server has not confirmed yet. @param {import("./messages.js").Stamp} image_time @param {Draft} draft @returns {Click} */
+function placedHere(image_time, draft) {
+  const mark = draft.mark ?? "clicked";
   return {
-    id: "", image_time: { sec, nanosec }, frame: frameOf({ sec, nanosec }), u_px: place.u, v_px: place.v, state: "pending",
+    id: "", image_time, frame: frameOf(image_time), u_px: draft.u, v_px: draft.v, state: mark === "untouched" ? "untouched" : "pending",
     projected_px: null, residual_px: null, ellipse: null, range_m: null, azimuth_deg: null, elevation_deg: null,
-    returns: null, outlier_probability: null, note: "",
+    returns: null, outlier_probability: null, note: "", mark, sigma_px: null, chosen: false,
   };
 }
 
@@ -103,20 +109,34 @@ function frameOf(stamp) {
   return times.sec.findIndex((sec, index) => sec === stamp.sec && times.nanosec[index] === stamp.nanosec);
 }
 
-/** The click in a frame. @param {number} index @returns {Click|undefined} */
-export const clickIn = (index) => drawn().byFrame.get(index);
+/** The clicks in a frame. @param {number} index @returns {Click[]} */
+export const clicksIn = (index) => drawn().byFrame.get(index) ?? [];
+
+/** The click in a frame that keys act on: the selected one, or else the first. @param {number} index @returns {Click|undefined} */
+export function clickIn(index) {
+  const here = clicksIn(index);
+  return here.find((click) => click.id !== "" && click.id === state.selected) ?? here[0];
+}
 
 /** The selected click. @returns {Click|undefined} */
 export const selectedClick = () => (state.selected ? drawn().byId.get(state.selected) : undefined);
 
-/** The placement that includes a frame. @param {number} index @returns {import("./messages.js").PlacementRow|undefined} */
-export function placementAt(index) {
+/** @typedef {import("./messages.js").PlacementRow} Placement */
+
+/** The placements that include a frame: several, if several reflectors stood at once. @param {number} index @returns {Placement[]} */
+export function placementsAt(index) {
   const time = state.seconds[index];
-  return state.placements.find((placement) => placement.start_s <= time && time <= placement.end_s);
+  return state.placements.filter((placement) => placement.start_s <= time && time <= placement.end_s);
 }
 
-/** Whether a placement has a click. @param {import("./messages.js").PlacementRow} placement */
-export function isClicked(placement) {
+/** The placement that includes a frame: one that still wants a click, if there is one. @param {number} index @returns {Placement|undefined} */
+export function placementAt(index) {
+  const here = placementsAt(index);
+  return here.find(isOffered) ?? here.find((placement) => !isDismissed(placement)) ?? here[0];
+}
+
+/** The clicks while a reflector stood at a placement, as far as the radar does not say that they are of another. @param {Placement} placement @returns {Click[]} */
+export function clicksOf(placement) {
   const { frames } = drawn();
   let [low, high] = [0, frames.length];
   while (low < high) {
@@ -124,17 +144,63 @@ export function isClicked(placement) {
     if (state.seconds[frames[middle]] < placement.start_s) low = middle + 1;
     else high = middle;
   }
-  return low < frames.length && state.seconds[frames[low]] <= placement.end_s;
+  /** @type {Click[]} */
+  const found = [];
+  for (let at = low; at < frames.length && state.seconds[frames[at]] <= placement.end_s; at++) {
+    if (at > low && frames[at] === frames[at - 1]) continue;
+    found.push(...clicksIn(frames[at]).filter((click) => isOf(click, placement)));
+  }
+  return found;
 }
+
+/** Whether a placement has a click, also one that is excluded or does not count. @param {Placement} placement */
+export const isClicked = (placement) => clicksOf(placement).length > 0;
+
+/** Whether the user said that a placement is not the reflector. @param {Placement} placement */
+export const isDismissed = (placement) => dismissalOf(placement) !== undefined;
+
+/** Positions of one placement differ less than this between two surveys of a recording [m]. */
+const SAME_M = 0.5;
+
+/** The dismissal of a placement. @param {Placement} placement */
+export function dismissalOf(placement) {
+  const start = state.recording?.start ?? { sec: 0, nanosec: 0 };
+  return state.view?.dismissed.find(({ time, position_m }) => {
+    const seconds = time.sec - start.sec + (time.nanosec - start.nanosec) * 1e-9;
+    const away = Math.hypot(...position_m.map((value, axis) => value - placement.position_radar_m[axis]));
+    return placement.start_s - 0.001 <= seconds && seconds <= placement.end_s + 0.001 && away < SAME_M;
+  });
+}
+
+/** Whether a placement still wants a click. @param {Placement} placement */
+export const isOffered = (placement) => !isDismissed(placement) && !isClicked(placement);
 
 /** A range that differs this much from the placement's is another target [m]; the reflector's own returns scatter by a few decimetres. */
 const APART_M = 0.75;
+/** The same across the radar's line of sight. */
+const ASIDE_M = 1.5;
 
-/** Returns a message if the radar position used for a click is not that of the placement in the timeline, else "". @param {Click} click */
+/** Whether a click is of a placement: where several reflectors stand at once, the radar position tells. @param {Click} click @param {Placement} placement */
+function isOf(click, placement) {
+  const others = placementsAt(click.frame);
+  if (others.length < 2 || click.range_m === null) return true;
+  const away = (/** @type {Placement} */ one) => apart(click, one);
+  const mine = away(placement);
+  return others.every((one) => one === placement || away(one) >= mine) && mine < 2;
+}
+
+/** How far a click's radar position is from a placement, in steps that are too far. @param {Click} click @param {Placement} placement */
+function apart(click, placement) {
+  const aside = (((click.azimuth_deg ?? 0) - placement.azimuth_deg) * Math.PI * placement.range_m) / 180;
+  return Math.hypot((Number(click.range_m) - placement.range_m) / APART_M, aside / ASIDE_M);
+}
+
+/** Returns a message if the radar position used for a click is not that of a placement in the timeline, else "". @param {Click} click */
 export function rangeApart(click) {
-  const placement = placementAt(click.frame);
-  if (!placement || click.range_m === null || Math.abs(click.range_m - placement.range_m) < APART_M) return "";
-  return `This pair is at ${click.range_m.toFixed(1)} m, but the placement is at ${placement.range_m.toFixed(1)} m`;
+  const range = click.range_m;
+  const here = placementsAt(click.frame);
+  if (!here.length || range === null || here.some((one) => Math.abs(range - one.range_m) < APART_M)) return "";
+  return `This pair is at ${range.toFixed(1)} m, but the placement is at ${here.map((one) => one.range_m.toFixed(1)).join(" and ")} m`;
 }
 
 /** Change the selection. @param {string|null} id */

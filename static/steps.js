@@ -2,7 +2,7 @@
 /** What to do next: three steps while there is no calibration, one line on the frame, and the same text in the status line. */
 
 import { make } from "./notices.js";
-import { clickIn, clicks, isClicked, on, placementAt, rangeApart, state } from "./state.js";
+import { clickIn, clicks, clicksIn, isClicked, isDismissed, isOffered, on, placementAt, placementsAt, rangeApart, state } from "./state.js";
 
 const guide = /** @type {HTMLElement} */ (document.getElementById("guide"));
 /** Minimum number of pairs for a pose; the server enforces it too. */
@@ -13,12 +13,12 @@ const CENTRE = "the inner corner, where its three sheets meet";
 /** Text with keys in between. @typedef {(string|{key: string})[]} Words */
 
 export function startGuide() {
-  on(["opening", "shown", "view", "placements", "playing", "overlay"], drawGuide);
+  on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected"], drawGuide);
 }
 
 /** Three steps to the first calibration. */
 export function drawSteps() {
-  const count = clicks().filter((click) => click.state !== "excluded").length;
+  const count = placesMarked();
   const found = state.placements.length;
   const foundNone = "No placement was found in the radar data. Go to a frame in which the reflector stands still.";
   const goesOn = state.recording ? "Searching the radar data for places where the reflector stood still…" : "Once the recording is open, the radar data is searched for places where the reflector stood still.";
@@ -37,6 +37,14 @@ export function drawSteps() {
     ]),
   );
   return make("ol", "steps", items);
+}
+
+/** How many places have a mark that counts; marks outside any placement count only where the radar data has none. */
+function placesMarked() {
+  const counting = clicks().filter((click) => click.state !== "excluded" && click.state !== "untouched" && click.state !== "unpaired");
+  const here = state.placements.filter((placement) => !isDismissed(placement));
+  if (!here.length) return counting.length;
+  return here.filter((placement) => counting.some((click) => placementsAt(click.frame).includes(placement)) && isClicked(placement)).length;
 }
 
 /** @param {string} name */
@@ -61,23 +69,46 @@ function opening() {
 function advice(index) {
   const placement = placementAt(index);
   const here = clickIn(index);
+  if (state.cross) return atCross(state.cross);
   if (here) return afterClick(here);
-  if (placement && !isClicked(placement)) {
+  if (placement && isDismissed(placement)) return { text: ["This placement is dismissed. ", { key: "X" }, " offers it again"], act: false };
+  if (placement && isOffered(placement)) {
     const number = state.placements.indexOf(placement) + 1;
-    return { text: [`Placement ${number} of ${state.placements.length}, ${placement.range_m.toFixed(1)} m away: click the reflector's inner corner, where its three sheets meet`], act: true };
+    const several = placementsAt(index).length > 1 ? ` (one of ${placementsAt(index).length} at this time)` : "";
+    return { text: [`Placement ${number} of ${state.placements.length}, ${placement.range_m.toFixed(1)} m away${several}: click the reflector's inner corner, where its three sheets meet. No reflector here: `, { key: "X" }], act: true };
   }
   const next = nextAction();
   return next ? { text: next, act: false } : null;
 }
 
+/** @param {import("./cross.js").Cross} cross @returns {{text: Words, act: boolean}} */
+function atCross(cross) {
+  const begin = cross.touched || !cross.expected ? "" : "The radar expects the reflector here. ";
+  const last = cross.touched ? " sets the mark" : cross.expected ? " without moving the cross leaves a guess that does not count" : " sets the mark once the cross is there";
+  return { text: [begin, { key: "1" }, "–", { key: "9" }, " zoom in, ", { key: "arrows" }, " move, ", { key: "Enter" }, last], act: true };
+}
+
 /** What is wrong with the pair of this frame, or else what to do next. @param {import("./messages.js").ClickRow} click @returns {{text: Words, act: boolean}|null} */
 function afterClick(click) {
+  const better = state.candidates?.click === click.id ? state.candidates.suggestion : "";
+  if (better) return { text: [better.replace(/: C takes it$/, ": "), { key: "C" }, " takes it"], act: true };
+  if (click.state === "untouched") return { text: ["A guess: nobody has looked, so it does not count. Move it to the inner corner, or press ", { key: "Del" }], act: true };
+  if (clicksIn(click.frame).length > placementsAt(click.frame).length && placementsAt(click.frame).length)
+    return { text: [`${clicksIn(click.frame).length} marks in this frame, and ${placementsAt(click.frame).length === 1 ? "one placement" : `${placementsAt(click.frame).length} placements`}. A mark that is not a reflector: `, { key: "Del" }], act: true };
+  if (state.placements.length && !placementsAt(click.frame).length) return { text: ["The radar saw no reflector put down at this time. If it was being carried, press ", { key: "Del" }], act: true };
   const apart = rangeApart(click);
   if (apart) return { text: [`${apart}. Correct the mark, or press `, { key: "X" }, " to exclude the pair"], act: true };
-  if (click.state === "outlier") return { text: ["This pair does not agree with the others. Correct the mark, or press ", { key: "X" }, " to exclude it"], act: true };
+  if (click.state === "outlier") return { text: outlierWords(click), act: true };
   if (click.state === "unpaired") return { text: ["No radar position here. Click another frame of this placement, or press ", { key: "N" }, " for the next one"], act: true };
   const next = nextAction();
   return next ? { text: next, act: false } : null;
+}
+
+/** What may be wrong with a pair that disagrees: the mark, or the return. @param {import("./messages.js").ClickRow} click @returns {Words} */
+function outlierWords(click) {
+  const others = state.candidates?.click === click.id && state.candidates.rows.length > 1;
+  if (others) return ["This pair does not agree with the others. Is the mark on the inner corner? ", { key: "C" }, " tries another return, ", { key: "X" }, " excludes it"];
+  return ["This pair does not agree with the others. Is the mark on the inner corner? If so, ", { key: "X" }, " excludes it"];
 }
 
 /** The next thing to do with the placements; null when there is nothing to say. @returns {Words|null} */
@@ -89,7 +120,9 @@ export function nextAction() {
     const used = clicks().filter((click) => click.state === "inlier").length + wrong;
     return [`${used - wrong} of ${used} pairs agree. Press `, { key: "J" }, wrong === 1 ? " to see the outlier" : ` to see the ${wrong} outliers one by one`];
   }
-  const left = state.placements.filter((placement) => !isClicked(placement)).length;
+  const guesses = clicks().filter((click) => click.state === "untouched").length;
+  const left = state.placements.filter(isOffered).length;
+  if (!left && guesses) return [`${guesses} ${guesses > 1 ? "marks are guesses that do" : "mark is a guess that does"} not count: move each to the reflector`];
   if (left) return [`${left} placement${left > 1 ? "s" : ""} left. Press `, { key: "N" }, " for the next one"];
   if (!state.placements.length || !view?.has_calibration || view.warnings.length) return null;
   return ["Every placement has a click. Press ", { key: "E" }, " to export the calibration"];

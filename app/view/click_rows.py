@@ -1,6 +1,7 @@
 """One row per click: its state, its reprojection, its ellipse and a note."""
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -10,7 +11,8 @@ from app.view.model import ClickRow, ClickState
 from app.view.number_format import plain
 from app.view.reprojections import Reprojection, reprojections
 from app.view.wording import sentence
-from calib_core.measurements import ReflectorClick, Stamp, Unpaired
+from calib_core.measurements import Pair, ReflectorClick, Stamp, Unpaired, Unsolvable
+from calib_core.radar import polar_from_cartesian
 from calib_core.results import Calibration
 
 __all__ = ["click_rows"]
@@ -26,9 +28,24 @@ def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
     calibration = session.outcome if isinstance(session.outcome, Calibration) else None
     pairs = reprojections(calibration.pairs if calibration else session.checked)
     unpaired = {row.id: row for row in session.outcome.unpaired} if session.outcome else {}
+    likely = {pair.id: pair for pair in session.outcome.pairs} if isinstance(session.outcome, Unsolvable) else {}
     times_ns = np.array([click.image_time for click in session.clicks], dtype=np.int64)
     rows = zip(session.clicks, facts.frames_at(times_ns).tolist(), strict=True)
-    return tuple(_row(click, frame, pairs.get(click.id), unpaired.get(click.id)) for click, frame in rows)
+    made = (_row(click, frame, pairs.get(click.id), unpaired.get(click.id)) for click, frame in rows)
+    return tuple(_with_likely_return(row, likely[row.id]) if row.id in likely else row for row in made)
+
+
+def _with_likely_return(row: ClickRow, pair: Pair) -> ClickRow:
+    """Add where the most plausible radar return is, while there is no pose yet."""
+    if row.range_m is not None:
+        return row
+    range_m, azimuth, elevation = polar_from_cartesian(pair.candidates[0].position_radar_m[None])[0].tolist()
+    return replace(
+        row,
+        range_m=round(range_m, 4),
+        azimuth_deg=round(math.degrees(azimuth), 4),
+        elevation_deg=round(math.degrees(elevation), 4),
+    )
 
 
 @lru_cache(maxsize=1 << 15)

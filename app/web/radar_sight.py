@@ -8,7 +8,7 @@ import numpy as np
 from app.session import Session
 from app.solving import RadarSource
 from app.view import Reference, shown_calibration
-from app.web.messages import Overlay, OverlayReturn, RadarLook, RadarReturn
+from app.web.messages import Overlay, OverlayGuess, OverlayReturn, RadarLook, RadarReturn
 from calib_core.arrays import Flags, Indices, Points3
 from calib_core.association.gating import static_returns
 from calib_core.association.placements import Placement
@@ -130,11 +130,17 @@ def _returns(calibration: Calibration, scan: RadarScan, options: GatingOptions) 
     )
 
 
-def _guesses(calibration: Calibration, placements: Sequence[Placement]) -> tuple[tuple[float, float], ...]:
+def _guesses(calibration: Calibration, placements: Sequence[Placement]) -> tuple[OverlayGuess, ...]:
     if not placements:
         return ()
-    pixels = calibration.reproject(np.stack([placement.position_radar_m for placement in placements]))
-    return tuple((float(u), float(v)) for u, v in pixels[calibration.camera.in_image(pixels)])
+    positions = np.stack([placement.position_radar_m for placement in placements])
+    pixels = calibration.reproject(positions)
+    ranges_m = np.linalg.norm(positions, axis=1)
+    inside = calibration.camera.in_image(pixels)
+    return tuple(
+        OverlayGuess(float(u), float(v), float(range_m))
+        for (u, v), range_m in zip(pixels[inside], ranges_m[inside], strict=True)
+    )
 
 
 def _number(value: float) -> float | None:

@@ -24,6 +24,7 @@ __all__ = [
     "Opening",
     "Outgoing",
     "Overlay",
+    "OverlayGuess",
     "OverlayReturn",
     "Problem",
     "Progress",
@@ -187,6 +188,20 @@ class OverlayReturn(msgspec.Struct, frozen=True, array_like=True):
     static: bool
 
 
+class OverlayGuess(msgspec.Struct, frozen=True, array_like=True):
+    """Where the reflector of a placement is expected; written as an array.
+
+    Attributes:
+        u_px: column.
+        v_px: row.
+        range_m: of the placement.
+    """
+
+    u_px: float
+    v_px: float
+    range_m: float
+
+
 @dataclass(frozen=True, slots=True)
 class Overlay:
     """The nearest radar scan as the camera would see it.
@@ -195,13 +210,13 @@ class Overlay:
         index: of the frame.
         revision: of the session whose calibration projected the returns.
         returns: None without a calibration.
-        guesses: pixels (u, v) at which the reflector is expected.
+        guesses: where the reflectors of the placements at that time are expected.
     """
 
     index: int
     revision: int
     returns: tuple[OverlayReturn, ...] | None
-    guesses: tuple[tuple[float, float], ...]
+    guesses: tuple[OverlayGuess, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -386,3 +386,8 @@ class CalibrationDocument(Struct, frozen=True):
     pairs: list[SolvedPairDocument] = []
     options: CalibrationOptions = field(default_factory=CalibrationOptions)
     provenance: ProvenanceDocument = field(default_factory=ProvenanceDocument)
+
+
+for _document in (ClicksDocument, PairsDocument, CalibrationDocument):
+    msgspec.json.Decoder(_document)
+"""msgspec learns the types here, in the one thread that imports them: two that read their first file crashed it (0.22.0)."""
