@@ -110,6 +110,9 @@ def too_small_for_a_finger(page: Driver) -> Any:
         "[...document.querySelectorAll('button, summary, select, input')]"
         ".filter((part) => part.checkVisibility({visibilityProperty: true}))"
         ".filter((part) => { const box = part.getBoundingClientRect(); const x = (box.left + box.right) / 2;"
-        "return [-19, 19].some((dy) => !part.contains(document.elementFromPoint(x, (box.top + box.bottom) / 2 + dy))); })"
+        "const y = (box.top + box.bottom) / 2;"
+        "const page = part.closest('[role=tabpanel]')?.getBoundingClientRect();"
+        "if (page && (y - 19 < page.top || y + 19 > page.bottom)) return false;"  # scrolled out
+        "return [-19, 19].some((dy) => !part.contains(document.elementFromPoint(x, y + dy))); })"
         ".map((part) => `${part.id} ${part.className} ${part.textContent}`)"
     )
