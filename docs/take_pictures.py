@@ -1,4 +1,7 @@
-"""Take the pictures of the documentation: `make picture` writes docs/pictures/*.png from the sample recording."""
+"""Take the pictures of the documentation: `make picture` writes docs/pictures/*.png from the sample recording.
+
+`python docs/take_pictures.py --sizes` writes docs/pictures/sizes.jpg: the page in windows of five sizes, dark and light.
+"""
 
 import json
 import sys
@@ -6,6 +9,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 from playwright.sync_api import Browser, sync_playwright
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -19,11 +24,20 @@ from tests.find_browser import find_browser  # noqa: E402
 
 PICTURES = ROOT / "docs" / "pictures"
 SIZE = {"width": 1440, "height": 900}
+SIZES = ((390, 844), (1024, 768), (1280, 720), (1440, 900), (3840, 2160))
+ROW_PX, GAP_PX = 400, 12
+"""Height of a picture in the contact sheet, and what is between two."""
 
 
-def opened(browser: Browser, server: RunningServer, theme: str, ready: str = "__cocalib.state.shown") -> Driver:
+def opened(
+    browser: Browser,
+    server: RunningServer,
+    theme: str,
+    ready: str = "__cocalib.state.shown",
+    size: dict[str, int] = SIZE,
+) -> Driver:
     """Open the page in a theme, 3D view included."""
-    page = browser.new_page(viewport=SIZE)  # type: ignore[arg-type]
+    page = browser.new_page(viewport=size)  # type: ignore[arg-type]
     page.add_init_script(f"if (top === window) localStorage.setItem('cocalib-layout', '{{\"theme\": \"{theme}\"}}')")
     driver = Driver(page, server.url, ready)
     driver.until("__cocalib.state.placementsKnown")
@@ -86,8 +100,48 @@ def take_radar_only(browser: Browser, folder: Path, session: Path) -> None:
         workspace.close()
 
 
+def take_sizes(browser: Browser, server: RunningServer, clicks: list[dict[str, Any]]) -> None:
+    """Put the page in windows of all sizes on one sheet, one row for each theme."""
+    first = opened(browser, server, "dark")
+    placed(first, clicks)
+    first.page.close()
+    rows = []
+    for theme in ("dark", "light"):
+        pictures = []
+        for width, height in SIZES:
+            driver = opened(browser, server, theme, size={"width": width, "height": height})
+            driver.go_to(driver.frame_at(clicks[3]["image_time"]))
+            driver.until("__cocalib.state.overlay.index === __cocalib.state.shown.index")
+            driver.page.wait_for_timeout(3000)  # the 3D view draws what it was told
+            pictures.append(scaled(driver.page.screenshot()))
+            driver.page.close()
+        rows.append(beside(pictures, axis=1))
+    path = PICTURES / "sizes.jpg"
+    cv2.imwrite(str(path), beside(rows, axis=0), [cv2.IMWRITE_JPEG_QUALITY, 78])
+    print(path)
+
+
+def scaled(screenshot: bytes) -> np.ndarray:
+    """Decode a screenshot and bring it to the height of a row (h, w, 3)."""
+    picture = cv2.imdecode(np.frombuffer(screenshot, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    width_px = round(picture.shape[1] * ROW_PX / picture.shape[0])
+    return np.asarray(cv2.resize(picture, (width_px, ROW_PX), interpolation=cv2.INTER_AREA))
+
+
+def beside(pictures: list[np.ndarray], axis: int) -> np.ndarray:
+    """Join pictures (h, w, 3) with grey gaps between them."""
+    shape = (pictures[0].shape[0], GAP_PX, 3) if axis == 1 else (GAP_PX, pictures[0].shape[1], 3)
+    gap = np.full(shape, 128, dtype=np.uint8)
+    parts = [part for picture in pictures for part in (gap, picture)]
+    return np.concatenate(parts[1:], axis=axis)
+
+
 def main() -> None:
     """Serve the sample with a session of its own and take the pictures."""
+    only_sizes = sys.argv[1:] == ["--sizes"]
+    if sys.argv[1:] and not only_sizes:
+        sys.exit("usage: python docs/take_pictures.py [--sizes]")
     PICTURES.mkdir(parents=True, exist_ok=True)
     folder = ROOT / "sample_data" / "rooftop"
     clicks = json.loads((folder / "clicks.json").read_text(encoding="utf-8"))["clicks"]
@@ -101,8 +155,11 @@ def main() -> None:
         server = start(workspace, recording, ServerOptions(port=0, token="pictures"))
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=str(find_browser()), args=FLAGS)
-            take_all(browser, server, clicks)
-            take_radar_only(browser, folder, Path(session) / "radar")
+            if only_sizes:
+                take_sizes(browser, server, clicks)
+            else:
+                take_all(browser, server, clicks)
+                take_radar_only(browser, folder, Path(session) / "radar")
             browser.close()
         server.close()
         workspace.close()

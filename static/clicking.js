@@ -61,14 +61,14 @@ function pressed(event) {
   /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
 }
 
-/** The mark of this frame under the pointer, the nearest of several. @param {number} x @param {number} y @returns {import("./messages.js").ClickRow|null} */
-function markNear(x, y) {
+/** The mark of this frame under the pointer, the nearest of several. @param {number} x @param {number} y @param {number} [reach] CSS px @returns {import("./messages.js").ClickRow|null} */
+export function markNear(x, y, reach = REACH) {
   if (state.playing) return null;
   const away = (/** @type {import("./messages.js").ClickRow} */ click) => {
     const [cx, cy] = toCss(click.u_px, click.v_px);
     return Math.hypot(cx - x, cy - y);
   };
-  const near = clicksIn(state.shown?.index ?? -1).filter((click) => away(click) <= REACH);
+  const near = clicksIn(state.shown?.index ?? -1).filter((click) => away(click) <= reach);
   return near.sort((a, b) => away(a) - away(b))[0] ?? null;
 }
 

@@ -1,115 +1,215 @@
 // @ts-check
-/** Draws the timeline, lane by lane: ruler, placements with residual stems, radar activity, and the current frame. */
+/** Draws the timeline, lane by lane: ruler, placements, clicks with their residuals as height, radar activity, picture changes, and the current frame. */
 
 import { ink, residualColour, themeColour } from "./colours.js";
+import { drawGaps, drawRuler, pixelsPerSecond, RULER, text } from "./ruler.js";
 import { clicks, isClicked, state } from "./state.js";
 
-export const lanes = { left: 12, right: 14, ruler: 17, activity: 18, gap: 5, bottom: 6 };
+export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
 /** Returns per slice of time, from the server; empty until known. @type {{step_s: number, returns: number[]}} */
 export const activity = { step_s: 1, returns: [] };
+/** How much the picture changes after some moments, from the server. @type {import("./picture_changes.js").PictureChanges} */
+export const changes = { seconds: [], grey_levels: [], complete: false };
+/** Changes below this are noise of the camera, at least [grey levels]; so a recording in which nothing moves is not all bright. */
+const MUCH = 12;
+/** @typedef {"placements"|"clicks"|"radar"|"picture"} LaneName */
+/** @typedef {Record<LaneName, {top: number, bottom: number}>} Boxes */
+const NAMES = { placements: "Placements", clicks: "Clicks", radar: "Radar", picture: "Picture" };
+/** A dismissed placement is one at this place and time [m]. */
+const SAME_PLACE_M = 0.75;
+/** A timeline of this height has larger text [CSS px]. */
+const LARGE = 140;
 
 /** @typedef {CanvasRenderingContext2D} Ink */
+/** What is drawn from: the visible part of the folded axis, and the way from seconds to CSS px. @typedef {{toX: (seconds: number) => number, from_s: number, to_s: number, folding: import("./folding.js").Folding}} Axis */
+
+/** Where each lane is; a low timeline has no room for the last ones. @param {number} height CSS px @returns {Boxes} */
+export function laneBoxes(height) {
+  const picture = height >= LARGE ? 15 : height >= 84 ? 9 : 0;
+  const radar = height >= 48 ? Math.min(24, Math.round(height * 0.15)) : 0;
+  const placements = Math.max(9, Math.min(20, Math.round(height * 0.15)));
+  const bottom = height - lanes.bottom;
+  const radarBottom = bottom - (picture ? picture + lanes.gap : 0);
+  const clicksBottom = radarBottom - (radar ? radar + lanes.gap : 0);
+  const top = RULER + 2;
+  return {
+    placements: { top, bottom: top + placements },
+    clicks: { top: top + placements + 2, bottom: clicksBottom },
+    radar: { top: radarBottom - radar, bottom: radarBottom },
+    picture: { top: bottom - picture, bottom },
+  };
+}
 
 /**
  * Draw everything.
- * @param {Ink} pen @param {number} width @param {number} height CSS px @param {(seconds: number) => number} toX
- * @param {{from: number, to: number}} span @param {number|null} pointer
+ * @param {Ink} pen @param {number} width @param {number} height CSS px @param {Axis} axis @param {number|null} pointer
  */
-export function drawLanes(pen, width, height, toX, span, pointer) {
+export function drawLanes(pen, width, height, axis, pointer) {
   pen.clearRect(0, 0, width, height);
   if (!state.seconds.length) return;
-  const base = height - lanes.bottom - lanes.activity - lanes.gap;
-  drawRuler(pen, width, height, toX, span);
-  drawPlacements(pen, base, toX);
-  drawActivity(pen, height, toX, span);
+  const boxes = laneBoxes(height);
+  [text.px, lanes.left] = height >= LARGE ? [13.5, 96] : [10.5, 74];
+  pen.save();
+  pen.beginPath();
+  pen.rect(lanes.left - 8, 0, width - lanes.left + 8, height);
+  pen.clip();
+  drawRuler(pen, lanes.left, width, height, axis);
+  drawRadar(pen, boxes.radar, axis);
+  drawPicture(pen, boxes.picture, axis);
   pen.fillStyle = themeColour("line-strong");
-  pen.fillRect(lanes.left, base, width - lanes.left - lanes.right, 1);
-  for (const click of clicks()) drawStem(pen, click, toX(state.seconds[click.frame]), base);
-  if (pointer !== null) {
+  pen.fillRect(lanes.left, boxes.clicks.bottom, width - lanes.left - lanes.right, 1);
+  drawGaps(pen, height, axis);
+  for (const placement of state.placements) drawPlacement(pen, placement, boxes.placements, axis);
+  for (const click of clicks()) drawStem(pen, click, axis.toX(state.seconds[click.frame]), boxes.clicks);
+  if (pointer !== null && pointer >= lanes.left) {
     pen.fillStyle = themeColour("line-strong");
-    pen.fillRect(Math.round(pointer), lanes.ruler, 1, height - lanes.ruler);
+    pen.fillRect(Math.round(pointer), RULER, 1, height - RULER);
   }
-  drawCursor(pen, height, toX(state.seconds[state.cursor] ?? 0));
+  drawCursor(pen, height, axis.toX(state.seconds[state.cursor] ?? 0));
+  pen.restore();
+  drawNames(pen, boxes);
 }
 
-/** @param {Ink} pen @param {number} width @param {number} height @param {(s: number) => number} toX @param {{from: number, to: number}} span */
-function drawRuler(pen, width, height, toX, span) {
-  const rough = ((span.to - span.from) / width) * 90;
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((factor) => factor * power).find((size) => size >= rough) ?? 10 * power;
-  pen.font = "10.5px " + themeColour("mono");
+/** @param {Ink} pen @param {Boxes} boxes */
+function drawNames(pen, boxes) {
+  pen.font = `${text.px}px ${getComputedStyle(document.body).fontFamily}`;
+  pen.textAlign = "left";
   pen.textBaseline = "middle";
-  pen.textAlign = "center";
-  for (let tick = Math.ceil(Math.max(0, span.from) / step); tick * step <= span.to; tick += 1) {
-    const x = toX(tick * step);
-    pen.fillStyle = themeColour("line");
-    pen.fillRect(Math.round(x), lanes.ruler - 3, 1, height - lanes.ruler + 3);
-    pen.fillStyle = themeColour("faint");
-    const text = step < 1 ? (tick * step).toFixed(Math.ceil(-Math.log10(step))) : String(Math.round(tick * step));
-    if (x > 10 && x < width - 12) pen.fillText(tick === 0 ? "0 s" : text, x, 6.5);
+  pen.fillStyle = themeColour("muted");
+  for (const name of /** @type {LaneName[]} */ (Object.keys(NAMES))) {
+    const { top, bottom } = boxes[name];
+    if (bottom - top >= 8) pen.fillText(NAMES[name], 8, (top + bottom) / 2 + 0.5);
   }
 }
 
-/** @param {Ink} pen @param {number} base @param {(s: number) => number} toX */
-function drawPlacements(pen, base, toX) {
+/** What became of a placement. @param {import("./messages.js").PlacementRow} placement @returns {"clicked"|"dismissed"|"open"} */
+export function fateOf(placement) {
+  if (isClicked(placement)) return "clicked";
+  return dismissals().some(({ seconds, at }) => placement.start_s <= seconds && seconds <= placement.end_s && apart(at, placement.position_radar_m) < SAME_PLACE_M) ? "dismissed" : "open";
+}
+
+/** The dismissed placements, each with its time [s]. */
+function dismissals() {
+  const first = state.recording?.frame_times;
+  if (!first?.sec.length) return [];
+  return (state.view?.dismissed ?? []).map(({ time, position_m }) => ({ seconds: time.sec - first.sec[0] + (time.nanosec - first.nanosec[0]) * 1e-9, at: position_m }));
+}
+
+/** @param {number[]} a @param {number[]} b */
+const apart = (a, b) => Math.hypot(...a.map((value, axis) => value - b[axis]));
+
+/**
+ * Clicked = solid, not clicked = hollow and dashed, dismissed = a line with a cross.
+ * @param {Ink} pen @param {import("./messages.js").PlacementRow} placement @param {{top: number, bottom: number}} box @param {Axis} axis
+ */
+function drawPlacement(pen, placement, { top, bottom }, axis) {
+  if (placement.end_s < axis.from_s || placement.start_s > axis.to_s) return;
   const here = state.seconds[state.cursor];
-  for (const placement of state.placements) {
-    const [left, right] = [toX(placement.start_s), toX(placement.end_s)];
-    const clicked = isClicked(placement);
-    pen.beginPath();
-    pen.roundRect(left, lanes.ruler + 2, Math.max(3, right - left), base - lanes.ruler - 2, 3);
-    pen.fillStyle = themeColour("accent-soft");
-    pen.globalAlpha = clicked ? 1 : 0.45;
-    pen.fill();
-    pen.globalAlpha = 1;
-    if (state.looking && right - left > 14) {
-      pen.font = `600 11px ${getComputedStyle(document.body).fontFamily}`;
-      pen.textAlign = "center";
-      pen.fillStyle = themeColour(placement.note ? "attention" : "accent");
-      pen.fillText(String(state.placements.indexOf(placement) + 1), (left + right) / 2, (base + lanes.ruler) / 2);
-    }
-    if (!clicked) {
-      pen.setLineDash([3, 3]);
-      pen.strokeStyle = placement.start_s <= here && here <= placement.end_s ? themeColour("ink") : themeColour("accent");
-      pen.lineWidth = 1;
-      pen.stroke();
-      pen.setLineDash([]);
-    }
-  }
+  const left = axis.toX(placement.start_s);
+  const wide = Math.max(5, axis.toX(placement.end_s) - left);
+  const [middle, height] = [left + wide / 2, bottom - top];
+  const fate = fateOf(placement);
+  const current = placement.start_s <= here && here <= placement.end_s;
+  pen.lineWidth = 1;
+  pen.beginPath();
+  pen.roundRect(left, top, wide, height, 3);
+  pen.strokeStyle = themeColour(current ? "ink" : fate === "dismissed" ? "faint" : "accent");
+  if (fate === "dismissed") return drawDismissed(pen, left, left + wide, (top + bottom) / 2);
+  pen.fillStyle = themeColour(fate === "clicked" ? "accent" : "accent-soft");
+  pen.globalAlpha = fate === "clicked" ? 0.55 : 1;
+  pen.fill();
+  pen.globalAlpha = 1;
+  pen.setLineDash(fate === "open" ? [3, 3] : []);
+  pen.stroke();
+  pen.setLineDash([]);
+  if (wide < 15 || height < 9) return;
+  pen.font = `600 ${text.px - 0.5}px ${getComputedStyle(document.body).fontFamily}`;
+  [pen.textAlign, pen.textBaseline] = ["center", "middle"];
+  pen.fillStyle = themeColour("ink");
+  pen.fillText(`${state.placements.indexOf(placement) + 1}${placement.note && wide >= 28 ? " !" : ""}`, middle, (top + bottom) / 2 + 0.5);
 }
 
-/** @param {Ink} pen @param {number} height @param {(s: number) => number} toX @param {{from: number, to: number}} span */
-function drawActivity(pen, height, toX, span) {
-  const most = Math.max(1, ...activity.returns);
-  const bottom = height - lanes.bottom;
+/** @param {Ink} pen @param {number} left @param {number} right @param {number} y */
+function drawDismissed(pen, left, right, y) {
+  const [middle, arm] = [(left + right) / 2, 3.5];
+  pen.beginPath();
+  pen.moveTo(left, y);
+  pen.lineTo(right, y);
+  for (const [dx, dy] of [[arm, arm], [arm, -arm]]) {
+    pen.moveTo(middle - dx, y - dy);
+    pen.lineTo(middle + dx, y + dy);
+  }
+  pen.stroke();
+}
+
+/** @param {Ink} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
+function drawRadar(pen, { top, bottom }, axis) {
+  if (bottom === top) return;
+  const most = Math.max(1, activity.returns.reduce((a, b) => Math.max(a, b), 0));
   pen.fillStyle = themeColour("faint");
-  pen.globalAlpha = 0.55;
-  for (let slice = 0; slice < activity.returns.length; slice += 1) {
-    const start = slice * activity.step_s;
-    if (start + activity.step_s < span.from || start > span.to || !activity.returns[slice]) continue;
-    const [left, right] = [toX(start), toX(start + activity.step_s)];
-    const tall = Math.max(1, (activity.returns[slice] / most) * lanes.activity);
-    pen.fillRect(left, bottom - tall, Math.max(1, right - left - 0.5), tall);
+  pen.globalAlpha = 0.6;
+  const bars = columns(axis, activity.returns.length, (slice) => slice * activity.step_s, (slice) => activity.returns[slice]);
+  for (const [x, value] of bars) {
+    const tall = Math.max(1, (value / most) * (bottom - top));
+    pen.fillRect(x, bottom - tall, Math.max(1, barWidth(axis, activity.step_s)), tall);
   }
   pen.globalAlpha = 1;
 }
 
-/** @param {Ink} pen @param {import("./messages.js").ClickRow} click @param {number} x @param {number} base */
-function drawStem(pen, click, x, base) {
+/** How much the picture changes: low where it stands still. @param {Ink} pen @param {{top: number, bottom: number}} box @param {Axis} axis */
+function drawPicture(pen, { top, bottom }, axis) {
+  if (bottom === top) return;
+  pen.fillStyle = themeColour("attention");
+  changes.seconds.forEach((at, index) => {
+    const stretch = axis.folding.stretches.find(({ from, to }) => from <= at && at <= to);
+    const next = Math.min(changes.seconds[index + 1] ?? Infinity, stretch?.to ?? at);
+    if (next < axis.from_s || at > axis.to_s) return;
+    const share = changeShare(index);
+    const tall = Math.max(1, share * (bottom - top));
+    pen.globalAlpha = 0.3 + 0.5 * share;
+    pen.fillRect(axis.toX(at), bottom - tall, Math.max(1, axis.toX(next) - axis.toX(at)), tall);
+  });
+  pen.globalAlpha = 1;
+}
+
+/** A change as a part of the most in the recording. @param {number} index */
+export const changeShare = (index) => Math.min(1, changes.grey_levels[index] / Math.max(MUCH, ...changes.grey_levels));
+
+/** The greatest value in each column of pixels, as [x, value]. @param {Axis} axis @param {number} count @param {(index: number) => number} time @param {(index: number) => number} value @returns {Map<number, number>} */
+function columns(axis, count, time, value) {
+  /** @type {Map<number, number>} */
+  const found = new Map();
+  const step = count > 1 ? time(1) - time(0) : 1;
+  const first = Math.max(0, Math.floor((axis.from_s - time(0)) / step) - 1);
+  for (let index = first; index < count && time(index) <= axis.to_s; index += 1) {
+    if (!value(index)) continue;
+    const x = Math.floor(axis.toX(time(index)));
+    found.set(x, Math.max(found.get(x) ?? 0, value(index)));
+  }
+  return found;
+}
+
+/** @param {Axis} axis @param {number} step_s */
+const barWidth = (axis, step_s) => Math.ceil(pixelsPerSecond(axis) * step_s) - (pixelsPerSecond(axis) * step_s > 3 ? 0.5 : 0);
+
+/** @param {Ink} pen @param {import("./messages.js").ClickRow} click @param {number} x @param {{top: number, bottom: number}} box */
+function drawStem(pen, click, x, { top, bottom }) {
   const limit = state.view?.residual_limit_px ?? 20;
-  const room = base - lanes.ruler - 8;
-  const tall = click.residual_px === null ? 6 : Math.min(room, Math.max(6, (click.residual_px / (1.5 * limit)) * room));
-  const colour = click.state === "pending" || click.state === "unpaired" ? ink.grey : residualColour(click.residual_px);
+  const size = Math.min(text.px / 3, (bottom - top) / 3);
+  const room = bottom - top - size - 1;
+  const least = Math.min(6, room);
+  const tall = click.residual_px === null ? least : Math.min(room, Math.max(least, (click.residual_px / (1.5 * limit)) * room));
+  const colour = ["pending", "unpaired", "untouched"].includes(click.state) ? ink.grey : residualColour(click.residual_px);
   const chosen = click.id !== "" && click.id === state.selected;
   pen.strokeStyle = pen.fillStyle = colour;
   pen.lineWidth = chosen ? 2.5 : 1.5;
   pen.beginPath();
-  pen.moveTo(x, base);
-  pen.lineTo(x, base - tall);
+  pen.moveTo(x, bottom);
+  pen.lineTo(x, bottom - tall);
   pen.stroke();
   pen.beginPath();
-  head(pen, click.state, x, base - tall, chosen ? 4.5 : 3.5);
-  if (click.state === "excluded" || click.state === "unpaired") {
+  head(pen, click.state, x, bottom - tall, chosen ? size + 1 : size);
+  if (["excluded", "unpaired", "untouched"].includes(click.state)) {
     pen.fillStyle = themeColour("surface");
     pen.fill();
     pen.lineWidth = 1.5;
@@ -131,11 +231,11 @@ function head(pen, clickState, x, y, size) {
 /** @param {Ink} pen @param {number} height @param {number} x */
 function drawCursor(pen, height, x) {
   pen.fillStyle = themeColour("ink");
-  pen.fillRect(Math.round(x), lanes.ruler, 1, height);
+  pen.fillRect(Math.round(x), RULER, 1, height);
   pen.beginPath();
-  pen.moveTo(x - 4.5, lanes.ruler - 4);
-  pen.lineTo(x + 5.5, lanes.ruler - 4);
-  pen.lineTo(x + 0.5, lanes.ruler + 3);
+  pen.moveTo(x - 4.5, RULER - 4);
+  pen.lineTo(x + 5.5, RULER - 4);
+  pen.lineTo(x + 0.5, RULER + 3);
   pen.closePath();
   pen.fill();
 }

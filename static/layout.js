@@ -1,11 +1,16 @@
 // @ts-check
-/** Dividers, tabs and the theme; the user's choices are remembered. */
+/** The shape of the page for the window's size, dividers, panes, tabs and the theme; the user's choices are remembered. */
 
 import { emit, on, state } from "./state.js";
 
 const root = document.documentElement;
 const KEPT = "cocalib-layout";
-/** @type {{right?: number, space?: number, theme?: string, tab?: string}} */
+/** Below this width [CSS px], or this height, there is room for the picture and one pane. */
+const NARROW = 900;
+const LOW = 560;
+/** Dividers are kept as parts of what they divide, so that they suit every window: the panel's of the width, the 3D view's of the
+ * column, the picture's of a narrow window's height.
+ * @type {{right?: number, space?: number, split?: number, theme?: string, tab?: string, pane?: string}} */
 let kept = {};
 
 export function startLayout() {
@@ -14,14 +19,14 @@ export function startLayout() {
   } catch {
     kept = {};
   }
-  if (kept.right) root.style.setProperty("--right", `${kept.right}px`);
-  if (kept.space) root.style.setProperty("--space", `${kept.space}px`);
+  for (const name of /** @type {const} */ (["right", "space", "split"])) if (!(Number(kept[name]) < 1)) delete kept[name];
+  applyDividers();
   setTheme(kept.theme === "light" ? "light" : "dark");
-  divider("divider-x", (event) => keep({ right: clamp(innerWidth - event.clientX - 2, 300, innerWidth - 340) }));
-  divider("divider-y", (event) => {
-    const top = /** @type {HTMLElement} */ (document.getElementById("right")).getBoundingClientRect();
-    keep({ space: clamp(event.clientY - top.top, 120, top.height - 180) });
-  });
+  startPanes();
+  addEventListener("resize", takeShape);
+  takeShape();
+  startDivider("divider-x", followX);
+  startDivider("divider-y", followY);
   const theme = /** @type {HTMLElement} */ (document.getElementById("theme"));
   theme.onclick = () => {
     kept.theme = root.dataset.theme === "light" ? "dark" : "light";
@@ -60,14 +65,41 @@ function setTheme(theme) {
   emit("theme");
 }
 
+/** Choose the arrangement: "wide" has everything side by side, "low" the picture and one pane, "tall" the picture above one pane. */
+function takeShape() {
+  const wide = innerWidth >= NARROW && innerHeight >= LOW;
+  root.dataset.shape = wide ? "wide" : innerHeight > innerWidth ? "tall" : "low";
+  element("divider-x").setAttribute("aria-orientation", root.dataset.shape === "tall" ? "horizontal" : "vertical");
+  element("divider-x").setAttribute("aria-label", root.dataset.shape === "tall" ? "Height of the picture" : "Width of the picture");
+  tellDividers();
+  emit("box");
+}
+
+function startPanes() {
+  for (const button of paneButtons()) button.onclick = () => showPane(button.dataset.pane ?? "");
+  showPane(paneButtons().some((button) => button.dataset.pane === kept.pane) ? (kept.pane ?? "") : "panel");
+}
+
+const paneButtons = () => /** @type {HTMLElement[]} */ ([...document.querySelectorAll("#panes button")]);
+
+/** Show a pane beside the picture where there is room for one only. @param {string} pane "picture" for none */
+export function showPane(pane) {
+  root.dataset.pane = pane;
+  for (const button of paneButtons()) button.setAttribute("aria-pressed", String(button.dataset.pane === pane));
+  keep({ pane });
+  tellDividers();
+  emit("box");
+}
+
+/** @param {string} id */
+const element = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+
 /** @param {number} value @param {number} low @param {number} high */
-const clamp = (value, low, high) => Math.round(Math.max(low, Math.min(high, value)));
+const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
 
 /** @param {typeof kept} change */
 function keep(change) {
   Object.assign(kept, change);
-  if (change.right) root.style.setProperty("--right", `${change.right}px`);
-  if (change.space) root.style.setProperty("--space", `${change.space}px`);
   try {
     localStorage.setItem(KEPT, JSON.stringify(kept));
   } catch {
@@ -75,9 +107,41 @@ function keep(change) {
   }
 }
 
+/** The divider beside the picture, or below it in a tall window. @param {{clientX: number, clientY: number}} event */
+function followX(event) {
+  const work = element("work").getBoundingClientRect();
+  if (root.dataset.shape === "tall") keep({ split: clamp(event.clientY - 2 - work.top, 110, work.height - 120) / work.height });
+  else keep({ right: clamp(innerWidth - event.clientX - 2, 260, innerWidth - 260) / innerWidth });
+  applyDividers();
+}
+
+/** The divider between the 3D view and the panel. @param {{clientX: number, clientY: number}} event */
+function followY(event) {
+  const right = element("right").getBoundingClientRect();
+  keep({ space: clamp(event.clientY - right.top, 120, right.height - 180) / right.height });
+  applyDividers();
+}
+
+function applyDividers() {
+  if (kept.right) root.style.setProperty("--right", `${100 * kept.right}vw`);
+  if (kept.space) root.style.setProperty("--space", `${100 * kept.space}%`);
+  if (kept.split) root.style.setProperty("--split", `${100 * kept.split}%`);
+  tellDividers();
+}
+
+/** Tell assistive technology where the dividers are, in percent. */
+function tellDividers() {
+  const [picture, work] = [element("picture-pane").getBoundingClientRect(), element("work").getBoundingClientRect()];
+  const [space, right] = [element("space").getBoundingClientRect(), element("right").getBoundingClientRect()];
+  const part = root.dataset.shape === "tall" ? picture.height / work.height : picture.width / work.width;
+  for (const [id, value] of /** @type {[string, number][]} */ ([["divider-x", part], ["divider-y", space.height / right.height]])) {
+    element(id).setAttribute("aria-valuenow", String(Math.round(100 * (Number.isFinite(value) ? value : 1))));
+  }
+}
+
 /** @param {string} id @param {(event: {clientX: number, clientY: number}) => void} follow */
-function divider(id, follow) {
-  const bar = /** @type {HTMLElement} */ (document.getElementById(id));
+function startDivider(id, follow) {
+  const bar = element(id);
   bar.addEventListener("pointerdown", (event) => {
     bar.setPointerCapture(event.pointerId);
     bar.classList.add("dragging");

@@ -1,6 +1,7 @@
 // @ts-check
 /** The header and the status line: recording, clock, buttons, status, progress, the pixel under the pointer. */
 
+import { longName, setLongName } from "./long_names.js";
 import { icon, make } from "./notices.js";
 import { toDevice, viewport, zoom } from "./geometry.js";
 import { fit } from "./picture.js";
@@ -29,16 +30,17 @@ function drawOpening() {
   const early = state.opening !== null && !state.recording;
   for (const id of NEED_FRAMES) /** @type {HTMLButtonElement} */ (get(id)).disabled = early;
   if (!early) return;
-  get("recording-name").textContent = state.opening?.name ?? "";
+  setLongName(get("recording-name"), state.opening?.name ?? "");
   document.title = `${state.opening?.name} · cocalib`;
 }
 
 function drawRecording() {
   const recording = state.recording;
   if (!recording) return;
-  get("recording-name").textContent = recording.name;
+  setLongName(get("recording-name"), recording.name);
   const picture = `${recording.width_px} × ${recording.height_px} px`;
   const size = recording.has_pictures ? [fact("picture", picture, `Size of every frame: ${picture}`)] : [];
+  for (const made of size) made.classList.add("short");
   get("recording-topics").replaceChildren(...recording.sensors.map(sensorFact), ...size);
   get("status-right").textContent = `cocalib ${recording.version}`;
   get("status-right").dataset.hint = recording.has_pictures ? `Every click is saved immediately in\n${recording.session.folder}` : "Nothing is saved: there are no pictures to click in.";
@@ -46,7 +48,7 @@ function drawRecording() {
 
 /** @param {string} name @param {string} value @param {string} hint */
 function fact(name, value, hint) {
-  const made = make("span", "fact", [make("small", "", name), value]);
+  const made = make("span", "fact", [make("small", "", name), longName(value)]);
   made.dataset.hint = hint;
   return made;
 }

@@ -1,9 +1,13 @@
 """The page as a user finds it: what it says first, its layout, what the 3D view shows, and what it remembers."""
 
+from collections.abc import Callable
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
 
+from app.web.port.server import RunningServer
 from tests.browser.driving import Driver
 
 pytestmark = pytest.mark.browser
@@ -66,37 +70,125 @@ def test_dividers_and_theme_are_remembered(page: Driver) -> None:
     assert pixels(page, "#bar").mean() > 200
 
 
-def test_nothing_is_cut_off_or_covered_at_any_common_size(page: Driver) -> None:
-    for width, height in ((1280, 720), (1440, 900), (1920, 1080), (1024, 640)):
-        page.page.set_viewport_size({"width": width, "height": height})
-        page.until(f"innerWidth === {width} && innerHeight === {height}")
-        page.drawn()
-        outside = page.value(
-            "[...document.querySelectorAll('button, canvas:not([hidden]), .figure, #status-text')]"
-            ".filter((part) => part.offsetParent !== null)"
-            ".map((part) => [part.id || part.className, part.getBoundingClientRect()])"
-            ".filter(([, box]) => box.left < -1 || box.top < -1 || box.right > innerWidth + 1 || box.bottom > innerHeight + 1)"
-            ".map(([name]) => name)"
-        )
-        assert outside == []
-        for button in ("#play", "#export", "#undo", "#tab-options", '[data-layer="returns"]'):
-            covered = page.value(
-                f"(() => {{ const part = document.querySelector('{button}'); const box = part.getBoundingClientRect();"
-                "const top = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2);"
-                "return !part.contains(top); })()"
-            )
-            assert not covered, button
+SIZES = (
+    (390, 844),
+    (768, 1024),
+    (640, 360),
+    (1024, 768),
+    (1280, 480),
+    (1280, 720),
+    (1440, 900),
+    (1920, 1080),
+    (3840, 2160),
+)
+"""From a phone to a 4K monitor; 640 x 360 is 1280 x 720 at 200 %."""
+EXTREME_NAMES = {
+    "name": "مسح رادار السيارة الأمامي في الطريق السريع الطويل جدا " + "2026_03_12_run_007_front_left" * 4 + ".bag",
+    "topics": [
+        "/vehicle/perception/sensors/front_left_corner/radar/points_raw",
+        "/vehicle/perception/sensors/front_center/camera_wide/image_rect/compressed",
+    ],
+}
 
 
-@pytest.mark.parametrize("width", [1024, 1440])
-def test_long_names_are_cut_short_and_push_nothing_out_of_the_window(page: Driver, width: int) -> None:
-    page.page.set_viewport_size({"width": width, "height": 720})
-    page.value(
-        "document.querySelectorAll('#recording-topics .fact').forEach((fact, place) => "
-        "{ if (!place) fact.append(' + /front_radar/points_with_a_long_name'.repeat(5)); })"
+def give_extreme_names(page: Driver) -> None:
+    """Let the recording and its topics have names as long as they come."""
+    page.page.evaluate(
+        "async ({ name, topics }) => { const { emit, state } = await import('./state.js'); state.recording.name = name;"
+        "topics.forEach((topic, place) => (state.recording.sensors[place].topic = topic)); emit('recording'); }",
+        EXTREME_NAMES,
     )
-    page.value("document.getElementById('recording-name').append('_of_a_long_day'.repeat(20))")
+    page.until("document.getElementById('recording-name').textContent.length > 100")
+
+
+def out_of_reach(page: Driver, *selectors: str) -> Any:
+    """Return what is not in the window, has no size, or is covered by something else."""
+    return page.page.evaluate(
+        "(selectors) => selectors.filter((selector) => { const part = document.querySelector(selector);"
+        "const box = part.getBoundingClientRect();"
+        "const inside = box.left >= -1 && box.top >= -1 && box.right <= innerWidth + 1 && box.bottom <= innerHeight + 1;"
+        "const top = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2);"
+        "return !inside || box.width < 8 || box.height < 8 || !(part.contains(top) || top?.contains(part)); })",
+        list(selectors),
+    )
+
+
+@pytest.mark.parametrize("names", ["ordinary", "extreme"])
+def test_everything_is_in_the_window_or_a_tab_away_at_any_size(page: Driver, names: str) -> None:
+    page.page.click("#theme")
+    if names == "extreme":
+        give_extreme_names(page)
+    for width, height in SIZES if names == "extreme" else SIZES[::4]:
+        page.page.set_viewport_size({"width": width, "height": height})
+        page.until(f"innerWidth === {width} && innerHeight === {height} && document.documentElement.dataset.shape")
+        page.drawn()
+        always = (
+            "#export",
+            "#undo",
+            "#help",
+            "#play",
+            "#next-placement",
+            "#status-text",
+            "#timeline",
+            "#picture-pane",
+            "#zoom",
+        )
+        assert out_of_reach(page, *always, ".recording", '[data-layer="returns"]') == [], (width, height)
+        panel = ("#panel", ".figure", "#tab-pairs", "#tab-options", "#page-pairs")
+        if page.value("document.documentElement.dataset.shape") == "wide":
+            assert out_of_reach(page, *panel, "#space", '[data-viewpoint="above"]') == [], (width, height)
+        else:
+            page.page.click('[data-pane="space"]')
+            assert out_of_reach(page, "#space", '[data-viewpoint="above"]', *always) == [], (width, height)
+            page.page.click('[data-pane="picture"]')
+            assert page.value("document.getElementById('picture-pane').offsetWidth") >= width - 4
+            page.page.click('[data-pane="panel"]')
+            assert out_of_reach(page, *panel, *always) == [], (width, height)
+        apart = page.value(
+            "document.querySelector('.recording').getBoundingClientRect().right"
+            " <= document.querySelector('.tools').getBoundingClientRect().left + 1"
+        )
+        assert apart, (width, height)
+        page.press("n")  # the first row and the first mark are asked to come into view
+    assert page.value("[scrollX, scrollY, document.body.scrollTop, document.getElementById('work').scrollTop]") == [
+        0,
+        0,
+        0,
+        0,
+    ]
+    assert page.value("document.documentElement.scrollWidth") == SIZES[-1][0]
+
+
+def test_at_200_percent_a_click_hits_its_pixel_and_moves_nothing_else(
+    open_page: Callable[..., Driver], server: RunningServer
+) -> None:
+    page = open_page(server.url, viewport={"width": 640, "height": 360}, device_scale_factor=2)
+    before = page.value("document.getElementById('picture-pane').getBoundingClientRect().toJSON()")
+    page.click(500, 300)
+    (click,) = page.view["clicks"]
+    assert abs(click["u_px"] - 500) < 2
+    assert abs(click["v_px"] - 300) < 2
+    assert page.value("document.getElementById('picture-pane').getBoundingClientRect().toJSON()") == before
+    page.page.click("#tab-options")
+    page.page.locator(".options input").last.evaluate("(part) => part.focus()")
+    assert page.value("[scrollX, scrollY, document.body.scrollTop]") == [0, 0, 0]
+    assert page.value("document.getElementById('picture-pane').getBoundingClientRect().toJSON()") == before
+
+
+def test_dividers_keep_their_part_in_another_window_and_move_by_keys(page: Driver) -> None:
+    bar = page.page.locator("#divider-x")
+    bar.focus()
+    for _ in range(6):
+        page.page.keyboard.press("ArrowLeft")
+    part = page.value("document.getElementById('right').offsetWidth / innerWidth")
+    told = float(page.value("document.getElementById('divider-x').getAttribute('aria-valuenow')"))
+    assert told == pytest.approx(100 * (1 - part), abs=1)
+    page.page.set_viewport_size({"width": 1800, "height": 900})
+    page.until(f"Math.abs(document.getElementById('right').offsetWidth / 1800 - {part}) < 0.01")
+    page.page.set_viewport_size({"width": 600, "height": 900})
+    page.until("document.getElementById('divider-x').getAttribute('aria-orientation') === 'horizontal'")
     page.drawn()
-    for part in ("#bar", "#help", "#right", "#timeline", "#recording-topics .fact:last-child"):
-        assert page.value(f"document.querySelector('{part}').getBoundingClientRect().right") <= width, part
-    assert page.value("document.querySelector('#recording-topics .fact:nth-child(2)').offsetWidth") >= 88
+    high = page.value("document.getElementById('picture-pane').offsetHeight")
+    bar.focus()
+    page.page.keyboard.press("ArrowDown")
+    page.until(f"document.getElementById('picture-pane').offsetHeight > {high} + 10")

@@ -107,8 +107,8 @@ def test_names_in_a_recording_are_text_and_never_run(open_page: Callable[..., Dr
         page.press("?")
         page.drawn()
         assert page.value("window.hit === undefined")
-        assert page.text("#recording-name") == f"name{hostile}"
-        assert hostile in page.text("#recording-topics")
+        assert page.value("document.getElementById('recording-name').textContent") == f"name{hostile}"
+        assert hostile in page.value("document.getElementById('recording-topics').textContent")
         assert page.page.locator("img").count() == 0
     finally:
         running.close()

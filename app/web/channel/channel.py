@@ -90,6 +90,11 @@ class Channel:
                 task.cancel()
             await asyncio.gather(sending, reading, return_exceptions=True)
 
+    @property
+    def is_playing(self) -> bool:
+        """Whether the page plays now."""
+        return self._cursor.playing
+
     def show(self) -> None:
         """Send the newest View, or what differs from the one that the page has."""
         self.outbox.put(self._view_text, kind="view")

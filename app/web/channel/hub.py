@@ -13,6 +13,7 @@ from app.resources import version
 from app.view import View, warning_in_sentences
 from app.web.channel.live_edge import LiveEdge
 from app.web.channel.outbox import Outbox
+from app.web.channel.picture_changes import PictureChanges, changes_of
 from app.web.channel.radar_survey import Survey, survey_of
 from app.web.channel.view_feed import ViewFeed
 from app.web.frames import FrameStore
@@ -44,6 +45,10 @@ class Tab(Protocol):
 
     outbox: Outbox
 
+    @property
+    def is_playing(self) -> bool:
+        """Whether the page plays now."""
+
     def show(self) -> None:
         """Send the newest View, or what differs from the one that the page has."""
 
@@ -63,6 +68,7 @@ class Hub:
         self.moments = workspace.facts.moments
         self.camera = recording.camera()
         self.survey: Survey | None = None
+        self.picture_changes = PictureChanges()
         self.tabs: set[Tab] = set()
         self.steps = ThreadPoolExecutor(max_workers=1, thread_name_prefix="steps")
         self.feed = ViewFeed(workspace.view)
@@ -154,6 +160,15 @@ class Hub:
             self.broadcast(message, kind)
         for tab in self.tabs:
             tab.refresh()
+        if self.workspace.facts.has_pictures:
+            with error_boundary("comparing the pictures", _log.error):
+                await changes_of(self.recording, self.moments, self.executor, self._compared, self._is_playing)
+
+    def _compared(self, changes: PictureChanges) -> None:
+        self.picture_changes = changes
+
+    def _is_playing(self) -> bool:
+        return any(tab.is_playing for tab in self.tabs)
 
     def _found(self, survey: Survey | None) -> Iterator[tuple[str, Outgoing]]:
         """Yield the messages about the whole radar recording, each with its kind; the map is drawn only without pictures."""

@@ -18,7 +18,7 @@ from calib_core.recordings.radar.scan_blocks import join_scans
 
 __all__ = ["Activity", "GrowingSurvey", "Survey", "placements_at", "survey_of"]
 
-_MOST_SLICES = 800
+_MOST_SLICES = 8000
 _MOST_STATIC_RETURNS = 1_000_000
 """Limit of one stretch: more than an hour of 25 static returns in each of 10 scans a second; searching it takes about 200 MB."""
 

@@ -16,6 +16,7 @@ from app.session import Session
 from app.solving import calibration_text
 from app.view import sentence
 from app.web.channel.export_preview import NoPreview, export_preview, exported, format_rows
+from app.web.channel.picture_changes import PictureChanges
 from app.web.channel.radar_survey import Survey
 from app.web.port.viser_hook import client_page
 from app.workspace import Workspace
@@ -58,10 +59,12 @@ _VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
 
 
 class Surveyor(Protocol):
-    """Provides the radar survey once it is complete."""
+    """Provides the radar survey once it is complete, and how much the pictures change as far as it is known."""
 
     @property
     def survey(self) -> Survey | None: ...
+    @property
+    def picture_changes(self) -> PictureChanges: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +165,7 @@ class _Downloads:
             "/api/clicks.json": self._clicks,
             "/api/formats.json": _formats,
             "/api/activity.json": self._activity,
+            "/api/picture_changes.json": self._picture_changes,
             **{f"/api/export/{form.name}": partial(self._export, form.name) for form in formats},
             **{f"/api/preview/{form.name}": partial(self._preview, form.name) for form in formats},
         }
@@ -204,6 +208,9 @@ class _Downloads:
         if survey is None:
             return refusal(409, "The radar data are still being read.")
         return _reply(msgspec.json.encode(survey.activity), _TYPES[".json"])
+
+    def _picture_changes(self, _query: str) -> Reply:
+        return _reply(msgspec.json.encode(self._hub.picture_changes), _TYPES[".json"])
 
 
 def _file(path: Path) -> Reply:

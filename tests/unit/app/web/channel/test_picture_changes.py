@@ -1,0 +1,58 @@
+"""How much the picture changes: much where something moves, little where it stands still; not measured while someone plays."""
+
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from app.web.channel.picture_changes import PictureChanges, changes_of, comparison_order
+from calib_core.measurements import NS_PER_S
+from tests.picture_recording import START, PictureRecording
+
+
+def walker(column_px: int) -> np.ndarray:
+    """Draw a person, dark on noise, 1 % of the picture."""
+    rng = np.random.default_rng(column_px)
+    picture = rng.normal(140, 3, (360, 640, 3)).clip(0, 255).astype(np.uint8)
+    picture[150:240, column_px : column_px + 26] = 40
+    return picture
+
+
+def compared(recording: PictureRecording, busy: list[bool]) -> list[PictureChanges]:
+    """Compare all frames; return what was told."""
+    told: list[PictureChanges] = []
+
+    async def run() -> None:
+        with ThreadPoolExecutor(1) as executor:
+            times = recording.image_times
+            await changes_of(recording, times, executor, told.append, lambda: bool(busy) and busy.pop())  # type: ignore[arg-type]
+
+    asyncio.run(run())
+    return told
+
+
+def test_a_person_who_walks_changes_the_picture_and_one_who_stands_does_not() -> None:
+    recording = PictureRecording([walker(100), walker(100), walker(100), walker(130), walker(160)])
+    last = compared(recording, [])[-1]
+    assert last.complete
+    assert last.seconds == (0.0, 0.1, 0.2, 0.3)
+    still, walking = last.grey_levels[:2], last.grey_levels[2:]
+    assert max(still) < 5
+    assert min(walking) > 50
+
+
+def test_pictures_are_compared_only_while_nobody_plays() -> None:
+    recording = PictureRecording([walker(100), walker(130)])
+    busy = [True]
+    told = compared(recording, busy)
+    assert busy == []
+    assert told[-1].complete
+
+
+def test_the_first_comparisons_span_the_recording_and_none_crosses_a_gap() -> None:
+    moments = START + (np.concatenate([np.arange(0, 100, 0.1), np.arange(4000, 4100, 0.1)]) * NS_PER_S).astype(np.int64)
+    order = comparison_order(moments)
+    assert len(order) == len(set(order)) == 300
+    assert np.ptp(order[:10]) > 0.8 * len(moments)
+    assert 999 not in order  # the last frame before the gap
+    assert comparison_order(moments[:1]) == []
