@@ -19,6 +19,9 @@ const VIEWPOINTS = [
 /** How long the 3D view waits after input on the page, so that mark and overlay are painted first [ms]. */
 const HOLD = 250;
 
+/** When the 3D view is loaded at the latest, counted from the recording's description: its first frame may be unreadable [ms]. */
+const LATEST = 3000;
+
 /** What static/pace.js reads in the 3D view's frame. */
 const pace = { playing: false, holdUntil: 0 };
 
@@ -39,7 +42,13 @@ export function startSpace() {
     tint();
   });
   on(["theme"], tint);
-  frame.src = `viser/${tab}/`;
+  on(["shown", "look"], () => requestAnimationFrame(() => setTimeout(load)));
+  on(["recording"], () => setTimeout(load, LATEST));
+}
+
+/** Load viser's page, once: it is large, and the first picture comes before it. */
+function load() {
+  if (!frame.hasAttribute("src")) frame.src = `viser/${tab}/`;
 }
 
 /** Apply the theme to the 3D view. */
