@@ -1,5 +1,6 @@
 """Where the program finds its own files and keeps its state, and whether another package overwrites it."""
 
+import hashlib
 import importlib.metadata
 import os
 import sys
@@ -8,15 +9,18 @@ from pathlib import Path
 from calib_core.errors import CalibrationError
 
 __all__ = [
+    "SESSION_SUFFIX",
     "InstallationError",
     "check_installation",
     "installed_app_owners",
     "sample_folder",
     "state_folder",
     "static_folder",
+    "user_session_folder",
     "version",
 ]
 
+SESSION_SUFFIX = ".cocalib-session"
 _DISTRIBUTION = "cocalib"
 _PACKAGE_FOLDER = Path(__file__).resolve().parent
 
@@ -48,6 +52,17 @@ def state_folder() -> Path:
     return _system_state_folder() / _DISTRIBUTION
 
 
+def user_session_folder(name: str, *, key: str = "") -> Path:
+    """Return a session folder in the user's state folder.
+
+    Args:
+        name: what the session is of.
+        key: distinguishes sessions of the same name, such as the recording's path.
+    """
+    distinct = f"-{hashlib.sha256(os.fsencode(key)).hexdigest()[:8]}" if key else ""
+    return state_folder() / "sessions" / f"{name}{distinct}{SESSION_SUFFIX}"
+
+
 def version() -> str:
     """Return the version of the installed program; "0+unknown" if it runs from a checkout that is not installed."""
     try:
@@ -58,7 +73,8 @@ def version() -> str:
 
 def installed_app_owners() -> tuple[str, ...]:
     """Return the names of the installed distributions that contain a top-level package `app`."""
-    return tuple(sorted(set(importlib.metadata.packages_distributions().get("app", ()))))
+    owners = {found.name for found in importlib.metadata.distributions() if _has_app(found)}
+    return tuple(sorted(owners))
 
 
 def check_installation() -> None:
@@ -74,6 +90,17 @@ def check_installation() -> None:
             f"so one of them has overwritten the other; install {_DISTRIBUTION} into its own environment "
             f"with `uv tool install {_DISTRIBUTION}` or `pipx install {_DISTRIBUTION}`"
         )
+
+
+def _has_app(installed: importlib.metadata.Distribution) -> bool:
+    """Return whether a distribution installs a package `app`.
+
+    The list of its files is searched as text: parsing all lists of an environment takes as long as starting the program.
+    """
+    if (top_level := installed.read_text("top_level.txt")) is not None:
+        return "app" in top_level.split()
+    files = installed.read_text("RECORD") or ""
+    return any(f"{before}app/" in files for before in ("\n", '\n"')) or files.startswith(("app/", '"app/'))
 
 
 def _folder(name: str) -> Path:

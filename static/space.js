@@ -31,6 +31,8 @@ const HOLD = 250;
 
 /** Time between two drawings while playing, with and without pictures [ms]. */
 const [PLAYING_EVERY, LOOKING_EVERY] = [1000, 340];
+/** When the 3D view is loaded at the latest, counted from the recording's description: its first frame may be unreadable [ms]. */
+const LATEST = 3000;
 
 /** What static/pace.js reads in the 3D view's frame. */
 const pace = { playing: false, every: 1000, holdUntil: 0 };
@@ -65,7 +67,13 @@ export function startSpace() {
   on(["cursor", "shown"], drawStanding);
   onDrawn(() => (drawBar(), drawStanding(), drawReadout(null)));
   arrange();
-  frame.src = `viser/${tab}/`;
+  on(["shown", "look"], () => requestAnimationFrame(() => setTimeout(load)));
+  on(["recording"], () => setTimeout(load, LATEST));
+}
+
+/** Load viser's page, once: it is large, and the first picture comes before it. */
+function load() {
+  if (!frame.hasAttribute("src")) frame.src = `viser/${tab}/`;
 }
 
 /** Take what the server says about the 3D view. @param {import("./messages.js").SpaceLook} look */

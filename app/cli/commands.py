@@ -56,7 +56,7 @@ class Command:
 COMMANDS: Mapping[str, Command] = {
     command.name: command
     for command in (
-        Command("demo", "app.cli.open:Demo", "Open the sample recording in the browser."),
+        Command("demo", "app.cli.demo:Demo", "Open the sample recording in the browser."),
         Command("open", "app.cli.open:Open", "Calibrate your own recording in the browser."),
         Command(
             "info",

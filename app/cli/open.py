@@ -1,8 +1,7 @@
-"""`cocalib demo` and `cocalib open`: calibrate in the browser."""
+"""`cocalib open`: calibrate in the browser."""
 
 import contextlib
 import dataclasses
-import hashlib
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -14,10 +13,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.cli.flags import File, Folder, Switch, called
+from app.cli.flags import File, Folder, Switch
 from app.cli.import_file import camera_in, reference_from
 from app.cli.output import read_text, required_camera, told_clicks_at_frames
 from app.cli.recording_flags import CameraPosition, MeasuredCamera, Options, Recordings, TopicFlags, Topics
+from app.cli.serving_flags import ServingFlags
+from app.web.port.link import Link
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from app.web.port.serving import Service
     from app.workspace import Workspace
 
-__all__ = ["Demo", "Open"]
+__all__ = ["Open", "serve"]
 
 _RECORDING_SUFFIXES = (".bag", ".mcap", ".db3")
 _LARGE_BYTES = 1_000_000_000
@@ -37,56 +38,6 @@ _LARGE_BYTES = 1_000_000_000
 _LOOK_EVERY_S = 0.2
 _SOON_S = 0.2
 """Smaller files are usually open within this time, and the page then shows no waiting screen [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class ServingFlags:
-    """Where to serve the page."""
-
-    host: Annotated[str, tyro.conf.arg(metavar="ADDRESS")] = "127.0.0.1"
-    """Address to bind; any other than loopback admits other machines, which then need the token."""
-    port: int = 8080
-    """Port; if it is taken, the next free one; 0 for any free port."""
-    token: Annotated[str | None, called("TOKEN")] = None
-    """Token that the link must contain, 8 characters or more, 16 for other machines; generated and printed if omitted."""
-    socket: Annotated[Path | None, called("PATH")] = None
-    """Serve on a Unix socket that only you can reach, for shared robots; the ssh command that forwards it is printed."""
-    no_browser: Switch = False
-    """Print the link, do not open a browser."""
-
-
-@dataclass(frozen=True, slots=True)
-class Demo:
-    """Open the sample recording in the browser."""
-
-    session: Folder = None
-    """Session folder; by default, one in your user folder that is kept between runs."""
-    fresh: Switch = False
-    """Start without the previous clicks (a backup is kept)."""
-    serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
-
-    def run(self) -> int:
-        """Serve until Ctrl+C, SIGTERM or SIGHUP; return the exit code."""
-        from app.resources import sample_folder
-        from app.session.file import user_session_folder
-
-        sample = sample_folder() / "rooftop"
-        bags = (sample / "radar.bag", sample / "camera.bag")
-        return _serve(
-            bags,
-            session=self.session or user_session_folder(f"demo-{_digest(bags)}"),
-            fresh=self.fresh,
-            serving=self.serving,
-            name="the sample recording",
-        )
-
-
-def _digest(files: Sequence[Path]) -> str:
-    """Return a short hash that identifies the version of the sample: a session belongs to one recording."""
-    content = hashlib.sha256()
-    for file in files:
-        content.update(file.read_bytes())
-    return content.hexdigest()[:8]
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,30 +65,34 @@ class Open:
 
     def run(self) -> int:
         """Serve until Ctrl+C, SIGTERM or SIGHUP; return the exit code."""
+        from app.resources import check_installation
+        from app.session.file import recording_session_folder
         from calib_core.recordings import require_files
 
         paths = self.recording if self.follow and self.recording else require_files(self.recording)
-        return _serve(
-            paths,
-            session=self.session,
-            fresh=self.fresh,
-            serving=self.serving,
-            name=name_text(paths[0].name),
-            camera_file=self.camera,
-            clicks_file=self.clicks,
-            calibration_file=self.calibration,
-            topics=self.topics,
-            options=self.measured.over(self.options),
-            follow=self.follow,
-        )
+        check_installation()
+        with contextlib.closing(self.serving.link(self.session or recording_session_folder(paths))) as link:
+            return serve(
+                paths,
+                session=self.session,
+                fresh=self.fresh,
+                link=link,
+                name=name_text(paths[0].name),
+                camera_file=self.camera,
+                clicks_file=self.clicks,
+                calibration_file=self.calibration,
+                topics=self.topics,
+                options=self.measured.over(self.options),
+                follow=self.follow,
+            )
 
 
-def _serve(
+def serve(
     paths: Sequence[Path],
     *,
     session: Path | None,
     fresh: Switch,
-    serving: ServingFlags,
+    link: Link,
     name: str,
     camera_file: Path | None = None,
     clicks_file: Path | None = None,
@@ -151,25 +106,18 @@ def _serve(
     Raises:
         CalibrationError: the recording, the intrinsics, the clicks or the session cannot be used.
     """
-    from app.resources import check_installation
     from app.session import ClicksImported, OptionsChanged
     from app.session.file import recording_session_folder
     from app.view import sentence
-    from app.web.port.address import require_address, require_one_address, require_token
-    from app.web.port.guard import is_loopback
     from app.workspace import open_workspace
     from calib_core.interchange import read_clicks
     from calib_core.recordings import open_recording
 
-    check_installation()
-    require_address(serving.host, serving.port)
-    require_one_address(serving.socket, serving.host)
-    require_token(serving.token, reachable=not is_loopback(serving.host))
     _require_given(camera_file, calibration_file, clicks_file)
     admissions = session or recording_session_folder(paths)
     topics = _with_remembered(topics or RecordingOptions(), admissions, fresh=fresh)
     awaited = AwaitedRecording(paths, topics) if follow else None
-    with _service(paths, topics, serving, name, admissions, follow=follow) as service, ExitStack() as stack:
+    with _service(paths, topics, link, name, follow=follow) as service, ExitStack() as stack:
         opened = (
             _awaited(awaited, service, name)
             if awaited is not None
@@ -275,19 +223,16 @@ def _remember(workspace: "Workspace", recording: Recording) -> None:
         workspace.dispatch(AssumptionsConfirmed(sure))
 
 
-def _service(
-    paths: Sequence[Path], topics: RecordingOptions, serving: ServingFlags, name: str, session: Path, *, follow: bool
-) -> "Service":
+def _service(paths: Sequence[Path], topics: RecordingOptions, link: Link, name: str, *, follow: bool) -> "Service":
     """Return the service; it serves the page of a large recording before the recording is open."""
     from app.web.messages import Opening
-    from app.web.port.server import ServerOptions
     from app.web.port.serving import Service
     from calib_core.recordings import first_picture
 
     size_bytes = sum(map(_size_bytes, paths))
     size = f" ({size_bytes / 1e9:.1f} GB)" if size_bytes >= _LARGE_BYTES / 10 else ""
     return Service(
-        ServerOptions(**dataclasses.asdict(serving), session=str(session.absolute())),
+        link,
         Opening(name, f"Waiting for {name}…" if follow else f"Opening {name}{size}: reading its index and times…"),
         partial(first_picture, () if follow else paths, topics),
         let_in_after_s=0.0 if follow or size_bytes >= _LARGE_BYTES else _SOON_S,

@@ -18,6 +18,8 @@ Size = Literal["full", "half", "thumbnail"]
 HALF_ABOVE_PX = 2_500_000
 """Pictures with more pixels than this are sent at half size while playing [px]."""
 THUMBNAIL_WIDTH_PX = 480
+BUDGET_BYTES = 16 << 20
+"""Enough for the frames read ahead and those just shown: the recording's file, which the system caches, has all the others."""
 _PROXY_QUALITY, _THUMBNAIL_QUALITY = 85, 80
 
 
@@ -45,7 +47,7 @@ class Frame:
 class FrameStore:
     """Frames by index and size, cached by last use; concurrent requests share one read. Runs on one event loop."""
 
-    def __init__(self, source: Recording, count: int, executor: Executor, *, budget_bytes: int = 256 << 20) -> None:
+    def __init__(self, source: Recording, count: int, executor: Executor, *, budget_bytes: int = BUDGET_BYTES) -> None:
         self._source = source
         self._count = count
         self._executor = executor

@@ -9,6 +9,7 @@ from benchmarks.speed.channel import measure_channel
 from benchmarks.speed.paging import measure_page
 from benchmarks.speed.recordings import measure_recordings
 from benchmarks.speed.rows import page
+from benchmarks.speed.serving import measure_serving
 from benchmarks.speed.solving import measure_solving
 from benchmarks.speed.starting import measure_starting
 
@@ -21,6 +22,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as scratch:
         tables = [
             *measure_page(Path(scratch)),
+            measure_serving(Path(scratch)),
             measure_channel(),
             measure_solving(),
             measure_starting(sample_folder() / "rooftop"),

@@ -15,7 +15,7 @@ from app.memory import keep_freed_memory
 from benchmarks.speed.rows import Row, Table
 from calib_core.recordings import first_picture, open_recording
 
-__all__ = ["measure_recordings"]
+__all__ = ["measure_recordings", "write_bag"]
 
 _START_NS = 1_700_000_000 * 10**9
 _FRAME_NS = 33_333_333
@@ -61,19 +61,19 @@ def measure_recordings(scratch: Path, *, large: bool = False) -> Table:
     """
     os.environ["COCALIB_CACHE"] = "off"
     keep_freed_memory()  # as the cocalib command does
-    plain = _write(scratch / "plain.bag", _FRAMES)
-    packed = _write(scratch / "packed.bag", 1_000, compression="lz4")
+    plain = write_bag(scratch / "plain.bag", _FRAMES)
+    packed = write_bag(scratch / "packed.bag", 1_000, compression="lz4")
     rows = [
         *_opening(plain, scratch / "cache"),
-        *_decoding(_write(scratch / "returns.bag", 1, returns=60_000), "RadarScan, one return per message", 15.0),
-        *_decoding(_write(scratch / "clouds.bag", 1, clouds=4_000), "PointCloud2 of 120 points", 10.0),
+        *_decoding(write_bag(scratch / "returns.bag", 1, returns=60_000), "RadarScan, one return per message", 15.0),
+        *_decoding(write_bag(scratch / "clouds.bag", 1, clouds=4_000), "PointCloud2 of 120 points", 10.0),
         _seeking(plain, "none"),
         _seeking(packed, "lz4"),
         *_memory(plain, plain.stat().st_size),
     ]
     plain.unlink()
     for frames, hole_bytes in ((8 * _FRAMES, 0), (_FRAMES, 50_000_000)) if large else ():
-        path = _write(scratch / f"{frames}-{hole_bytes}.bag", frames, hole_bytes=hole_bytes)
+        path = write_bag(scratch / f"{frames}-{hole_bytes}.bag", frames, hole_bytes=hole_bytes)
         rows += [*_opening(path, scratch / path.stem), *_memory(path, path.stat().st_size)]
         path.unlink()
     return Table(
@@ -90,7 +90,7 @@ def measure_recordings(scratch: Path, *, large: bool = False) -> Table:
 # -- files
 
 
-def _write(
+def write_bag(
     path: Path, frames: int, *, compression: str = "", returns: int = 0, clouds: int = 0, hole_bytes: int = 0
 ) -> Path:
     """Write a bag with rosbags; with holes, its pictures are far apart in a sparse file."""

@@ -1,18 +1,15 @@
 """Where a session is stored: next to its recording if that folder is writable, else in the user's state folder."""
 
-import hashlib
-import os
 import re
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.resources import state_folder
+from app.resources import SESSION_SUFFIX, user_session_folder
 
 __all__ = ["is_writable", "recording_session_folder", "session_folders_in", "user_session_folder"]
 
-_SUFFIX = ".cocalib-session"
-_SET_ASIDE = re.compile(re.escape(_SUFFIX) + r"\.[0-9]+$")
+_SET_ASIDE = re.compile(re.escape(SESSION_SUFFIX) + r"\.[0-9]+$")
 
 
 def recording_session_folder(paths: Sequence[Path]) -> Path:
@@ -22,23 +19,12 @@ def recording_session_folder(paths: Sequence[Path]) -> Path:
         paths: the files or folders of the recording, at least one; the first names the session.
     """
     first = paths[0].resolve()
-    adjacent = first.with_name(first.name + _SUFFIX)
+    adjacent = first.with_name(first.name + SESSION_SUFFIX)
     in_state_folder = user_session_folder(first.name, key=str(first))
     for folder in (adjacent, in_state_folder):
         if folder.is_dir() and is_writable(folder):
             return folder
     return adjacent if is_writable(adjacent.parent) else in_state_folder
-
-
-def user_session_folder(name: str, *, key: str = "") -> Path:
-    """Return a session folder in the user's state folder.
-
-    Args:
-        name: what the session is of.
-        key: distinguishes sessions of the same name, such as the recording's path.
-    """
-    distinct = f"-{hashlib.sha256(os.fsencode(key)).hexdigest()[:8]}" if key else ""
-    return state_folder() / "sessions" / f"{name}{distinct}{_SUFFIX}"
 
 
 def session_folders_in(folder: Path, *, set_aside: bool = False) -> tuple[Path, ...]:
@@ -53,7 +39,9 @@ def session_folders_in(folder: Path, *, set_aside: bool = False) -> tuple[Path, 
     except OSError:
         return ()
     return tuple(
-        folder / name for name in names if name.endswith(_SUFFIX) or (set_aside and _SET_ASIDE.search(name) is not None)
+        folder / name
+        for name in names
+        if name.endswith(SESSION_SUFFIX) or (set_aside and _SET_ASIDE.search(name) is not None)
     )
 
 

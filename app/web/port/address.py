@@ -5,9 +5,12 @@ from pathlib import Path
 
 from calib_core.errors import CalibrationError
 
-__all__ = ["AddressError", "require_address", "require_one_address", "require_token"]
+__all__ = ["AddressError", "listening_at", "require_address", "require_one_address", "require_token"]
 
 _LAST_PORT = 65535
+_PORTS_TRIED = 1000
+_QUEUE = 100
+"""Connections that may wait until the server accepts them."""
 _LEAST, _LEAST_REACHABLE, _LEAST_DIFFERENT = 8, 16, 4
 
 
@@ -38,6 +41,28 @@ def require_address(host: str, port: int) -> None:
             f"--host {host}: cannot serve on this address ({(error.strerror or str(error)).lower()}); "
             "give an address of this machine, such as 127.0.0.1, or 0.0.0.0 for all of them"
         ) from None
+
+
+def listening_at(host: str, port: int) -> socket.socket:
+    """Return a listening socket on the first free port.
+
+    Args:
+        host: an address of this machine.
+        port: the first port to try; 0 for any free port.
+
+    Raises:
+        AddressError: none of the ports is free.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    for number in range(port, min(port + _PORTS_TRIED, _LAST_PORT + 1)) if port else (0,):
+        try:
+            return socket.create_server((host, number), family=family, backlog=_QUEUE)
+        except OSError as error:
+            reason = error
+    raise AddressError(
+        f"--port {port}: neither this port nor the {_PORTS_TRIED} after it can be used "
+        f"({(reason.strerror or str(reason)).lower()}); give another one, or 0 for any free port"
+    )
 
 
 def require_token(token: str | None, *, reachable: bool) -> None:

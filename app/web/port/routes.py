@@ -18,6 +18,7 @@ from app.view import sentence
 from app.web.channel.export_preview import NoPreview, export_preview, exported, format_rows
 from app.web.channel.picture_changes import PictureChanges
 from app.web.channel.radar_survey import Survey
+from app.web.port.preloading import with_preloaded_modules
 from app.web.port.viser_hook import client_page
 from app.workspace import Workspace
 from calib_core.errors import CalibrationError
@@ -55,6 +56,7 @@ _LANDING = (
     b'<!doctype html><meta charset="utf-8"><title>cocalib</title><link rel="icon" href="/icon.svg">'
     b'<p><a href="/">Open the page</a>'
 )
+_PAGE = "index.html"
 _VISER_PAGE = re.compile(r"/viser/[0-9a-z]{1,40}/")
 
 
@@ -123,7 +125,7 @@ class Routes:
 
     def __init__(self, static: Path) -> None:
         self._files = {f"/{path.name}": path for path in static.iterdir() if path.suffix in _TYPES and path.is_file()}
-        self._files["/"] = self._files["/index.html"]
+        self._files["/"] = self._files[f"/{_PAGE}"]
         self._made: Mapping[str, Callable[[str], Reply]] | None = None
 
     def admit(self, workspace: Workspace, recording: Recording, hub: Surveyor) -> None:
@@ -141,7 +143,8 @@ class Routes:
             return refusal(503, "The recording is still being opened; try again in a moment.")
         make = self._made.get(path) if self._made is not None else None
         if path in self._files:
-            make = lambda _query: _file(self._files[path])  # noqa: E731
+            file = self._files[path]
+            make = lambda _query: _page(file) if file.name == _PAGE else _file(file)  # noqa: E731
         elif _VISER_PAGE.fullmatch(path):
             make = lambda _query: _viser_page()  # noqa: E731
         if make is None:
@@ -215,6 +218,11 @@ class _Downloads:
 
 def _file(path: Path) -> Reply:
     return _reply(path.read_bytes(), _TYPES[path.suffix])
+
+
+def _page(path: Path) -> Reply:
+    page = with_preloaded_modules(path.read_text(encoding="utf-8"), path.parent)
+    return _reply(page.encode(), _TYPES[path.suffix])
 
 
 def _download(data: bytes, name: str) -> Reply:

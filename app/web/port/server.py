@@ -3,12 +3,8 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import quote
 
 import websockets
 from websockets.asyncio.server import ServerConnection
@@ -21,11 +17,10 @@ from app.web.channel.channel import Channel, Socket
 from app.web.channel.hub import Hub
 from app.web.messages import Opening
 from app.web.port import guard
-from app.web.port.admissions import Admissions
 from app.web.port.entrance import Entrance
+from app.web.port.link import Link, ServerOptions
 from app.web.port.resumption import Resumption
 from app.web.port.routes import Reply, Routes, refusal
-from app.web.port.unix_socket import listening_socket, remove_socket
 from app.web.port.viser_hook import only_allowed, path_of_client, start_viser, stop_viser
 from app.web.port.waiting import WaitingRoom
 from app.web.port.websockets_hook import ProcessRequest, SocketHandler, head_of
@@ -38,60 +33,34 @@ if TYPE_CHECKING:
 
 __all__ = ["RunningServer", "ServerOptions", "start"]
 
-_FORWARDED_PORT = 8080
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class ServerOptions:
-    """Where the page is served, and who has access.
-
-    Attributes:
-        host: address to bind.
-        port: first port to try, then the next free one; 0 for any free port.
-        token: token that the link must contain; None generates one-time tokens.
-        no_browser: print the link, do not open a browser.
-        more_hosts: further host names that requests may use.
-        socket: serve on this Unix socket instead of a port.
-        session: what is served, such as the session's folder: cookies and tickets are for it only.
-    """
-
-    host: str = "127.0.0.1"
-    port: int = 8080
-    token: str | None = None
-    no_browser: bool = False
-    more_hosts: tuple[str, ...] = ()
-    socket: Path | None = None
-    session: str = ""
 
 
 class RunningServer:
     """A running server; `close` stops it. Pages can connect at once; they wait until a recording is admitted."""
 
-    def __init__(self, options: ServerOptions, room: WaitingRoom) -> None:
-        self._options = options
-        admissions = Admissions(options.session)
-        self._guard = guard.Guard(admissions, host=options.host, token=options.token, more_hosts=options.more_hosts)
+    def __init__(self, link: Link, room: WaitingRoom) -> None:
+        options, self._link = link.options, link
         self._executor = ThreadPoolExecutor(max_workers=3, thread_name_prefix="frames")
         self._room = room
         self._routes = Routes(static_folder())
-        self._port = 0
         self._entrance = Entrance(
-            admissions, self._guard, self._routes, Resumption(options.session), self._direct_origin
+            link.admissions, link.guard, self._routes, Resumption(options.session), link.direct_origin
         )
+        self._entrance.on_admitted = link.used
         self._hub: Hub | None = None
         self._is_closed = False
         self._channels: dict[str, Channel] = {}
         self._scenes: dict[str, tuple[int, TabScene]] = {}
-        listening = None if options.socket is None else listening_socket(options.socket)
         self._viser = start_viser(
             options.host,
             options.port,
             wrap_request=self._wrap_request,
             wrap_handler=self._wrap_handler,
-            listening=listening,
+            listening=link.listening,
         )
-        self._port = (options.port or _FORWARDED_PORT) if options.socket else self._viser.get_port()
+        if not link.is_bound:
+            link.port = self._viser.get_port()
         self._viser.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         self._viser.initial_camera.position, self._viser.initial_camera.look_at = STAND_AT, LOOK_AT
         self._viser.initial_camera.fov = FIELD_OF_VIEW_RAD
@@ -127,31 +96,20 @@ class RunningServer:
         if self._hub is None and not self._is_closed:
             asyncio.run_coroutine_threadsafe(self._room.refuse(problem), self._viser.get_event_loop()).result()
 
-    def on_admitted(self, call: Callable[[], None]) -> None:
-        """Call this whenever a link was used."""
-        self._entrance.on_admitted = call
-
     @property
     def port(self) -> int:
         """The bound port; with a Unix socket, the port to forward to it."""
-        return self._port
+        return self._link.port
 
     @property
     def origin(self) -> str:
         """The address without a token."""
-        host = self._options.host
-        shown = "127.0.0.1" if host == "0.0.0.0" else f"[{host}]" if ":" in host else host
-        return f"http://{shown}:{self.port}"
+        return self._link.origin
 
     @property
     def url(self) -> str:
         """The link that opens the page; it works once unless the user chose the token."""
-        return f"{self.origin}/?token={quote(self._guard.token)}"
-
-    def _direct_origin(self) -> str:
-        """Return the origin of pages that reach this server at its own address; "" if a name or a tunnel is in between."""
-        host = "127.0.0.1" if self._options.host == "0.0.0.0" else self._options.host
-        return self.origin if self._options.socket is None and guard.is_address(host) else ""
+        return self._link.url
 
     def close(self) -> None:
         """Stop serving; the workspace and the recording stay open. Safe to call twice."""
@@ -162,8 +120,7 @@ class RunningServer:
             asyncio.run_coroutine_threadsafe(self._hub.end(), self._viser.get_event_loop()).result()
             self._hub.steps.shutdown(wait=True, cancel_futures=True)
         stop_viser(self._viser)
-        if self._options.socket is not None:
-            remove_socket(self._options.socket)
+        self._link.close()
         self._executor.shutdown(wait=True, cancel_futures=True)
 
     def _wrap_request(self, _viser_files: object) -> ProcessRequest:
@@ -229,7 +186,7 @@ class RunningServer:
 
 def start(workspace: Workspace, recording: Recording, options: ServerOptions) -> RunningServer:
     """Start serving a recording; return once the port accepts connections."""
-    server = RunningServer(options, WaitingRoom())
+    server = RunningServer(Link(options), WaitingRoom())
     server.admit(workspace, recording)
     return server
 

@@ -8,16 +8,13 @@ import logging
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import partial
 from types import TracebackType
 from typing import Self
 
 from app.view import sentence
 from app.web.messages import Opening
-from app.web.port.guard import is_loopback
-from app.web.port.hand_over import HandOver
-from app.web.port.server import RunningServer, ServerOptions
-from app.web.port.unix_socket import forwarding_command
+from app.web.port.link import Link, ServerOptions
+from app.web.port.server import RunningServer
 from app.web.port.waiting import WaitingRoom
 from app.workspace import Workspace
 from calib_core.errors import CalibrationError
@@ -36,7 +33,7 @@ class Service:
 
     def __init__(
         self,
-        options: ServerOptions,
+        link: Link | ServerOptions,
         opening: Opening,
         first_picture: Callable[[], EncodedImage | None],
         *,
@@ -45,18 +42,17 @@ class Service:
         """Set up the service; nothing is served yet.
 
         Args:
-            options: where the page is served, and who has access.
+            link: where the page is served, and who has access; one that was announced already can be in use.
             opening: the message for waiting pages.
             first_picture: reads the picture for waiting pages, in its own thread; returns None if there is none to show early.
             let_in_after_s: delay before waiting pages are admitted [s]; with 0, the link is printed before anything is opened,
                 so that opening the recording and starting the browser do not slow each other down.
         """
-        self._options = options
+        self._link = Link(link) if isinstance(link, ServerOptions) else link
         self._opening = opening
         self._first_picture = first_picture
         self._let_in_after_s = let_in_after_s
         self._is_settled = threading.Event()
-        self._hand_over: HandOver | None = None
         self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="early")
 
     def __enter__(self) -> Self:
@@ -94,7 +90,7 @@ class Service:
                 server.admit(workspace, recording)
                 threading.Event().wait()
         finally:
-            self._close(server)
+            server.close()
 
     def _end(self, error: BaseException | None) -> None:
         """Show the error on the waiting pages, and stop serving."""
@@ -103,7 +99,8 @@ class Service:
         if server is not None:
             if isinstance(error, Exception):
                 server.refuse(_problem_text(error))
-            self._close(server)
+            server.close()
+        self._link.close()
         self._threads.shutdown()
 
     def _start_if_slow(self) -> RunningServer | None:
@@ -117,33 +114,9 @@ class Service:
 
     def _start(self, room: WaitingRoom) -> RunningServer:
         """Start the server and print its link."""
-        options, server = self._options, RunningServer(self._options, room)
-        if not is_loopback(options.host):
-            print(
-                f"Warning: serving on {options.host}: anyone who has the link and can reach this machine sees the recording. "
-                "From another machine, use this machine's address in the link."
-            )
-        if options.socket is not None:
-            print("On the machine with the browser, run:")
-            print(f"  {forwarding_command(options.socket, server.port)}")
-        print(f"Open {server.url}", flush=True)
-        if not options.no_browser and options.socket is None:
-            self._hand_over = HandOver(server.url)
-        server.on_admitted(partial(self._link_used, server, server.url))
+        server = RunningServer(self._link, room)
+        self._link.announce()
         return server
-
-    def _link_used(self, server: RunningServer, used: str) -> None:
-        """Delete the file with the link; a link that works once is followed by the next one."""
-        if self._hand_over is not None:
-            self._hand_over.discard()
-        if server.url != used:
-            print(f"For another browser, open {server.url}", flush=True)
-            server.on_admitted(partial(self._link_used, server, server.url))
-
-    def _close(self, server: RunningServer) -> None:
-        if self._hand_over is not None:
-            self._hand_over.discard()
-        server.close()
 
 
 def _show(server: RunningServer, picture: "Future[EncodedImage | None]") -> None:

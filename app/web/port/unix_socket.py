@@ -38,6 +38,7 @@ def listening_socket(path: Path) -> socket.socket:
         _require_free(path)
         bound.bind(str(path))
         path.chmod(0o600)
+        bound.listen()
     except OSError as error:
         bound.close()
         raise AddressError(

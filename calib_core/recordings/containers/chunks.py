@@ -28,7 +28,7 @@ from calib_core.results import DataWarning
 __all__ = ["CACHE_BYTES", "FIRST_CHUNKS", "MAX_MESSAGE_BYTES", "ChannelFilter", "Chunk", "ChunkedSource"]
 
 ChannelFilter: TypeAlias = Callable[[Channel], bool]
-CACHE_BYTES = 64 * 2**20
+CACHE_BYTES = 24 * 2**20
 FIRST_CHUNKS = 16
 """Number of chunks to read first if the beginning of a file is enough, and to add until everything wanted is found."""
 

@@ -24,6 +24,12 @@ print(faults())
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is not glibc")
+def test_the_c_library_takes_every_setting() -> None:
+    code = "import sys; from app.memory import keep_freed_memory; sys.exit(not keep_freed_memory())"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the C library is not glibc")
 def test_pictures_reuse_the_memory_of_earlier_ones() -> None:
     answer = subprocess.run([sys.executable, "-c", _FAULTS, "keep"], check=True, capture_output=True, text=True)
     assert int(answer.stdout) < 1000  # 20 pictures of two sizes are over 60 000 pages

@@ -48,14 +48,46 @@ def test_an_uninstalled_checkout_has_a_version_too(monkeypatch: pytest.MonkeyPat
     assert version() == "0+unknown"
 
 
-@pytest.mark.parametrize("owners", [{}, {"app": ["cocalib"]}, {"app": ["cocalib", "cocalib"], "numpy": ["numpy"]}])
-def test_an_environment_of_its_own_is_accepted(owners: dict[str, list[str]], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.metadata, "packages_distributions", lambda: owners)
+class Installed:
+    """A distribution with these metadata files."""
+
+    def __init__(self, name: str, **files: str) -> None:
+        self.name = name
+        self._files = files
+
+    def read_text(self, name: str) -> str | None:
+        return self._files.get(name.partition(".")[0].lower())
+
+
+OURS = Installed("cocalib", record="__editable__.cocalib.pth,sha256=a,1\n")
+
+
+@pytest.mark.parametrize(
+    "others",
+    [
+        (),
+        (OURS,),
+        (Installed("numpy", record="numpy/app/a.py,sha256=a,1\nmyapp/a.py,,\napple/b.py,,\n"),),
+        (Installed("old", top_level="apps\nthe.app\n", record="app/a.py,,\n"),),
+        (Installed("bare"),),
+    ],
+)
+def test_an_environment_of_its_own_is_accepted(others: tuple[Installed, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.metadata, "distributions", lambda: (OURS, *others))
     check_installation()
 
 
-def test_another_package_called_app_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(importlib.metadata, "packages_distributions", lambda: {"app": ["webshop", "cocalib"]})
+@pytest.mark.parametrize(
+    "webshop",
+    [
+        Installed("webshop", top_level="webshop\napp\n"),
+        Installed("webshop", record="app/__init__.py,sha256=a,1\n"),
+        Installed("webshop", record='webshop/a.py,,\n"app/with, comma.py",,\n'),
+    ],
+)
+def test_another_package_called_app_is_refused_by_name(webshop: Installed, monkeypatch: pytest.MonkeyPatch) -> None:
+    ours = Installed("cocalib", record="app/__init__.py,,\n")
+    monkeypatch.setattr(importlib.metadata, "distributions", lambda: (webshop, ours))
     assert installed_app_owners() == ("cocalib", "webshop")
     with pytest.raises(InstallationError, match=r"another package, webshop, .*`uv tool install cocalib"):
         check_installation()

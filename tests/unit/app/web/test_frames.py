@@ -122,6 +122,19 @@ def test_a_client_that_leaves_early_does_not_cancel_the_frame_for_others(executo
     assert pictures.read == [1]
 
 
+def test_playing_a_long_recording_keeps_few_of_its_frames(executor: ThreadPoolExecutor) -> None:
+    pictures = Pictures(64, 48)
+    pictures.data += bytes(1 << 20)
+
+    async def play() -> None:
+        store = FrameStore(pictures, 100, executor)
+        for index in range(20, 60):
+            await store.get(index)
+        assert 4 * len(pictures.data) <= store.kept_bytes <= 20 << 20
+
+    asyncio.run(play())
+
+
 def test_the_memory_stays_within_the_budget_and_drops_the_oldest(executor: ThreadPoolExecutor) -> None:
     pictures = Pictures(64, 48)
     budget = 3 * len(pictures.data)

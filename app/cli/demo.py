@@ -1,0 +1,51 @@
+"""`cocalib demo`: the sample recording in the browser.
+
+The link is printed and the browser started before the readers, the solver and the server are imported.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from app.cli.flags import Folder, Switch
+from app.cli.serving_flags import ServingFlags
+from app.resources import check_installation, sample_folder, user_session_folder
+
+__all__ = ["Demo"]
+
+
+@dataclass(frozen=True, slots=True)
+class Demo:
+    """Open the sample recording in the browser."""
+
+    session: Folder = None
+    """Session folder; by default, one in your user folder that is kept between runs."""
+    fresh: Switch = False
+    """Start without the previous clicks (a backup is kept)."""
+    serving: Annotated[ServingFlags, tyro.conf.arg(name="")] = field(default_factory=ServingFlags)
+
+    def run(self) -> int:
+        """Serve until Ctrl+C, SIGTERM or SIGHUP; return the exit code."""
+        check_installation()
+        sample = sample_folder() / "rooftop"
+        bags = (sample / "radar.bag", sample / "camera.bag")
+        session = self.session or user_session_folder(f"demo-{_digest(bags)}")
+        with closing(self.serving.link(session)) as link:
+            if link.is_bound:
+                link.announce()
+            from app.cli.open import serve
+
+            return serve(bags, session=session, fresh=self.fresh, link=link, name="the sample recording")
+
+
+def _digest(files: Sequence[Path]) -> str:
+    """Return a short hash that identifies the version of the sample: a session belongs to one recording."""
+    content = hashlib.sha256()
+    for file in files:
+        content.update(file.read_bytes())
+    return content.hexdigest()[:8]
