@@ -9,6 +9,7 @@ import numpy as np
 
 from app.error_boundary import error_boundary
 from app.view import sentence
+from app.web.channel.desk import answer_of
 from app.web.channel.hub import Hub
 from app.web.channel.newest import NewestWins
 from app.web.channel.outbox import Outbox
@@ -23,6 +24,7 @@ from app.web.messages import (
     Hello,
     ImportWanted,
     Incoming,
+    OpeningCommand,
     Problem,
     ViewpointWanted,
     ViewWanted,
@@ -101,7 +103,7 @@ class Channel:
             text = await socket.recv()
             with error_boundary("a page's message", partial(self._refuse, text)):
                 try:
-                    await self._obey(parse(text))
+                    await self._take(parse(text))
                 except CalibrationError as error:
                     self._refuse(text, str(error))
 
@@ -110,6 +112,13 @@ class Channel:
 
     def _refuse(self, text: str | bytes, reason: str) -> None:
         self.outbox.put(encode(Problem(sentence(reason), request=request_of(text))))
+
+    async def _take(self, incoming: Incoming) -> None:
+        """Carry out a command, or answer a message about the choice of a recording."""
+        if not isinstance(incoming.command, OpeningCommand):
+            return await self._obey(incoming)
+        for text in await answer_of(self._hub.desk, incoming):
+            self.outbox.put(text)
 
     async def _obey(self, incoming: Incoming) -> None:
         """Carry out a command of the page.

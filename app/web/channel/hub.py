@@ -11,6 +11,7 @@ from typing import Protocol
 from app.error_boundary import error_boundary
 from app.resources import version
 from app.view import View, warning_in_sentences
+from app.web.channel.desk import ClosedDesk, Desk
 from app.web.channel.live_edge import LiveEdge
 from app.web.channel.outbox import Outbox
 from app.web.channel.radar_survey import Survey, survey_of
@@ -54,14 +55,24 @@ class Tab(Protocol):
 class Hub:
     """Runs on viser's event loop, except for the workspace's callback."""
 
-    def __init__(self, workspace: Workspace, recording: Recording, executor: Executor) -> None:
+    def __init__(
+        self,
+        workspace: Workspace,
+        recording: Recording,
+        executor: Executor,
+        *,
+        desk: Desk | None = None,
+        opening: int = 1,
+    ) -> None:
+        self.desk: Desk = desk or ClosedDesk()
+        self._opening = opening
         self.workspace = workspace
         self.recording = recording
         self.executor = executor
         self.frames = FrameStore(recording, len(recording.image_times), executor)
         self.radar = RadarSight(recording)
         self.moments = workspace.facts.moments
-        self.camera = recording.camera()
+        self.camera = workspace.camera
         self.survey: Survey | None = None
         self.tabs: set[Tab] = set()
         self.steps = ThreadPoolExecutor(max_workers=1, thread_name_prefix="steps")
@@ -177,6 +188,8 @@ class Hub:
             ),
             session=SessionNote(str(restored.folder), len(restored.history.present.clicks), restored.note),
             version=version(),
+            opening=self._opening,
+            intrinsics=self.workspace.intrinsics,
         )
 
 

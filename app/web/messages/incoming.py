@@ -11,6 +11,7 @@ from msgspec import Meta
 from app.option_changes import changes_from_tree
 from app.session import OptionsEdited, Step
 from app.session.file import step_json as forms
+from app.web.messages.opening_messages import ChoicesWanted, FolderWanted, OpeningCommand, OpenWith, RecentForgotten
 from calib_core.errors import InputError
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "ViewWanted",
     "Viewpoint",
     "ViewpointWanted",
+    "is_about_opening",
     "parse",
     "request_of",
 ]
@@ -117,7 +119,9 @@ class ImportWanted:
     name: str
 
 
-Command: TypeAlias = Step | Hello | ViewWanted | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted
+Command: TypeAlias = (
+    Step | Hello | ViewWanted | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted | OpeningCommand
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +183,10 @@ class ImportForm(_Form, frozen=True, tag="import_clicks"):
     name: Annotated[str, Meta(max_length=300)] = "the file"
 
 
-MessageForm: TypeAlias = forms.StepForm | HelloForm | ViewForm | FrameForm | CursorForm | ViewpointForm | ImportForm
+OpeningForm: TypeAlias = ChoicesWanted | FolderWanted | RecentForgotten | OpenWith
+MessageForm: TypeAlias = (
+    forms.StepForm | HelloForm | ViewForm | FrameForm | CursorForm | ViewpointForm | ImportForm | OpeningForm
+)
 
 
 _TYPES = {str(form.__struct_config__.tag): form for form in get_args(MessageForm)}
@@ -187,6 +194,10 @@ _TYPES = {str(form.__struct_config__.tag): form for form in get_args(MessageForm
 
 class _Envelope(msgspec.Struct):
     request: RequestNumber | None = None
+
+
+class _Named(msgspec.Struct):
+    type: str = ""
 
 
 def parse(text: str | bytes) -> Incoming:
@@ -217,6 +228,15 @@ def request_of(text: str | bytes) -> int | None:
         return msgspec.json.decode(text[:MAX_TEXT_BYTES], type=_Envelope).request
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
         return None
+
+
+def is_about_opening(text: str | bytes) -> bool:
+    """Return whether a message that `parse` refused was about the choice of a recording."""
+    try:
+        kind = msgspec.json.decode(text[:MAX_TEXT_BYTES], type=_Named).type
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+        return False
+    return kind in _TYPES and issubclass(_TYPES[kind], OpeningCommand)
 
 
 def _kind(fields: object) -> str:
@@ -273,3 +293,8 @@ def _viewpoint(form: ViewpointForm) -> Command:
 @_command.register
 def _import(form: ImportForm) -> Command:
     return ImportWanted(form.text, form.name)
+
+
+@_command.register
+def _opening(form: OpeningCommand) -> Command:
+    return form

@@ -9,6 +9,7 @@ import msgspec
 
 from app.option_changes import OptionGroup, option_groups
 from app.view import FollowState, View
+from app.web.messages.opening_messages import FolderListing, OpeningChoices
 from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
 from app.web.messages.view_changes import ViewChange
 from calib_core.arrays import TimesNs
@@ -120,6 +121,8 @@ class RecordingNote:
         session: where the session is stored.
         version: of the program.
         option_groups: how to draw the options; their values are in the view.
+        opening: how often the server has opened a recording; with another number it is another one, or read in another way.
+        intrinsics: where the camera's intrinsics come from; "" if there are none.
     """
 
     name: str
@@ -136,6 +139,8 @@ class RecordingNote:
     session: SessionNote
     version: str
     option_groups: tuple[OptionGroup, ...] = field(default_factory=option_groups)
+    opening: int = 1
+    intrinsics: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,6 +265,8 @@ Outgoing: TypeAlias = (
     View
     | ViewChange
     | Opening
+    | OpeningChoices
+    | FolderListing
     | RecordingNote
     | FramesAdded
     | FollowNote
@@ -276,6 +283,8 @@ TYPES: Mapping[type, str] = {
     View: "view",
     ViewChange: "view_change",
     Opening: "opening",
+    OpeningChoices: "opening_choices",
+    FolderListing: "folder_listing",
     RecordingNote: "recording",
     FramesAdded: "frames_added",
     FollowNote: "following",
