@@ -15,6 +15,7 @@ import { startLive, takeFollowing, takeFrames } from "./live.js";
 import { startLooking } from "./looking.js";
 import { startLoupe } from "./loupe.js";
 import { setBanner, startTips, toast } from "./notices.js";
+import { isAnother, startOpening, takeChoices, takeFolder } from "./opening.js";
 import { startOptions } from "./options.js";
 import { startPairs } from "./pairs.js";
 import { startPicture } from "./picture.js";
@@ -37,6 +38,8 @@ const readers = {
     setBanner(message.problem);
     emit("opening");
   },
+  opening_choices: takeChoices,
+  folder_listing: takeFolder,
   recording: takeRecording,
   view(message) {
     follower.take(message);
@@ -88,6 +91,7 @@ function takeView() {
 
 /** @param {import("./messages.js").RecordingNote} message */
 function takeRecording(message) {
+  if (isAnother(message)) return;
   const same = state.recording !== null;
   state.recording = message;
   state.opening = null;
@@ -143,6 +147,7 @@ startExporting();
 startGuide();
 startArriving();
 startLooking();
+startOpening();
 listen(window);
 press("undo", () => turnBack("undo"));
 press("redo", () => turnBack("redo"));

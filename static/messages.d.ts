@@ -264,7 +264,10 @@ export interface OpeningChoices {
   radars: TopicRow[];
   radar_reason: string;
   cameras: TopicRow[];
+  radar_topic: string | null;
+  image_topic: string | null;
   intrinsics: string;
+  intrinsics_file: boolean;
   recorded_intrinsics: boolean;
   intrinsics_near: string;
   session: SessionOffer;

@@ -9,7 +9,13 @@ from pathlib import Path
 
 from app.resources import state_folder
 
-__all__ = ["is_writable", "recording_session_folder", "session_folders_in", "user_session_folder"]
+__all__ = [
+    "is_writable",
+    "recording_session_folder",
+    "session_folders_in",
+    "unused_session_folder",
+    "user_session_folder",
+]
 
 _SUFFIX = ".cocalib-session"
 _SET_ASIDE = re.compile(re.escape(_SUFFIX) + r"\.[0-9]+$")
@@ -28,6 +34,15 @@ def recording_session_folder(paths: Sequence[Path]) -> Path:
         if folder.is_dir() and is_writable(folder):
             return folder
     return adjacent if is_writable(adjacent.parent) else in_state_folder
+
+
+def unused_session_folder(folder: Path) -> Path:
+    """Return a name that no session has yet: the given one, or that with a number, such as NAME-2.cocalib-session."""
+    number, free = 1, folder
+    while os.path.lexists(free):
+        number += 1
+        free = folder.with_name(f"{folder.name.removesuffix(_SUFFIX)}-{number}{_SUFFIX}")
+    return free
 
 
 def user_session_folder(name: str, *, key: str = "") -> Path:

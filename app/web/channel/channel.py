@@ -17,6 +17,7 @@ from app.web.channel.radar_survey import placements_at
 from app.web.channel.view_feed import Shown
 from app.web.frames import Frame
 from app.web.messages import (
+    Command,
     CursorMoved,
     Done,
     FrameHeader,
@@ -116,17 +117,19 @@ class Channel:
     async def _take(self, incoming: Incoming) -> None:
         """Carry out a command, or answer a message about the choice of a recording."""
         if not isinstance(incoming.command, OpeningCommand):
-            return await self._obey(incoming)
+            await self._obey(incoming.command)
+            if incoming.request is not None:
+                self.outbox.put(encode(Done(incoming.request)))
+            return
         for text in await answer_of(self._hub.desk, incoming):
             self.outbox.put(text)
 
-    async def _obey(self, incoming: Incoming) -> None:
+    async def _obey(self, command: Command) -> None:
         """Carry out a command of the page.
 
         Raises:
             CalibrationError: it cannot be done; nothing changed.
         """
-        command = incoming.command
         if isinstance(command, FrameWanted):
             self._frames.give(command)
         elif isinstance(command, CursorMoved):
@@ -146,8 +149,6 @@ class Channel:
                 else partial(workspace.dispatch, command)
             )
             await asyncio.get_running_loop().run_in_executor(self._hub.steps, change)
-        if incoming.request is not None:
-            self.outbox.put(encode(Done(incoming.request)))
 
     def _view_text(self) -> str:
         """Write the message that makes the page show the newest View; called when the page can take it."""

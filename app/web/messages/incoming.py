@@ -119,9 +119,7 @@ class ImportWanted:
     name: str
 
 
-Command: TypeAlias = (
-    Step | Hello | ViewWanted | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted | OpeningCommand
-)
+Command: TypeAlias = Step | Hello | ViewWanted | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +131,7 @@ class Incoming:
         request: the number to answer with; None when no answer is wanted.
     """
 
-    command: Command
+    command: Command | OpeningCommand
     request: int | None = None
 
 
@@ -251,7 +249,7 @@ def _kind(fields: object) -> str:
 
 
 @singledispatch
-def _command(form: Any) -> Command:
+def _command(form: Any) -> Command | OpeningCommand:
     return forms.step_from_form(form)
 
 
@@ -296,5 +294,5 @@ def _import(form: ImportForm) -> Command:
 
 
 @_command.register
-def _opening(form: OpeningCommand) -> Command:
+def _opening(form: OpeningCommand) -> OpeningCommand:
     return form

@@ -149,7 +149,10 @@ class OpeningChoices:
         radars: the radars, the one in use first.
         radar_reason: why this one is used; "" if there is no choice.
         cameras: the image topics.
+        radar_topic: what was asked for; None if it was chosen automatically.
+        image_topic: what was asked for; None if it was chosen automatically.
         intrinsics: where those in use come from; "" if there are none.
+        intrinsics_file: whether those in use come from a file of intrinsics.
         recorded_intrinsics: whether the recording has its own.
         intrinsics_near: name of a file next to the recording that may hold intrinsics; "" if there is none.
         session: what can be continued or copied from.
@@ -164,7 +167,10 @@ class OpeningChoices:
     radars: tuple[TopicRow, ...] = ()
     radar_reason: str = ""
     cameras: tuple[TopicRow, ...] = ()
+    radar_topic: str | None = None
+    image_topic: str | None = None
     intrinsics: str = ""
+    intrinsics_file: bool = False
     recorded_intrinsics: bool = False
     intrinsics_near: str = ""
     session: SessionOffer = SessionOffer()
