@@ -104,7 +104,8 @@ def solve_in_steps(
         yield Unsolvable(
             "no-camera",
             "the camera intrinsics are missing: the recording contains none that can be used",
-            "calibrate the camera with OpenCV, Kalibr or ROS camera_calibration, then start again with --camera FILE",
+            "calibrate the camera with OpenCV, Kalibr or ROS camera_calibration, then drop its file on the page, or start "
+            "again with --camera FILE",
         )
         return
     times = sorted({click.image_time for click in clicks})

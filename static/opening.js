@@ -88,10 +88,10 @@ export function takeChoices(message) {
   for (const ready of waiting.splice(0)) ready();
   if (!message.is_open) {
     document.body.classList.add("asking");
-    if (!dialog.open) dialog.showModal();
     if (message.root && !folder) tell({ type: "folder", path: "" });
-  }
-  if (dialog.open) draw();
+    draw();
+    if (!dialog.open) dialog.showModal();
+  } else if (dialog.open) draw();
 }
 
 /** @param {import("./messages.js").FolderListing} message */
@@ -207,10 +207,28 @@ async function forget() {
   if (refused) toast(refused);
 }
 
+/** What is missing or unclear about the recording: intrinsics, or which radar is meant. */
 function drawStrip() {
   const recording = state.recording;
-  strip.hidden = !recording || !recording.has_pictures || recording.intrinsics !== "";
-  if (strip.hidden) return;
+  strip.hidden = true;
+  if (!recording) return;
+  const radars = recording.warnings.find((warning) => warning.code === "several-radars");
+  if (recording.has_pictures && !recording.intrinsics) askIntrinsics();
+  else if (radars && !recording.session.restored_clicks) askRadar(radars.message);
+}
+
+/** @param {string} message */
+function askRadar(message) {
+  const pick = make("button", "chip", "Choose…");
+  pick.onclick = show;
+  const close = make("button", "chip", "Keep it");
+  close.onclick = () => (strip.hidden = true);
+  strip.replaceChildren(make("span", "", message), pick, close);
+  strip.hidden = false;
+}
+
+function askIntrinsics() {
+  strip.hidden = false;
   const input = make("input", "", "");
   input.type = "file";
   input.hidden = true;

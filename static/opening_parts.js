@@ -87,7 +87,7 @@ export function drawSession({ choices, draft, redraw }) {
   const held = `${clicks} ${clicks === 1 ? "click" : "clicks"}`;
   /** @type {[import("./opening.js").Draft["session"], string, string][]} */
   const rows = [
-    ["continue", "Continue where the frames are the same", continues ? `${held}, ${folder}` : "a session of other frames is left alone"],
+    ["continue", "Continue where the frames are the same", continues ? `${held}, ${folder}` : `if that in ${folder} is of these frames; another one is left alone`],
     ["new", "Start a new session", "the one there is kept under another name"],
     ["copy", "Start a new session with the clicks that fit", `${held} of ${recording || folder}: those whose frames this recording has`],
   ];

@@ -1,6 +1,7 @@
 """What the page can choose from: the radars, cameras, intrinsics and session of a recording, with what is known about them."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import calib_core.recordings as recordings
 from app.opening.choice import Choice
@@ -9,6 +10,7 @@ from app.opening.sessions import session_offer
 from app.solving import intrinsics_near
 from app.web.messages import OpeningChoices, TopicRow
 from calib_core.errors import CalibrationError
+from calib_core.input_files import name_text
 from calib_core.recordings import Recording, TopicSummary
 
 __all__ = ["choices_after", "choices_of"]
@@ -54,9 +56,17 @@ def _described(choice: Choice, recording: Recording) -> OpeningChoices:
         radars=_radars(recording),
         radar_reason=recording.radar_choice,
         cameras=tuple(_row(topic) for topic in recording.topics if topic.kind == "image"),
+        intrinsics=_intrinsics(choice, recording),
         recorded_intrinsics=recording.camera() is not None,
         intrinsics_near=_near(choice),
     )
+
+
+def _intrinsics(choice: Choice, recording: Recording) -> str:
+    """Say which intrinsics would be used; "" if there are none."""
+    if choice.camera_file is not None:
+        return name_text(Path(choice.camera_file.source).name)
+    return (recording.camera_info_topic or "the recording") if recording.camera() is not None else ""
 
 
 def _near(choice: Choice) -> str:

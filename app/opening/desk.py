@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.opening.choice import Choice
+from app.opening.opened import Opened
 from app.opening.recent import RecentRecordings
 from app.opening.root_folder import RootFolder
 from app.solving import camera_for, intrinsics_near
@@ -21,7 +22,6 @@ from app.web.messages import (
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.interchange import CameraFile
-from calib_core.recordings import Recording
 
 __all__ = ["OpeningDesk"]
 
@@ -41,22 +41,22 @@ class OpeningDesk:
         self._question = 0
         self._choices = OpeningChoices(0)
         self._choice: Choice | None = None
-        self._recording: Recording | None = None
+        self._opened: Opened | None = None
         self._session: Path | None = None
         self._next: Choice | None = None
         self._answer = ""
 
-    def put(self, choices: OpeningChoices, choice: Choice | None, recording: Recording | None = None) -> OpeningChoices:
+    def put(self, choices: OpeningChoices, choice: Choice | None, opened: Opened | None = None) -> OpeningChoices:
         """Ask a new question; return it as pages see it.
 
         Args:
             choices: what can be chosen.
             choice: what is open, or could not be opened; None if nothing has been chosen.
-            recording: the open recording; None if none is.
+            opened: the open recording with its session; None if none is.
         """
         with self._lock:
             self._question += 1
-            self._choices, self._choice, self._recording = choices, choice, recording
+            self._choices, self._choice, self._opened = choices, choice, opened
             return self._current()
 
     def take(self) -> Choice:
@@ -64,7 +64,7 @@ class OpeningDesk:
         with self._lock:
             assert self._next is not None
             chosen, self._next = self._next, None
-            self._recording = None
+            self._opened = None
             self.chosen.clear()
             return chosen
 
@@ -89,7 +89,10 @@ class OpeningDesk:
 
     def _current(self) -> OpeningChoices:
         root = "" if self._root is None else name_text(self._root.path)
-        return replace(self._choices, question=self._question, recent=self._recent.rows(), root=root)
+        session = self._choices.session
+        if self._opened is not None:
+            session = replace(session, clicks=len(self._opened.workspace.session.clicks))
+        return replace(self._choices, question=self._question, session=session, recent=self._recent.rows(), root=root)
 
     def _root_folder(self) -> RootFolder:
         if self._root is None:
@@ -126,8 +129,8 @@ class OpeningDesk:
             raise InputError("no recording has been chosen; choose one from the list")
         camera_file = self._camera_file(command, self._choice)
         same_frames = command.image_topic == self._choice.topics.image_topic
-        if camera_file is not None and self._recording is not None and same_frames:
-            camera_for(self._recording, camera_file)  # refused while everything is still open
+        if camera_file is not None and self._opened is not None and same_frames:
+            camera_for(self._opened.recording, camera_file)  # refused while everything is still open
         folder = self._choices.session.folder
         return self._choice.read_as(command, camera_file, Path(folder) if folder else None)
 

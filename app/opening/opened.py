@@ -140,7 +140,7 @@ def _workspace(choice: Choice, recording: Recording) -> Workspace:
         session_folder=found.path,
         name=choice.title,
         reference=reference,
-        warnings=_warnings(found, copied),
+        warnings=_warnings(found, copied, calibration if reference is None and len(recording.image_times) else None),
         camera_file=choice.camera_file,
         intrinsics=name_text(calibration.name) if from_calibration and calibration else "",
     )
@@ -149,8 +149,15 @@ def _workspace(choice: Choice, recording: Recording) -> Workspace:
     return workspace
 
 
-def _warnings(found: FoundFolder, copied: FittingClicks | None) -> tuple[DataWarning, ...]:
-    return found.warnings if copied is None else (*found.warnings, copied.about)
+def _warnings(found: FoundFolder, copied: FittingClicks | None, unshown: Path | None) -> tuple[DataWarning, ...]:
+    """Return what the user must know about the session, and about a calibration that cannot be shown without intrinsics."""
+    about = [*found.warnings, *([] if copied is None else [copied.about])]
+    if unshown is not None:
+        message = f"{name_text(unshown.name)} is not shown, since there are no camera intrinsics"
+        about.append(
+            DataWarning("calibration-not-shown", message, "drop the camera file on the page, or give --camera FILE")
+        )
+    return tuple(about)
 
 
 def _camera(choice: Choice, recording: Recording) -> Camera | None:

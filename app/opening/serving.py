@@ -120,7 +120,7 @@ def _served_to_the_end(choice: Choice, service: Service, desk: OpeningDesk, serv
     with ExitStack() as stack:
         opened = open_choice(choice, stack, service.tell)
         workspace, settled = opened.workspace, choice.settled()
-        desk.put(choices_of(settled, opened), settled, opened.recording)
+        desk.put(choices_of(settled, opened), settled, opened)
         if not choice.is_sample:
             serving.recent.add(choice.paths, choice.title, len(workspace.session.clicks))
         goes_on = service.serve(workspace, opened.recording)
