@@ -45,6 +45,7 @@ class OpeningDesk:
         self._session: Path | None = None
         self._next: Choice | None = None
         self._answer = ""
+        self._asks = False
 
     def put(self, choices: OpeningChoices, choice: Choice | None, opened: Opened | None = None) -> OpeningChoices:
         """Ask a new question; return it as pages see it.
@@ -56,6 +57,7 @@ class OpeningDesk:
         """
         with self._lock:
             self._question += 1
+            self._asks = True
             self._choices, self._choice, self._opened = choices, choice, opened
             return self._current()
 
@@ -65,6 +67,7 @@ class OpeningDesk:
             assert self._next is not None
             chosen, self._next = self._next, None
             self._opened = None
+            self._asks = False
             self.chosen.clear()
             return chosen
 
@@ -103,7 +106,7 @@ class OpeningDesk:
         with self._lock:
             if command.answer == self._answer:
                 return  # sent again after a lost connection
-            if command.question != self._question or self._next is not None:
+            if not self._asks or command.question != self._question or self._next is not None:
                 raise InputError(
                     "this question has been answered already, in another tab or window; what was chosen there is being opened"
                 )

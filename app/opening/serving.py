@@ -70,15 +70,19 @@ def serve(first: Choice | None, serving: Serving) -> int:
     with _service(first, serving, desk) as service:
         while True:
             problem = _Problem()
-            with problem.kept() if serving.asks else contextlib.nullcontext():
-                if choice is None:
-                    problem.asks = True
-                elif _served_to_the_end(choice, service, desk, serving):
-                    return 0
+            try:
+                with problem.kept() if serving.asks else contextlib.nullcontext():
+                    if choice is not None and _served_to_the_end(choice, service, desk, serving):
+                        return 0
+                if choice is None or problem.words:
+                    _ask(choice, problem.words, service, desk)
                 else:
                     was_served = True
-            if problem.asks and not _asked(choice, problem.words, service, desk):
-                return 0 if was_served or not problem.words else 2
+            except KeyboardInterrupt:
+                if not was_served and choice is not None and not problem.words:
+                    raise
+                _say_stopped()
+                return 2 if problem.words and not was_served else 0
             choice = desk.take()
             service.start_over(_opening(choice))
 
@@ -89,11 +93,9 @@ class _Problem:
 
     Attributes:
         words: in sentences; "" if nothing did.
-        asks: the page is asked for another recording.
     """
 
     words: str = ""
-    asks: bool = False
 
     @contextlib.contextmanager
     def kept(self) -> Iterator[None]:
@@ -108,7 +110,7 @@ class _Problem:
 
     def _keep(self, line: str) -> None:
         print(f"cocalib: {' '.join(line.split())}", file=sys.stderr)
-        self.words, self.asks = sentence(line), True
+        self.words = sentence(line)
 
 
 def _served_to_the_end(choice: Choice, service: Service, desk: OpeningDesk, serving: Serving) -> bool:
@@ -134,16 +136,18 @@ def _served_to_the_end(choice: Choice, service: Service, desk: OpeningDesk, serv
     return not goes_on
 
 
-def _asked(choice: Choice | None, problem: str, service: Service, desk: OpeningDesk) -> bool:
-    """Ask the page what to open; return False if a signal comes first."""
-    choices = OpeningChoices(0) if choice is None else choices_after(choice, problem)
-    try:
-        service.ask(desk.put(choices, choice))
-    except KeyboardInterrupt:
-        with contextlib.suppress(OSError):  # the terminal may be gone
-            print("\nStopped.")
-        return False
-    return True
+def _ask(choice: Choice | None, problem: str, service: Service, desk: OpeningDesk) -> None:
+    """Ask the page what to open, and wait for its answer."""
+    choices = OpeningChoices(0) if choice is None else OpeningChoices(0, choice.title, problem)
+    if choice is not None:
+        with error_boundary("listing what can be chosen", lambda _line: None):  # `problem` says what is wrong
+            choices = choices_after(choice, problem)
+    service.ask(desk.put(choices, choice))
+
+
+def _say_stopped() -> None:
+    with contextlib.suppress(OSError):  # the terminal may be gone
+        print("\nStopped.")
 
 
 def _service(first: Choice | None, serving: Serving, desk: OpeningDesk) -> Service:
