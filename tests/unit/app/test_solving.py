@@ -210,6 +210,21 @@ def test_intrinsics_of_another_image_size_are_refused_with_both_sizes(tmp_path: 
         camera_for(recording, CameraFile.read(tmp_path / "camera.yaml"))
 
 
+def test_a_camera_file_is_named_by_its_content_whether_it_came_by_its_path_or_was_dropped_on_the_page(
+    tmp_path: Path, recording: Recording, solved: Calibration
+) -> None:
+    given = recording.camera()
+    assert given is not None
+    data = camera_info_text(given).encode()
+    (tmp_path / "camera.yaml").write_bytes(data)
+    by_path, dropped = CameraFile.read(tmp_path / "camera.yaml"), CameraFile("camera.yaml", data)
+    text = calibration_text(solved, recording, camera_file=dropped)
+    assert calibration_text(solved, recording, camera_file=by_path) == text
+    inputs = json.loads(text)["provenance"]["inputs"]
+    assert inputs[-1] == {"name": "camera.yaml", "size_bytes": len(data), "sha256": sha256(data).hexdigest()}
+    assert inputs[:-1] == json.loads(calibration_text(solved, recording))["provenance"]["inputs"]
+
+
 def pairs_text(solved: Calibration, count: int) -> str:
     camera = solved.camera
     return json.dumps(
