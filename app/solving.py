@@ -28,7 +28,7 @@ from calib_core.interchange import (
     read_pairs,
 )
 from calib_core.interchange import calibration_text as interchange_text
-from calib_core.measurements import Pair, RadarScans, ReflectorClick, TimeNs, Unsolvable
+from calib_core.measurements import Candidate, Pair, RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.option_checks import checked_options
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, about_assumptions
@@ -45,7 +45,11 @@ __all__ = [
     "solve_clicks",
     "solve_in_steps",
     "solve_pairs",
+    "window_candidates",
 ]
+
+_MOST_CANDIDATES = 50
+"""As many as the option allows."""
 
 _log = logging.getLogger(__name__)
 
@@ -136,6 +140,22 @@ def _under(pair: Pair, reference: Calibration) -> PairResult:
     return PairResult(
         pair.id, pair.pixel_px, pixels_px[nearest], points_radar_m[nearest], False, True, image_time=pair.image_time
     )
+
+
+def window_candidates(
+    recording: RadarSource, click: ReflectorClick, options: CalibrationOptions
+) -> tuple[Candidate, ...]:
+    """Return every static return of a click's window as a candidate, also those that were too implausible for its pair.
+
+    Raises:
+        CalibrationError: the recording cannot be read at the click.
+    """
+    scans = recording.radar_scans_around([click.image_time], half_window_s(options))
+    all_of_them = dataclasses.replace(
+        options, locating=dataclasses.replace(options.locating, max_candidates=_MOST_CANDIDATES)
+    )
+    alone = dataclasses.replace(click, chosen=None, mark="clicked")
+    return tuple(one for pair in pair_clicks([alone], scans, all_of_them).pairs for one in pair.candidates)
 
 
 def half_window_s(options: CalibrationOptions) -> float:

@@ -93,11 +93,11 @@ def calibration_steps(
         yield calibrate_as_printed(clicks, scans, camera, options)
         return
     pairing = pair_clicks(clicks, scans, options, background=background)
-    excluded = frozenset(click.id for click in clicks if click.excluded)
+    excluded = frozenset(click.id for click in clicks if not click.counts)
     task = _Task.of(pairing.pairs, pairing.unpaired, excluded, camera, options)
     for outcome in _steps(task, previous=previous, preview=preview):
         if isinstance(outcome, Unsolvable):
-            yield replace(outcome, unpaired=pairing.unpaired)
+            yield replace(outcome, unpaired=pairing.unpaired, pairs=pairing.pairs)
         elif outcome.checking:
             yield outcome
         else:
@@ -234,7 +234,8 @@ class _Task:
 def _steps(task: _Task, *, previous: Calibration | None, preview: bool) -> Iterator[Calibration | Unsolvable]:
     """Yield the preview, if one is wanted and a pose is found, then the answer."""
     if len(task.clicked) < MIN_PAIRS:
-        yield unsolved.too_few(len(task.clicked), len(task.excluded), len(task.unpaired))
+        untouched = sum(pair.id in task.excluded and pair.mark == "untouched" for pair in task.shown)
+        yield unsolved.too_few(len(task.clicked), len(task.excluded) - untouched, len(task.unpaired), untouched)
         return
     groups = placement_groups(task.clicked, task.options)
     if len(groups) < MIN_PAIRS:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NewType, NoReturn
+from typing import Literal, NewType, NoReturn, TypeAlias
 
 import numpy as np
 
@@ -13,6 +13,8 @@ __all__ = [
     "MIN_PAIRS",
     "NS_PER_S",
     "Candidate",
+    "ChosenReturn",
+    "Mark",
     "Pair",
     "RadarScan",
     "RadarScans",
@@ -63,6 +65,26 @@ class Stamp:
         return time_from_parts(self.sec, self.nanosec)
 
 
+Mark: TypeAlias = Literal["clicked", "moved", "snapped", "untouched"]
+"""How a click came to its pixel: set or moved by a person, snapped to the reflector's apex in the picture, or left untouched
+where the radar expected it; the last is no measurement."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class ChosenReturn:
+    """The radar return that a person chose for a click.
+
+    Attributes:
+        position_m: (x, y, z) in the radar frame, as the radar reports it.
+        radar_time: stamp of the nearest scan; None if unknown.
+        topic: of the radar; "" if unknown.
+    """
+
+    position_m: tuple[float, float, float]
+    radar_time: TimeNs | None = None
+    topic: str = ""
+
+
 @dataclass(frozen=True, slots=True, order=True)
 class ReflectorClick:
     """The reflector's centre, clicked in one camera frame. Sorts by time, then id.
@@ -74,6 +96,8 @@ class ReflectorClick:
         v_px: row.
         sigma_px: standard deviation of the click per axis; None takes the options' value.
         excluded: kept and shown, but not used to solve.
+        mark: how it came to its pixel.
+        chosen: the radar return that it belongs to, if a person said so.
     """
 
     image_time: TimeNs
@@ -82,6 +106,13 @@ class ReflectorClick:
     v_px: float
     sigma_px: float | None = None
     excluded: bool = False
+    mark: Mark = "clicked"
+    chosen: ChosenReturn | None = None
+
+    @property
+    def counts(self) -> bool:
+        """Whether it is used to solve: not excluded, and a measurement rather than a guess."""
+        return not self.excluded and self.mark != "untouched"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -294,6 +325,9 @@ class Pair:
         candidates: at least one.
         image_time: stamp of the frame; None for pairs from a pairs file.
         radar_time: stamp of the nearest scan; None for pairs from a pairs file.
+        mark: how the click came to its pixel.
+        chosen: the return that a person chose; the pair then has no other candidate.
+        set_aside: the candidates that this choice ruled out.
     """
 
     id: str
@@ -302,6 +336,9 @@ class Pair:
     sigma_px: float | None = None
     image_time: TimeNs | None = None
     radar_time: TimeNs | None = None
+    mark: Mark = "clicked"
+    chosen: ChosenReturn | None = None
+    set_aside: tuple[Candidate, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
@@ -335,12 +372,14 @@ class Unsolvable:
         reason: what is missing, with figures.
         hint: what to do about it.
         unpaired: clicks without a radar position; often the cause.
+        pairs: the others, with their candidates; empty if unknown.
     """
 
     code: str
     reason: str
     hint: str
     unpaired: tuple[Unpaired, ...] = ()
+    pairs: tuple[Pair, ...] = field(default=(), compare=False, repr=False)
 
     def unwrap(self) -> NoReturn:
         """Raise, because there is no calibration; `Calibration.unwrap` returns itself.

@@ -7,9 +7,10 @@ from calib_core.options import CameraPositionPrior
 __all__ = ["contradicted", "degenerate", "mirrored", "no_pose", "one_place", "too_few"]
 
 
-def too_few(used: int, excluded: int, unpaired: int) -> Unsolvable:
+def too_few(used: int, excluded: int, unpaired: int, untouched: int = 0) -> Unsolvable:
     """Fewer pairs than a pose needs."""
-    others = "".join(f", {count} {what}" for count, what in ((excluded, "excluded"), (unpaired, "unpaired")) if count)
+    kinds = ((excluded, "excluded"), (unpaired, "unpaired"), (untouched, "untouched"))
+    others = "".join(f", {count} {what}" for count, what in kinds if count)
     return Unsolvable(
         "too-few-pairs",
         f"{used} of at least {MIN_PAIRS} required pairs{others}",

@@ -33,6 +33,7 @@ const side = make("aside", "", []);
 const fileName = make("input", "", []);
 const copy = make("button", "second", "Copy");
 const save = make("button", "first", "Download");
+const clicksFile = make("input", "", []);
 
 export function startExporting() {
   try {
@@ -41,7 +42,6 @@ export function startExporting() {
     // Without storage, the choice is just not remembered.
   }
   build();
-  button.onclick = openExport;
   dialog.addEventListener("keydown", trap);
   dialog.addEventListener("click", (event) => {
     if (event.target === dialog) dialog.close();
@@ -268,21 +268,25 @@ async function download() {
 }
 
 function importer() {
-  const input = make("input", "", []);
-  input.type = "file";
-  input.accept = ".json,application/json";
-  input.onchange = async () => {
-    const file = input.files?.[0];
+  clicksFile.type = "file";
+  clicksFile.accept = ".json,application/json";
+  clicksFile.onchange = async () => {
+    const file = clicksFile.files?.[0];
     if (!file) return;
     dialog.close();
     const refusal = await send({ type: "import_clicks", text: await file.text(), name: file.name });
     if (refusal) toast(refusal);
-    input.value = "";
+    clicksFile.value = "";
   };
   const open = make("button", "second", "Load clicks…");
   open.dataset.hint = "Add the clicks from a clicks.json. In frames that already have a click, they replace it.";
-  open.onclick = () => input.click();
-  return make("span", "", [open, input]);
+  open.onclick = loadClicks;
+  return make("span", "", [open, clicksFile]);
+}
+
+/** Ask for a file of clicks, and add them. */
+export function loadClicks() {
+  clicksFile.click();
 }
 
 /** @param {Partial<typeof kept>} change */

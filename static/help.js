@@ -2,7 +2,7 @@
 /** The help dialog: keys, mouse and marks. */
 
 import { ink } from "./colours.js";
-import { KEYS } from "./keys.js";
+import { ACTIONS, keyNames } from "./actions.js";
 import { make } from "./notices.js";
 
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("help-dialog"));
@@ -36,28 +36,47 @@ function build() {
   const close = make("button", "icon close", "×");
   close.setAttribute("aria-label", "Close");
   close.onclick = () => dialog.close();
-  const keys = make("dl", "", KEYS.flatMap(({ keys: names, does }) => [make("dt", "", names.map(key)), make("dd", "", does)]));
-  const mouse = make("dl", "", MOUSE.flatMap(([hand, does]) => [make("dt", "", [key(hand)]), make("dd", "", does)]));
+  const groups = [...new Set(lines().map((line) => line.group))].map((group) => part(group, lines().filter((line) => line.group === group).map(({ keys, does }) => [keys, does])));
   const legend = make("div", "legend", MARKS.map(([path, words]) => make("div", "", [drawing(path), words])));
-  const title = make("h2", "", "Shortcuts, mouse and marks");
+  const title = make("h2", "", "Keys, mouse and marks");
+  title.id = "help-title";
   title.tabIndex = -1;
   title.autofocus = true;
   dialog.replaceChildren(
     title,
     close,
-    make("div", "columns", [keys, make("div", "", [mouse, note()])]),
+    make("div", "groups", [...groups, part("Mouse", MOUSE.map(([hand, does]) => [[hand], does]))]),
+    make("h3", "", "Marks in the picture"),
     legend,
+    note(),
   );
   dialog.addEventListener("click", (event) => {
     if (event.target === dialog) dialog.close();
   });
 }
 
+/** The actions that have keys, neighbours that share a line together. @returns {{group: string, does: string, keys: string[]}[]} */
+function lines() {
+  /** @type {{group: string, does: string, keys: string[]}[]} */
+  const made = [];
+  for (const { group, words, help = words, keys } of ACTIONS) {
+    if (!keys) continue;
+    const names = keyNames(keys[0]);
+    const last = made.at(-1);
+    if (last?.group === group && last.does === help) last.keys.push(...names.filter((name) => !last.keys.includes(name)));
+    else made.push({ group, does: help, keys: names });
+  }
+  return made;
+}
+
+/** @param {string} name @param {[string[], string][]} rows the keys, and what they do */
+function part(name, rows) {
+  const list = make("dl", "", rows.flatMap(([keys, does]) => [make("dt", "", keys.map(key)), make("dd", "", does)]));
+  return make("section", "", [make("h3", "", name), list]);
+}
+
 function note() {
-  const text = make("p", "", "Every click is saved to disk immediately; there is no save button. Colours run from blue (small residual) to red (large). Hover over any number for an explanation.");
-  text.style.maxWidth = "260px";
-  text.style.color = "var(--muted)";
-  return text;
+  return make("p", "note", ["Every click is saved to disk immediately; there is no save button. Colours run from blue (small residual) to red (large). Point at a figure or a control, or go to it with ", key("Tab"), ", for an explanation."]);
 }
 
 /** @param {string} name */

@@ -1,13 +1,13 @@
 // @ts-check
 /** The page: wires the modules together and passes the server's messages to those that draw them. */
 
+import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
-import { startClicking, turnBack } from "./clicking.js";
+import { startClicking } from "./clicking.js";
 import { setFormats, startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
-import { toggleHelp } from "./help.js";
-import { listen, placement } from "./keys.js";
+import { listen } from "./keys.js";
 import { activity } from "./lanes.js";
 import { startLayers } from "./layers.js";
 import { startLayout } from "./layout.js";
@@ -19,7 +19,7 @@ import { isAnother, startOpening, takeChoices, takeFolder } from "./opening.js";
 import { startOptions } from "./options.js";
 import { startPairs } from "./pairs.js";
 import { startPicture } from "./picture.js";
-import { frameFailed, goTo, pause, play, receiveFrame, requestAgain, step, tellCursor } from "./player.js";
+import { frameFailed, goTo, receiveFrame, requestAgain, tellCursor } from "./player.js";
 import { startScatter } from "./scatter.js";
 import { connect, tell, unconfirmed } from "./socket.js";
 import { startSpace } from "./space.js";
@@ -125,11 +125,6 @@ async function loadActivity() {
   emit("cursor");
 }
 
-/** @param {string} id @param {() => unknown} action */
-function press(id, action) {
-  /** @type {HTMLElement} */ (document.getElementById(id)).addEventListener("click", action);
-}
-
 startLayout();
 startTips();
 startStatus();
@@ -149,14 +144,7 @@ startArriving();
 startLooking();
 startOpening();
 listen(window);
-press("undo", () => turnBack("undo"));
-press("redo", () => turnBack("redo"));
-press("help", toggleHelp);
-press("play", () => (state.playing ? pause() : play()));
-press("step-back", () => step(-1));
-press("step-forward", () => step(1));
-press("previous-placement", () => placement(-1));
-press("next-placement", () => placement(1));
+for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-action]"))) button.addEventListener("click", () => act(actionNamed(button.dataset.action ?? "")));
 on(["cursor"], () => sessionStorage.setItem("cocalib-frame", String(state.cursor)));
 on(["selected", "theme"], tellCursor);
 connect({

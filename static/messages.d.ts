@@ -17,7 +17,7 @@ export interface ClickRow {
   frame: number;
   u_px: number;
   v_px: number;
-  state: "pending" | "inlier" | "outlier" | "excluded" | "unpaired";
+  state: "pending" | "inlier" | "outlier" | "excluded" | "unpaired" | "untouched";
   projected_px: [number, number] | null;
   residual_px: number | null;
   ellipse: Ellipse | null;
@@ -27,6 +27,9 @@ export interface ClickRow {
   returns: number | null;
   outlier_probability: number | null;
   note: string;
+  mark: "clicked" | "moved" | "snapped" | "untouched";
+  sigma_px: number | null;
+  chosen: boolean;
 }
 
 /** One number as displayed. */
@@ -152,6 +155,12 @@ export interface AssumptionRow {
   hint: string;
 }
 
+/** A placement that the user dismissed. */
+export interface DismissedRow {
+  time: Stamp;
+  position_m: [number, number, number];
+}
+
 /** One error that all pairs share, as a row of a table. */
 export interface SystematicErrorRow {
   key: string;
@@ -197,6 +206,8 @@ export interface View {
   comparison: Figure[];
   pose_assumed: Figure[];
   assumptions: AssumptionRow[];
+  dismissed: DismissedRow[];
+  acknowledged: string[];
   systematic_errors: SystematicErrorTable;
 }
 
@@ -426,6 +437,33 @@ export interface Overlay {
   guesses: [number, number][];
 }
 
+/** One radar return that may belong to a click. */
+export interface CandidateRow {
+  position_m: [number, number, number];
+  range_m: number;
+  azimuth_deg: number;
+  elevation_deg: number;
+  snr_db: number | null;
+  scans: number;
+  probability: number | null;
+  u_px: number | null;
+  v_px: number | null;
+  distance_px: number | null;
+  used: boolean;
+  chosen: boolean;
+  words: string;
+}
+
+/** The candidates of the selected click. */
+export interface PairCandidates {
+  type: "candidates";
+  click: string;
+  revision: number;
+  rows: CandidateRow[];
+  suggested: number;
+  suggestion: string;
+}
+
 /** Progress of a long operation. */
 export interface Progress {
   type: "progress";
@@ -464,19 +502,23 @@ export interface StampForm {
   nanosec: number;
 }
 
-/** A click in a frame. */
+/** A mark in a frame; without "mark" in a journal, the click that the frame already has is moved. */
 export interface ClickPlacedForm {
   type: "click_placed";
   image_time: StampForm;
   pixel_px: [number, number];
+  mark?: "clicked" | "moved" | "snapped" | "untouched" | null;
+  sigma_px?: number | null;
   request?: number;
 }
 
-/** A click dragged or nudged. */
+/** A click dragged, nudged or snapped. */
 export interface ClickMovedForm {
   type: "click_moved";
   id: string;
   pixel_px: [number, number];
+  mark?: "clicked" | "moved" | "snapped" | "untouched";
+  sigma_px?: number | null;
   request?: number;
 }
 
@@ -492,6 +534,38 @@ export interface ClickExcludedForm {
   type: "click_excluded";
   id: string;
   excluded: boolean;
+  request?: number;
+}
+
+/** A chosen radar return, as in a clicks-1 file. */
+export interface ReturnForm {
+  position_m: [number, number, number];
+  radar_time?: StampForm | null;
+  topic?: string;
+}
+
+/** A return chosen for a click; null takes the choice back. */
+export interface ReturnChosenForm {
+  type: "return_chosen";
+  id: string;
+  return: ReturnForm | null;
+  request?: number;
+}
+
+/** A placement dismissed, or offered again. */
+export interface PlacementDismissedForm {
+  type: "placement_dismissed";
+  time: StampForm;
+  position_m: [number, number, number];
+  dismissed?: boolean;
+  request?: number;
+}
+
+/** Warnings read, or shown again, by their codes. */
+export interface WarningsAcknowledgedForm {
+  type: "warnings_acknowledged";
+  codes: string[];
+  acknowledged?: boolean;
   request?: number;
 }
 
@@ -515,6 +589,8 @@ export interface ClickForm {
   pixel_px: [number, number];
   sigma_px?: number | null;
   excluded?: boolean;
+  mark?: "clicked" | "moved" | "snapped" | "untouched";
+  return?: ReturnForm | null;
 }
 
 /** Clicks from a file. */
@@ -653,6 +729,7 @@ export type FromServer =
   | RadarLook
   | RadarMap
   | Overlay
+  | PairCandidates
   | Progress
   | Problem
   | Done;
@@ -662,6 +739,9 @@ export type FromPage =
   | ClickMovedForm
   | ClickRemovedForm
   | ClickExcludedForm
+  | ReturnChosenForm
+  | PlacementDismissedForm
+  | WarningsAcknowledgedForm
   | OptionsChangedForm
   | ClearedForm
   | ClicksImportedForm

@@ -29,7 +29,6 @@ let busy = false;
 let waiting = [];
 
 export function startOpening() {
-  /** @type {HTMLElement} */ (document.getElementById("choose-recording")).onclick = show;
   strip.id = "intrinsics-strip";
   strip.hidden = true;
   pane.append(strip);
@@ -101,7 +100,7 @@ export function takeFolder(message) {
 }
 
 /** Ask what can be chosen, and show it. */
-export async function show() {
+export async function chooseRecording() {
   if (dialog.open) return;
   if (!(await known())) return;
   if (choices?.root && !folder) tell({ type: "folder", path: "" });
@@ -220,7 +219,7 @@ function drawStrip() {
 /** @param {string} message */
 function askRadar(message) {
   const pick = make("button", "chip", "Choose…");
-  pick.onclick = show;
+  pick.onclick = chooseRecording;
   const close = make("button", "chip", "Keep it");
   close.onclick = () => (strip.hidden = true);
   strip.replaceChildren(make("span", "", message), pick, close);
@@ -236,6 +235,6 @@ function askIntrinsics() {
   const pick = make("button", "chip", "Choose file…");
   pick.onclick = () => input.click();
   const others = make("button", "chip", "More…");
-  others.onclick = show;
+  others.onclick = chooseRecording;
   strip.replaceChildren(make("span", "", [make("strong", "", "No camera intrinsics. "), "Click already; the pose comes once you drop the camera file here."]), pick, others, input);
 }

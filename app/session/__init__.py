@@ -16,14 +16,17 @@ from app.session.events import (
     Event,
     OptionsChanged,
     OptionsEdited,
+    PlacementDismissed,
     Redo,
+    ReturnChosen,
     ScansAdded,
     Solved,
     Step,
     Undo,
+    WarningsAcknowledged,
 )
 from app.session.history import History, advance, settled
-from app.session.state import AssumedReading, Outcome, RecordingFacts, Session
+from app.session.state import AssumedReading, DismissedPlacement, Outcome, RecordingFacts, Session
 
 __all__ = [
     "AssumedReading",
@@ -35,19 +38,23 @@ __all__ = [
     "ClickRemoved",
     "ClicksImported",
     "ColumnsMapped",
+    "DismissedPlacement",
     "Event",
     "EventError",
     "History",
     "OptionsChanged",
     "OptionsEdited",
     "Outcome",
+    "PlacementDismissed",
     "RecordingFacts",
     "Redo",
+    "ReturnChosen",
     "ScansAdded",
     "Session",
     "Solved",
     "Step",
     "Undo",
+    "WarningsAcknowledged",
     "advance",
     "apply",
     "settled",

@@ -18,12 +18,15 @@ from app.session.events import (
     Event,
     OptionsChanged,
     OptionsEdited,
+    PlacementDismissed,
+    ReturnChosen,
     ScansAdded,
     Solved,
+    WarningsAcknowledged,
 )
-from app.session.state import RecordingFacts, Session
+from app.session.state import DismissedPlacement, RecordingFacts, Session
 from calib_core.errors import CalibrationError
-from calib_core.measurements import ReflectorClick, TimeNs, time_parts
+from calib_core.measurements import Mark, ReflectorClick, TimeNs, time_parts
 from calib_core.option_checks import checked_options
 
 __all__ = ["EventError", "apply"]
@@ -48,6 +51,10 @@ def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
         return replace(session, revision=session.revision + 1)
     if isinstance(event, ColumnsMapped | AssumptionsConfirmed):
         return _about_reading(event, session)
+    if isinstance(event, WarningsAcknowledged):
+        return _acknowledged(event, session)
+    if isinstance(event, PlacementDismissed):
+        return _dismissed(event, session)
     changed = _changed(event, session, facts)
     if changed.clicks == session.clicks and changed.options == session.options:
         return session
@@ -62,6 +69,23 @@ def _about_reading(event: ColumnsMapped | AssumptionsConfirmed, session: Session
     return session if confirmed == session.confirmed else replace(session, confirmed=confirmed)
 
 
+def _acknowledged(event: WarningsAcknowledged, session: Session) -> Session:
+    """Return the session with warnings folded away or shown again; answers in progress stay valid."""
+    others = tuple(code for code in session.acknowledged if code not in event.codes)
+    codes = tuple(dict.fromkeys((*session.acknowledged, *event.codes))) if event.acknowledged else others
+    return session if codes == session.acknowledged else replace(session, acknowledged=codes)
+
+
+def _dismissed(event: PlacementDismissed, session: Session) -> Session:
+    """Return the session with a placement dismissed or offered again; answers in progress stay valid."""
+    if not all(map(math.isfinite, event.position_m)):
+        raise EventError("the position of the placement is not finite; give it in metres")
+    placement = DismissedPlacement(event.time, event.position_m)
+    others = tuple(one for one in session.dismissed if one != placement)
+    dismissed = (*others, placement) if event.dismissed else others
+    return session if set(dismissed) == set(session.dismissed) else replace(session, dismissed=dismissed)
+
+
 @singledispatch
 def _changed(event: Event, session: Session, facts: RecordingFacts) -> Session:
     """Return the session with the event applied; `apply` increments the revision."""
@@ -73,16 +97,47 @@ def _placed(event: ClickPlaced, session: Session, facts: RecordingFacts) -> Sess
     _require_frame(event.image_time, facts)
     _require_pixel(event.u_px, event.v_px, facts)
     for click in session.clicks:
-        if click.image_time == event.image_time:
+        if click.image_time != event.image_time:
+            continue
+        if event.mark is None:
             return _with_click(session, replace(click, u_px=event.u_px, v_px=event.v_px))
-    click = ReflectorClick(event.image_time, f"c{session.next_click}", event.u_px, event.v_px)
+        if (click.u_px, click.v_px) == (event.u_px, event.v_px):
+            return _with_click(session, _marked(click, event.mark, event.sigma_px))
+    click = ReflectorClick(
+        event.image_time,
+        f"c{session.next_click}",
+        event.u_px,
+        event.v_px,
+        sigma_px=event.sigma_px,
+        mark=event.mark or "clicked",
+    )
+    _require_sigma(click)
     return replace(_with_click(session, click), next_click=session.next_click + 1)
+
+
+def _marked(click: ReflectorClick, mark: Mark, sigma_px: float | None) -> ReflectorClick:
+    """Return a click that was marked again at its pixel: a guess becomes a measurement; what a person marked stays as it is."""
+    marked = replace(click, mark=mark, sigma_px=sigma_px) if click.mark == "untouched" or mark == "snapped" else click
+    _require_sigma(marked)
+    return marked
 
 
 @_changed.register
 def _moved(event: ClickMoved, session: Session, facts: RecordingFacts) -> Session:
     _require_pixel(event.u_px, event.v_px, facts)
-    return _with_click(session, replace(_click(session, event.id), u_px=event.u_px, v_px=event.v_px))
+    click = _click(session, event.id)
+    if (click.u_px, click.v_px) == (event.u_px, event.v_px) and event.mark == "moved":
+        return session
+    moved = replace(click, u_px=event.u_px, v_px=event.v_px, mark=event.mark, sigma_px=event.sigma_px)
+    _require_sigma(moved)
+    return _with_click(session, moved)
+
+
+@_changed.register
+def _chosen(event: ReturnChosen, session: Session, facts: RecordingFacts) -> Session:
+    if event.chosen is not None and not all(map(math.isfinite, event.chosen.position_m)):
+        raise EventError("the position of the chosen return is not finite; give it in metres")
+    return _with_click(session, replace(_click(session, event.id), chosen=event.chosen))
 
 
 @_changed.register
@@ -113,14 +168,11 @@ def _cleared(event: Cleared, session: Session, facts: RecordingFacts) -> Session
 
 @_changed.register
 def _imported(event: ClicksImported, session: Session, facts: RecordingFacts) -> Session:
-    times: set[TimeNs] = set()
     for click in event.clicks:
         _require_frame(click.image_time, facts)
         _require_pixel(click.u_px, click.v_px, facts)
         _require_sigma(click)
-        if click.image_time in times:
-            raise EventError(f"two of the clicks are in the frame at {_seconds(click.image_time)}; keep one per frame")
-        times.add(click.image_time)
+    times = {click.image_time for click in event.clicks}
     clicks = [click for click in session.clicks if click.image_time not in times]
     taken = {click.id for click in clicks}
     number = max([session.next_click, *(_number(click.id) + 1 for click in event.clicks)])

@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 from app.option_changes import OptionChange
 from app.session.state import Outcome
-from calib_core.measurements import ReflectorClick, TimeNs
+from calib_core.measurements import ChosenReturn, Mark, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.results import PairResult
 
@@ -21,30 +21,46 @@ __all__ = [
     "Event",
     "OptionsChanged",
     "OptionsEdited",
+    "PlacementDismissed",
     "Redo",
+    "ReturnChosen",
     "ScansAdded",
     "Solved",
     "Step",
     "Undo",
+    "WarningsAcknowledged",
 ]
 
 
 @dataclass(frozen=True, slots=True)
 class ClickPlaced:
-    """The reflector's centre was clicked in a frame; a click that this frame already has is moved."""
+    """The reflector's centre was marked in a frame; a frame may have several.
+
+    Attributes:
+        image_time: stamp of the frame.
+        u_px: column.
+        v_px: row.
+        mark: how it came to this pixel; None in journals of versions that kept one click per frame: a click that the frame
+            already has is then moved.
+        sigma_px: its standard deviation per axis; None takes the options' value.
+    """
 
     image_time: TimeNs
     u_px: float
     v_px: float
+    mark: Mark | None = "clicked"
+    sigma_px: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class ClickMoved:
-    """A click was dragged or nudged."""
+    """A click was dragged, nudged or snapped; it then counts, also if it was a guess before."""
 
     id: str
     u_px: float
     v_px: float
+    mark: Mark = "moved"
+    sigma_px: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +76,37 @@ class ClickExcluded:
 
     id: str
     excluded: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ReturnChosen:
+    """A person said which radar return a click belongs to, or took that back (None)."""
+
+    id: str
+    chosen: ChosenReturn | None
+
+
+@dataclass(frozen=True, slots=True)
+class PlacementDismissed:
+    """A placement found in the radar data is not the reflector: it is not offered any more.
+
+    Attributes:
+        time: a stamp within it.
+        position_m: (x, y, z) of it in the radar frame.
+        dismissed: False offers it again.
+    """
+
+    time: TimeNs
+    position_m: tuple[float, float, float]
+    dismissed: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class WarningsAcknowledged:
+    """The user has read the warnings of these codes, or wants to see them again. Not undone with clicks."""
+
+    codes: tuple[str, ...]
+    acknowledged: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +178,9 @@ Event: TypeAlias = (
     | ClickMoved
     | ClickRemoved
     | ClickExcluded
+    | ReturnChosen
+    | PlacementDismissed
+    | WarningsAcknowledged
     | OptionsChanged
     | OptionsEdited
     | Cleared

@@ -14,6 +14,7 @@ from app.session.events import (
     Solved,
     Step,
     Undo,
+    WarningsAcknowledged,
 )
 from app.session.state import RecordingFacts, Session
 
@@ -43,7 +44,7 @@ def advance(history: History, step: Step, facts: RecordingFacts) -> History:
     present = apply(history.present, step, facts)
     if present is history.present:
         return history
-    if isinstance(step, Solved | ScansAdded | ColumnsMapped | AssumptionsConfirmed):
+    if isinstance(step, Solved | ScansAdded | ColumnsMapped | AssumptionsConfirmed | WarningsAcknowledged):
         return replace(history, present=present)
     return History(present, (*history.past, history.present))
 
@@ -83,4 +84,5 @@ def _resumed(kept: Session, current: Session) -> Session:
         outcome_revision=revision if kept.is_solved else kept.outcome_revision,
         column_map=current.column_map,
         confirmed=current.confirmed,
+        acknowledged=current.acknowledged,
     )

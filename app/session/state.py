@@ -10,7 +10,7 @@ from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, PairResult
 
-__all__ = ["AssumedReading", "Outcome", "RecordingFacts", "Session"]
+__all__ = ["AssumedReading", "DismissedPlacement", "Outcome", "RecordingFacts", "Session"]
 
 Outcome: TypeAlias = Calibration | Unsolvable
 
@@ -87,11 +87,24 @@ class RecordingFacts:
 
 
 @dataclass(frozen=True, slots=True)
+class DismissedPlacement:
+    """A placement that the user dismissed.
+
+    Attributes:
+        time: a stamp within it.
+        position_m: (x, y, z) of it in the radar frame.
+    """
+
+    time: TimeNs
+    position_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class Session:
     """Everything the user decided, and the resulting outcome.
 
     Attributes:
-        clicks: sorted by time; at most one per frame.
+        clicks: sorted by time, then id.
         options: what the next solve uses.
         next_click: number of the next id ("c7"); it only increases, so that no id is used twice.
         revision: increases by one with every change of clicks or options, including undo and redo.
@@ -100,6 +113,8 @@ class Session:
         checked: while there is no calibration, the clicks evaluated under the one given for review.
         column_map: the values of --map that the recording is read with; remembered for the next opening.
         confirmed: texts of the assumptions about the recording that the user has confirmed.
+        dismissed: placements that are not the reflector.
+        acknowledged: codes of the warnings that the user has read.
     """
 
     clicks: tuple[ReflectorClick, ...] = ()
@@ -111,6 +126,8 @@ class Session:
     checked: tuple[PairResult, ...] = ()
     column_map: tuple[str, ...] = ()
     confirmed: tuple[str, ...] = ()
+    dismissed: tuple[DismissedPlacement, ...] = ()
+    acknowledged: tuple[str, ...] = ()
 
     @property
     def is_solved(self) -> bool:

@@ -1,6 +1,7 @@
 """What the screen shows, as a value: `view(session)` is pure, and every client draws the same View."""
 
 from app.view.build import view
+from app.view.candidates import CandidateRow, PairCandidates, click_candidates, pair_of_click
 from app.view.following import FollowState, Pace, advice_words, pace_words
 from app.view.model import Advice, ClickRow, ClickState, Ellipse, Figure, Level, Stage, View
 from app.view.reference import Reference, shown_calibration
@@ -9,6 +10,7 @@ from app.view.wording import sentence, warning_in_sentences
 
 __all__ = [
     "Advice",
+    "CandidateRow",
     "ClickRow",
     "ClickState",
     "Ellipse",
@@ -16,11 +18,14 @@ __all__ = [
     "FollowState",
     "Level",
     "Pace",
+    "PairCandidates",
     "Reference",
     "Stage",
     "View",
     "advice_words",
+    "click_candidates",
     "pace_words",
+    "pair_of_click",
     "sentence",
     "shown_calibration",
     "summary_lines",

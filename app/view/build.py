@@ -4,11 +4,11 @@ from app.session import History, RecordingFacts, Session
 from app.view.advice import advice_for
 from app.view.click_rows import click_rows
 from app.view.figures import assumed_figures, firm_text, metric_figures, pose_figures, residual_limit_px
-from app.view.model import AssumptionRow, Stage, SystematicErrorTable, View
+from app.view.model import AssumptionRow, DismissedRow, Stage, SystematicErrorTable, View
 from app.view.reference import Reference, comparison_figures, reference_words, shown_calibration
 from app.view.systematic_errors import systematic_errors
 from app.view.wording import sentence, warning_in_sentences
-from calib_core.measurements import MIN_PAIRS, Unpaired, Unsolvable
+from calib_core.measurements import MIN_PAIRS, Stamp, Unpaired, Unsolvable
 from calib_core.results import Calibration, DataWarning
 
 __all__ = ["view"]
@@ -59,6 +59,8 @@ def view(history: History, facts: RecordingFacts, reference: Reference | None = 
         reference=reference.name if reference else "",
         comparison=comparison_figures(reference, calibration) if reference and calibration else (),
         assumptions=_assumptions(session, facts),
+        dismissed=tuple(DismissedRow(Stamp.of(one.time), one.position_m) for one in session.dismissed),
+        acknowledged=session.acknowledged,
     )
 
 
@@ -79,7 +81,7 @@ def _stage(session: Session) -> Stage:
 def _missing(session: Session) -> int:
     """Return how many placements are still needed to solve; clicks without a radar position do not count."""
     unseen = {row.id for row in _unpaired(session)}
-    usable = sum(not click.excluded and click.id not in unseen for click in session.clicks)
+    usable = sum(click.counts and click.id not in unseen for click in session.clicks)
     return max(0, MIN_PAIRS - usable)
 
 

@@ -15,6 +15,11 @@ from calib_core.results import Calibration
 
 __all__ = ["click_rows"]
 
+_GUESS = (
+    "It stands where the radar expects the reflector, and nobody has looked: it does not count. "
+    "Move it to the reflector's inner corner."
+)
+
 
 def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
     """Return one row per click, in order of image time; a row that is as before is the same object."""
@@ -30,9 +35,20 @@ def click_rows(session: Session, facts: RecordingFacts) -> tuple[ClickRow, ...]:
 def _row(click: ReflectorClick, frame: int, pair: Reprojection | None, lone: Unpaired | None) -> ClickRow:
     stamp = Stamp.of(click.image_time)
     if pair is None:
-        state: ClickState = "excluded" if click.excluded else "unpaired" if lone else "pending"
-        note = f"{sentence(lone.reason)} {sentence(lone.hint)}" if lone else ""
-        return ClickRow(click.id, stamp, frame, click.u_px, click.v_px, state, note=note)
+        state: ClickState = _uncounted(click) or ("unpaired" if lone else "pending")
+        note = f"{sentence(lone.reason)} {sentence(lone.hint)}" if lone else _GUESS if state == "untouched" else ""
+        return ClickRow(
+            click.id,
+            stamp,
+            frame,
+            click.u_px,
+            click.v_px,
+            state,
+            note=note,
+            mark=click.mark,
+            sigma_px=click.sigma_px,
+            chosen=click.chosen is not None,
+        )
     state = _state(click, pair)
     residual_px = _residual_px(click, pair)
     return ClickRow(
@@ -50,6 +66,9 @@ def _row(click: ReflectorClick, frame: int, pair: Reprojection | None, lone: Unp
         elevation_deg=pair.elevation_deg,
         outlier_probability=pair.outlier_probability,
         note=_note(state, residual_px, pair),
+        mark=click.mark,
+        sigma_px=click.sigma_px,
+        chosen=click.chosen is not None,
     )
 
 
@@ -62,14 +81,22 @@ def _residual_px(click: ReflectorClick, pair: Reprojection) -> float | None:
 
 
 def _state(click: ReflectorClick, pair: Reprojection) -> ClickState:
-    if click.excluded:
-        return "excluded"
+    uncounted = _uncounted(click)
+    if uncounted is not None:
+        return uncounted
     if pair.excluded:  # included again since that outcome
         return "pending"
     return "inlier" if pair.inlier else "outlier"
 
 
+def _uncounted(click: ReflectorClick) -> ClickState | None:
+    """Return the state of a click that is not used to solve; None for others."""
+    return "excluded" if click.excluded else None if click.counts else "untouched"
+
+
 def _note(state: ClickState, residual_px: float | None, pair: Reprojection) -> str:
+    if state == "untouched":
+        return _GUESS
     if state not in ("outlier", "excluded"):
         return ""
     where = "is behind the camera" if residual_px is None else f"reprojects {plain(residual_px)} px from the click"

@@ -5,7 +5,7 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-from calib_core.measurements import Stamp
+from calib_core.measurements import Mark, Stamp
 from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning
 
@@ -13,6 +13,7 @@ __all__ = [
     "Advice",
     "ClickRow",
     "ClickState",
+    "DismissedRow",
     "Ellipse",
     "Figure",
     "Level",
@@ -22,7 +23,7 @@ __all__ = [
     "View",
 ]
 
-ClickState: TypeAlias = Literal["pending", "inlier", "outlier", "excluded", "unpaired"]
+ClickState: TypeAlias = Literal["pending", "inlier", "outlier", "excluded", "unpaired", "untouched"]
 Level: TypeAlias = Literal["plain", "good", "warning"]
 Stage: TypeAlias = Literal["collecting", "solving", "solved", "unsolvable"]
 
@@ -51,7 +52,7 @@ class ClickRow:
         frame: index of its frame.
         u_px: column of the click.
         v_px: row of the click.
-        state: according to the latest outcome; "pending" if that does not cover it.
+        state: according to the latest outcome; "pending" if that does not cover it; "untouched" is a guess that does not count.
         projected_px: reprojection of its radar position (u, v), rounded to 1 % of the ellipse or finer; None if it has none.
         residual_px: length of projected_px minus the current click, rounded likewise; None without projected_px.
         ellipse: None if the method has no noise model.
@@ -61,6 +62,9 @@ class ClickRow:
         returns: how many radar returns the position averages; None if unknown.
         outlier_probability: 0 to 1; None if the method has none.
         note: text for the user; "" when there is nothing to say.
+        mark: how it came to its pixel.
+        sigma_px: its own standard deviation per axis; None if it has the options' value.
+        chosen: a person said which return belongs to it.
     """
 
     id: str
@@ -78,6 +82,22 @@ class ClickRow:
     returns: int | None = None
     outlier_probability: float | None = None
     note: str = ""
+    mark: Mark = "clicked"
+    sigma_px: float | None = None
+    chosen: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class DismissedRow:
+    """A placement that the user dismissed.
+
+    Attributes:
+        time: a stamp within it.
+        position_m: (x, y, z) in the radar frame.
+    """
+
+    time: Stamp
+    position_m: tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,6 +229,8 @@ class View:
         reference: file name of the calibration under review; "" if there is none.
         comparison: how far the solved calibration is from the reference; empty if either is missing.
         assumptions: what the recording does not state, reading it takes for granted, and nobody has confirmed.
+        dismissed: the placements that the user dismissed.
+        acknowledged: the codes of the warnings that the user has read.
     """
 
     revision: int
@@ -233,4 +255,6 @@ class View:
     comparison: tuple[Figure, ...] = ()
     pose_assumed: tuple[Figure, ...] = ()
     assumptions: tuple[AssumptionRow, ...] = ()
+    dismissed: tuple[DismissedRow, ...] = ()
+    acknowledged: tuple[str, ...] = ()
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)

@@ -18,7 +18,16 @@ from calib_core.measurements import NS_PER_S, Candidate, RadarScans, TimeNs
 from calib_core.options import LocatingOptions, NoiseOptions
 from calib_core.radar import covariance_from_sigma_polar, direction_cosines
 
-__all__ = ["Cluster", "candidate_at", "candidates_of", "clusters_of", "window_around"]
+__all__ = [
+    "Cluster",
+    "candidate_at",
+    "candidates_of",
+    "cluster_at",
+    "clusters_of",
+    "clusters_wanted",
+    "nearest_cluster",
+    "window_around",
+]
 
 CLUSTER_SCALE = np.array([0.06, np.deg2rad(1.2), np.deg2rad(2.5)])
 """The least step of distance in range [m], u and w: about a range bin, an angle bin, and an elevation error.
@@ -140,6 +149,36 @@ def _found_clusters(key: _WindowKey, most: int, scale: tuple[float, ...]) -> tup
             clusters.append(_cluster(window, steps, amplitude, members, step))
     alternatives = cluster_alternatives(window, cluster_of, len(clusters))
     return tuple(replace(own, alternative_of=of) for own, of in zip(clusters, alternatives.tolist(), strict=True))
+
+
+def nearest_cluster(clusters: Sequence[Cluster], position_radar_m: Vector3, *, scale: Vector3) -> Cluster | None:
+    """Return the cluster at a position (3,) [m]; None if there is none within its reach.
+
+    Args:
+        clusters: of one window.
+        position_radar_m: in the radar frame.
+        scale: (3,) one step of distance in range [m], u and w.
+    """
+    ahead = [one for one in clusters if one.forward * position_radar_m[0] >= 0]
+    if not ahead:
+        return None
+    away = (np.array([one.centre for one in ahead]) - direction_cosines(position_radar_m[None])) / scale
+    squared = (away**2).sum(axis=1)
+    return ahead[int(squared.argmin())] if squared.min() <= _REACH**2 else None
+
+
+def cluster_at(window: RadarScans, position_radar_m: Vector3, *, scale: Vector3) -> Cluster | None:
+    """Make a cluster of the returns at a position (3,) [m]; None if there are none.
+
+    Args:
+        window: the static returns around one click.
+        position_radar_m: in the radar frame.
+        scale: (3,) one step of distance in range [m], u and w.
+    """
+    steps = direction_cosines(window.points_radar_m) / scale
+    at = direction_cosines(position_radar_m[None])[0] / scale
+    members = _near(steps, at, _REACH) & (window.points_radar_m[:, 0] * position_radar_m[0] >= 0)
+    return _cluster(window, steps, _amplitudes(window.snr_db), members, scale) if members.any() else None
 
 
 def _amplitudes(snr_db: Values) -> Values:

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib_core.association.choices import chosen_candidate, no_chosen_return, with_shared_choices
 from calib_core.association.cluster_scale import cluster_scale
 from calib_core.association.clustering import candidates_of, clusters_of, clusters_wanted, window_around
 from calib_core.association.companions import balanced_pairs
 from calib_core.association.gating import static_returns
 from calib_core.association.novelty import background_windows, scores_of
 from calib_core.association.placement_groups import linked_clicks
-from calib_core.measurements import NS_PER_S, Pair, RadarScans, ReflectorClick, TimeNs, Unpaired
+from calib_core.measurements import NS_PER_S, Candidate, Pair, RadarScans, ReflectorClick, TimeNs, Unpaired
 from calib_core.options import CalibrationOptions
 
 __all__ = ["Pairing", "pair_clicks"]
@@ -39,7 +40,8 @@ def pair_clicks(
 ) -> Pairing:
     """Pair every click with the candidate positions in the window around the nearest scan (paper section III).
 
-    Excluded clicks are paired too; the caller keeps them out of the solution.
+    Excluded and untouched clicks are paired too; the caller keeps them out of the solution. Untouched ones leave the pairs
+    of the others as they are.
 
     Args:
         clicks: in any order; they are sorted by time, then id.
@@ -48,10 +50,28 @@ def pair_clicks(
         background: scans of the same recording, such as all of it: what they show far from every click stood there before
             and after. It helps most while there are fewer than four clicks.
     """
+    measured = [click for click in clicks if click.mark != "untouched"]
+    pairing = _pairing(measured, scans, options, background)
+    if len(measured) == len(clicks):
+        return pairing
+    every = _pairing(clicks, scans, options, background)
+    untouched = {click.id for click in clicks if click.mark == "untouched"}
+    pairs = [*pairing.pairs, *(pair for pair in every.pairs if pair.id in untouched)]
+    unpaired = [*pairing.unpaired, *(one for one in every.unpaired if one.id in untouched)]
+    rank = {click.id: place for place, click in enumerate(sorted(clicks))}
+    return Pairing(
+        tuple(sorted(pairs, key=lambda one: rank[one.id])), tuple(sorted(unpaired, key=lambda one: rank[one.id]))
+    )
+
+
+def _pairing(
+    clicks: Sequence[ReflectorClick], scans: RadarScans, options: CalibrationOptions, background: RadarScans | None
+) -> Pairing:
+    """Pair clicks that may all influence one another."""
     static = static_returns(scans, options.gating)
     reachable: list[ReflectorClick] = []
     unpaired: list[Unpaired] = []
-    for click in sorted(clicks):
+    for click in with_shared_choices(sorted(clicks), options):
         problem = _gap_problem(click, static, options.locating.max_time_gap_s)
         if problem is None:
             reachable.append(click)
@@ -63,7 +83,7 @@ def pair_clicks(
     shared = _windows_of_placements(reachable, windows, pairs, static, options)
     if shared is not windows:
         pairs, empty = _paired(reachable, shared, static, elsewhere, options)
-    unpaired += [_nothing_static(click, window, options) for click, window in empty]
+    unpaired += [_without_return(click, window, options) for click, window in empty]
     rank = {click.id: place for place, click in enumerate(sorted(clicks))}
     return Pairing(balanced_pairs(pairs), tuple(sorted(unpaired, key=lambda one: rank[one.id])))
 
@@ -93,17 +113,26 @@ def _paired(
     pairs, empty = [], []
     for click, window in zip(clicks, windows, strict=True):
         found = clusters[row[id(window)]]
-        if not found:
+        candidates = candidates_of(found, scores[row[id(window)]], options.locating, options.noise) if found else ()
+        set_aside: tuple[Candidate, ...] = ()
+        if click.chosen is not None:
+            at = np.array(click.chosen.position_m)
+            fixed = chosen_candidate(at, window, found, scale=scale, locating=options.locating, noise=options.noise)
+            set_aside, candidates = candidates, () if fixed is None else (fixed,)
+        if not candidates:
             empty.append((click, window))
             continue
         pairs.append(
             Pair(
                 id=click.id,
                 pixel_px=np.array([click.u_px, click.v_px]),
-                candidates=candidates_of(found, scores[row[id(window)]], options.locating, options.noise),
+                candidates=candidates,
                 sigma_px=click.sigma_px,
                 image_time=click.image_time,
                 radar_time=TimeNs(int(static.times_ns[static.nearest(click.image_time)])),
+                mark=click.mark,
+                chosen=click.chosen,
+                set_aside=set_aside,
             )
         )
     return pairs, empty
@@ -117,7 +146,7 @@ def _windows_of_placements(
     options: CalibrationOptions,
 ) -> list[RadarScans]:
     """Give the clicks of one placement the scans of all their windows; the same list if each has a placement of its own."""
-    excluded = {click.id for click in clicks if click.excluded}
+    excluded = {click.id for click in clicks if not click.counts}
     used = [pair for pair in pairs if pair.id not in excluded]
     groups = [rows for rows in linked_clicks(used, options) if len(rows) > 1]
     if not groups:
@@ -154,6 +183,10 @@ def _gap_problem(click: ReflectorClick, scans: RadarScans, max_gap_s: float) -> 
         f"the nearest radar scan is {gap_s:.2f} s away; at most {max_gap_s:g} s are allowed",
         "click where both recordings overlap, or check that both clocks agree",
     )
+
+
+def _without_return(click: ReflectorClick, window: RadarScans, options: CalibrationOptions) -> Unpaired:
+    return _nothing_static(click, window, options) if click.chosen is None else no_chosen_return(click)
 
 
 def _nothing_static(click: ReflectorClick, window: RadarScans, options: CalibrationOptions) -> Unpaired:

@@ -25,7 +25,7 @@ from calib_core.measurements import (
 )
 from calib_core.metrics import aed, distances, metrics_of
 from calib_core.options import CalibrationOptions, PaperOptions
-from calib_core.paper.checks import warnings_as_printed
+from calib_core.paper.checks import unused_choices, warnings_as_printed
 from calib_core.paper.pnp import PnPSolver, refine_lm, solve_pnp_ransac, spans_a_plane
 from calib_core.results import Calibration, PairResult
 
@@ -207,6 +207,8 @@ def pair_as_printed(click: ReflectorClick, static: RadarScans, options: Calibrat
         sigma_px=click.sigma_px,
         image_time=click.image_time,
         radar_time=radar_time,
+        mark=click.mark,
+        chosen=click.chosen,
     )
 
 
@@ -229,10 +231,12 @@ def calibrate_as_printed(
         [pair for pair in found if isinstance(pair, Pair)],
         camera,
         options,
-        excluded=frozenset(click.id for click in ordered if click.excluded),
+        excluded=frozenset(click.id for click in ordered if not click.counts),
         unpaired=unpaired,
     )
-    return replace(outcome, unpaired=unpaired) if isinstance(outcome, Unsolvable) else outcome
+    if isinstance(outcome, Unsolvable):
+        return replace(outcome, unpaired=unpaired, pairs=tuple(pair for pair in found if isinstance(pair, Pair)))
+    return replace(outcome, warnings=(*outcome.warnings, *unused_choices(ordered)))
 
 
 def solve_pairs_as_printed(

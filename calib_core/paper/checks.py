@@ -4,7 +4,7 @@ The algorithm has no noise model and gives no warnings itself. Its residuals are
 method assumes; the pose stays as printed.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +13,13 @@ from calib_core.arrays import Flags, Points2, Points3
 from calib_core.camera import Camera
 from calib_core.estimation.linearization import Linearization, linearize
 from calib_core.geometry import RigidTransform, skew
+from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.plausibility import implausible_input
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import DataWarning
 
-__all__ = ["warnings_as_printed"]
+__all__ = ["unused_choices", "warnings_as_printed"]
 
 _MOST_DISAGREEING = 0.35
 _NOISE_EXCESS = 2.5  # of the mean squared residual
@@ -26,6 +27,21 @@ _FAR_CAMERA = 3.0  # expected distances
 _TRUSTED_ROTATION_RAD = np.deg2rad(1.0)  # an error of a method that states no uncertainty is not expected to be larger
 _TRUSTED_POSITION_M = 0.25
 _SURE_SIGMAS = 2.9  # exceeded in 1 of 300 poses
+
+
+def unused_choices(clicks: Iterable[ReflectorClick]) -> tuple[DataWarning, ...]:
+    """Say that Algorithm 1 averages all returns of a window, also where a person chose one."""
+    count = sum(click.chosen is not None and click.counts for click in clicks)
+    if not count:
+        return ()
+    which = "the chosen return of 1 click" if count == 1 else f"the chosen returns of {count} clicks"
+    return (
+        DataWarning(
+            "choices-unused",
+            f"Algorithm 1 averages all static returns of a window, so {which} had no effect",
+            "use the default method, which keeps to the choice",
+        ),
+    )
 
 
 def warnings_as_printed(

@@ -11,15 +11,25 @@ import msgspec
 from msgspec import Meta
 
 from app.option_changes import options_from_tree
-from app.session import AssumptionsConfirmed, ClicksImported, ColumnsMapped, OptionsChanged, Session, Step
+from app.session import (
+    AssumptionsConfirmed,
+    ClicksImported,
+    ColumnsMapped,
+    DismissedPlacement,
+    OptionsChanged,
+    PlacementDismissed,
+    Session,
+    Step,
+    WarningsAcknowledged,
+)
 from app.session.file.checksums import line_bytes, sealed, taken_apart
 from app.session.file.errors import SessionFileError
 from app.session.file.guarded_folder import GuardedFolder
 from app.session.file.identity import RecordingForm
 from app.session.file.journal_reading import SCHEMA, SCHEMA_1
-from app.session.file.step_json import ClickForm, click_from_form, form_of_click
+from app.session.file.step_json import ClickForm, PlacementDismissedForm, StampForm, click_from_form, form_of_click
 from calib_core.errors import CalibrationError
-from calib_core.measurements import ReflectorClick
+from calib_core.measurements import ReflectorClick, Stamp
 from calib_core.options import CalibrationOptions
 
 __all__ = ["SNAPSHOT", "FoundSnapshot", "read_snapshot", "write_snapshot"]
@@ -39,6 +49,8 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     lines: str = ""
     column_map: tuple[str, ...] = ()
     confirmed: tuple[str, ...] = ()
+    dismissed: tuple[PlacementDismissedForm, ...] = ()
+    acknowledged: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +67,8 @@ class FoundSnapshot:
         sum: its own checksum.
         column_map: the user's --map of that step.
         confirmed: the assumptions about the recording that were confirmed by then.
+        dismissed: the placements that were dismissed.
+        acknowledged: the codes of the warnings that were read.
     """
 
     recording: RecordingForm
@@ -66,13 +80,17 @@ class FoundSnapshot:
     sum: str
     column_map: tuple[str, ...] = ()
     confirmed: tuple[str, ...] = ()
+    dismissed: tuple[DismissedPlacement, ...] = ()
+    acknowledged: tuple[str, ...] = ()
 
     @property
     def steps(self) -> tuple[Step, ...]:
         """The steps that lead from an empty session to the snapshot."""
         reading: tuple[Step, ...] = (ColumnsMapped(self.column_map),) if self.column_map else ()
         reading += (AssumptionsConfirmed(self.confirmed),) if self.confirmed else ()
-        return (*reading, OptionsChanged(self.options), ClicksImported(self.clicks))
+        reading += (WarningsAcknowledged(self.acknowledged),) if self.acknowledged else ()
+        dismissals = (PlacementDismissed(one.time, one.position_m) for one in self.dismissed)
+        return (*reading, OptionsChanged(self.options), ClicksImported(self.clicks), *dismissals)
 
     def agrees_with(self, sums: Sequence[str]) -> bool:
         """Return whether the journal's lines are those of the snapshot, as far as both have them."""
@@ -107,6 +125,10 @@ def write_snapshot(
         lines=_marks(sums),
         column_map=session.column_map,
         confirmed=session.confirmed,
+        dismissed=tuple(
+            PlacementDismissedForm(StampForm.of(Stamp.of(one.time)), one.position_m) for one in session.dismissed
+        ),
+        acknowledged=session.acknowledged,
     )
     folder.replace(SNAPSHOT, line_bytes(sealed(msgspec.json.encode(snapshot))) + b"\n")
 
@@ -139,6 +161,8 @@ def read_snapshot(data: bytes, place: str) -> FoundSnapshot:
             lines=snapshot.lines,
             column_map=snapshot.column_map,
             confirmed=snapshot.confirmed,
+            dismissed=tuple(DismissedPlacement(one.time.stamp.time, one.position_m) for one in snapshot.dismissed),
+            acknowledged=snapshot.acknowledged,
             sum=found.sum or sealed(data).sum,
         )
     except SessionFileError:

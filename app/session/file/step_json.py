@@ -17,11 +17,14 @@ from app.session import (
     ClicksImported,
     ColumnsMapped,
     OptionsChanged,
+    PlacementDismissed,
     Redo,
+    ReturnChosen,
     Step,
     Undo,
+    WarningsAcknowledged,
 )
-from calib_core.measurements import ReflectorClick, Stamp
+from calib_core.measurements import ChosenReturn, Mark, ReflectorClick, Stamp
 
 __all__ = [
     "AssumptionsConfirmedForm",
@@ -36,10 +39,14 @@ __all__ = [
     "ColumnsMappedForm",
     "OptionsChangedForm",
     "PixelForm",
+    "PlacementDismissedForm",
     "RedoForm",
+    "ReturnChosenForm",
+    "ReturnForm",
     "StampForm",
     "StepForm",
     "UndoForm",
+    "WarningsAcknowledgedForm",
     "click_from_form",
     "form_of_click",
     "form_of_step",
@@ -48,6 +55,8 @@ __all__ = [
 
 ClickId: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
 PixelForm: TypeAlias = tuple[float, float]
+PositionForm: TypeAlias = tuple[float, float, float]
+CodeForm: TypeAlias = Annotated[str, Meta(min_length=1, max_length=100)]
 MapForm: TypeAlias = Annotated[str, Meta(max_length=500)]
 AssumptionForm: TypeAlias = Annotated[str, Meta(max_length=2000)]
 
@@ -69,7 +78,17 @@ class StampForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return Stamp(self.sec, self.nanosec)
 
 
-class ClickForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+class ReturnForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """A chosen radar return, as in a clicks-1 file."""
+
+    position_m: PositionForm
+    radar_time: StampForm | None = None
+    topic: Annotated[str, Meta(max_length=500)] = ""
+
+
+class ClickForm(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, rename={"chosen": "return"}
+):
     """A click, as in a clicks-1 file."""
 
     id: ClickId
@@ -77,6 +96,8 @@ class ClickForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
     pixel_px: PixelForm
     sigma_px: float | None = None
     excluded: bool = False
+    mark: Mark = "clicked"
+    chosen: ReturnForm | None = None
 
 
 class _Form(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
@@ -84,17 +105,21 @@ class _Form(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
 
 class ClickPlacedForm(_Form, frozen=True, tag="click_placed"):
-    """A click in a frame."""
+    """A mark in a frame; without "mark" in a journal, the click that the frame already has is moved."""
 
     image_time: StampForm
     pixel_px: PixelForm
+    mark: Mark | None = None
+    sigma_px: float | None = None
 
 
 class ClickMovedForm(_Form, frozen=True, tag="click_moved"):
-    """A click dragged or nudged."""
+    """A click dragged, nudged or snapped."""
 
     id: ClickId
     pixel_px: PixelForm
+    mark: Mark = "moved"
+    sigma_px: float | None = None
 
 
 class ClickRemovedForm(_Form, frozen=True, tag="click_removed"):
@@ -108,6 +133,28 @@ class ClickExcludedForm(_Form, frozen=True, tag="click_excluded"):
 
     id: ClickId
     excluded: bool
+
+
+class ReturnChosenForm(_Form, frozen=True, tag="return_chosen", rename={"chosen": "return"}):
+    """A return chosen for a click; null takes the choice back."""
+
+    id: ClickId
+    chosen: ReturnForm | None
+
+
+class PlacementDismissedForm(_Form, frozen=True, tag="placement_dismissed"):
+    """A placement dismissed, or offered again."""
+
+    time: StampForm
+    position_m: PositionForm
+    dismissed: bool = True
+
+
+class WarningsAcknowledgedForm(_Form, frozen=True, tag="warnings_acknowledged"):
+    """Warnings read, or shown again, by their codes."""
+
+    codes: Annotated[tuple[CodeForm, ...], Meta(max_length=100)]
+    acknowledged: bool = True
 
 
 class OptionsChangedForm(_Form, frozen=True, tag="options_changed"):
@@ -151,6 +198,9 @@ StepForm: TypeAlias = (
     | ClickMovedForm
     | ClickRemovedForm
     | ClickExcludedForm
+    | ReturnChosenForm
+    | PlacementDismissedForm
+    | WarningsAcknowledgedForm
     | OptionsChangedForm
     | ClearedForm
     | ClicksImportedForm
@@ -164,12 +214,31 @@ StepForm: TypeAlias = (
 def form_of_click(click: ReflectorClick) -> ClickForm:
     """Convert a click to its JSON form."""
     stamp = StampForm.of(Stamp.of(click.image_time))
-    return ClickForm(click.id, stamp, (click.u_px, click.v_px), click.sigma_px, click.excluded)
+    pixel = (click.u_px, click.v_px)
+    chosen = form_of_return(click.chosen)
+    return ClickForm(click.id, stamp, pixel, click.sigma_px, click.excluded, click.mark, chosen)
 
 
 def click_from_form(form: ClickForm) -> ReflectorClick:
     """Convert a click from its JSON form."""
-    return ReflectorClick(form.image_time.stamp.time, form.id, *form.pixel_px, form.sigma_px, form.excluded)
+    chosen = return_from_form(form.chosen)
+    time = form.image_time.stamp.time
+    return ReflectorClick(time, form.id, *form.pixel_px, form.sigma_px, form.excluded, form.mark, chosen)
+
+
+def form_of_return(chosen: ChosenReturn | None) -> ReturnForm | None:
+    """Convert a chosen return to its JSON form; None stays None."""
+    if chosen is None:
+        return None
+    time = None if chosen.radar_time is None else StampForm.of(Stamp.of(chosen.radar_time))
+    return ReturnForm(chosen.position_m, time, chosen.topic)
+
+
+def return_from_form(form: ReturnForm | None) -> ChosenReturn | None:
+    """Convert a chosen return from its JSON form; None stays None."""
+    if form is None:
+        return None
+    return ChosenReturn(form.position_m, None if form.radar_time is None else form.radar_time.stamp.time, form.topic)
 
 
 @singledispatch
@@ -194,12 +263,13 @@ def step_from_form(form: StepForm) -> Step:
 
 @form_of_step.register
 def _form_of_placed(step: ClickPlaced) -> StepForm:
-    return ClickPlacedForm(StampForm.of(Stamp.of(step.image_time)), (step.u_px, step.v_px))
+    stamp = StampForm.of(Stamp.of(step.image_time))
+    return ClickPlacedForm(stamp, (step.u_px, step.v_px), step.mark, step.sigma_px)
 
 
 @form_of_step.register
 def _form_of_moved(step: ClickMoved) -> StepForm:
-    return ClickMovedForm(step.id, (step.u_px, step.v_px))
+    return ClickMovedForm(step.id, (step.u_px, step.v_px), step.mark, step.sigma_px)
 
 
 @form_of_step.register
@@ -210,6 +280,21 @@ def _form_of_removed(step: ClickRemoved) -> StepForm:
 @form_of_step.register
 def _form_of_excluded(step: ClickExcluded) -> StepForm:
     return ClickExcludedForm(step.id, step.excluded)
+
+
+@form_of_step.register
+def _form_of_chosen(step: ReturnChosen) -> StepForm:
+    return ReturnChosenForm(step.id, form_of_return(step.chosen))
+
+
+@form_of_step.register
+def _form_of_dismissed(step: PlacementDismissed) -> StepForm:
+    return PlacementDismissedForm(StampForm.of(Stamp.of(step.time)), step.position_m, step.dismissed)
+
+
+@form_of_step.register
+def _form_of_acknowledged(step: WarningsAcknowledged) -> StepForm:
+    return WarningsAcknowledgedForm(step.codes, step.acknowledged)
 
 
 @form_of_step.register
@@ -249,12 +334,12 @@ def _form_of_redo(step: Redo) -> StepForm:
 
 @step_from_form.register
 def _placed(form: ClickPlacedForm) -> Step:
-    return ClickPlaced(form.image_time.stamp.time, *form.pixel_px)
+    return ClickPlaced(form.image_time.stamp.time, *form.pixel_px, form.mark, form.sigma_px)
 
 
 @step_from_form.register
 def _moved(form: ClickMovedForm) -> Step:
-    return ClickMoved(form.id, *form.pixel_px)
+    return ClickMoved(form.id, *form.pixel_px, form.mark, form.sigma_px)
 
 
 @step_from_form.register
@@ -265,6 +350,21 @@ def _removed(form: ClickRemovedForm) -> Step:
 @step_from_form.register
 def _excluded(form: ClickExcludedForm) -> Step:
     return ClickExcluded(form.id, form.excluded)
+
+
+@step_from_form.register
+def _chosen(form: ReturnChosenForm) -> Step:
+    return ReturnChosen(form.id, return_from_form(form.chosen))
+
+
+@step_from_form.register
+def _dismissed(form: PlacementDismissedForm) -> Step:
+    return PlacementDismissed(form.time.stamp.time, form.position_m, form.dismissed)
+
+
+@step_from_form.register
+def _acknowledged(form: WarningsAcknowledgedForm) -> Step:
+    return WarningsAcknowledged(form.codes, form.acknowledged)
 
 
 @step_from_form.register

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.error_boundary import error_boundary
 from app.view import sentence
+from app.web.channel.click_candidates import candidates_of
 from app.web.channel.desk import answer_of
 from app.web.channel.hub import Hub
 from app.web.channel.newest import NewestWins
@@ -71,7 +72,9 @@ class Channel:
         self._frames = NewestWins(self._send_frame, self._report)
         self._overlay = NewestWins(self._send_overlay, self._report)
         self._space = NewestWins(self._draw_space, self._report)
+        self._candidates = NewestWins(self._send_candidates, self._report)
         self._forward = True
+        self._has_candidates = False
 
     async def run(self, socket: Socket) -> None:
         """Serve the page until it disconnects; the socket's exception is then raised to the caller."""
@@ -84,7 +87,7 @@ class Channel:
                 task.result()
         finally:
             self._hub.tabs.discard(self)
-            for worker in (self._greetings, self._views, self._frames, self._overlay, self._space):
+            for worker in (self._greetings, self._views, self._frames, self._overlay, self._space, self._candidates):
                 worker.close()
             for task in (sending, reading):
                 task.cancel()
@@ -98,6 +101,8 @@ class Channel:
         """Draw again, after a change of the session or once the 3D view is connected."""
         self._overlay.give(self._cursor)
         self._space.give(self._cursor)
+        if not self._cursor.playing:
+            self._candidates.give(self._cursor)
 
     async def _read(self, socket: Socket) -> None:
         while True:
@@ -204,6 +209,16 @@ class Channel:
             cursor.index, session, scan, placements_at(self._hub.survey, stamp), self._hub.workspace.reference
         )
         self.outbox.put(encode(overlay), kind="overlay")
+
+    async def _send_candidates(self, cursor: CursorMoved) -> None:
+        """Send the returns that may belong to the selected click; nothing if none is selected, as before."""
+        if cursor.selected is None and not self._has_candidates:
+            return
+        self._has_candidates = cursor.selected is not None
+        session = self._hub.workspace.session
+        find = partial(candidates_of, session, cursor.selected, self._hub.recording)
+        found = await asyncio.get_running_loop().run_in_executor(self._hub.executor, find)
+        self.outbox.put(encode(found), kind="candidates")
 
     async def _draw_space(self, cursor: CursorMoved) -> None:
         """Draw the 3D view; while playing, pause afterwards. The last frame is always drawn."""

@@ -1,7 +1,7 @@
 """What a page may send: text in, commands out."""
 
 import difflib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import singledispatch
 from typing import Annotated, Any, Literal, TypeAlias, get_args
 
@@ -9,7 +9,7 @@ import msgspec
 from msgspec import Meta
 
 from app.option_changes import changes_from_tree
-from app.session import OptionsEdited, Step
+from app.session import ClickPlaced, OptionsEdited, Step
 from app.session.file import step_json as forms
 from app.web.messages.opening_messages import ChoicesWanted, FolderWanted, OpeningCommand, OpenWith, RecentForgotten
 from calib_core.errors import InputError
@@ -256,6 +256,12 @@ def _command(form: Any) -> Command | OpeningCommand:
 @_command.register
 def _options(form: forms.OptionsChangedForm) -> Command:
     return OptionsEdited(changes_from_tree(form.options))
+
+
+@_command.register
+def _placed(form: forms.ClickPlacedForm) -> Command:
+    step = forms.step_from_form(form)
+    return replace(step, mark=step.mark or "clicked") if isinstance(step, ClickPlaced) else step
 
 
 @_command.register

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 import msgspec
 
 from app.option_changes import OptionGroup, option_groups
-from app.view import FollowState, View
+from app.view import FollowState, PairCandidates, View
 from app.web.messages.opening_messages import FolderListing, OpeningChoices
 from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
 from app.web.messages.view_changes import ViewChange
@@ -274,6 +274,7 @@ Outgoing: TypeAlias = (
     | RadarLook
     | RadarMap
     | Overlay
+    | PairCandidates
     | Progress
     | Problem
     | Done
@@ -292,6 +293,7 @@ TYPES: Mapping[type, str] = {
     RadarLook: "radar_look",
     RadarMap: "radar_map",
     Overlay: "overlay",
+    PairCandidates: "candidates",
     Progress: "progress",
     Problem: "error",
     Done: "done",

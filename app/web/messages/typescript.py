@@ -57,13 +57,14 @@ def _declare(owner: Any, known: dict[str, str]) -> None:
 
 def _interface(owner: Any, known: dict[str, str], *, is_form: bool) -> str:
     hints = typing.get_type_hints(owner, include_extras=False)
+    written = dict(zip(owner.__struct_fields__, owner.__struct_encode_fields__, strict=True)) if is_form else {}
     lines = [f"/** {_summary(owner)} */", f"export interface {owner.__name__} {{"]
     tag = owner.__struct_config__.tag if is_form else TYPES.get(owner)
     if tag:
         lines.append(f'  type: "{tag}";')
     for name in _field_names(owner):
         optional = "?" if is_form and _has_default(owner, name) else ""
-        lines.append(f"  {name}{optional}: {_type(hints[name], known)};")
+        lines.append(f"  {written.get(name, name)}{optional}: {_type(hints[name], known)};")
     if is_form and tag and "request" not in hints:
         lines.append("  request?: number;")
     return "\n".join([*lines, "}", ""])

@@ -7,6 +7,7 @@ from msgspec import UNSET
 
 from calib_core.errors import InputError
 from calib_core.interchange.own.documents import CLICKS_SCHEMA, ClickDocument, ClicksDocument, TimeDocument
+from calib_core.interchange.own.return_document import chosen_of, return_document
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import parse_document
 from calib_core.measurements import ReflectorClick, time_from_parts, time_parts
@@ -35,6 +36,8 @@ def read_clicks(text: str, source: str = "clicks") -> tuple[ReflectorClick, ...]
                 v_px=click.pixel_px[1],
                 sigma_px=click.sigma_px,
                 excluded=click.excluded,
+                mark=click.mark,
+                chosen=None if click.chosen is None else chosen_of(click.chosen),
             )
             for click in document.clicks
         )
@@ -55,6 +58,8 @@ def write_clicks(clicks: Iterable[ReflectorClick], *, radar_topics: Sequence[str
             (click.u_px, click.v_px),
             sigma_px=click.sigma_px,
             excluded=click.excluded,
+            mark=click.mark,
+            chosen=None if click.chosen is None else return_document(click.chosen),
         )
         for click in sorted(clicks, key=lambda click: (click.image_time, click.id))
     ]

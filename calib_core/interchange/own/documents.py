@@ -9,6 +9,7 @@ import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType, field
 
 from calib_core.camera import CameraModel
+from calib_core.measurements import Mark
 from calib_core.options import CalibrationOptions
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "PositionDocument",
     "RadarDocument",
     "RadarErrorsDocument",
+    "ReturnDocument",
     "SolvedPairDocument",
     "SystematicErrorDocument",
     "TimeDocument",
@@ -74,14 +76,28 @@ class TimeDocument(Struct, frozen=True, forbid_unknown_fields=True):
     nanosec: Annotated[int, Meta(ge=0, le=999_999_999)]
 
 
-class ClickDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The reflector's centre in one frame; pixel (0, 0) is the centre of the top-left pixel."""
+class ReturnDocument(Struct, frozen=True, omit_defaults=True):
+    """The radar return that a person chose for a click, at the position that the radar reports."""
+
+    position_m: Position
+    radar_time: TimeDocument | None = None
+    topic: str = ""
+
+
+class ClickDocument(Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, rename={"chosen": "return"}):
+    """The reflector's centre in one frame; pixel (0, 0) is the centre of the top-left pixel.
+
+    mark "untouched" is where the radar expected the reflector: no measurement, and not used. return is the radar return that
+    a person chose for the click.
+    """
 
     id: Name
     image_time: TimeDocument
     pixel_px: Pixel
     sigma_px: Positive | None = None
     excluded: bool = False
+    mark: Mark = "clicked"
+    chosen: ReturnDocument | None = None
 
 
 class ClicksDocument(Struct, frozen=True, forbid_unknown_fields=True):
@@ -200,10 +216,11 @@ class CandidateDocument(Struct, frozen=True):
     alternative_of: Count | UnsetType = UNSET
 
 
-class SolvedPairDocument(Struct, frozen=True):
+class SolvedPairDocument(Struct, frozen=True, rename={"chosen": "return"}):
     """One pair under the solved pose; residual_px is projected_px minus pixel_px, distance_px its length.
 
-    sigma_px, radar_time and candidates are the data the pair was solved from; with them it can be solved again.
+    sigma_px, radar_time and candidates are the data the pair was solved from; with them it can be solved again. mark and
+    return are those of the click; return is absent unless a person chose one.
     """
 
     id: Name
@@ -222,6 +239,8 @@ class SolvedPairDocument(Struct, frozen=True):
     sigma_px: Positive | None = None
     radar_time: TimeDocument | None = None
     candidates: list[CandidateDocument] = []
+    mark: Mark | UnsetType = UNSET
+    chosen: ReturnDocument | UnsetType = UNSET
 
 
 class UnpairedDocument(Struct, frozen=True):

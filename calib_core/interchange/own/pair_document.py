@@ -6,6 +6,7 @@ from msgspec import UNSET, UnsetType
 from calib_core.errors import InputError
 from calib_core.interchange.own import documents
 from calib_core.interchange.own.numbers import finite_or_none, nan_if_none, nested
+from calib_core.interchange.own.return_document import chosen_of, return_document
 from calib_core.measurements import Candidate, Pair, TimeNs, time_from_parts, time_parts
 from calib_core.radar import covariance_from_sigma_polar
 from calib_core.results import PairResult
@@ -38,6 +39,8 @@ def solved_pair_document(pair: PairResult) -> documents.SolvedPairDocument:
         sigma_px=measured.sigma_px if measured else None,
         radar_time=_time_document(measured.radar_time) if measured else None,
         candidates=[_candidate_document(candidate) for candidate in measured.candidates] if measured else [],
+        mark=measured.mark if measured and measured.mark != "clicked" else UNSET,
+        chosen=return_document(measured.chosen) if measured and measured.chosen else UNSET,
     )
 
 
@@ -72,6 +75,8 @@ def _measured(document: documents.SolvedPairDocument) -> Pair:
         sigma_px=document.sigma_px,
         image_time=_time_of(document.image_time),
         radar_time=_time_of(document.radar_time),
+        mark="clicked" if isinstance(document.mark, UnsetType) else document.mark,
+        chosen=None if isinstance(document.chosen, UnsetType) else chosen_of(document.chosen),
     )
 
 

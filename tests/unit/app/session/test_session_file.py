@@ -24,10 +24,13 @@ from app.session import (
     History,
     OptionsChanged,
     OptionsEdited,
+    PlacementDismissed,
     RecordingFacts,
     Redo,
+    ReturnChosen,
     Solved,
     Undo,
+    WarningsAcknowledged,
     advance,
 )
 from app.session.file import (
@@ -40,21 +43,34 @@ from app.session.file import (
 )
 from app.session.file.checksums import line_bytes, sealed, taken_apart
 from app.session.file.step_json import StepForm, form_of_step, step_from_form
-from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
+from calib_core.measurements import ChosenReturn, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, CameraPositionPrior, SolvingOptions
 
 START_NS = 1_700_000_000_123_456_789
 FACTS = RecordingFacts("drive", START_NS + 100_000_000 * np.arange(50), width_px=640, height_px=480)
 TIMES = [TimeNs(int(time)) for time in FACTS.image_times]
-STEPS = (
-    ClickPlaced(TIMES[3], 100.1, 200.2),
-    ClickPlaced(TIMES[1], 0.1 + 0.2, 1e-17),
+EARLIER_STEPS = (
+    ClickPlaced(TIMES[3], 100.1, 200.2, None),
+    ClickPlaced(TIMES[1], 0.1 + 0.2, 1e-17, None),
     ClickMoved("c1", 101.0, 201.0),
     OptionsChanged(CalibrationOptions(method="paper", solving=SolvingOptions(CameraPositionPrior((0.1, 0.2, 0.3))))),
     ClickExcluded("c2", True),
     Undo(),
     Redo(),
     ClicksImported((ReflectorClick(TIMES[9], "p1", 5.0, 6.0, 0.5, True),)),
+    ClickRemoved("c1"),
+    Cleared(),
+    Undo(),
+)
+"""Those of tests/golden/session-1, of a version that kept one click per frame."""
+STEPS = (
+    *EARLIER_STEPS,
+    Undo(),
+    ClickPlaced(TIMES[3], 300.5, 20.25, "snapped", 0.3),
+    ClickPlaced(TIMES[4], 30.5, 20.25, "untouched"),
+    ReturnChosen("p1", ChosenReturn((20.0, 0.1 + 0.2, -0.5), TIMES[9], "/radar")),
+    PlacementDismissed(TIMES[7], (5.0, 1.0, 0.1 + 0.2)),
+    WarningsAcknowledged(("few-pairs", "weak-geometry")),
     ClickRemoved("c1"),
     Cleared(),
     Undo(),
@@ -313,7 +329,7 @@ def test_a_session_of_the_earlier_version_is_opened_and_written_again_with_check
     shutil.copytree(project_root / "tests" / "golden" / "session-1", tmp_path, dirs_exist_ok=True)
     before = files(tmp_path)
     history = History()
-    for step in STEPS:
+    for step in EARLIER_STEPS:
         history = advance(history, step, FACTS)
     session_file = open_session_file(tmp_path, FACTS)
     assert session_file.restored.history == history

@@ -1,0 +1,136 @@
+// @ts-check
+/** Every action of the page, once: what it does in words, its keys, and when it can be done. Keys, help and palette are made from this table. */
+
+import { fitEye, zoomEye } from "./birdseye.js";
+import { nudgeBy, placeByKey, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
+import { loadClicks, openExport } from "./exporting.js";
+import { toggleHelp } from "./help.js";
+import { placement } from "./keys.js";
+import { toggleLayer } from "./layers.js";
+import { showTab } from "./layout.js";
+import { goLive } from "./live.js";
+import { nextWorst } from "./pairs.js";
+import { chooseRecording } from "./opening.js";
+import { fit, zoomBy } from "./picture.js";
+import { goTo, pause, play, step } from "./player.js";
+import { tell } from "./socket.js";
+import { clickIn, clicks, selectedClick, state } from "./state.js";
+
+/**
+ * @typedef {object} Action
+ * @property {string} id
+ * @property {string} group Heading in the help.
+ * @property {string} words What it does, in the imperative.
+ * @property {string[]} [keys] Keys that run it, such as "Ctrl+Shift+Z"; the first one is shown.
+ * @property {string} [help] The line of the help, where neighbouring actions share one.
+ * @property {string} [also] Other words by which someone may look for it.
+ * @property {() => unknown} run
+ * @property {() => string} [when] Why it cannot be done now, "" if it can; without it, it can be done at any time.
+ */
+
+const opened = () => (state.recording ? "" : "The recording is not open yet");
+const withPictures = () => opened() || (state.looking ? "There are no pictures in this recording" : "");
+const withFrames = () => opened() || (state.seconds.length > 1 ? "" : "There is only one frame");
+const withPlacements = () => opened() || (state.placements.length ? "" : "No placement was found in the radar data");
+const withMark = () => withPictures() || (clickIn(state.cursor) ? "" : "There is no mark in this frame");
+const withoutMark = () => withPictures() || (clickIn(state.cursor) ? "This frame has a mark already: move or delete it" : "");
+const withSelected = () => withPictures() || (selectedClick() ? "" : "No pair is selected: go to one first");
+const withResiduals = () => withPictures() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
+const undoable = () => withPictures() || (state.view?.can_undo ? "" : "There is nothing to undo");
+const redoable = () => withPictures() || (state.view?.can_redo ? "" : "There is nothing to redo");
+const following = () => (state.following && !["complete", "ended"].includes(state.following.state) ? "" : "The recording is complete: no new frames come");
+
+/** @param {number} du @param {number} dv image px */
+const nudge = (du, dv) => () => nudgeBy(du, dv);
+/** @param {string} viewpoint */
+const lookFrom = (viewpoint) => () => tell({ type: "viewpoint", viewpoint });
+/** @param {string} id of a button on the page */
+const press = (id) => () => document.getElementById(id)?.click();
+const zoom = (/** @type {number} */ factor) => (state.looking ? zoomEye(factor) : zoomBy(factor));
+
+const FRAMES = { help: "step one frame", when: withFrames };
+const TENS = { help: "step ten frames", when: withFrames };
+const ENDS = { help: "first or last frame", when: withFrames };
+const PLACES = { help: "next or previous placement", when: withPlacements };
+const FINE = { group: "Mark", help: "move the mark by 0.1 px", also: "nudge shift subpixel fine", when: withMark };
+const COARSE = { group: "Mark", help: "move the mark by 1 px", also: "nudge shift", when: withMark };
+const ZOOM = { group: "Picture", help: "zoom", when: opened };
+const OVERLAY = { group: "Picture", help: "toggle overlays", when: withPictures };
+const SPACE = { group: "3D view", when: opened };
+
+/** In the order of the help. @type {Action[]} */
+export const ACTIONS = [
+  { id: "play", group: "Time", words: "Play or pause", keys: ["Space"], also: "start stop run video", run: () => (state.playing ? pause() : play()), when: withFrames },
+  { id: "frame-back", group: "Time", words: "One frame back", keys: ["ArrowLeft"], also: "previous step", run: () => step(-1), ...FRAMES },
+  { id: "frame-forward", group: "Time", words: "One frame forward", keys: ["ArrowRight"], also: "next step", run: () => step(1), ...FRAMES },
+  { id: "ten-back", group: "Time", words: "Ten frames back", keys: ["Shift+ArrowLeft"], also: "previous jump rewind", run: () => step(-10), ...TENS },
+  { id: "ten-forward", group: "Time", words: "Ten frames forward", keys: ["Shift+ArrowRight"], also: "next jump skip", run: () => step(10), ...TENS },
+  { id: "first-frame", group: "Time", words: "Go to the first frame", keys: ["Home"], also: "start beginning", run: () => goTo(0), ...ENDS },
+  { id: "last-frame", group: "Time", words: "Go to the last frame", keys: ["End"], also: "finish newest", run: () => goTo(state.seconds.length - 1), ...ENDS },
+  { id: "next-placement", group: "Time", words: "Next placement", keys: ["N"], also: "reflector position forward", run: () => placement(1), ...PLACES },
+  { id: "previous-placement", group: "Time", words: "Previous placement", keys: ["P"], also: "reflector position back", run: () => placement(-1), ...PLACES },
+  { id: "live", group: "Time", words: "Show the newest frame as it comes", also: "live follow recording now", run: goLive, when: following },
+
+  { id: "place-mark", group: "Mark", words: "Place a mark where the reflector is expected, or in the middle", keys: ["Enter"], also: "click set add cross", run: placeByKey, when: withoutMark },
+  { id: "mark-left", words: "Move the mark left by 0.1 px", keys: ["Alt+ArrowLeft"], run: nudge(-0.1, 0), ...FINE },
+  { id: "mark-right", words: "Move the mark right by 0.1 px", keys: ["Alt+ArrowRight"], run: nudge(0.1, 0), ...FINE },
+  { id: "mark-up", words: "Move the mark up by 0.1 px", keys: ["Alt+ArrowUp"], run: nudge(0, -0.1), ...FINE },
+  { id: "mark-down", words: "Move the mark down by 0.1 px", keys: ["Alt+ArrowDown"], run: nudge(0, 0.1), ...FINE },
+  { id: "mark-left-1", words: "Move the mark left by 1 px", keys: ["Alt+Shift+ArrowLeft"], run: nudge(-1, 0), ...COARSE },
+  { id: "mark-right-1", words: "Move the mark right by 1 px", keys: ["Alt+Shift+ArrowRight"], run: nudge(1, 0), ...COARSE },
+  { id: "mark-up-1", words: "Move the mark up by 1 px", keys: ["Alt+Shift+ArrowUp"], run: nudge(0, -1), ...COARSE },
+  { id: "mark-down-1", words: "Move the mark down by 1 px", keys: ["Alt+Shift+ArrowDown"], run: nudge(0, 1), ...COARSE },
+  { id: "delete", group: "Mark", words: "Delete the click", keys: ["Delete", "Backspace"], also: "remove mark erase", run: removeSelected, when: withSelected },
+  { id: "undo", group: "Mark", words: "Undo", keys: ["Ctrl+Z"], also: "back revert take back", run: () => turnBack("undo"), when: undoable },
+  { id: "redo", group: "Mark", words: "Redo", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], also: "again repeat", run: () => turnBack("redo"), when: redoable },
+
+  { id: "worst", group: "Pairs", words: "Next worst pair", keys: ["J"], also: "outlier residual largest wrong bad", run: nextWorst, when: withResiduals },
+  { id: "exclude", group: "Pairs", words: "Exclude the pair, or include it again", keys: ["X"], also: "leave out use ignore disable", run: toggleExcluded, when: withSelected },
+
+  { id: "fit", group: "Picture", words: "Fit the picture", keys: ["F"], also: "zoom reset whole 100", run: () => (state.looking ? fitEye() : fit()), when: opened },
+  { id: "zoom-in", words: "Zoom in", keys: ["+", "="], also: "magnify closer larger", run: () => zoom(1.25), ...ZOOM },
+  { id: "zoom-out", words: "Zoom out", keys: ["-"], also: "smaller farther", run: () => zoom(0.8), ...ZOOM },
+  { id: "show-returns", words: "Show or hide the radar returns", keys: ["1"], also: "overlay layer points dots", run: () => toggleLayer("returns"), ...OVERLAY },
+  { id: "show-clicks", words: "Show or hide the clicks of other frames", keys: ["2"], also: "overlay layer marks all", run: () => toggleLayer("others"), ...OVERLAY },
+  { id: "show-ellipses", words: "Show or hide the 95 % ellipses", keys: ["3"], also: "overlay layer uncertainty covariance", run: () => toggleLayer("ellipses"), ...OVERLAY },
+  { id: "show-predictions", words: "Show or hide the expected positions", keys: ["4"], also: "overlay layer predicted guess next placement", run: () => toggleLayer("predictions"), ...OVERLAY },
+
+  { id: "view-behind", words: "3D: look from behind the radar", also: "viewpoint", run: lookFrom("behind"), ...SPACE },
+  { id: "view-above", words: "3D: look down from above", also: "viewpoint top bird", run: lookFrom("above"), ...SPACE },
+  { id: "view-side", words: "3D: look from the side", also: "viewpoint right", run: lookFrom("side"), ...SPACE },
+  { id: "view-camera", words: "3D: look from the camera", also: "viewpoint", run: lookFrom("camera"), group: "3D view", when: withPictures },
+
+  { id: "tab-pairs", group: "Panel", words: "Show the pairs", also: "tab table list clicks placements", run: () => showTab("tab-pairs") },
+  { id: "tab-pose", group: "Panel", words: "Show the pose", also: "tab transform extrinsics rotation translation errors advice", run: () => showTab("tab-pose"), when: withPictures },
+  { id: "tab-options", group: "Panel", words: "Show the options", also: "tab settings parameters method", run: () => showTab("tab-options"), when: withPictures },
+  { id: "theme", group: "Panel", words: "Light or dark theme", also: "colours colors bright night mode", run: press("theme") },
+
+  { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: openExport, when: withPictures },
+  { id: "recording", group: "File", words: "Choose another recording, other topics, intrinsics or session", also: "open file folder recent camera radar topic intrinsics", run: chooseRecording },
+  { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withPictures },
+
+  { id: "help", group: "Help", words: "Keys, mouse and marks", keys: ["?"], also: "help shortcuts legend manual", run: () => toggleHelp() },
+];
+
+/** The action with a name. @param {string} id @returns {Action} */
+export function actionNamed(id) {
+  const found = ACTIONS.find((action) => action.id === id);
+  if (!found) throw new Error(`no action ${id}`);
+  return found;
+}
+
+/** Why an action cannot be done now; "" if it can. @param {Action} action */
+export const reasonAgainst = (action) => action.when?.() ?? "";
+
+/** Do it, unless it cannot be done now. @param {Action} action @returns {boolean} whether it was done */
+export function act(action) {
+  if (reasonAgainst(action)) return false;
+  action.run();
+  return true;
+}
+
+/** @type {Record<string, string>} */
+const NAMES = { ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", Delete: "Del", Escape: "Esc", "-": "−" };
+
+/** The names of the keys that are pressed together. @param {string} keys such as "Ctrl+Shift+Z" */
+export const keyNames = (keys) => keys.split(/(?<=.)\+(?=.)/).map((key) => NAMES[key] ?? key);
