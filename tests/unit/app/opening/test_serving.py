@@ -58,8 +58,8 @@ def test_a_page_chooses_a_recording_and_gives_its_camera_file(without_intrinsics
             assert "choose one from the list" in asked(socket, **answer)["message"]
             assert "not there any more" in asked(socket, **answer, recent="0123")["message"]
             assert asked(socket, **answer, paths=["damaged.bag"])["type"] == "done"
-            assert asked(socket, **answer, paths=["damaged.bag"])["type"] == "done"  # the same answer, sent again
             question = wanted(socket, "opening_choices")
+            assert asked(socket, **answer, paths=["damaged.bag"])["type"] == "done"  # the same answer, sent again
             assert question["name"] == "damaged.bag"
             assert "damaged.bag" in question["problem"]
             answer = {"type": "open_with", "question": question["question"], "answer": "b"}
