@@ -16,14 +16,15 @@ from calib_core.association.pairing import pair_clicks
 from calib_core.calibration import calibrate_pairs, calibration_steps, solve_again
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
+from calib_core.input_files import name_text
 from calib_core.interchange import (
     CALIBRATION_SCHEMA,
     AssumptionNote,
+    CameraFile,
     FrameNames,
     Provenance,
     names_schema,
     read_calibration,
-    read_camera_file,
     read_pairs,
 )
 from calib_core.interchange import calibration_text as interchange_text
@@ -40,6 +41,7 @@ __all__ = [
     "camera_for",
     "check_clicks",
     "half_window_s",
+    "intrinsics_near",
     "solve_clicks",
     "solve_in_steps",
     "solve_pairs",
@@ -106,7 +108,8 @@ def solve_in_steps(
         yield Unsolvable(
             "no-camera",
             "the camera intrinsics are missing: the recording contains none that can be used",
-            "calibrate the camera with OpenCV, Kalibr or ROS camera_calibration, then start again with --camera FILE",
+            "calibrate the camera with OpenCV, Kalibr or ROS camera_calibration, then drop its file on the page, or start "
+            "again with --camera FILE",
         )
         return
     times = sorted({click.image_time for click in clicks})
@@ -213,7 +216,7 @@ def _require_same_pairing(kept: CalibrationOptions, given: CalibrationOptions, s
             )
 
 
-def camera_for(recording: Recording, camera_file: Path | None) -> Camera | None:
+def camera_for(recording: Recording, camera_file: CameraFile | None) -> Camera | None:
     """Return the intrinsics to solve with: the file's if one is given, else the recording's, else None.
 
     Raises:
@@ -222,22 +225,36 @@ def camera_for(recording: Recording, camera_file: Path | None) -> Camera | None:
     if camera_file is None:
         return recording.camera()
     picture = recording.image_bytes(0)
-    camera = read_camera_file(camera_file, image_size_px=(picture.width_px, picture.height_px))
+    camera = camera_file.camera(image_size_px=(picture.width_px, picture.height_px))
     if (camera.width_px, camera.height_px) != (picture.width_px, picture.height_px):
         raise InputError(
-            f"{camera_file}: calibrated for {camera.width_px} x {camera.height_px} px, but the frames have "
+            f"{camera_file.source}: calibrated for {camera.width_px} x {camera.height_px} px, but the frames have "
             f"{picture.width_px} x {picture.height_px} px; give the intrinsics of these frames"
         )
     return camera
 
 
-def calibration_text(calibration: Calibration, recording: Recording, confirmed: Sequence[str] = ()) -> str:
+def intrinsics_near(paths: Sequence[Path]) -> Path | None:
+    """Return a file of intrinsics in or next to a recording, by its name; None if there is none."""
+    folders = dict.fromkeys(path if path.is_dir() else path.parent for path in paths)
+    names = ("*camera*.y*ml", "*intrinsic*.y*ml", "*camchain*.y*ml", "*calib*.y*ml")
+    found = (file for folder in folders for name in names for file in sorted(folder.glob(name)))
+    return next((file for file in found if file.is_file()), None)
+
+
+def calibration_text(
+    calibration: Calibration,
+    recording: Recording,
+    confirmed: Sequence[str] = (),
+    camera_file: CameraFile | None = None,
+) -> str:
     """Write a calibration-1 file; the page and the command line give the same bytes for the same clicks.
 
     Args:
         calibration: what was solved.
         recording: what it was solved from; assumptions about it that nobody has confirmed become warnings of the file.
         confirmed: texts of the assumptions that were confirmed after the recording was opened.
+        camera_file: the file whose intrinsics were used; None for the recording's own.
     """
     assumed = [
         (one.assumption, one.confirmed or one.assumption.words in confirmed) for one in recording.stated_assumptions
@@ -246,7 +263,7 @@ def calibration_text(calibration: Calibration, recording: Recording, confirmed: 
     if unconfirmed:
         calibration = dataclasses.replace(calibration, warnings=(*calibration.warnings, *unconfirmed))
     provenance = Provenance(
-        inputs=recording.fingerprint(),
+        inputs=(*recording.fingerprint(), *([] if camera_file is None else [_input_file(camera_file)])),
         radar_topic=recording.radar_topic,
         radar_topics=recording.radar_topics,
         radar_choice=recording.radar_choice,
@@ -261,6 +278,12 @@ def calibration_text(calibration: Calibration, recording: Recording, confirmed: 
         assumptions=tuple(AssumptionNote(assumption.words, sure) for assumption, sure in assumed),
     )
     return interchange_text(calibration, _frame_names(recording), provenance)
+
+
+def _input_file(camera_file: CameraFile) -> InputFile:
+    """Identify a file of intrinsics by its content."""
+    name, data = name_text(Path(camera_file.source).name), camera_file.data
+    return InputFile(name, len(data), hashlib.sha256(data).hexdigest())
 
 
 def _frame_names(recording: Recording) -> FrameNames:

@@ -28,7 +28,8 @@ from calib_core.arrays import TimesNs
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import read_clicks, write_clicks
+from calib_core.input_files import name_text
+from calib_core.interchange import CameraFile, read_clicks, write_clicks
 from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, assumption_hint
@@ -89,7 +90,14 @@ class Workspace:
         facts: the recording's frames.
         restored: what was found in the session's folder at the start.
         reference: a calibration to show until the clicks give a new one; None if there is none.
+        camera: the intrinsics to solve with; None if there are none.
+        camera_file: the file that they come from; None for the recording's own.
+        intrinsics: where they come from, in words; "" if there are none.
     """
+
+    camera: Camera | None = None
+    camera_file: CameraFile | None = None
+    intrinsics: str = ""
 
     def __init__(
         self,
@@ -277,6 +285,8 @@ def open_workspace(
     name: str,
     reference: Reference | None = None,
     warnings: tuple[DataWarning, ...] = (),
+    camera_file: CameraFile | None = None,
+    intrinsics: str = "",
 ) -> Workspace:
     """Open or start the session of a recording, with its solver.
 
@@ -287,6 +297,8 @@ def open_workspace(
         name: what to call the recording.
         reference: a calibration to review and to compare with; None if there is none.
         warnings: what is known about the choice of the session folder.
+        camera_file: the file that the intrinsics come from; None for the recording's own.
+        intrinsics: where they come from, in words; by default, that file or the recording's topic.
 
     Without pictures there is nothing to click and nothing to store: the session folder is not touched.
 
@@ -300,4 +312,16 @@ def open_workspace(
         return Workspace(facts, Restored(session_folder, History()), nothing, SolverWorker(recording, None))
     session_file = open_session_file(session_folder, facts, warnings)
     solver = SolverWorker(recording, camera, reference.calibration if reference else None)
-    return Workspace(facts, session_file.restored, session_file, solver, reference)
+    workspace = Workspace(facts, session_file.restored, session_file, solver, reference)
+    workspace.camera, workspace.camera_file = camera, camera_file
+    workspace.intrinsics = intrinsics or _source_of(camera, camera_file, recording)
+    return workspace
+
+
+def _source_of(camera: Camera | None, camera_file: CameraFile | None, recording: Recording) -> str:
+    """Say where intrinsics come from; "" if there are none."""
+    if camera is None:
+        return ""
+    if camera_file is not None:
+        return name_text(Path(camera_file.source).name)
+    return recording.camera_info_topic or "the recording"

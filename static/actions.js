@@ -17,6 +17,7 @@ import { goLive } from "./live.js";
 import { magnify, stretchContrast } from "./loupe.js";
 import { nextWorst } from "./pairs.js";
 import { togglePalette } from "./palette.js";
+import { chooseRecording } from "./opening.js";
 import { fit, zoomBy } from "./picture.js";
 import { goTo, pause, play, step } from "./player.js";
 import { enlargeReview } from "./review.js";
@@ -124,6 +125,7 @@ export const ACTIONS = [
   { id: "theme", group: "Panel", words: "Light or dark theme", also: "colours colors bright night mode", run: press("theme") },
 
   { id: "export", group: "File", words: "Export the calibration or the clicks", keys: ["E"], also: "save download write file json yaml urdf tf format", run: openExport, when: withPictures },
+  { id: "recording", group: "File", words: "Choose another recording, other topics, intrinsics or session", also: "open file folder recent camera radar topic intrinsics", run: chooseRecording },
   { id: "load-clicks", group: "File", words: "Load clicks from a file", also: "import open clicks.json", run: loadClicks, when: withPictures },
 
   { id: "palette", group: "Help", words: "Search for an action, placement, pair or option", keys: ["Ctrl+K"], also: "command palette find go to", run: togglePalette },

@@ -21,6 +21,7 @@ import { startLive, takeFollowing, takeFrames } from "./live.js";
 import { startLooking } from "./looking.js";
 import { startLoupe } from "./loupe.js";
 import { setBanner, startTips, toast } from "./notices.js";
+import { isAnother, startOpening, takeChoices, takeFolder } from "./opening.js";
 import { startOptions } from "./options.js";
 import { startPairs } from "./pairs.js";
 import { startPalette } from "./palette.js";
@@ -50,6 +51,8 @@ const readers = {
     setBanner(message.problem);
     emit("opening");
   },
+  opening_choices: takeChoices,
+  folder_listing: takeFolder,
   recording: takeRecording,
   view(message) {
     follower.take(message);
@@ -110,6 +113,7 @@ function takeView() {
 
 /** @param {import("./messages.js").RecordingNote} message */
 function takeRecording(message) {
+  if (isAnother(message)) return;
   const same = state.recording !== null;
   state.recording = message;
   state.opening = null;
@@ -166,6 +170,7 @@ startRoving();
 startDescribing();
 startArriving();
 startLooking();
+startOpening();
 listen(window);
 for (const button of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-action]"))) button.addEventListener("click", () => act(actionNamed(button.dataset.action ?? "")));
 on(["cursor"], () => sessionStorage.setItem("cocalib-frame", String(state.cursor)));

@@ -250,6 +250,69 @@ export interface Opening {
   problem: string;
 }
 
+/** A radar or a camera that can be chosen. */
+export interface TopicRow {
+  value: string;
+  about: string;
+  used: boolean;
+  problem: string;
+}
+
+/** The session that an opening would continue, or could take clicks from. */
+export interface SessionOffer {
+  folder: string;
+  clicks: number;
+  recording: string;
+  continues: boolean;
+}
+
+/** A recording that was opened before and still exists. */
+export interface RecentRecording {
+  id: string;
+  name: string;
+  folder: string;
+  opened_s: number;
+  clicks: number;
+}
+
+/** What can be chosen now. */
+export interface OpeningChoices {
+  type: "opening_choices";
+  question: number;
+  name: string;
+  problem: string;
+  is_open: boolean;
+  radars: TopicRow[];
+  radar_reason: string;
+  cameras: TopicRow[];
+  radar_topic: string | null;
+  image_topic: string | null;
+  intrinsics: string;
+  intrinsics_file: boolean;
+  recorded_intrinsics: boolean;
+  intrinsics_near: string;
+  session: SessionOffer;
+  recent: RecentRecording[];
+  root: string;
+}
+
+/** A recording or a folder below the root folder. */
+export interface FolderEntry {
+  name: string;
+  path: string;
+  kind: "folder" | "recording" | "recording folder";
+  size_bytes: number;
+}
+
+/** What is in a folder below the root folder. */
+export interface FolderListing {
+  type: "folder_listing";
+  path: string;
+  parent: string | null;
+  entries: FolderEntry[];
+  note: string;
+}
+
 /** Many stamps, as two columns. */
 export interface StampColumns {
   sec: number[];
@@ -308,6 +371,8 @@ export interface RecordingNote {
   session: SessionNote;
   version: string;
   option_groups: OptionGroup[];
+  opening: number;
+  intrinsics: string;
 }
 
 /** Frames have been written since; they follow those that a page knows. */
@@ -811,10 +876,53 @@ export interface SnapForm {
   request?: number;
 }
 
+/** A page asks what can be chosen. */
+export interface ChoicesWanted {
+  type: "choices";
+  request?: number;
+}
+
+/** A page looks into a folder below the root folder, by its path from there; "" is the root itself. */
+export interface FolderWanted {
+  type: "folder";
+  path?: string;
+  request?: number;
+}
+
+/** The list of recent recordings is to be emptied. */
+export interface RecentForgotten {
+  type: "forget_recent";
+  request?: number;
+}
+
+/** A file that was dropped on the page; its content is written in base 64. */
+export interface DroppedFile {
+  name: string;
+  data: string;
+  camera?: string;
+}
+
+/** A recording is to be opened, or opened again in another way. */
+export interface OpenWith {
+  type: "open_with";
+  question: number;
+  answer: string;
+  recent?: string;
+  paths?: string[];
+  radar_topic?: string | null;
+  image_topic?: string | null;
+  intrinsics?: "keep" | "recorded" | "near" | "file";
+  file?: DroppedFile | null;
+  session?: "continue" | "new" | "copy";
+  request?: number;
+}
+
 export type FromServer =
   | View
   | ViewChange
   | Opening
+  | OpeningChoices
+  | FolderListing
   | RecordingNote
   | FramesAdded
   | FollowNote
@@ -858,4 +966,8 @@ export type FromPage =
   | PairReviewForm
   | CompareForm
   | UncertaintyForm
-  | SnapForm;
+  | SnapForm
+  | ChoicesWanted
+  | FolderWanted
+  | RecentForgotten
+  | OpenWith;

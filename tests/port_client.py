@@ -4,13 +4,22 @@ import http.client
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Protocol
 
 from websockets.sync.client import ClientConnection, connect
 
-from app.web.port.server import RunningServer
-
 __all__ = ["Answer", "channel", "come_in", "get", "wanted"]
+
+
+class Served(Protocol):
+    """A server, in this process or another one."""
+
+    @property
+    def port(self) -> int: ...
+    @property
+    def origin(self) -> str: ...
+    @property
+    def url(self) -> str: ...
 
 
 class Answer:
@@ -18,7 +27,7 @@ class Answer:
         self.status, self.headers, self.body = response.status, response.headers, response.read()
 
 
-def get(server: RunningServer, path: str, **headers: str) -> Answer:
+def get(server: Served, path: str, **headers: str) -> Answer:
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
     connection.request("GET", path, headers=headers)
     answer = Answer(connection.getresponse())
@@ -27,13 +36,13 @@ def get(server: RunningServer, path: str, **headers: str) -> Answer:
 
 
 @contextmanager
-def channel(server: RunningServer, cookie: str, path: str = "/ws/tab1") -> Iterator[ClientConnection]:
+def channel(server: Served, cookie: str, path: str = "/ws/tab1") -> Iterator[ClientConnection]:
     address = server.origin.replace("http", "ws") + path
     with connect(address, origin=server.origin, additional_headers={"Cookie": cookie}, max_size=None) as socket:
         yield socket
 
 
-def come_in(server: RunningServer) -> str:
+def come_in(server: Served) -> str:
     """Come in by the link; return the cookie."""
     answer = get(server, server.url.removeprefix(server.origin))
     assert answer.status == 200

@@ -35,12 +35,13 @@ class Demo:
         sample = sample_folder() / "rooftop"
         bags = (sample / "radar.bag", sample / "camera.bag")
         session = self.session or user_session_folder(f"demo-{_digest(bags)}")
-        with closing(self.serving.link(session)) as link:
+        with closing(self.serving.link(str(session.absolute()))) as link:
             if link.is_bound:
                 link.announce()
-            from app.cli.open import serve
+            from app.opening import Choice, Serving, serve
 
-            return serve(bags, session=session, fresh=self.fresh, link=link, name="the sample recording")
+            choice = Choice(bags, "the sample recording", session=session, fresh=self.fresh, is_sample=True)
+            return serve(choice, Serving(link, asks=self.serving.asks))
 
 
 def _digest(files: Sequence[Path]) -> str:

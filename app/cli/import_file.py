@@ -1,4 +1,4 @@
-"""`cocalib import`, and reading the calibration that `cocalib open --calibration` shows."""
+"""`cocalib import`."""
 
 import hashlib
 import sys
@@ -14,11 +14,10 @@ from calib_core.errors import InputError
 from calib_core.input_files import name_text
 
 if TYPE_CHECKING:
-    from app.view import Reference
     from calib_core.camera import Camera
     from calib_core.interchange import ImportedCalibration
 
-__all__ = ["Import", "camera_in", "reference_from"]
+__all__ = ["Import"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +59,7 @@ def _sized_camera(found: "ImportedCalibration", path: Path, image_size_px: tuple
     Raises:
         InputError: the matrix is not a camera's.
     """
+    from app.opening.reference import camera_of
     from calib_core.recordings import size_of_pictures_beside
 
     if found.matrix_px is None:
@@ -71,38 +71,4 @@ def _sized_camera(found: "ImportedCalibration", path: Path, image_size_px: tuple
         return None
     if image_size_px is None:
         print(f"note: image size {size_px[0]} x {size_px[1]} px from the pictures beside the file", file=sys.stderr)
-    return _camera_for(found, path, size_px)
-
-
-def _camera_for(found: "ImportedCalibration", path: Path, size_px: tuple[int, int]) -> "Camera | None":
-    try:
-        return found.camera_for(size_px)
-    except ValueError as error:
-        raise InputError(f"{path}: {error}; give the intrinsics with --camera FILE") from None
-
-
-def camera_in(path: Path, width_px: int, height_px: int) -> "Camera | None":
-    """Return the camera in a calibration file if it has this image size, else None.
-
-    Raises:
-        InputError: the file contains no calibration.
-    """
-    from calib_core.interchange import read_any_file
-
-    camera = _camera_for(read_any_file(path), path, (width_px, height_px))
-    fits = camera is not None and (camera.width_px, camera.height_px) == (width_px, height_px)
-    return camera if fits else None
-
-
-def reference_from(path: Path, camera: "Camera | None") -> "Reference":
-    """Return the calibration in a file, to be shown with the recording's camera.
-
-    Raises:
-        InputError: it contains no calibration, contradicts itself or fails its own check point.
-    """
-    from app.view import Reference
-    from calib_core.interchange import adopted_calibration, read_any_file
-
-    if camera is None:
-        raise InputError(f"{path}: showing this calibration needs intrinsics; give --camera FILE")
-    return Reference(name_text(path.name), adopted_calibration(read_any_file(path), str(path), camera=camera))
+    return camera_of(found, path, size_px)

@@ -13,6 +13,7 @@ from calib_core.input_files import file_text, read_input
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
+    from calib_core.interchange import CameraFile
     from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
     from calib_core.recordings import Recording
 
@@ -67,13 +68,13 @@ def write_whole(path: Path, content: str | bytes) -> None:
         raise InputError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from error
 
 
-def required_camera(recording: "Recording", camera_file: Path | None) -> "Camera":
+def required_camera(recording: "Recording", camera_file: "CameraFile | None") -> "Camera":
     """Return the intrinsics: from the file if one is given, else from the recording.
 
     Raises:
         InputError: there are none.
     """
-    from app.solving import camera_for
+    from app.solving import camera_for, intrinsics_near
 
     camera = camera_for(recording, camera_file)
     if camera is None:
@@ -82,21 +83,13 @@ def required_camera(recording: "Recording", camera_file: Path | None) -> "Camera
             if recording.camera_info_topic
             else "it has no CameraInfo topic"
         )
-        near = _intrinsics_near(recording.paths)
+        near = intrinsics_near(recording.paths)
         raise InputError(
             f"{recording.paths[0].name}: no intrinsics for {recording.image_topic}: {found}; "
             "give them with --camera FILE (ROS camera_info YAML, OpenCV YAML or XML, Kalibr camchain, JSON)"
             + (f", such as --camera {near}" if near else "")
         )
     return camera
-
-
-def _intrinsics_near(paths: Sequence[Path]) -> Path | None:
-    """Return a file of intrinsics in or next to the recording, by its name; None if there is none."""
-    folders = dict.fromkeys(path if path.is_dir() else path.parent for path in paths)
-    names = ("*camera*.y*ml", "*intrinsic*.y*ml", "*camchain*.y*ml", "*calib*.y*ml")
-    found = (file for folder in folders for name in names for file in sorted(folder.glob(name)))
-    return next((file for file in found if file.is_file()), None)
 
 
 @contextmanager

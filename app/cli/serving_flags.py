@@ -1,9 +1,9 @@
 """Flags that say where the page is served."""
 
-import dataclasses
+import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -29,12 +29,22 @@ class ServingFlags:
     """Serve on a Unix socket that only you can reach, for shared robots; the ssh command that forwards it is printed."""
     no_browser: Switch = False
     """Print the link, do not open a browser."""
+    on_problem: Annotated[Literal["ask", "exit"] | None, called()] = None
+    """What to do if the recording cannot be opened: ask in the page, or exit with code 2; by default ask, but exit
+    with --no-browser if the output is no terminal, as in scripts."""
 
-    def link(self, session: Path) -> Link:
+    @property
+    def asks(self) -> bool:
+        """Whether a recording that cannot be opened leads to a question in the page; otherwise it ends the command."""
+        if self.on_problem is not None:
+            return self.on_problem == "ask"
+        return not self.no_browser or sys.stdout.isatty()
+
+    def link(self, session: str) -> Link:
         """Bind the address and generate the token; nothing is printed yet.
 
         Args:
-            session: the session's folder.
+            session: what is served, such as the session's folder.
 
         Raises:
             AddressError: the address, the port, the token or the socket cannot be used.
@@ -42,4 +52,8 @@ class ServingFlags:
         require_address(self.host, self.port)
         require_one_address(self.socket, self.host)
         require_token(self.token, reachable=not is_loopback(self.host))
-        return Link(ServerOptions(**dataclasses.asdict(self), session=str(session.absolute())))
+        return Link(
+            ServerOptions(
+                self.host, self.port, self.token, no_browser=self.no_browser, socket=self.socket, session=session
+            )
+        )

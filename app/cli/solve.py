@@ -91,21 +91,22 @@ class Solve:
 
     def _solve_recording(self, clicks_path: Path) -> int:
         from app.solving import calibration_text, solve_clicks
-        from calib_core.interchange import read_clicks
+        from calib_core.interchange import CameraFile, read_clicks
         from calib_core.recordings import open_recording
 
+        camera_file = None if self.camera is None else CameraFile.read(self.camera)
         clicks = read_clicks(read_text(clicks_path), source=str(clicks_path))
         with open_recording(self.recording, self.topics) as recording:
             _require_confirmed(recording)
             if recording.radar_choice:
                 print(f"radar: {recording.radar_choice}", file=sys.stderr)
-            camera = required_camera(recording, self.camera)
+            camera = required_camera(recording, camera_file)
             _require_inside(clicks, recording, camera, source=clicks_path)
             clicks = told_clicks_at_frames(clicks, recording, source=str(clicks_path))
             outcome = solve_clicks(recording, clicks, camera, self.measured.over(self.options))
             if isinstance(outcome, Unsolvable):
                 return explain_unsolvable(outcome)
-            return self._deliver(outcome, calibration_text(outcome, recording))
+            return self._deliver(outcome, calibration_text(outcome, recording, camera_file=camera_file))
 
     def _solve_pairs(self, path: Path) -> int:
         from app.solving import calibration_text_of_pairs, solve_pairs

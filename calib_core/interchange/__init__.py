@@ -8,7 +8,7 @@ from calib_core.interchange.calibration_file import (
     Provenance,
     choose_check_point,
 )
-from calib_core.interchange.cameras.files import camera_info_text, read_camera, read_camera_file
+from calib_core.interchange.cameras.files import CameraFile, camera_info_text, read_camera, read_camera_file
 from calib_core.interchange.check.comparison import Comparison, PixelDifference, compare
 from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
@@ -31,6 +31,7 @@ __all__ = [
     "FORMATS",
     "AssumptionNote",
     "CalibrationFile",
+    "CameraFile",
     "CheckPairs",
     "CheckReport",
     "CheckResult",

@@ -6,6 +6,7 @@ from calib_core.recordings.description import clock_lines, describe
 from calib_core.recordings.first_picture import first_picture
 from calib_core.recordings.following import AwaitedRecording, FollowedRecording, Growth
 from calib_core.recordings.plain_files.folder_cameras import size_of_pictures_beside
+from calib_core.recordings.radar_choice import figures_text
 from calib_core.recordings.recording import Recording, inspect_recording, open_recording, require_files
 from calib_core.recordings.selection import RecordingOptions
 from calib_core.recordings.summary import RecordingSummary, recording_summary
@@ -31,6 +32,7 @@ __all__ = [
     "assumption_hint",
     "clock_lines",
     "describe",
+    "figures_text",
     "first_picture",
     "inspect_recording",
     "open_recording",

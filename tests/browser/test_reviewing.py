@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.cli.import_file import reference_from
+from app.opening.reference import reference_from
 from app.web.port.server import ServerOptions, start
 from app.workspace import open_workspace
 from calib_core.recordings import Recording

@@ -99,5 +99,4 @@ def test_what_needs_no_command_imports_none(arguments: list[str]) -> None:
 def test_a_command_imports_no_other_command(command: Command) -> None:
     mine = command.where.partition(":")[0]
     others = {other.where.partition(":")[0] for other in COMMANDS.values()} - {mine}
-    allowed = {"app.cli.import_file"} if mine == "app.cli.open" else set()  # it shows imported calibrations
-    assert imported_after(command.name, "--help") & others == allowed
+    assert imported_after(command.name, "--help") & others == set()

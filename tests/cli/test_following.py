@@ -36,7 +36,7 @@ def test_a_recording_that_has_not_been_begun_is_waited_for(
         else:
             writers[0].write_until(8.0)
 
-    monkeypatch.setattr("app.cli.open.sleep", write_on)
+    monkeypatch.setattr("app.opening.opened.sleep", write_on)
     answer = cocalib("open", "--follow", path, "--no-browser", "--port", 0, "--session", tmp_path / "session")
     writers[0].stop()
     assert answer.code == 0, answer.err

@@ -7,8 +7,8 @@ them are opened without following links, carry checksums, and are compared with 
 
 from app.session.file.closing import Closed
 from app.session.file.errors import SessionFileError
-from app.session.file.finding import FoundFolder, find_session_folder
-from app.session.file.folders import recording_session_folder, user_session_folder
+from app.session.file.finding import FoundFolder, find_session_folder, has_session_of
+from app.session.file.folders import recording_session_folder, unused_session_folder, user_session_folder
 from app.session.file.listing import SessionSummary, session_summaries
 from app.session.file.remembered import remembered_map
 from app.session.file.repairing import Repair, inspect_session, repair_session
@@ -23,6 +23,7 @@ __all__ = [
     "SessionFileError",
     "SessionSummary",
     "find_session_folder",
+    "has_session_of",
     "inspect_session",
     "open_session_file",
     "recording_session_folder",
@@ -30,5 +31,6 @@ __all__ = [
     "repair_session",
     "session_summaries",
     "set_aside",
+    "unused_session_folder",
     "user_session_folder",
 ]

@@ -14,7 +14,7 @@ from app.session.file.journal_reading import JOURNAL, read_journal
 from app.session.file.snapshot import SNAPSHOT, read_snapshot
 from calib_core.results import DataWarning
 
-__all__ = ["FoundFolder", "find_session_folder"]
+__all__ = ["FoundFolder", "find_session_folder", "has_session_of"]
 
 _HEAD_BYTES = 1 << 16
 
@@ -63,6 +63,12 @@ def find_session_folder(paths: Sequence[Path], facts: RecordingFacts) -> FoundFo
     return FoundFolder(
         found.path, (*found.warnings, *_about_closed([each for each in folders if _is_of(each, paths[0])]))
     )
+
+
+def has_session_of(folder: Path, facts: RecordingFacts) -> bool:
+    """Return whether a folder has a session that can be read, of a recording with these frames."""
+    candidate = _candidate(folder)
+    return candidate is not None and is_same_recording(candidate.recording, facts)
 
 
 def _chosen(named: Path, same: Sequence[_Candidate], facts: RecordingFacts) -> FoundFolder:

@@ -1,5 +1,6 @@
 """Where a session is stored: next to its recording if that folder is writable, else in the user's state folder."""
 
+import os
 import re
 import tempfile
 from collections.abc import Sequence
@@ -7,7 +8,13 @@ from pathlib import Path
 
 from app.resources import SESSION_SUFFIX, user_session_folder
 
-__all__ = ["is_writable", "recording_session_folder", "session_folders_in", "user_session_folder"]
+__all__ = [
+    "is_writable",
+    "recording_session_folder",
+    "session_folders_in",
+    "unused_session_folder",
+    "user_session_folder",
+]
 
 _SET_ASIDE = re.compile(re.escape(SESSION_SUFFIX) + r"\.[0-9]+$")
 
@@ -25,6 +32,15 @@ def recording_session_folder(paths: Sequence[Path]) -> Path:
         if folder.is_dir() and is_writable(folder):
             return folder
     return adjacent if is_writable(adjacent.parent) else in_state_folder
+
+
+def unused_session_folder(folder: Path) -> Path:
+    """Return a name that no session has yet: the given one, or that with a number, such as NAME-2.cocalib-session."""
+    number, free = 1, folder
+    while os.path.lexists(free):
+        number += 1
+        free = folder.with_name(f"{folder.name.removesuffix(SESSION_SUFFIX)}-{number}{SESSION_SUFFIX}")
+    return free
 
 
 def session_folders_in(folder: Path, *, set_aside: bool = False) -> tuple[Path, ...]:

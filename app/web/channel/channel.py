@@ -8,6 +8,7 @@ from app.error_boundary import error_boundary
 from app.session import Step
 from app.view import sentence
 from app.web.channel.click_candidates import candidates_of
+from app.web.channel.desk import answer_of
 from app.web.channel.hub import Hub
 from app.web.channel.newest import NewestWins
 from app.web.channel.outbox import Outbox
@@ -24,6 +25,8 @@ from app.web.messages import (
     FrameWanted,
     Hello,
     ImportWanted,
+    Incoming,
+    OpeningCommand,
     Problem,
     ReviewRequest,
     SnapWanted,
@@ -111,10 +114,7 @@ class Channel:
             text = await socket.recv()
             with error_boundary("a page's message", partial(self._refuse, text)):
                 try:
-                    incoming = parse(text)
-                    await self._obey(incoming.command)
-                    if incoming.request is not None:
-                        self.outbox.put(encode(Done(incoming.request)))
+                    await self._take(parse(text))
                 except CalibrationError as error:
                     self._refuse(text, str(error))
 
@@ -123,6 +123,16 @@ class Channel:
 
     def _refuse(self, text: str | bytes, reason: str) -> None:
         self.outbox.put(encode(Problem(sentence(reason), request=request_of(text))))
+
+    async def _take(self, incoming: Incoming) -> None:
+        """Carry out a command, or answer a message about the choice of a recording."""
+        if not isinstance(incoming.command, OpeningCommand):
+            await self._obey(incoming.command)
+            if incoming.request is not None:
+                self.outbox.put(encode(Done(incoming.request)))
+            return
+        for text in await answer_of(self._hub.desk, incoming):
+            self.outbox.put(text)
 
     async def _obey(self, command: Command) -> None:
         """Carry out a command of the page.

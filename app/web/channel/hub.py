@@ -11,6 +11,7 @@ from typing import Protocol
 from app.error_boundary import error_boundary
 from app.resources import version
 from app.view import View, warning_in_sentences
+from app.web.channel.desk import ClosedDesk, Desk
 from app.web.channel.live_edge import LiveEdge
 from app.web.channel.outbox import Outbox
 from app.web.channel.picture_changes import PictureChanges, changes_of
@@ -59,14 +60,24 @@ class Tab(Protocol):
 class Hub:
     """Runs on viser's event loop, except for the workspace's callback."""
 
-    def __init__(self, workspace: Workspace, recording: Recording, executor: Executor) -> None:
+    def __init__(
+        self,
+        workspace: Workspace,
+        recording: Recording,
+        executor: Executor,
+        *,
+        desk: Desk | None = None,
+        opening: int = 1,
+    ) -> None:
+        self.desk: Desk = desk or ClosedDesk()
+        self._opening = opening
         self.workspace = workspace
         self.recording = recording
         self.executor = executor
         self.frames = FrameStore(recording, len(recording.image_times), executor)
         self.radar = RadarSight(recording)
         self.moments = workspace.facts.moments
-        self.camera = recording.camera()
+        self.camera = workspace.camera
         self.survey: Survey | None = None
         self.picture_changes = PictureChanges()
         self.tabs: set[Tab] = set()
@@ -195,6 +206,8 @@ class Hub:
             ),
             session=SessionNote(str(restored.folder), len(restored.history.present.clicks), restored.note),
             version=version(),
+            opening=self._opening,
+            intrinsics=self.workspace.intrinsics,
         )
 
 

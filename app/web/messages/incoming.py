@@ -11,6 +11,7 @@ from msgspec import Meta
 from app.option_changes import changes_from_tree
 from app.session import ClickPlaced, OptionsEdited, Step
 from app.session.file import step_json as forms
+from app.web.messages.opening_messages import ChoicesWanted, FolderWanted, OpeningCommand, OpenWith, RecentForgotten
 from app.web.messages.review_messages import ReviewRequest
 from calib_core.errors import InputError
 from calib_core.measurements import TimeNs
@@ -29,6 +30,7 @@ __all__ = [
     "ViewWanted",
     "Viewpoint",
     "ViewpointWanted",
+    "is_about_opening",
     "parse",
     "request_of",
 ]
@@ -151,7 +153,7 @@ class Incoming:
         request: the number to answer with; None when no answer is wanted.
     """
 
-    command: Command
+    command: Command | OpeningCommand
     request: int | None = None
 
 
@@ -210,6 +212,7 @@ class SnapForm(_Form, frozen=True, tag="snap_wanted"):
     id: forms.ClickId | None = None
 
 
+OpeningForm: TypeAlias = ChoicesWanted | FolderWanted | RecentForgotten | OpenWith
 MessageForm: TypeAlias = (
     forms.StepForm
     | HelloForm
@@ -220,6 +223,7 @@ MessageForm: TypeAlias = (
     | ImportForm
     | ReviewRequest
     | SnapForm
+    | OpeningForm
 )
 
 
@@ -228,6 +232,10 @@ _TYPES = {str(form.__struct_config__.tag): form for form in get_args(MessageForm
 
 class _Envelope(msgspec.Struct):
     request: RequestNumber | None = None
+
+
+class _Named(msgspec.Struct):
+    type: str = ""
 
 
 def parse(text: str | bytes) -> Incoming:
@@ -260,6 +268,15 @@ def request_of(text: str | bytes) -> int | None:
         return None
 
 
+def is_about_opening(text: str | bytes) -> bool:
+    """Return whether a message that `parse` refused was about the choice of a recording."""
+    try:
+        kind = msgspec.json.decode(text[:MAX_TEXT_BYTES], type=_Named).type
+    except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+        return False
+    return kind in _TYPES and issubclass(_TYPES[kind], OpeningCommand)
+
+
 def _kind(fields: object) -> str:
     if not isinstance(fields, dict):
         raise InputError('the message is not a JSON object; expected one with a "type"')
@@ -272,7 +289,7 @@ def _kind(fields: object) -> str:
 
 
 @singledispatch
-def _command(form: Any) -> Command:
+def _command(form: Any) -> Command | OpeningCommand:
     return forms.step_from_form(form)
 
 
@@ -332,3 +349,8 @@ def _import(form: ImportForm) -> Command:
 @_command.register
 def _snap(form: SnapForm) -> Command:
     return SnapWanted(form.image_time.stamp.time, form.pixel_px, form.id)
+
+
+@_command.register
+def _opening(form: OpeningCommand) -> OpeningCommand:
+    return form

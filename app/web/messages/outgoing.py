@@ -12,6 +12,7 @@ from app.view import FollowState, PairCandidates, View
 from app.view.review import Review
 from app.view.review_pair import PairReview
 from app.view.review_solutions import Compared
+from app.web.messages.opening_messages import FolderListing, OpeningChoices
 from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
 from app.web.messages.review_messages import Uncertainty
 from app.web.messages.space_messages import SpaceLook
@@ -127,6 +128,8 @@ class RecordingNote:
         session: where the session is stored.
         version: of the program.
         option_groups: how to draw the options; their values are in the view.
+        opening: how often the server has opened a recording; with another number it is another one, or read in another way.
+        intrinsics: where the camera's intrinsics come from; "" if there are none.
     """
 
     name: str
@@ -143,6 +146,8 @@ class RecordingNote:
     session: SessionNote
     version: str
     option_groups: tuple[OptionGroup, ...] = field(default_factory=option_groups)
+    opening: int = 1
+    intrinsics: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,6 +303,8 @@ Outgoing: TypeAlias = (
     View
     | ViewChange
     | Opening
+    | OpeningChoices
+    | FolderListing
     | RecordingNote
     | FramesAdded
     | FollowNote
@@ -321,6 +328,8 @@ TYPES: Mapping[type, str] = {
     View: "view",
     ViewChange: "view_change",
     Opening: "opening",
+    OpeningChoices: "opening_choices",
+    FolderListing: "folder_listing",
     RecordingNote: "recording",
     FramesAdded: "frames_added",
     FollowNote: "following",

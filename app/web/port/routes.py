@@ -132,6 +132,10 @@ class Routes:
         """Serve this recording from now on."""
         self._made = _Downloads(workspace, recording, hub).by_path()
 
+    def withdraw(self) -> None:
+        """Serve no recording until another one is admitted."""
+        self._made = None
+
     async def answer(self, address: str) -> Reply:
         """Answer a GET; files and exports are produced outside the event loop.
 
@@ -195,11 +199,11 @@ class _Downloads:
 
     def _of_calibration(self, make: Callable[[str], Reply]) -> Reply:
         """Make a reply from the current calibration-1 text, or say why there is none; never from an outdated calibration."""
-        session = self._workspace.session
+        session, camera_file = self._workspace.session, self._workspace.camera_file
         if not session.is_solved or not isinstance(session.outcome, Calibration):
             return refusal(409, _why_none(session))
         try:
-            return make(calibration_text(session.outcome, self._recording, session.confirmed))
+            return make(calibration_text(session.outcome, self._recording, session.confirmed, camera_file))
         except CalibrationError as error:
             return refusal(409, sentence(str(error)))
 

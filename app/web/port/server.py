@@ -3,8 +3,9 @@
 import asyncio
 import contextlib
 import logging
+from collections.abc import Coroutine
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import websockets
 from websockets.asyncio.server import ServerConnection
@@ -14,8 +15,9 @@ from websockets.http11 import Request, Response
 from app.error_boundary import error_boundary
 from app.resources import static_folder
 from app.web.channel.channel import Channel, Socket
+from app.web.channel.desk import Desk
 from app.web.channel.hub import Hub
-from app.web.messages import Opening
+from app.web.messages import Opening, OpeningChoices
 from app.web.port import guard
 from app.web.port.entrance import Entrance
 from app.web.port.link import Link, ServerOptions
@@ -33,15 +35,20 @@ if TYPE_CHECKING:
 
 __all__ = ["RunningServer", "ServerOptions", "start"]
 
+_AGAIN = 1012
+"""The WebSocket's close code for a service that restarts."""
 _log = logging.getLogger(__name__)
 
 
 class RunningServer:
     """A running server; `close` stops it. Pages can connect at once; they wait until a recording is admitted."""
 
-    def __init__(self, link: Link, room: WaitingRoom) -> None:
+    def __init__(self, link: Link, room: WaitingRoom, desk: Desk | None = None) -> None:
         options, self._link = link.options, link
-        self._executor = ThreadPoolExecutor(max_workers=3, thread_name_prefix="frames")
+        self._desk = desk
+        self._executor = _frame_threads()
+        self._openings = 0
+        self._pages: set[ServerConnection] = set()
         self._room = room
         self._routes = Routes(static_folder())
         self._entrance = Entrance(
@@ -69,7 +76,8 @@ class RunningServer:
 
     def admit(self, workspace: Workspace, recording: Recording) -> None:
         """Serve this recording from now on, also to the pages that are waiting."""
-        hub = Hub(workspace, recording, self._executor)
+        self._openings += 1
+        hub = Hub(workspace, recording, self._executor, desk=self._desk, opening=self._openings)
 
         async def open_up() -> None:
             await hub.start()
@@ -77,7 +85,37 @@ class RunningServer:
             self._routes.admit(workspace, recording, hub)
             self._room.end()
 
-        asyncio.run_coroutine_threadsafe(open_up(), self._viser.get_event_loop()).result()
+        self._on_loop(open_up())
+
+    def withdraw(self, opening: Opening) -> None:
+        """Stop serving the recording, and return once nothing reads it any more; its pages connect again and wait."""
+        hub, executor = self._hub, self._executor
+        if hub is None:
+            return
+
+        async def turn_out() -> None:
+            self._hub = None
+            self._routes.withdraw()
+            self._room = WaitingRoom(opening, self._desk)
+            await hub.end()
+            await asyncio.gather(*(page.close(_AGAIN, "another recording is being opened") for page in [*self._pages]))
+
+        self._on_loop(turn_out())
+        hub.steps.shutdown(wait=True, cancel_futures=True)
+        executor.shutdown(wait=True, cancel_futures=True)
+        self._executor = _frame_threads()
+
+    def start_over(self, opening: Opening) -> None:
+        """Tell the pages that wait that another recording is being opened."""
+        self._viser.get_event_loop().call_soon_threadsafe(self._room.start_over, opening)
+
+    def ask(self, choices: OpeningChoices) -> None:
+        """Ask the pages that wait which recording to open, or how."""
+        self._viser.get_event_loop().call_soon_threadsafe(self._room.ask, choices)
+
+    def _on_loop(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run on the event loop, and wait until it is done."""
+        asyncio.run_coroutine_threadsafe(work, self._viser.get_event_loop()).result()
 
     def show(self, picture: EncodedImage) -> None:
         """Show a picture of the recording on the pages that are waiting for it.
@@ -94,7 +132,7 @@ class RunningServer:
     def refuse(self, problem: str) -> None:
         """Tell the waiting pages why the recording cannot be opened; do nothing if it was admitted or the server is closed."""
         if self._hub is None and not self._is_closed:
-            asyncio.run_coroutine_threadsafe(self._room.refuse(problem), self._viser.get_event_loop()).result()
+            self._on_loop(self._room.refuse(problem))
 
     @property
     def port(self) -> int:
@@ -117,7 +155,7 @@ class RunningServer:
             return
         self._is_closed = True
         if self._hub is not None:
-            asyncio.run_coroutine_threadsafe(self._hub.end(), self._viser.get_event_loop()).result()
+            self._on_loop(self._hub.end())
             self._hub.steps.shutdown(wait=True, cancel_futures=True)
         stop_viser(self._viser)
         self._link.close()
@@ -153,6 +191,13 @@ class RunningServer:
         return handle
 
     async def _run_channel(self, connection: ServerConnection, tab: str) -> None:
+        self._pages.add(connection)
+        try:
+            await self._talk(connection, tab)
+        finally:
+            self._pages.discard(connection)
+
+    async def _talk(self, connection: ServerConnection, tab: str) -> None:
         socket: Socket = connection if self._hub else await self._room.stay(connection)
         if self._hub is None:
             return
@@ -189,6 +234,10 @@ def start(workspace: Workspace, recording: Recording, options: ServerOptions) ->
     server = RunningServer(Link(options), WaitingRoom())
     server.admit(workspace, recording)
     return server
+
+
+def _frame_threads() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(max_workers=3, thread_name_prefix="frames")
 
 
 def _asked(request: Request, method: str = "GET") -> guard.Request:

@@ -9,10 +9,11 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self
 
 from app.view import sentence
-from app.web.messages import Opening
+from app.web.channel.desk import Desk
+from app.web.messages import Opening, OpeningChoices
 from app.web.port.link import Link, ServerOptions
 from app.web.port.server import RunningServer
 from app.web.port.waiting import WaitingRoom
@@ -20,13 +21,19 @@ from app.workspace import Workspace
 from calib_core.errors import CalibrationError
 from calib_core.recordings import EncodedImage, Recording
 
-__all__ = ["Service"]
+__all__ = ["ChoosingDesk", "Service"]
 
 _log = logging.getLogger(__name__)
 
 
+class ChoosingDesk(Desk, Protocol):
+    """Answers what pages ask about the choice of a recording; `chosen` is set once a page has chosen."""
+
+    chosen: threading.Event
+
+
 class Service:
-    """Serves a recording that is opened inside the `with` block; if that takes long, pages can already connect and wait.
+    """Serves recordings that are opened inside the `with` block; if that takes long, pages can already connect and wait.
 
     An error inside the `with` block is shown on the waiting pages and then raised to the caller.
     """
@@ -38,6 +45,7 @@ class Service:
         first_picture: Callable[[], EncodedImage | None],
         *,
         let_in_after_s: float,
+        desk: ChoosingDesk | None = None,
     ) -> None:
         """Set up the service; nothing is served yet.
 
@@ -47,11 +55,15 @@ class Service:
             first_picture: reads the picture for waiting pages, in its own thread; returns None if there is none to show early.
             let_in_after_s: delay before waiting pages are admitted [s]; with 0, the link is printed before anything is opened,
                 so that opening the recording and starting the browser do not slow each other down.
+            desk: answers what pages ask about the choice of a recording; without, the recording is kept.
         """
         self._link = Link(link) if isinstance(link, ServerOptions) else link
         self._opening = opening
         self._first_picture = first_picture
         self._let_in_after_s = let_in_after_s
+        self._desk = desk
+        self._chosen = threading.Event() if desk is None else desk.chosen
+        self._server: RunningServer | None = None
         self._is_settled = threading.Event()
         self._threads = ThreadPoolExecutor(max_workers=2, thread_name_prefix="early")
 
@@ -73,29 +85,58 @@ class Service:
     def tell(self, doing: str) -> None:
         """Say what is being done, in the terminal and on the pages that wait."""
         print(doing, flush=True)
-        server = self._early.result()
+        server = self._server or self._early.result()
         if server is not None:
             server.tell(Opening(self._opening.name, doing))
 
-    def serve(self, workspace: Workspace, recording: Recording) -> None:
-        """Serve the opened recording until a signal ends it; the caller then closes the session and says so.
+    def start_over(self, opening: Opening) -> None:
+        """Say that another recording is being opened."""
+        self._opening = opening
+        if self._server is not None:
+            self._server.start_over(opening)
+
+    def serve(self, workspace: Workspace, recording: Recording) -> bool:
+        """Serve the opened recording until a signal ends it, or a page chose another one; the caller then closes the session.
+
+        Returns:
+            whether a page chose another recording, or another way to read this one.
 
         Raises:
             OSError: no port can be bound.
         """
-        self._is_settled.set()
-        server = self._early.result() or self._start(WaitingRoom())
+        server = self._running()
         try:
-            with contextlib.suppress(KeyboardInterrupt):
-                server.admit(workspace, recording)
-                threading.Event().wait()
-        finally:
+            server.admit(workspace, recording)
+            self._chosen.wait()
+        except KeyboardInterrupt:
             server.close()
+            return False
+        except BaseException:
+            server.close()
+            raise
+        server.withdraw(Opening(workspace.facts.name, "Closing the session…"))
+        return True
+
+    def ask(self, choices: OpeningChoices) -> None:
+        """Ask on the page which recording to open, or how, and wait for an answer.
+
+        Raises:
+            OSError: no port can be bound.
+        """
+        self._running().ask(choices)
+        self._chosen.wait()
+
+    def _running(self) -> RunningServer:
+        """Return the server, started now if that was not needed earlier."""
+        self._is_settled.set()
+        if self._server is None:
+            self._server = self._early.result() or self._start(WaitingRoom(desk=self._desk))
+        return self._server
 
     def _end(self, error: BaseException | None) -> None:
         """Show the error on the waiting pages, and stop serving."""
         self._is_settled.set()
-        server = None if self._early.exception() else self._early.result()
+        server = self._server or (None if self._early.exception() else self._early.result())
         if server is not None:
             if isinstance(error, Exception):
                 server.refuse(_problem_text(error))
@@ -108,13 +149,13 @@ class Service:
             return None
         picture = self._threads.submit(self._first_picture)
         print(self._opening.doing, flush=True)
-        server = self._start(WaitingRoom(self._opening))
+        server = self._start(WaitingRoom(self._opening, self._desk))
         picture.add_done_callback(lambda done: _show(server, done))
         return server
 
     def _start(self, room: WaitingRoom) -> RunningServer:
         """Start the server and print its link."""
-        server = RunningServer(self._link, room)
+        server = RunningServer(self._link, room, self._desk)
         self._link.announce()
         return server
 

@@ -1,13 +1,34 @@
-"""Pages that wait while the recording is being opened: they show its first picture, and their messages are kept for later."""
+"""Pages that wait while the recording is being opened, or chosen: they show its first picture, what can be chosen, and why.
+
+Messages about the choice are answered at once; all others are kept until the recording is open.
+"""
 
 import asyncio
+import logging
 from collections import deque
 
+from app.error_boundary import error_boundary
+from app.view import sentence
 from app.web.channel.channel import Socket
-from app.web.messages import FrameHeader, Opening, encode, encode_frame
+from app.web.channel.desk import ClosedDesk, Desk, answer_of
+from app.web.messages import (
+    FrameHeader,
+    Opening,
+    OpeningChoices,
+    OpeningCommand,
+    Problem,
+    encode,
+    encode_frame,
+    is_about_opening,
+    parse,
+    request_of,
+)
+from calib_core.errors import CalibrationError
 from calib_core.recordings import EncodedImage
 
 __all__ = ["WaitingRoom"]
+
+_log = logging.getLogger(__name__)
 
 _MAX_HELD = 2000
 """A page that sends more messages than this before it can be answered is disconnected; it reconnects and repeats what matters."""
@@ -18,7 +39,9 @@ _REFUSAL_TIMEOUT_S = 3.0
 class WaitingRoom:
     """Sends to every waiting page, once and in order: what is being done, the first picture, the end. Runs on the event loop."""
 
-    def __init__(self, opening: Opening | None = None) -> None:
+    def __init__(self, opening: Opening | None = None, desk: Desk | None = None) -> None:
+        self._desk: Desk = desk or ClosedDesk()
+        self._first = 0
         self._opening = opening
         self._news: list[str | bytes] = [] if opening is None else [encode(opening)]
         self._changed = asyncio.Event()
@@ -33,6 +56,17 @@ class WaitingRoom:
         """Show a picture. It is not a frame yet: it has no index and no time."""
         header = FrameHeader(-1, 0, picture.width_px, picture.height_px, 1.0, picture.format)
         self._add(encode_frame(header, picture.data))
+
+    def start_over(self, opening: Opening) -> None:
+        """Say that another recording is being opened; pages that come from now on see nothing of the one before."""
+        self._first, self._opening = len(self._news), opening
+        self.tell(opening)
+
+    def ask(self, choices: OpeningChoices) -> None:
+        """Ask which recording to open, or how."""
+        self._first, name = len(self._news), choices.name
+        self.tell(Opening(name, "Choose how to open it" if name else "Choose a recording"))
+        self._add(encode(choices))
 
     def end(self) -> None:
         """Let all pages continue: the recording is open."""
@@ -57,7 +91,7 @@ class WaitingRoom:
             BufferError: the page sent too many messages.
         """
         held: deque[str | bytes] = deque()
-        reading = asyncio.create_task(_hold(socket, held))
+        reading = asyncio.create_task(self._hold(socket, held))
         sending = asyncio.create_task(self._send_news(socket))
         self._waiting.add(sending)
         try:
@@ -73,7 +107,7 @@ class WaitingRoom:
         return _ResumedSocket(socket, held)
 
     async def _send_news(self, socket: Socket) -> None:
-        sent = 0
+        sent = self._first
         while True:
             changed = self._changed
             while sent < len(self._news):
@@ -82,6 +116,31 @@ class WaitingRoom:
             if self._over:
                 return
             await changed.wait()
+
+    async def _hold(self, socket: Socket, held: deque[str | bytes]) -> None:
+        """Keep what a page sends for later, except for messages about the choice of a recording."""
+        while len(held) < _MAX_HELD:
+            text = await socket.recv()
+            answers: list[str] | None = []
+            with error_boundary("a waiting page's message", _log.error):
+                answers = await self._answers(text)
+            if answers is None:
+                held.append(text)
+            for answer in answers or ():
+                await socket.send(answer)
+        raise BufferError(f"the page sent {len(held)} messages before it could be answered")
+
+    async def _answers(self, text: str | bytes) -> list[str] | None:
+        """Answer a message about the choice of a recording; return None for any other."""
+        try:
+            incoming = parse(text)
+            if not isinstance(incoming.command, OpeningCommand):
+                return None
+            return await answer_of(self._desk, incoming)
+        except CalibrationError as error:
+            if not is_about_opening(text):
+                return None
+            return [encode(Problem(sentence(str(error)), request=request_of(text)))]
 
     def _add(self, message: str | bytes) -> None:
         self._news.append(message)
@@ -104,9 +163,3 @@ class _ResumedSocket:
 
     async def send(self, message: str | bytes, /) -> None:
         await self._socket.send(message)
-
-
-async def _hold(socket: Socket, held: deque[str | bytes]) -> None:
-    while len(held) < _MAX_HELD:
-        held.append(await socket.recv())
-    raise BufferError(f"the page sent {len(held)} messages before it could be answered")

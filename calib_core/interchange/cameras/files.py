@@ -1,5 +1,6 @@
 """Read a camera from the file formats in common use, and write ROS camera_info YAML."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from calib_core.interchange.syntax.strict_json import json_object
 from calib_core.interchange.syntax.yaml_text import load_yaml, numbers_text, quoted
 from calib_core.lens_models.naming import written_lens
 
-__all__ = ["camera_info_text", "read_camera", "read_camera_file"]
+__all__ = ["CameraFile", "camera_info_text", "read_camera", "read_camera_file"]
 
 _MAX_BYTES = 512 * 1024 * 1024
 _LOOKED_FOR = (
@@ -45,23 +46,59 @@ def read_camera(
     return _chosen(cameras, name, source=source).camera(image_size_px=image_size_px, source=source)
 
 
+@dataclass(frozen=True, slots=True)
+class CameraFile:
+    """A file with a camera, as it was given: its content can be read as often as needed, and identified.
+
+    Attributes:
+        source: its path or name, for error messages.
+        data: its content.
+        name: which of its cameras; None if it has one.
+    """
+
+    source: str
+    data: bytes
+    name: str | None = None
+
+    @classmethod
+    def read(cls, path: str | Path) -> "CameraFile":
+        """Read a file; "file.yml#cam1" selects one of its cameras.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        file, name = Path(path), None
+        if not file.exists() and "#" in str(path):
+            head, _, name = str(path).rpartition("#")
+            file = Path(head)
+        try:
+            return cls(str(file), read_input(file, max_bytes=_MAX_BYTES, is_what="a camera file"), name)
+        except OSError as error:
+            raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
+
+    def camera(self, *, image_size_px: tuple[int, int] | None = None) -> Camera:
+        """Return the camera.
+
+        Args:
+            image_size_px: width and height, used if the file does not state them.
+
+        Raises:
+            InputError: there is no camera in it.
+        """
+        try:
+            text = file_text(self.data)
+        except UnicodeDecodeError:
+            raise InputError(f"{self.source}: not a text file; {_LOOKED_FOR}") from None
+        return read_camera(text, self.source, name=self.name, image_size_px=image_size_px)
+
+
 def read_camera_file(path: str | Path, *, image_size_px: tuple[int, int] | None = None) -> Camera:
     """Read a camera from a file; "file.yml#cam1" selects one of several.
 
     Raises:
         InputError: the file cannot be read, or contains no camera.
     """
-    file, name = Path(path), None
-    if not file.exists() and "#" in str(path):
-        head, _, name = str(path).rpartition("#")
-        file = Path(head)
-    try:
-        text = file_text(read_input(file, max_bytes=_MAX_BYTES, is_what="a camera file"))
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{file}: not a text file; {_LOOKED_FOR}") from None
-    return read_camera(text, str(file), name=name, image_size_px=image_size_px)
+    return CameraFile.read(path).camera(image_size_px=image_size_px)
 
 
 def camera_info_text(camera: Camera, name: str = "camera") -> str:

@@ -24,7 +24,7 @@ from app.solving import (
 from app.workspace import open_workspace
 from calib_core.camera import Camera
 from calib_core.errors import InputError, OptionError
-from calib_core.interchange import camera_info_text, read_calibration, read_clicks
+from calib_core.interchange import CameraFile, camera_info_text, read_calibration, read_clicks
 from calib_core.measurements import RadarScans, ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions, LocatingOptions
 from calib_core.recordings import Recording, RecordingOptions, open_recording
@@ -197,7 +197,7 @@ def test_the_recordings_own_camera_is_used_unless_a_file_is_given(tmp_path: Path
     assert given is not None
     other = Camera("pinhole", given.width_px, given.height_px, given.matrix_px * [[1.1], [1.1], [1.0]])
     (tmp_path / "camera.yaml").write_text(camera_info_text(other), encoding="utf-8")
-    read = camera_for(recording, tmp_path / "camera.yaml")
+    read = camera_for(recording, CameraFile.read(tmp_path / "camera.yaml"))
     assert read is not None
     assert read.matrix_px == pytest.approx(other.matrix_px)
 
@@ -207,7 +207,22 @@ def test_intrinsics_of_another_image_size_are_refused_with_both_sizes(tmp_path: 
         camera_info_text(replace(CAMERA, width_px=123, height_px=45)), encoding="utf-8"
     )
     with pytest.raises(InputError, match=r"camera\.yaml: calibrated for 123 x 45 px, but the frames have"):
-        camera_for(recording, tmp_path / "camera.yaml")
+        camera_for(recording, CameraFile.read(tmp_path / "camera.yaml"))
+
+
+def test_a_camera_file_is_named_by_its_content_whether_it_came_by_its_path_or_was_dropped_on_the_page(
+    tmp_path: Path, recording: Recording, solved: Calibration
+) -> None:
+    given = recording.camera()
+    assert given is not None
+    data = camera_info_text(given).encode()
+    (tmp_path / "camera.yaml").write_bytes(data)
+    by_path, dropped = CameraFile.read(tmp_path / "camera.yaml"), CameraFile("camera.yaml", data)
+    text = calibration_text(solved, recording, camera_file=dropped)
+    assert calibration_text(solved, recording, camera_file=by_path) == text
+    inputs = json.loads(text)["provenance"]["inputs"]
+    assert inputs[-1] == {"name": "camera.yaml", "size_bytes": len(data), "sha256": sha256(data).hexdigest()}
+    assert inputs[:-1] == json.loads(calibration_text(solved, recording))["provenance"]["inputs"]
 
 
 def pairs_text(solved: Calibration, count: int) -> str:

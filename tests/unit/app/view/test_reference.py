@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.cli.import_file import camera_in, reference_from
+from app.opening.reference import camera_in, reference_from
 from app.session import History, RecordingFacts, Session
 from app.solving import check_clicks
 from app.view import Reference, shown_calibration, view

@@ -269,7 +269,7 @@ def test_a_late_error_is_one_line_and_exit_code_2(
     monkeypatch.setattr("webbrowser.open", lambda _: link_is_out.set())
     monkeypatch.setattr("calib_core.recordings.open_recording", slow_and_wrong)
     (tmp_path / "holiday.bag").write_bytes(b"GIF89a")
-    assert run(["open", str(tmp_path / "holiday.bag"), "--port", "0"]) == 2
+    assert run(["open", str(tmp_path / "holiday.bag"), "--port", "0", "--on-problem", "exit"]) == 2
     printed = capsys.readouterr()
     assert printed.err == "cocalib: holiday.bag: not a recording\n"
     assert "Open http://" in printed.out

@@ -1,0 +1,240 @@
+// @ts-check
+/**
+ * Choosing what is opened and how: the dialog behind "Recording…", which the server also opens with a question, the strip on a
+ * recording without intrinsics, and camera files dropped on the page.
+ */
+
+import { drawIntrinsics, drawOthers, drawSession, drawTopics } from "./opening_parts.js";
+import { make, toast } from "./notices.js";
+import { send, tell, unconfirmed } from "./socket.js";
+import { on, state } from "./state.js";
+
+/** @typedef {import("./messages.js").OpeningChoices} Choices */
+/** What the user has chosen in the dialog so far. @typedef {{recent: string, paths: Set<string>, radar: string|null, image: string|null, intrinsics: "keep"|"recorded"|"near"|"file", file: {name: string, data: string, camera: string}|null, session: "continue"|"new"|"copy"}} Draft */
+
+/** Files of intrinsics have a few kB; the server refuses more than this as well. */
+const MAX_FILE_BYTES = 512 * 1024;
+const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("opening-dialog"));
+const pane = /** @type {HTMLElement} */ (document.getElementById("picture-pane"));
+const strip = make("div", "", "");
+/** @type {Choices|null} */
+let choices = null;
+/** @type {Draft} */
+let draft = emptyDraft();
+/** @type {import("./messages.js").FolderListing|null} */
+let folder = null;
+let problem = "";
+let busy = false;
+/** Called with the next choices. @type {(() => void)[]} */
+let waiting = [];
+
+export function startOpening() {
+  strip.id = "intrinsics-strip";
+  strip.hidden = true;
+  pane.append(strip);
+  on(["recording"], drawStrip);
+  on(["opening", "recording"], () => {
+    document.body.classList.remove("asking");
+    busy = false;
+    if (dialog.open) dialog.close();
+  });
+  dialog.addEventListener("cancel", (event) => {
+    if (!choices?.is_open) event.preventDefault(); // there is nothing behind it
+  });
+  window.addEventListener("dragover", (event) => {
+    if (!carriesFile(event)) return;
+    event.preventDefault();
+    document.body.classList.add("dropping");
+  });
+  for (const end of ["dragleave", "drop"]) window.addEventListener(end, () => document.body.classList.remove("dropping"));
+  window.addEventListener("drop", (event) => {
+    if (!carriesFile(event)) return;
+    event.preventDefault();
+    const file = event.dataTransfer?.files[0];
+    if (file) give(file);
+  });
+}
+
+/** @param {DragEvent} event */
+const carriesFile = (event) => Array.from(event.dataTransfer?.types ?? []).includes("Files");
+
+/** @returns {Draft} */
+function emptyDraft() {
+  return { recent: "", paths: new Set(), radar: null, image: null, intrinsics: "keep", file: null, session: "continue" };
+}
+
+/** Whether the server has opened another recording, or this one in another way: the page then starts again, once all is confirmed. @param {import("./messages.js").RecordingNote} message */
+export function isAnother(message) {
+  const before = state.recording;
+  if (!before || before.opening === message.opening) return false;
+  const same = before.frame_times.sec.length === message.frame_times.sec.length && before.start.sec === message.start.sec && before.start.nanosec === message.start.nanosec;
+  if (!same) sessionStorage.removeItem("cocalib-frame");
+  const again = () => (unconfirmed() ? setTimeout(again, 50) : location.reload());
+  again();
+  return true;
+}
+
+/** @param {Choices} message */
+export function takeChoices(message) {
+  const isNew = message.question !== choices?.question;
+  choices = message;
+  if (isNew) {
+    draft = { ...emptyDraft(), radar: message.radar_topic, image: message.image_topic };
+    folder = null;
+    busy = false;
+    problem = "";
+  }
+  for (const ready of waiting.splice(0)) ready();
+  if (!message.is_open) {
+    document.body.classList.add("asking");
+    if (message.root && !folder) tell({ type: "folder", path: "" });
+    draw();
+    if (!dialog.open) dialog.showModal();
+  } else if (dialog.open) draw();
+}
+
+/** @param {import("./messages.js").FolderListing} message */
+export function takeFolder(message) {
+  folder = message;
+  if (dialog.open) draw();
+}
+
+/** Ask what can be chosen, and show it. */
+export async function chooseRecording() {
+  if (dialog.open) return;
+  if (!(await known())) return;
+  if (choices?.root && !folder) tell({ type: "folder", path: "" });
+  draw();
+  dialog.showModal();
+}
+
+/** Wait for the present choices. @returns {Promise<boolean>} whether the server can be asked */
+async function known() {
+  if (!tell({ type: "choices" })) {
+    toast("Not connected to the server.", "Try again when it is back.");
+    return false;
+  }
+  await new Promise((ready) => waiting.push(() => ready(true)));
+  return true;
+}
+
+function draw() {
+  if (!choices) return;
+  const title = make("h2", "", choices.is_open || !choices.name ? "Recording" : `${choices.name} cannot be opened as it is`);
+  title.id = "opening-title";
+  title.tabIndex = -1;
+  title.autofocus = true;
+  const words = problem || choices.problem;
+  const box = make("p", "problem", words);
+  box.setAttribute("role", "alert");
+  box.hidden = !words;
+  const tools = { choices, draft, folder, redraw: draw, give, choose, enter, forget };
+  const parts = choices.name ? [drawTopics(tools, "radar"), drawTopics(tools, "image"), drawIntrinsics(tools), drawSession(tools)] : [];
+  const scrolled = dialog.querySelector(".parts")?.scrollTop ?? 0;
+  dialog.replaceChildren(make("header", "", [title, close()]), box, make("div", "parts", [...parts, drawOthers(tools)]), footer());
+  /** @type {HTMLElement} */ (dialog.querySelector(".parts")).scrollTop = scrolled;
+}
+
+function close() {
+  const button = make("button", "icon close", "×");
+  button.setAttribute("aria-label", "Close");
+  button.onclick = () => dialog.close();
+  button.hidden = !choices?.is_open;
+  return button;
+}
+
+function footer() {
+  const another = draft.recent !== "" || draft.paths.size > 0;
+  const open = make("button", "primary", busy ? "Opening…" : another || !choices?.is_open ? "Open" : "Open again this way");
+  open.disabled = busy || (!another && !choices?.name);
+  open.onclick = choose;
+  const kept = choices?.is_open ? "Clicks are on disk; they stay where the frames are the same." : "";
+  return make("footer", "", [make("span", "", kept), open]);
+}
+
+/** Send what was chosen; words that refuse it are shown in the dialog, and nothing has changed. */
+async function choose() {
+  if (!choices || busy) return;
+  busy = true;
+  problem = "";
+  draw();
+  const { recent, paths, radar, image, intrinsics, file, session } = draft;
+  const answer = crypto.getRandomValues(new Uint32Array(4)).join("-");
+  const refused = await send({ type: "open_with", question: choices.question, answer, recent, paths: [...paths], radar_topic: radar, image_topic: image, intrinsics, file, session });
+  if (refused === null) return;
+  busy = false;
+  problem = refused;
+  if (dialog.open) return draw();
+  toast(refused);
+}
+
+/** Use a file of intrinsics: in the dialog it is chosen, outside it is used at once. @param {File} file */
+async function give(file) {
+  const refuse = (/** @type {string} */ words) => {
+    problem = words;
+    if (dialog.open) draw();
+    else toast(words);
+  };
+  if (file.size > MAX_FILE_BYTES) return refuse(`${file.name} has ${(file.size / 1e6).toFixed(1)} MB, and a file of intrinsics has a few kB. Drop the YAML, XML or JSON file of the camera.`);
+  const data = await content(file);
+  if (data === null) return refuse(`${file.name} cannot be read by the browser; a folder cannot be dropped. Choose the file itself.`);
+  problem = "";
+  if (!dialog.open && !(await known())) return;
+  draft.intrinsics = "file";
+  draft.file = { name: file.name, data, camera: "" };
+  if (dialog.open) draw();
+  else choose();
+}
+
+/** The bytes of a file in base 64; null if they cannot be read. @param {File} file @returns {Promise<string|null>} */
+function content(file) {
+  return new Promise((ready) => {
+    const reader = new FileReader();
+    reader.onload = () => ready(String(reader.result).replace(/^[^,]*,/, ""));
+    reader.onerror = () => ready(null);
+    reader.readAsDataURL(file);
+  });
+}
+
+/** Look into a folder. @param {string} path */
+function enter(path) {
+  if (!tell({ type: "folder", path })) toast("Not connected to the server.");
+}
+
+async function forget() {
+  const refused = await send({ type: "forget_recent" });
+  if (refused) toast(refused);
+}
+
+/** What is missing or unclear about the recording: intrinsics, or which radar is meant. */
+function drawStrip() {
+  const recording = state.recording;
+  strip.hidden = true;
+  if (!recording) return;
+  const radars = recording.warnings.find((warning) => warning.code === "several-radars");
+  if (recording.has_pictures && !recording.intrinsics) askIntrinsics();
+  else if (radars && !recording.session.restored_clicks) askRadar(radars.message);
+}
+
+/** @param {string} message */
+function askRadar(message) {
+  const pick = make("button", "chip", "Choose…");
+  pick.onclick = chooseRecording;
+  const close = make("button", "chip", "Keep it");
+  close.onclick = () => (strip.hidden = true);
+  strip.replaceChildren(make("span", "", message), pick, close);
+  strip.hidden = false;
+}
+
+function askIntrinsics() {
+  strip.hidden = false;
+  const input = make("input", "", "");
+  input.type = "file";
+  input.hidden = true;
+  input.onchange = () => input.files?.[0] && give(input.files[0]);
+  const pick = make("button", "chip", "Choose file…");
+  pick.onclick = () => input.click();
+  const others = make("button", "chip", "More…");
+  others.onclick = chooseRecording;
+  strip.replaceChildren(make("span", "", [make("strong", "", "No camera intrinsics. "), "Click already; the pose comes once you drop the camera file here."]), pick, others, input);
+}

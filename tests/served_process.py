@@ -1,0 +1,77 @@
+"""Run `cocalib open` in its own process, as a user does; its address is used as that of a RunningServer."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["ServedProcess", "served_process"]
+
+
+@dataclass(slots=True)
+class ServedProcess:
+    """A running command.
+
+    Attributes:
+        process: it.
+        url: the link that it printed.
+    """
+
+    process: "subprocess.Popen[str]"
+    url: str
+
+    @property
+    def origin(self) -> str:
+        """The address without a token."""
+        return self.url.partition("/?")[0]
+
+    @property
+    def port(self) -> int:
+        """The port that it serves on."""
+        return int(self.origin.rpartition(":")[2])
+
+    def stop(self) -> tuple[int, str]:
+        """End it as Ctrl+C does; return its exit code and what it printed since the link."""
+        self.process.send_signal(signal.SIGINT)
+        printed = self.process.communicate(timeout=60)[0]
+        return self.process.returncode, printed
+
+
+@contextmanager
+def served_process(*arguments: object, state: Path) -> Iterator[ServedProcess]:
+    """Start the command, and wait for its link; it is ended with the `with` block.
+
+    Args:
+        arguments: those after `cocalib open`.
+        state: the folder for its state.
+    """
+    program = (
+        "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\nfrom app.__main__ import main\nmain()"
+    )
+    command = [sys.executable, "-c", program, "open", *map(str, arguments), "--no-browser", "--port", "0"]
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1", "XDG_STATE_HOME": str(state)},
+    )
+    try:
+        assert process.stdout is not None
+        printed = []
+        for line in process.stdout:
+            printed.append(line)
+            if found := re.search(r"Open (http\S+)", line):
+                yield ServedProcess(process, found[1])
+                break
+        else:
+            raise AssertionError(f"no link was printed: {''.join(printed)}")
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
