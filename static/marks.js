@@ -27,7 +27,7 @@ export function drawMarks(pen) {
   const overlay = state.overlay?.index === index ? state.overlay : null;
   if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
   if (state.layers.predictions && overlay) for (const [u, v, range] of overlay.guesses) if (isOpen(index, range)) drawGuess(pen, u, v);
-  if (state.layers.predictions && state.view?.advice) drawAdvice(pen, state.view.advice);
+  if (state.layers.predictions && state.view?.advice && !state.view.verdict.done) drawAdvice(pen, state.view.advice);
   const here = clicks();
   if (state.layers.others) for (const click of here) if (click.frame !== index) drawOther(pen, click);
   for (const click of clicksIn(index)) drawClick(pen, click);

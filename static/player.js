@@ -133,7 +133,7 @@ export async function receiveFrame(header, data) {
   if (stale) return;
   const shown = { index: header.index, ...(await decoded(header, data)) };
   keep(shown);
-  const wanted = moving ? header.index > (state.shown?.index ?? -1) || header.request === newest : header.index === state.cursor;
+  const wanted = state.playing || state.live ? header.index > (state.shown?.index ?? -1) || header.request === newest : header.index === state.cursor;
   if (wanted) show(shown);
 }
 

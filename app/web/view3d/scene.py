@@ -203,7 +203,7 @@ class TabScene:
     def _show_advice(self, sight: Sight) -> None:
         """Draw a ring around the best next placement."""
         advice = sight.view.advice
-        if advice is None or advice.may_stop:
+        if advice is None or advice.may_stop or sight.view.verdict.done:
             self._next.visible = False
             return
         place = np.array(advice.position_radar_m)
