@@ -1,12 +1,16 @@
 """Signals that end the program: Ctrl+C, SIGTERM and SIGHUP all end it in order, once."""
 
 import signal
+import sys
 import threading
+from collections.abc import Callable
+from functools import partial
 from types import FrameType
 
 __all__ = ["stop_on_signals"]
 
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # Windows has no SIGHUP
+_AGAIN_S = 0.02
 
 
 def stop_on_signals() -> None:
@@ -17,15 +21,42 @@ def stop_on_signals() -> None:
     """
     if threading.current_thread() is not threading.main_thread():
         return
-    for number in _numbers():
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _stop)
+    heard = [number for number in _numbers() if signal.getsignal(number) is not signal.SIG_IGN]
+    for number in heard:
+        signal.signal(number, _stop)
+    sys.unraisablehook = partial(_unraisable, sys.unraisablehook, heard)
 
 
 def _stop(number: int, _: FrameType | None) -> None:
     for other in _numbers():
         signal.signal(other, signal.SIG_IGN)
     raise KeyboardInterrupt(number)
+
+
+def _unraisable(
+    usual: Callable[["sys.UnraisableHookArgs"], object],
+    heard: list[signal.Signals],
+    found: "sys.UnraisableHookArgs",
+) -> None:
+    """Send a signal again that came while an object was being deleted: Python drops what is raised there."""
+    interrupt = found.exc_value
+    if not isinstance(interrupt, KeyboardInterrupt) or not interrupt.args:
+        usual(found)
+        return
+    for number in heard:
+        signal.signal(number, _stop)
+    again = threading.Timer(_AGAIN_S, partial(_send_again, interrupt.args[0]))
+    again.daemon = True
+    again.start()
+
+
+def _send_again(number: int) -> None:
+    """Send a signal to the main thread; it also wakes it, where the system can do that."""
+    main = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main is not None:
+        signal.pthread_kill(main, number)
+    else:
+        signal.raise_signal(number)
 
 
 def _numbers() -> list[signal.Signals]:
