@@ -10,7 +10,7 @@ from calib_core.results import Calibration
 __all__ = ["StatedError", "stated_error"]
 
 _BEYOND = 0.05 / 3.0  # rotation, position and picture hold together, so each may fail in a third of the 5 %
-_MOST_FREEDOM = 1e5
+_LEAST_FREEDOM, _MOST_FREEDOM = 0.5, 1e5
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +55,15 @@ def stated_error(calibration: Calibration) -> StatedError:
     turned = pose.rotation.T
     to_centre = np.concatenate([-turned, -turned @ skew(pose.translation_m)], axis=1)
     about_axes = np.concatenate([np.zeros((3, 3)), turned], axis=1)[2 if in_plane else 0 :]
-    position_m = _radius(to_centre @ calibration.covariance @ to_centre.T, freedom)
-    picture_px2 = calibration.metrics.picture_sigma_px**2 * np.eye(2)
+    with np.errstate(over="ignore", invalid="ignore"):  # a file may state any number: beyond all numbers is infinite
+        of_centre = to_centre @ calibration.covariance @ to_centre.T
+        of_axes = about_axes @ calibration.covariance @ about_axes.T
+    position_m = _radius(of_centre, freedom)
+    picture_px2 = np.float64(calibration.metrics.picture_sigma_px) ** 2 * np.eye(2)
     ranges_m = [float(np.linalg.norm(pair.point_radar_m)) for pair in calibration.pairs if pair.inlier]
     known = bool(ranges_m) and bool(np.isfinite(picture_px2).all())
     return StatedError(
-        rotation_deg=_rounded_up(np.rad2deg(_radius(about_axes @ calibration.covariance @ about_axes.T, freedom))),
+        rotation_deg=_rounded_up(np.rad2deg(_radius(of_axes, freedom))),
         position_cm=float("nan") if in_plane else _rounded_up(100.0 * position_m),
         picture_px=_rounded_up(_radius(picture_px2, freedom)) if known else float("nan"),
         range_m=float(np.median(ranges_m)) if known else float("nan"),
@@ -75,7 +78,9 @@ def _freedom(quantile_95: float) -> float:
 
     if not quantile_95 > 6.0 * fdtri(6.0, _MOST_FREEDOM, 0.95):
         return _MOST_FREEDOM
-    return float(brentq(lambda nu: 6.0 * fdtri(6.0, nu, 0.95) - quantile_95, 0.5, _MOST_FREEDOM))
+    if quantile_95 >= 6.0 * fdtri(6.0, _LEAST_FREEDOM, 0.95):
+        return _LEAST_FREEDOM
+    return float(brentq(lambda nu: 6.0 * fdtri(6.0, nu, 0.95) - quantile_95, _LEAST_FREEDOM, _MOST_FREEDOM))
 
 
 def _radius(covariance: np.ndarray, freedom: float) -> float:
@@ -86,16 +91,22 @@ def _radius(covariance: np.ndarray, freedom: float) -> float:
     """
     from scipy.special import fdtri
 
-    trace = float(np.trace(covariance))
+    if not np.isfinite(covariance).all():
+        return float("inf")
+    largest = float(np.abs(covariance).max())
+    if largest <= 0.0:
+        return 0.0
+    scaled = covariance / largest
+    trace = float(np.trace(scaled))
     if trace <= 0.0:
         return 0.0
-    effective = trace**2 / float((covariance**2).sum())
-    return float(np.sqrt(trace * fdtri(effective, freedom, 1.0 - _BEYOND)))
+    effective = trace**2 / float((scaled**2).sum())
+    return float(np.sqrt(trace * fdtri(effective, freedom, 1.0 - _BEYOND)) * np.sqrt(largest))
 
 
 def _rounded_up(value: float) -> float:
     """Round up to two digits, so that a figure never states less than the covariance."""
-    if value <= 0.0:
-        return 0.0
+    if value <= 0.0 or not np.isfinite(value):
+        return max(value, 0.0)
     step = 10.0 ** (np.floor(np.log10(value)) - 1.0)
     return float(f"{np.ceil(value / step - 1e-9) * step:.3g}")

@@ -45,6 +45,7 @@ _CONTRADICTIONS = ("mirrored-axes", "no-pose", "camera-position-contradicted", "
 _ABOUT_FIGURES = ("weak-geometry", "few-pairs")
 _MORE_PAIRS_HELP = (*_ABOUT_FIGURES, "one-pair-decides")
 _BETWEEN = {"good": " to ", "usable": " to ", "nothing": " yet: "}
+_LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e12
 _CORNER = "the reflector's inner corner, where its three sheets meet"
 DONE = "Done: export the calibration"
 """The action when nothing more is needed."""
@@ -100,7 +101,7 @@ def verdict_on(outcome: Calibration | Unsolvable | None, *, left: int | None = N
     if unconfirmed:
         reason = f"{unconfirmed} of the recording's units or axes {'is' if unconfirmed == 1 else 'are'} assumed, not confirmed"
         return Verdict("weak", reason, "Confirm what is assumed about the recording, or state what is right")
-    if not np.isfinite(outcome.covariance).all():
+    if not _states_error(outcome):
         return _without_covariance(outcome, warning)
     return _judged(outcome, stated_error(outcome), warning, left)
 
@@ -116,6 +117,14 @@ def placement_words(best: NextPlacement) -> str:
 
 def _capitalized(phrase: str) -> str:
     return phrase[:1].upper() + phrase[1:]
+
+
+def _states_error(calibration: Calibration) -> bool:
+    """Return whether the covariance can be one of a pose in metres and radians; a file may state anything."""
+    variances = np.diag(calibration.covariance)
+    return bool(np.isfinite(calibration.covariance).all()) and bool(
+        ((variances > _LEAST_VARIANCE) & (variances < _MOST_VARIANCE)).all()
+    )
 
 
 def _without_covariance(calibration: Calibration, warning: DataWarning | None) -> Verdict:

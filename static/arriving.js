@@ -17,6 +17,8 @@ export function startArriving() {
 
 /** What is shown around an expected reflector is this part of the picture. */
 const PART = 1 / 6;
+/** A view in which that part is at least so wide is close enough already. */
+const NEAR = 0.4;
 /** Whether to zoom in where the reflector is expected. */
 let closely = false;
 
@@ -39,7 +41,7 @@ function arrive() {
   const [u, v] = expectedHere() ?? state.overlay.guesses[0] ?? [];
   if (u === undefined || v === undefined) return whole();
   const wide = viewport.imageWidth * PART;
-  if (closely && zoom() * wide < viewport.width * 0.8) lookInto(u, v, wide, viewport.imageHeight * PART);
+  if (closely && zoom() * wide < viewport.width * NEAR) lookInto(u, v, wide, viewport.imageHeight * PART);
   centre(u, v);
 }
 

@@ -6,6 +6,7 @@
 
 import { themeColour } from "./colours.js";
 import { hideTip, make, showTip } from "./notices.js";
+import { arrow, diamond, ticks, words } from "./plot_shapes.js";
 
 /** @typedef {"agreeing"|"outlier"|"excluded"|"untouched"} Kind */
 /** A mark; beyond the axis it is drawn at the edge. @typedef {{ids: string[], x: number, y: number, kind: Kind, text: string}} Mark */
@@ -279,35 +280,4 @@ export class Plot {
     else return;
     event.preventDefault();
   }
-}
-
-/** Round values on an axis, about so many. @param {Axis} axis @param {number} count @returns {number[]} */
-export function ticks(axis, count) {
-  const span = axis.high - axis.low;
-  if (!(span > 0) || !Number.isFinite(span)) return [];
-  const power = 10 ** Math.floor(Math.log10(span / count));
-  const step = ([1, 2, 5, 10].find((factor) => span / (factor * power) <= count) ?? 10) * power;
-  const first = Math.ceil(axis.low / step - 1e-9);
-  const last = Math.floor(axis.high / step + 1e-9);
-  return Array.from({ length: last - first + 1 }, (_, index) => (first + index) * step);
-}
-
-/** A number as a tick: without noise of the last digits. @param {number} value */
-const words = (value) => String(Number(value.toPrecision(6))).replace("-", "−");
-
-/** @param {CanvasRenderingContext2D} pen @param {number} x @param {number} y @param {number} size */
-function diamond(pen, x, y, size) {
-  pen.moveTo(x, y - size);
-  pen.lineTo(x + size, y);
-  pen.lineTo(x, y + size);
-  pen.lineTo(x - size, y);
-  pen.closePath();
-}
-
-/** A mark beyond the axis. @param {CanvasRenderingContext2D} pen @param {number} x @param {number} y @param {number} size @param {number} up */
-function arrow(pen, x, y, size, up) {
-  pen.moveTo(x, y - up * size * 0.4);
-  pen.lineTo(x + size, y + up * size);
-  pen.lineTo(x - size, y + up * size);
-  pen.closePath();
 }

@@ -5,6 +5,7 @@ import { comeTo } from "./arriving.js";
 import { showTab } from "./layout.js";
 import { make } from "./notices.js";
 import { pairParts } from "./review_pair.js";
+import { count, digits, spread, told } from "./review_words.js";
 import { Plot } from "./plots.js";
 import { tell } from "./socket.js";
 import { clicks, on, select, state } from "./state.js";
@@ -254,28 +255,6 @@ function influences(drawn) {
   const high = 1.12 * Math.max(0.1, ...marks.map((mark) => mark.y));
   return { marks, x: { label: "pair, in order of time", ...spread(marks.map((mark) => mark.x)) }, y: { label: "pose moves without it [σ]", low: 0, high }, bar: 0, curve: [], limit: null, empty: "this method states none" };
 }
-
-/** Limits of an axis, a little beyond its values. @param {number[]} values */
-function spread(values) {
-  if (!values.length) return { low: 0, high: 1 };
-  const [low, high] = [Math.min(...values), Math.max(...values)];
-  const margin = 0.05 * (high - low) || 0.5;
-  return { low: low - margin, high: high + margin };
-}
-
-/** A pair in one line. @param {Row} row */
-function told(row) {
-  const { click } = row;
-  const side = (/** @type {number|null} */ angle, /** @type {string} */ plus, /** @type {string} */ minus) => `${Math.abs(angle ?? 0).toFixed(1)}° ${(angle ?? 0) >= 0 ? plus : minus}`;
-  const more = [row.heldOut === null ? "" : `held out ${digits(row.heldOut)} px`, row.influence === null ? "" : `influence ${digits(row.influence)} σ`];
-  return [`${click.id}: ${digits(row.length)} px`, `${click.range_m?.toFixed(1)} m, ${side(click.azimuth_deg, "left", "right")}`, ...more.filter(Boolean)].join(" · ");
-}
-
-/** Three significant digits. @param {number} value */
-const digits = (value) => (Math.abs(value) < 0.995 ? String(Number(value.toFixed(2))) : String(Number(value.toPrecision(3))));
-
-/** @param {number} number */
-const count = (number) => `${number} pair${number === 1 ? "" : "s"}`;
 
 /** @param {Mark|null} mark */
 function hovered(mark) {

@@ -7,7 +7,7 @@ import { listen } from "./keys.js";
 import { icon, make } from "./notices.js";
 import { tellCursor } from "./player.js";
 import { tab, tell } from "./socket.js";
-import { candidates, frameShown, itemAt, lookShown, mark, onDrawn, pickable, pickedWords, pictureBox, redraw, startLayer, takeLook } from "./space_layer.js";
+import { candidates, frameShown, itemAt, layer, lookShown, mark, onDrawn, pickable, pickedWords, pictureBox, redraw, startLayer, takeLook } from "./space_layer.js";
 import { changeSpace, spaceColour, spaceOptions } from "./space_options.js";
 import { clicks, on, select, state } from "./state.js";
 
@@ -38,6 +38,7 @@ const LATEST = 3000;
 const pace = { playing: false, every: 1000, holdUntil: 0 };
 const cameraChip = chip("Camera", "The page's own picture with the radar returns in front of it, through the same lens.", () => setCamera(!spaceOptions.camera));
 const largeChip = chip("", "Enlarge the 3D view (B)", toggleLarge);
+largeChip.setAttribute("aria-label", "Enlarge the 3D view");
 const hideChip = chip("Hide 3D", "Hide the 3D view; it then costs nothing (V)", toggleHidden);
 const trailChip = chip("", "For how long returns stay; they fade with age. Click for longer.", nextTrail);
 const colours = make("select", "chip", COLOURS.map(([value, label]) => { const option = make("option", "", label); option.value = value; return option; }));
@@ -55,13 +56,13 @@ export function startSpace() {
   startChips();
   startLayer(frame);
   frame.addEventListener("load", () => {
-    if (frame.contentWindow) {
+    if (frame.contentWindow && frame.contentDocument) {
       listen(frame.contentWindow);
       follow(frame.contentWindow);
     }
     tint();
   });
-  follow(/** @type {HTMLElement} */ (document.getElementById("space-layer")));
+  follow(layer);
   on(["theme"], tint);
   on(["recording", "layers"], () => (arrange(), drawBar()));
   on(["cursor", "shown"], drawStanding);

@@ -13,8 +13,8 @@ import { clicks, on, state } from "./state.js";
 /** @typedef {import("./space_picking.js").Item} Item */
 /** @typedef {import("./messages.js").SpaceLook} Look */
 const pane = /** @type {HTMLElement} */ (document.getElementById("space"));
-const canvas = document.createElement("canvas");
-const pen = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+export const layer = document.createElement("canvas");
+const pen = /** @type {CanvasRenderingContext2D} */ (layer.getContext("2d"));
 const [LABEL_HIGH, RING, DOT] = [15, 8, 3.8];
 /** So many looks are kept until the 3D view has drawn them. */
 const MOST_LOOKS = 8;
@@ -29,8 +29,8 @@ let waiting = false;
 
 /** @param {HTMLIFrameElement} frame */
 export function startLayer(frame) {
-  canvas.id = "space-layer";
-  frame.after(canvas);
+  layer.id = "space-layer";
+  frame.after(layer);
   frame.addEventListener("load", () => hookUp(frame));
   new ResizeObserver(() => (drawAgain(), redraw())).observe(pane);
   on(["theme", "selected", "view", "placements", "candidates"], redraw);
@@ -80,13 +80,13 @@ export const onDrawn = (listener) => (told = listener);
 export function pictureBox() {
   const shown = state.shown;
   if (!shown) return null;
-  const scale = Math.min(canvas.clientWidth / shown.width, canvas.clientHeight / shown.height);
-  return { left: (canvas.clientWidth - shown.width * scale) / 2, top: (canvas.clientHeight - shown.height * scale) / 2, scale };
+  const scale = Math.min(layer.clientWidth / shown.width, layer.clientHeight / shown.height);
+  return { left: (layer.clientWidth - shown.width * scale) / 2, top: (layer.clientHeight - shown.height * scale) / 2, scale };
 }
 
 /** From a thing's place in space and its pixel to CSS px of the view. @returns {((position: readonly number[], pixel: readonly (number|null)[]|null) => [number, number]|null)|null} */
 function placing() {
-  if (!spaceOptions.camera) return projection(canvas.clientWidth, canvas.clientHeight);
+  if (!spaceOptions.camera) return projection(layer.clientWidth, layer.clientHeight);
   const box = pictureBox();
   if (!box) return null;
   return (_position, pixel) => (pixel && pixel[0] !== null && pixel[1] !== null ? [box.left + (pixel[0] + 0.5) * box.scale, box.top + (pixel[1] + 0.5) * box.scale] : null);
@@ -100,7 +100,7 @@ export function pickable() {
   const made = /** @type {Item[]} */ ([]);
   /** @param {Item["kind"]} kind @param {number} index @param {[number, number]|null} at @param {string} key @param {() => string} words */
   const add = (kind, index, at, key, words) => {
-    if (at && at[0] >= 0 && at[1] >= 0 && at[0] <= canvas.clientWidth && at[1] <= canvas.clientHeight) made.push({ kind, index, x: at[0], y: at[1], key, get words() { return words(); } });
+    if (at && at[0] >= 0 && at[1] >= 0 && at[0] <= layer.clientWidth && at[1] <= layer.clientHeight) made.push({ kind, index, x: at[0], y: at[1], key, get words() { return words(); } });
   };
   look.returns.forEach((seen, index) => add("return", index, place(seen.slice(0, 3).map(Number), [seen[10], seen[11]]), `return ${seen.slice(0, 4)}`, () => describeReturn(seen)));
   look.window.forEach((seen, index) => add("window", index, place(seen.slice(0, 3).map(Number), [seen[10], seen[11]]), `return ${seen.slice(0, 4)}`, () => describeReturn(seen)));
@@ -146,8 +146,8 @@ export const pickedWords = () => (marked.picked ? (pickable().find((item) => ite
 
 function draw() {
   const ratio = window.devicePixelRatio || 1;
-  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+  const [width, height] = [layer.clientWidth, layer.clientHeight];
+  if (layer.width !== Math.round(width * ratio) || layer.height !== Math.round(height * ratio)) [layer.width, layer.height] = [Math.round(width * ratio), Math.round(height * ratio)];
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.clearRect(0, 0, width, height);
   const look = lookShown();
@@ -191,7 +191,7 @@ function drawLook(look, place, board) {
 /** The page's own picture, as large as it fits. @param {Look|null} look */
 function drawPicture(look) {
   pen.fillStyle = themeColour("ground");
-  pen.fillRect(0, 0, canvas.clientWidth, canvas.clientHeight);
+  pen.fillRect(0, 0, layer.clientWidth, layer.clientHeight);
   const [box, shown] = [pictureBox(), state.shown];
   if (!box || !shown) return;
   pen.imageSmoothingQuality = state.playing ? "low" : "high";

@@ -29,14 +29,14 @@ class ServingFlags:
     """Serve on a Unix socket that only you can reach, for shared robots; the ssh command that forwards it is printed."""
     no_browser: Switch = False
     """Print the link, do not open a browser."""
-    on_problem: Annotated[Literal["ask", "exit"] | None, called()] = None
-    """What to do if the recording cannot be opened: ask in the page, or exit with code 2; by default ask, but exit
-    with --no-browser if the output is no terminal, as in scripts."""
+    on_problem: Annotated[Literal["auto", "ask", "exit"], called()] = "auto"
+    """What to do if the recording cannot be opened: ask in the page, or exit with code 2; auto asks, but exits with
+    --no-browser if the output is no terminal, as in scripts."""
 
     @property
     def asks(self) -> bool:
         """Whether a recording that cannot be opened leads to a question in the page; otherwise it ends the command."""
-        if self.on_problem is not None:
+        if self.on_problem != "auto":
             return self.on_problem == "ask"
         return not self.no_browser or sys.stdout.isatty()
 

@@ -49,10 +49,13 @@ def test_a_placement_can_be_marked_without_a_mouse(page: Driver, truth: Any) -> 
     page.until("__cocalib.state.placementsKnown")
     page.press("n")
     page.until("__cocalib.state.shown.index === __cocalib.state.placements[0].frame")
-    page.press("Enter")
+    page.press("Enter", "Enter")
+    assert page.view["clicks"] == [], "nothing is expected yet, and the cross was not moved"
+    page.press("ArrowRight", "Enter")
     [first] = page.view["clicks"]
-    assert (first["u_px"], first["v_px"]) == pytest.approx((479.5, 299.5), abs=0.6)
-    page.press("Alt+Shift+ArrowRight", "Enter")
+    assert (first["u_px"], first["v_px"]) == pytest.approx((479.5 + 960 / 60, 299.5), abs=0.6)
+    assert first["mark"] == "clicked"
+    page.press("Alt+Shift+ArrowRight")
     page.until("__cocalib.state.view.revision === 2")
     [moved] = page.view["clicks"]
     assert moved["u_px"] == pytest.approx(first["u_px"] + 1)
@@ -62,10 +65,11 @@ def test_a_placement_can_be_marked_without_a_mouse(page: Driver, truth: Any) -> 
     page.until("__cocalib.state.shown.index === __cocalib.state.placements[8].frame")
     page.until("__cocalib.state.overlay.index === __cocalib.state.shown.index")
     guess = page.value("__cocalib.state.overlay.guesses[0]")
-    page.press("Enter")
+    page.press("Enter", "Enter")
     assert len(page.view["clicks"]) == 9
     last = page.view["clicks"][-1]
-    assert (last["u_px"], last["v_px"]) == pytest.approx(guess)
+    assert (last["u_px"], last["v_px"]) == pytest.approx(guess[:2])
+    assert last["state"] == "untouched"
 
 
 def test_a_failure_of_the_papers_method_is_shown_in_the_warning_box(page: Driver, truth: Any) -> None:

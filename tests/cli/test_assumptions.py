@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from app.cli import open as opening
+from app.opening.choice import Choice
+from app.opening.opened import with_remembered
 from calib_core.recordings import RecordingOptions
 from tests.vendor_recording import STATED, vendor_sample
 
@@ -64,10 +65,11 @@ def test_solve_waits_until_everything_is_confirmed_or_stated(
 def test_open_uses_the_map_that_the_session_remembers_unless_another_is_given(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    radar = (tmp_path / "radar.bag",)
     step = {"n": 1, "step": {"type": "columns_mapped", "column_map": list(STATED)}}
     (tmp_path / "journal.jsonl").write_text(json.dumps(step) + "\n")
-    assert opening._with_remembered(RecordingOptions(), tmp_path, fresh=False).map == STATED
+    assert with_remembered(Choice(radar, session=tmp_path)).map == STATED
     assert "--map azimuth=f_Azimuth:rad" in capsys.readouterr().out
-    assert opening._with_remembered(RecordingOptions(), tmp_path, fresh=True).map == ()
+    assert with_remembered(Choice(radar, session=tmp_path, fresh=True)).map == ()
     given = RecordingOptions(map=("x=posX:m",))
-    assert opening._with_remembered(given, tmp_path, fresh=False) is given
+    assert with_remembered(Choice(radar, topics=given, session=tmp_path)) is given

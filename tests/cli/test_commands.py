@@ -13,8 +13,9 @@ import cv2
 import numpy as np
 import pytest
 
-from app import resources
-from app.cli import open as opening
+from app.cli import demo
+from app.cli.serving_flags import ServingFlags
+from app.opening import Choice, Serving
 from calib_core.geometry import rotation_angle_rad
 from tests.cli.conftest import Made
 
@@ -317,17 +318,18 @@ def test_video_writes_the_camera_and_says_when_it_begins(
 def test_the_demo_of_another_version_has_a_session_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sessions: list[Path] = []
 
-    def serve(_bags: Any, *, session: Path, **_more: Any) -> int:
-        sessions.append(session)
+    def serve(choice: Choice, _serving: Serving) -> int:
+        assert choice.session is not None
+        sessions.append(choice.session)
         return 0
 
-    monkeypatch.setattr(opening, "_serve", serve)
+    monkeypatch.setattr("app.opening.serve", serve)
     for sample in ("first", "first", "second"):
         (tmp_path / sample / "rooftop").mkdir(parents=True, exist_ok=True)
         for bag in ("radar.bag", "camera.bag"):
             (tmp_path / sample / "rooftop" / bag).write_text(f"{bag} of the {sample} version")
-        monkeypatch.setattr(resources, "sample_folder", partial(tmp_path.__truediv__, sample))
-        assert opening.Demo().run() == 0
+        monkeypatch.setattr(demo, "sample_folder", partial(tmp_path.__truediv__, sample))
+        assert demo.Demo(serving=ServingFlags(no_browser=True, port=0)).run() == 0
     assert sessions[0] == sessions[1]
     assert sessions[2] != sessions[0]
 

@@ -37,7 +37,7 @@ CLICKS = tuple(ReflectorClick(TimeNs(index), f"c{index}", 10.0, 10.0) for index 
 @pytest.fixture
 def ask(project_root: Path) -> Callable[[Session, str], Reply]:
     def answer(session: Session, address: str) -> Reply:
-        workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive 7.mcap"))
+        workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive 7.mcap"), camera_file=None)
         hub: Any = SimpleNamespace(survey=None)
         routes = Routes(project_root / "static")
         routes.admit(workspace, PictureRecording(grey_pictures(1)), hub)
