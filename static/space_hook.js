@@ -15,9 +15,18 @@ let viser = null;
 /** @type {any} */
 let hookedScene = null;
 
+/** A frame whose page could not be loaded shows a page of the browser's, which nothing can be read from. @param {any} owner */
+function partsOf(owner) {
+  try {
+    return owner?.__viserMutable;
+  } catch {
+    return undefined;
+  }
+}
+
 /** What the 3D view in a window lacks, in words; empty if everything is there. @param {any} owner @returns {string[]} */
 export function missingParts(owner) {
-  const found = owner?.__viserMutable;
+  const found = partsOf(owner);
   if (!found) return ["window.__viserMutable"];
   const elements = (/** @type {any} */ matrix) => matrix?.elements?.length === 16;
   const parts = {

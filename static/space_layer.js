@@ -39,7 +39,7 @@ export function startLayer(frame) {
 
 /** @param {HTMLIFrameElement} frame */
 async function hookUp(frame) {
-  const missing = frame.contentWindow ? await hookInto(frame.contentWindow, redraw) : ["the frame"];
+  const missing = frame.contentDocument && frame.contentWindow ? await hookInto(frame.contentWindow, redraw) : ["the frame"];
   if (missing.length) console.info(`The 3D view has no labels and nothing can be picked in it: viser has no ${missing.join(", ")}.`);
   redraw();
 }
