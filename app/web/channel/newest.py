@@ -31,7 +31,7 @@ class NewestWins(Generic[Item]):
     def give(self, item: Item) -> None:
         """Process this as soon as the current item is done."""
         self._next = [item]
-        if self._task is None:
+        if self._task is None or self._task.done():  # done, but its callback has not run yet: it takes no more items
             self._task = asyncio.get_running_loop().create_task(self._run())
             self._task.add_done_callback(self._ended)
 
@@ -46,5 +46,6 @@ class NewestWins(Generic[Item]):
             with error_boundary("a picture or drawing for a page", self._tell):
                 await self._work(self._next.pop())
 
-    def _ended(self, _task: "asyncio.Task[None]") -> None:
-        self._task = None
+    def _ended(self, task: "asyncio.Task[None]") -> None:
+        if self._task is task:
+            self._task = None
