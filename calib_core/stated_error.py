@@ -59,7 +59,8 @@ def stated_error(calibration: Calibration) -> StatedError:
         of_centre = to_centre @ calibration.covariance @ to_centre.T
         of_axes = about_axes @ calibration.covariance @ about_axes.T
     position_m = _radius(of_centre, freedom)
-    picture_px2 = np.float64(calibration.metrics.picture_sigma_px) ** 2 * np.eye(2)
+    common_px = calibration.options.reflector.click_offset_sigma_px  # the pose follows what all clicks are off by
+    picture_px2 = (np.float64(calibration.metrics.picture_sigma_px) ** 2 + common_px**2) * np.eye(2)
     ranges_m = [float(np.linalg.norm(pair.point_radar_m)) for pair in calibration.pairs if pair.inlier]
     known = bool(ranges_m) and bool(np.isfinite(picture_px2).all())
     return StatedError(
