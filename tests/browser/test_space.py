@@ -107,8 +107,9 @@ def choosing(page: Driver) -> None:
 
 def hidden_and_enlarged(page: Driver) -> None:
     """Hidden it takes no room and gets nothing; enlarged it takes the place of the picture; both are remembered."""
+    box = "JSON.stringify(document.getElementById('%s').getBoundingClientRect())"
     page.press("b")
-    page.until("document.getElementById('space').clientWidth > 700")
+    page.until(f"{box % 'space'} === {box % 'picture-pane'}")
     page.press("v")
     page.until("document.getElementById('space').clientHeight < 40")
     before = page.value("__cocalibSpace.lookShown().number")
