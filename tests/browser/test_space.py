@@ -188,6 +188,13 @@ def test_without_pictures_returns_and_placements_can_be_picked_too(
     page.until("__cocalib.state.cursor > 0 && __cocalibSpace.frameShown() === __cocalib.state.cursor")
 
 
+def test_before_a_pose_the_camera_view_says_why_there_are_no_returns(page: Driver) -> None:
+    page.page.click("#space-camera")
+    page.until("document.querySelector('.space-readout').textContent.startsWith('No pose yet')")
+    page.page.click("#space-camera")
+    page.until("document.querySelector('.space-readout').textContent === ''")
+
+
 def test_the_mathematics_of_picking_and_of_range_numbers(page: Driver) -> None:
     found = page.page.evaluate(PICKING)
     assert found["nearest"] == "placement"
