@@ -11,6 +11,7 @@ __all__ = ["StatedError", "stated_error"]
 
 _BEYOND = 0.05 / 3.0  # rotation, position and picture hold together, so each may fail in a third of the 5 %
 _LEAST_FREEDOM, _MOST_FREEDOM = 0.5, 1e5
+_HALVINGS = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +75,17 @@ def stated_error(calibration: Calibration) -> StatedError:
 
 def _freedom(quantile_95: float) -> float:
     """Return nu, the degrees of freedom that the quantile of the 6 parameters states: 6 F(6, nu) is at most that with 95 %."""
-    from scipy.optimize import brentq
     from scipy.special import fdtri
 
     if not quantile_95 > 6.0 * fdtri(6.0, _MOST_FREEDOM, 0.95):
         return _MOST_FREEDOM
     if quantile_95 >= 6.0 * fdtri(6.0, _LEAST_FREEDOM, 0.95):
         return _LEAST_FREEDOM
-    return float(brentq(lambda nu: 6.0 * fdtri(6.0, nu, 0.95) - quantile_95, _LEAST_FREEDOM, _MOST_FREEDOM))
+    low, high = np.log(_LEAST_FREEDOM), np.log(_MOST_FREEDOM)
+    for _ in range(_HALVINGS):  # 6 F(6, nu) falls with nu; importing scipy.optimize would take a third of a second
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if 6.0 * fdtri(6.0, np.exp(middle), 0.95) > quantile_95 else (low, middle)
+    return float(np.exp(high))
 
 
 def _radius(covariance: np.ndarray, freedom: float) -> float:

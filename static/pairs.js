@@ -181,7 +181,7 @@ function line(click) {
   const bar = make("b", "", "");
   bar.style.width = `${Math.min(100, (100 * (click.residual_px ?? 0)) / LARGE_PX)}%`;
   bar.style.background = colour;
-  const residual = click.residual_px === null || click.state === "untouched" ? word(click) : `${digits(click.residual_px)} px`;
+  const residual = click.residual_px === null || click.state === "untouched" ? word(click) : `${residualLength(click.residual_px)} px`;
   const excluded = click.state === "excluded";
   const act = make("input", "act", []);
   act.type = "checkbox";
@@ -203,6 +203,9 @@ function line(click) {
   row.dataset.hint = explain(click);
   return row;
 }
+
+/** As many decimals as the server sends, one from 1 px on. @param {number} value */
+const residualLength = (value) => (value < 0.995 ? String(value) : value < 99.95 ? value.toFixed(1) : digits(value));
 
 /** Three significant digits. @param {number} value */
 const digits = (value) => (value < 0.995 ? value.toFixed(2) : value < 999.5 ? value.toPrecision(3) : value.toFixed(0));

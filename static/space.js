@@ -17,7 +17,7 @@ const frame = /** @type {HTMLIFrameElement} */ (document.getElementById("space-v
 const group = /** @type {HTMLElement} */ (document.getElementById("viewpoints"));
 /** @type {[string, string, string][]} */
 const VIEWPOINTS = [
-  ["behind", "Behind", "Look forward from behind the radar; all of the data are in sight."],
+  ["behind", "Behind", "Look forward from behind the radar; the placements, or without any all returns, are in sight."],
   ["above", "Above", "Look down on the radar; forward is up."],
   ["side", "Side", "Look from the right-hand side."],
 ];
@@ -33,6 +33,9 @@ const HOLD = 250;
 const [PLAYING_EVERY, LOOKING_EVERY] = [1000, 340];
 /** When the 3D view is loaded at the latest, counted from the recording's description: its first frame may be unreadable [ms]. */
 const LATEST = 3000;
+
+/** What the Camera view says before it can place the returns. */
+const NO_POSE = "No pose yet: the returns appear here once enough placements are clicked.";
 
 /** What static/pace.js reads in the 3D view's frame. */
 const pace = { playing: false, every: 1000, holdUntil: 0 };
@@ -179,7 +182,8 @@ function drawStanding() {
 
 /** Words about what is under the pointer, else about what was picked. @param {import("./space_picking.js").Item|null} item */
 function drawReadout(item) {
-  const words = item?.words ?? (hovered?.words || pickedWords());
+  const unplaced = spaceOptions.camera && lookShown()?.projected === false;
+  const words = item?.words ?? (hovered?.words || pickedWords() || (unplaced ? NO_POSE : ""));
   if (readout.textContent !== words) readout.textContent = words;
 }
 

@@ -10,7 +10,7 @@ from app.session import RecordingFacts, Session
 from app.view.disagreement import Disagreement, disagreement
 from app.view.model import ClickRow, ClickState
 from app.view.number_format import plain
-from app.view.reprojections import Reprojection, reprojections
+from app.view.reprojections import Reprojection, length_px, reprojections
 from app.view.wording import sentence
 from calib_core.measurements import Pair, ReflectorClick, Stamp, Unpaired, Unsolvable
 from calib_core.radar import polar_from_cartesian
@@ -96,9 +96,10 @@ def _row(
 def _residual_px(click: ReflectorClick, pair: Reprojection) -> float | None:
     if pair.projected_px is None:
         return None
-    u_px, v_px = pair.projected_px
-    distance_px = math.hypot(u_px - click.u_px, v_px - click.v_px)
-    return round(distance_px / pair.step_px) * pair.step_px
+    if (click.u_px, click.v_px) == pair.pixel_px:
+        return pair.distance_px
+    u_px, v_px = pair.projected_px  # moved since that outcome
+    return length_px(math.hypot(u_px - click.u_px, v_px - click.v_px), pair.step_px)
 
 
 def _state(click: ReflectorClick, pair: Reprojection) -> ClickState:

@@ -1,7 +1,8 @@
 """Where each pair's radar position falls in the picture, for all pairs of an answer at once.
 
 Pixels are rounded to steps of at most 1 % of the pair's ellipse and a quarter of a pixel, which cannot be seen: with many clicks,
-one more then leaves most pairs as they are, and only the others are sent to the page.
+one more then leaves most pairs as they are, and only the others are sent to the page. The length of a residual is read as a
+number, so it is rounded by itself, to the next finer power of ten.
 """
 
 import math
@@ -16,7 +17,7 @@ from calib_core.arrays import Flags, Values
 from calib_core.radar import polar_from_cartesian
 from calib_core.results import PairResult
 
-__all__ = ["Reprojection", "ellipses_of", "reprojections"]
+__all__ = ["Reprojection", "ellipses_of", "length_px", "reprojections"]
 
 _CHI2_95_2D = 5.991464547107979  # 95 % quantile of chi-squared with 2 degrees of freedom
 _SHARE, _FINEST_PX, _COARSEST_PX = 0.01, 2.0**-7, 0.25
@@ -31,6 +32,8 @@ class Reprojection:
     Attributes:
         projected_px: (u, v), in whole steps; None if the radar position lies behind the camera.
         step_px: to which pixels of this pair are rounded.
+        pixel_px: (u, v) of the click that was solved.
+        distance_px: from there to the reprojection before it was rounded; None if the radar position lies behind the camera.
         ellipse: None if the method has no noise model.
         range_m: of the radar position.
         azimuth_deg: of the radar position, positive to the left.
@@ -42,6 +45,8 @@ class Reprojection:
 
     projected_px: tuple[float, float] | None
     step_px: float
+    pixel_px: tuple[float, float]
+    distance_px: float | None
     ellipse: Ellipse | None
     range_m: float
     azimuth_deg: float
@@ -67,6 +72,8 @@ def reprojections(pairs: tuple[PairResult, ...]) -> Mapping[str, Reprojection]:
         pair.id: Reprojection(
             projected_px=(u_px, v_px) if math.isfinite(u_px) and math.isfinite(v_px) else None,
             step_px=step_px,
+            pixel_px=(float(pair.pixel_px[0]), float(pair.pixel_px[1])),
+            distance_px=length_px(pair.distance_px, step_px) if math.isfinite(pair.distance_px) else None,
             ellipse=None if ellipse is None else _in_steps(ellipse, step_px),
             range_m=range_m,
             azimuth_deg=azimuth_deg,
@@ -77,6 +84,11 @@ def reprojections(pairs: tuple[PairResult, ...]) -> Mapping[str, Reprojection]:
         )
         for pair, (u_px, v_px), step_px, ellipse, (range_m, azimuth_deg, elevation_deg) in rows
     }
+
+
+def length_px(distance_px: float, step_px: float) -> float:
+    """Round the length of a residual to a power of ten, the largest that is not above the step."""
+    return round(distance_px, -math.floor(math.log10(step_px)))
 
 
 def _rounded(probability: float) -> float | None:

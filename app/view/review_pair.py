@@ -8,7 +8,6 @@ import numpy as np
 
 from app.view.direction import direction_words
 from app.view.number_format import plain
-from app.view.reprojections import reprojections
 from calib_core.arrays import Values
 from calib_core.measurements import Candidate
 from calib_core.radar import polar_from_cartesian
@@ -85,7 +84,7 @@ def pair_review(calibration: Calibration, name: str) -> PairReview:
     if pair is None:
         reason = next((f"{row.reason}; {row.hint}" for row in calibration.unpaired if row.id == name), "not solved yet")
         return PairReview(name, f"{name} has no radar position: {reason}.")
-    facts = _facts(pair, _residual_px(calibration, pair))
+    facts = _facts(pair)
     measured = pair.measured
     candidates = (*measured.candidates, *measured.set_aside) if measured is not None else ()
     if not candidates:
@@ -93,22 +92,12 @@ def pair_review(calibration: Calibration, name: str) -> PairReview:
     points = np.array([candidate.position_radar_m for candidate in candidates])
     pixels = calibration.reproject(points)
     distances_px = np.linalg.norm(pixels - pair.pixel_px, axis=1)
-    distances_px[pair.candidate] = _residual_px(calibration, pair)
     rows = tuple(
         _row(candidate, pixel, float(distance_px), chosen=i == pair.candidate)
         for i, (candidate, pixel, distance_px) in enumerate(zip(candidates, pixels, distances_px, strict=True))
     )
     facts = (*facts, *_noise_fact(candidates[pair.candidate]))
     return PairReview(name, _why(pair, candidates, distances_px), facts, rows)
-
-
-def _residual_px(calibration: Calibration, pair: PairResult) -> float:
-    """Return the length of a residual as all of the page shows it; NaN if there is none."""
-    drawn = reprojections(calibration.pairs)[pair.id]
-    if drawn.projected_px is None:
-        return float("nan")
-    distance_px = float(np.linalg.norm(np.array(drawn.projected_px) - pair.pixel_px))
-    return round(distance_px / drawn.step_px) * drawn.step_px
 
 
 def _row(candidate: Candidate, pixel: Values, distance_px: float, *, chosen: bool) -> ReviewedReturn:
@@ -160,9 +149,9 @@ def _why(pair: PairResult, candidates: Sequence[Candidate], distances_px: Values
     )
 
 
-def _facts(pair: PairResult, residual_px: float) -> tuple[PairFact, ...]:
+def _facts(pair: PairResult) -> tuple[PairFact, ...]:
     return (
-        PairFact("residual", _px(residual_px), "Distance between the click and the reprojection under the pose."),
+        PairFact("residual", _px(pair.distance_px), "Distance between the click and the reprojection under the pose."),
         PairFact("held out", _px(pair.held_out_px), "The same under the pose that the other pairs give."),
         PairFact(
             "outlier probability",

@@ -37,6 +37,20 @@ def test_numpy_random_is_not_imported_before_it_is_needed() -> None:
     assert done.stdout.strip() == "False"
 
 
+def test_a_verdict_needs_no_optimizer_of_scipy() -> None:
+    """`scipy.optimize` is a third of a second of every `cocalib solve`, and of the first answer on the page."""
+    code = (
+        "import sys\nfrom dataclasses import replace\nimport numpy as np\n"
+        "from calib_core.calibration import calibrate_pairs\nfrom calib_core.stated_error import stated_error\n"
+        "from calib_core.synthetic import simulate_pairs\n"
+        "drawn = simulate_pairs(8, rng=np.random.default_rng(1))\n"
+        "answer = calibrate_pairs(drawn.pairs, drawn.camera).unwrap()\n"
+        "stated_error(replace(answer, covariance_quantile=20.0))\nprint('scipy.optimize' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
 def test_session_and_view_import_nothing_heavy() -> None:
     assert heavy_modules_after("import app.session\nimport app.view") == ""
 

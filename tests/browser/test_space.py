@@ -107,8 +107,9 @@ def choosing(page: Driver) -> None:
 
 def hidden_and_enlarged(page: Driver) -> None:
     """Hidden it takes no room and gets nothing; enlarged it takes the place of the picture; both are remembered."""
+    box = "JSON.stringify(document.getElementById('%s').getBoundingClientRect())"
     page.press("b")
-    page.until("document.getElementById('space').clientWidth > 700")
+    page.until(f"{box % 'space'} === {box % 'picture-pane'}")
     page.press("v")
     page.until("document.getElementById('space').clientHeight < 40")
     before = page.value("__cocalibSpace.lookShown().number")
@@ -185,6 +186,13 @@ def test_without_pictures_returns_and_placements_can_be_picked_too(
     placement = items(page, "placement")[-1]
     page.page.mouse.click(placement["x"], placement["y"])
     page.until("__cocalib.state.cursor > 0 && __cocalibSpace.frameShown() === __cocalib.state.cursor")
+
+
+def test_before_a_pose_the_camera_view_says_why_there_are_no_returns(page: Driver) -> None:
+    page.page.click("#space-camera")
+    page.until("document.querySelector('.space-readout').textContent.startsWith('No pose yet')")
+    page.page.click("#space-camera")
+    page.until("document.querySelector('.space-readout').textContent === ''")
 
 
 def test_the_mathematics_of_picking_and_of_range_numbers(page: Driver) -> None:

@@ -84,7 +84,7 @@ class ReviewDesk:
 
     def give(self, request: ReviewRequest) -> None:
         """Answer this as soon as the current request of its kind is done; of those that wait, only the newest counts."""
-        if isinstance(request, CompareForm) and request.file_base64:
+        if isinstance(request, CompareForm) and request.file_name:
             self._sent = request
         self._workers[type(request)].give(partial(self._answer, request))
 

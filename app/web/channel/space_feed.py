@@ -24,7 +24,7 @@ from calib_core.errors import CalibrationError
 from calib_core.measurements import RadarScans, TimeNs
 from calib_core.radar import RadarErrors
 
-__all__ = ["SpaceFeed"]
+__all__ = ["SpaceFeed", "surveyed_extent"]
 
 _PLAYING_EVERY_S, _LOOKING_EVERY_S = 1.0, 0.34
 """Minimum time between two drawings while playing, with and without pictures: the 3D view shares the page's main thread, and the
@@ -81,7 +81,7 @@ class SpaceFeed:
             picture=await self._thumbnail(cursor) if has_pictures else None,
             camera=hub.camera,
             has_pictures=has_pictures,
-            extent=self._extent_now(survey),
+            extent=self._extent_now(survey, returns),
             placements=survey.placements if survey else (),
             map=survey.map if survey and cursor.whole else None,
             snr_db=_ends_db(survey, returns),
@@ -123,12 +123,10 @@ class SpaceFeed:
         except (CalibrationError, ValueError):
             return None
 
-    def _extent_now(self, survey: Survey | None) -> Extent:
+    def _extent_now(self, survey: Survey | None, returns: Returns) -> Extent:
         if survey is not self._surveyed and survey is not None:
             self._surveyed = survey
-            points = np.stack([survey.map.x_m, survey.map.y_m, survey.map.z_m], axis=1)
-            reflectors = np.array([placement.position_radar_m for placement in survey.placements]).reshape(-1, 3)
-            self._extent = extent_of(points, np.array(survey.map.share), reflectors)
+            self._extent = surveyed_extent(survey, returns)
         return self._extent
 
     def _fastest_now(self, returns: Returns) -> float:
@@ -137,6 +135,23 @@ class SpaceFeed:
         if len(speeds):
             self._fastest_mps = max(self._fastest_mps, float(np.ceil(np.quantile(speeds, 0.98))))
         return self._fastest_mps
+
+
+def surveyed_extent(survey: Survey, returns: Returns) -> Extent:
+    """Return the extent of a recording: of its placements and of the static returns in the range of the gate.
+
+    Without a placement nothing says that the reflector is near, and all that the radar sees now counts, also beyond the gate.
+
+    Args:
+        survey: of the recording.
+        returns: that are shown when the survey is known.
+    """
+    points = np.stack([survey.map.x_m, survey.map.y_m, survey.map.z_m], axis=1)
+    weights = np.array(survey.map.share)
+    reflectors = np.array([placement.position_radar_m for placement in survey.placements]).reshape(-1, 3)
+    if not survey.placements:
+        points, weights = np.concatenate([points, returns.points_m]), np.append(weights, np.ones(len(returns)))
+    return extent_of(points, weights, reflectors)
 
 
 def _drawn(scene: TabScene, sight: Sight) -> SpaceLook:

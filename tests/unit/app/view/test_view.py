@@ -353,6 +353,12 @@ def test_marks_are_rounded_to_steps_that_cannot_be_seen() -> None:
     )
 
 
+def test_the_length_of_a_residual_is_right_to_its_last_decimal() -> None:
+    wide = replace(pair("c1", projected_px=[13.87, 24.12]), expected_covariance_px2=np.eye(2) * 40.0**2)
+    exact_px = float(np.hypot(*(wide.projected_px - wide.pixel_px)))
+    assert reprojections((wide,))["c1"].distance_px == round(exact_px, 1)
+
+
 def test_ninety_five_percent_of_draws_lie_in_the_ellipse() -> None:
     rng = np.random.default_rng(5)
     covariance = np.array([[9.0, 4.0], [4.0, 5.0]])

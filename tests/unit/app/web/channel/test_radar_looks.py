@@ -6,8 +6,10 @@ import pytest
 from app.web.channel.placement_words import placement_figures, placement_note, placement_summary
 from app.web.channel.radar_map import RadarMapSum
 from app.web.channel.radar_survey import survey_of
+from app.web.channel.space_feed import surveyed_extent
 from app.web.messages import PlacementRow
 from app.web.radar_sight import RadarSight, look_of, shown_rows
+from app.web.view3d.returns import Returns
 from calib_core.measurements import NS_PER_S, RadarScan, RadarScans, TimeNs
 from calib_core.options import GatingOptions
 
@@ -41,6 +43,16 @@ class Radar:
 
 def row(lasted_s: float = 6.0, azimuth_deg: float = 10.0, snr_db: float | None = 30.0, note: str = "") -> PlacementRow:
     return PlacementRow(0.0, lasted_s, 3, 5.0, 1.0, (5.0, 0.0, 0.0), azimuth_deg, snr_db, 12.0, note)
+
+
+def test_without_a_placement_the_3d_view_reaches_as_far_as_the_radar_sees() -> None:
+    far = RadarScans.from_scans(
+        [scan(0.1 * n, [(8.0, 0.0, 0.0, 0.0, 10.0), (180.0, 30.0, 0.0, 0.0, 10.0)]) for n in range(6)]
+    )
+    seen = Returns.of(far, TimeNs(0), GatingOptions(), lambda points_m: points_m)
+    assert surveyed_extent(survey_of([far], far.times_ns, GatingOptions()), seen).range_m == pytest.approx(200.0)
+    scans = recorded()
+    assert surveyed_extent(survey_of([scans], scans.times_ns, GatingOptions()), seen).range_m < 10.0
 
 
 def test_without_frames_a_placement_is_found_at_the_radars_own_moments() -> None:

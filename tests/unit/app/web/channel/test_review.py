@@ -89,6 +89,7 @@ def test_now_and_the_method_in_use_are_the_same_answer(solved: Calibration) -> N
         (CompareForm("now", "toggled"), "no pair is selected"),
         (CompareForm("now", "toggled", pair="c1"), "c1 is an untouched guess"),
         (CompareForm("now", "file", file_name="a.json", file_base64="!"), "a.json"),
+        (CompareForm("now", "file", file_name="empty.json"), "empty.json"),
         (CompareForm("now", "paper"), "intrinsics are missing"),
     ],
 )
