@@ -24,6 +24,7 @@ SHARED_SIGMA_PX = 1.0
 """Standard deviation per axis of what all clicks of one placement have in common: the lens, the reflector's look [px]."""
 
 _REACH = 8.0  # standard deviations of a click, from one click of a placement to another
+_ONE_MARK = 3.0  # standard deviations of a click, between two clicks of one frame that mark the same point
 _MOST_OFF = 3.0  # standard deviations from the placement's median
 _NEAR_WINDOWS = 4.0  # windows between two clicks of one dwell
 _SAME_DWELL = 0.5  # steps between the positions of one dwell in two windows that do not overlap
@@ -108,6 +109,7 @@ def linked_clicks(pairs: Sequence[Pair], options: CalibrationOptions) -> tuple[I
     first, second = _near_pixels(pairs, options)
     if len(first):
         same = _same_placement(pairs, first, second, options.locating.window_s)
+        same &= ~_two_reflectors(pairs, first, second, options)
         first, second = first[same], second[same]
     root = np.arange(len(pairs))
     for i, j in sorted(zip(first.tolist(), second.tolist(), strict=True)):
@@ -160,6 +162,14 @@ def _same_placement(pairs: Sequence[Pair], first: Indices, second: Indices, wind
     for k in overlapping.tolist():
         near[k] = _share_return(pairs[first[k]], pairs[second[k]])
     return np.asarray(near)
+
+
+def _two_reflectors(pairs: Sequence[Pair], first: Indices, second: Indices, options: CalibrationOptions) -> Flags:
+    """Return which clicks (k,) are two marks of one frame: whoever sets two marks there sees two reflectors."""
+    apart_px = np.linalg.norm(_pixels(pairs)[first] - _pixels(pairs)[second], axis=1)
+    sigma_px = _click_sigmas(pairs, options)
+    in_one_frame = _seconds_apart(pairs, first, second) == 0.0
+    return np.asarray(in_one_frame & (apart_px > _ONE_MARK * np.maximum(sigma_px[first], sigma_px[second])))
 
 
 def _seconds_apart(pairs: Sequence[Pair], first: Indices, second: Indices) -> Values:

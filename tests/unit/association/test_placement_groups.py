@@ -72,6 +72,17 @@ def test_two_reflectors_clicked_in_neighbouring_frames_are_two_placements() -> N
     assert len(placement_groups(pairs, OPTIONS)) == 2
 
 
+def test_two_marks_of_one_frame_are_two_reflectors_unless_they_are_at_one_point() -> None:
+    pair = simulate_pairs(1, rng=np.random.default_rng(3)).pairs[0]
+    one = replace(pair, id="one", image_time=TimeNs(NS_PER_S))
+    beside = replace(one, id="beside", pixel_px=pair.pixel_px + np.array([8.5, 0.0]))
+    again = replace(one, id="again", pixel_px=pair.pixel_px + np.array([2.0, 0.0]))
+    later = replace(beside, id="later", image_time=TimeNs(2 * NS_PER_S))
+    assert len(linked_clicks([one, beside], OPTIONS)) == 2
+    assert len(linked_clicks([one, again], OPTIONS)) == 1
+    assert len(linked_clicks([one, later], OPTIONS)) == 1
+
+
 def test_a_click_far_from_the_others_of_its_placement_is_out_and_shown_as_an_outlier() -> None:
     rng = np.random.default_rng(5)
     simulated = simulate_pairs(10, rng=rng)
