@@ -3,7 +3,7 @@
 
 import { ink, residualColour, themeColour } from "./colours.js";
 import { drawGaps, drawRuler, pixelsPerSecond, RULER, text } from "./ruler.js";
-import { clicks, isClicked, state } from "./state.js";
+import { clicks, isLookedAt, state } from "./state.js";
 
 export const lanes = { left: 74, right: 14, gap: 4, bottom: 5 };
 /** Returns per slice of time, from the server; empty until known. @type {{step_s: number, returns: number[]}} */
@@ -84,7 +84,7 @@ function drawNames(pen, boxes) {
 
 /** What became of a placement. @param {import("./messages.js").PlacementRow} placement @returns {"clicked"|"dismissed"|"open"} */
 export function fateOf(placement) {
-  if (isClicked(placement)) return "clicked";
+  if (isLookedAt(placement)) return "clicked";
   return dismissals().some(({ seconds, at }) => placement.start_s <= seconds && seconds <= placement.end_s && apart(at, placement.position_radar_m) < SAME_PLACE_M) ? "dismissed" : "open";
 }
 

@@ -156,6 +156,9 @@ export function clicksOf(placement) {
 /** Whether a placement has a click, also one that is excluded or does not count. @param {Placement} placement */
 export const isClicked = (placement) => clicksOf(placement).length > 0;
 
+/** Whether a placement has a click that somebody looked at. @param {Placement} placement */
+export const isLookedAt = (placement) => clicksOf(placement).some((click) => click.state !== "untouched");
+
 /** Whether the user said that a placement is not the reflector. @param {Placement} placement */
 export const isDismissed = (placement) => dismissalOf(placement) !== undefined;
 
