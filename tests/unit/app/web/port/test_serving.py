@@ -193,8 +193,8 @@ def test_a_recording_that_opens_at_once_is_served_without_an_opening_message(
         admit(server, *opened)
         with channel(server, come_in(server)) as socket:
             socket.send('{"type":"hello"}')
-            first = json.loads(socket.recv(timeout=20))
-            started.append((server, first["type"]))
+            kinds = iter(lambda: json.loads(socket.recv(timeout=20))["type"], "")
+            started.append((server, next(kind for kind in kinds if kind in ("opening", "recording"))))
         raise KeyboardInterrupt
 
     monkeypatch.setattr(RunningServer, "admit", admit_look_and_stop)
