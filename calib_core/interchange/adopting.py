@@ -62,7 +62,7 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
         InputError: the file contradicts itself, or fails its own check point.
     """
     _refuse_wrong(found, source, camera)
-    assumed = tuple(DataWarning("assumed", note, "verify this assumption") for note in found.notes)
+    assumed = tuple(DataWarning("assumed", note, "verify this assumption") for note in found.assumptions)
     return Calibration(
         camera_from_radar=found.camera_from_radar,
         covariance=found.file.calibration.covariance if found.file else np.full((6, 6), _UNKNOWN),

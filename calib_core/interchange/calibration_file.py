@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calib_core.errors import InputError
+from calib_core.interchange.evidence import Evidence
 from calib_core.results import Calibration, CheckPoint, InputFile, PairResult
 from calib_core.verdict import Verdict
 
@@ -141,6 +142,7 @@ class CalibrationFile:
         provenance: where it comes from.
         unknown: results written by a later version and unknown to this one; kept when the file is rewritten.
         verdict: how far to trust it, as it was judged when it was solved; None in files of older versions and other tools.
+        evidence: what the pose rests on, as the file states it; None in files of older versions.
     """
 
     calibration: Calibration
@@ -149,6 +151,12 @@ class CalibrationFile:
     provenance: Provenance = field(default_factory=Provenance)
     unknown: tuple[UnknownResult, ...] = ()
     verdict: Verdict | None = None
+    evidence: Evidence | None = None
+
+    @property
+    def rests_on(self) -> Evidence:
+        """What the pose rests on: as stated; else it was clicked if it has solved pairs, and assumed if it has none."""
+        return self.evidence or ("clicked" if self.calibration.pairs else "imported_assumed")
 
 
 def choose_check_point(calibration: Calibration) -> CheckPoint | None:

@@ -12,6 +12,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
+from calib_core.interchange.evidence import Evidence
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, matrix_from_rpy, nearest_rotation
 
 __all__ = [
@@ -139,10 +140,13 @@ class ImportedCalibration:
         camera: the camera; None if the format or the file has none.
         frames: the two frame names; None if the file has none.
         check_point: None if the file states none.
-        notes: the assumptions that were made, one sentence each.
+        assumptions: what the file does not state and reading it takes for granted, one sentence each.
+        notes: what reading it did with the numbers, one sentence each.
         faults: the contradictions in the file, one sentence each.
         file: everything else, if it is a calibration-1 file.
         matrix_px: (3, 3) K of undistorted pictures whose size the file does not state; None if it has none.
+        evidence: what the pose rests on, as the file states it; None if it states nothing.
+        calibration_sha256: of the calibration-1 file that it says it was exported from; None if it states none.
     """
 
     format: str
@@ -150,10 +154,13 @@ class ImportedCalibration:
     camera: Camera | None = None
     frames: FrameNames | None = None
     check_point: StatedCheckPoint | None = None
+    assumptions: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     faults: tuple[str, ...] = ()
     file: CalibrationFile | None = None
     matrix_px: Matrix33 | None = None
+    evidence: Evidence | None = None
+    calibration_sha256: str | None = None
 
     def camera_for(self, image_size_px: tuple[int, int]) -> Camera | None:
         """Return the camera; one whose size the file does not state gets that of the pictures. None if there is none.
@@ -193,6 +200,7 @@ def imported(file: CalibrationFile) -> ImportedCalibration:
         frames=file.frames,
         check_point=StatedCheckPoint(check.radar_m, pixel_px=check.pixel_px) if check else None,
         file=file,
+        evidence=file.rests_on,
     )
 
 
@@ -203,7 +211,7 @@ class Roles:
     direction: Direction
     axes: Axes
     frames: FrameNames
-    notes: tuple[str, ...]
+    assumptions: tuple[str, ...]
 
 
 def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
@@ -217,14 +225,14 @@ def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
     Raises:
         InputError: a frame has no name.
     """
-    notes: list[str] = []
+    assumptions: list[str] = []
     if stated is not None and stated.radar in (parent, child):
         radar, camera = stated.radar, child if parent == stated.radar else parent
     else:
         radar_first = not (looks_like_radar(child) and not looks_like_radar(parent))
         radar, camera = (parent, child) if radar_first else (child, parent)
         if not (looks_like_radar(radar) and not looks_like_radar(camera)):
-            notes.append(f"the file does not say which frame is the radar's; assumed {radar!r}")
+            assumptions.append(f"the file does not say which frame is the radar's; assumed {radar!r}")
     if stated is not None and camera in (stated.camera, stated.camera_link):
         axes: Axes = "optical" if camera == stated.camera else "link"
         frames = stated
@@ -232,10 +240,10 @@ def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
         axes = "link" if camera.endswith("_link") and "optical" not in camera else "optical"
         if "optical" not in camera:
             meant = "optical axes (z forward)" if axes == "optical" else "body axes (x forward)"
-            notes.append(f"assumed that {camera!r} has {meant}")
+            assumptions.append(f"assumed that {camera!r} has {meant}")
         frames = FrameNames(radar, camera if axes == "optical" else camera.removesuffix("_link") + "_optical")
     direction: Direction = "radar_from_camera" if parent == radar else "camera_from_radar"
-    return Roles(direction, axes, frames, tuple(notes))
+    return Roles(direction, axes, frames, tuple(assumptions))
 
 
 def looks_like_camera(name: str) -> bool:

@@ -1,11 +1,13 @@
 """Read a calibration in any known format."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from calib_core.errors import InputError
 from calib_core.input_files import read_input
 from calib_core.interchange.formats.registry import readers
 from calib_core.interchange.imported import ImportedCalibration
+from calib_core.interchange.origin import stated_origin
 from calib_core.interchange.syntax.content import Content, readings
 
 __all__ = ["calibration_bytes", "read_any", "read_any_file"]
@@ -59,9 +61,17 @@ def _read(content: str | bytes, source: str) -> ImportedCalibration:
     for reading in readings(content, source=source):
         for reader in readers():
             if reader.recognizes(reading):
-                return reader.read(reading, source)
+                return _with_origin(reader.read(reading, source), reading)
         seen.append(reading)
     raise _refusal(seen[-1], source)
+
+
+def _with_origin(found: ImportedCalibration, content: Content) -> ImportedCalibration:
+    """Add what the text says about the calibration that the file was made from, unless the reader found it in a key."""
+    if found.file is not None or found.evidence is not None or content.syntax == "bytes":
+        return found
+    origin = stated_origin(content.text)
+    return replace(found, evidence=origin.evidence, calibration_sha256=origin.calibration_sha256)
 
 
 def _refusal(content: Content, source: str) -> InputError:

@@ -75,7 +75,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     roles = posed_between(parent.lstrip("/"), child.lstrip("/"), stated_frames(text))
     pose = WrittenPose("quaternion_xyzw", np.array(numbers[1]), np.array(numbers[0]), roles.direction, roles.axes)
     return ImportedCalibration(
-        "apollo", pose, frames=roles.frames, check_point=stated_check_point(text), notes=roles.notes
+        "apollo", pose, frames=roles.frames, check_point=stated_check_point(text), assumptions=roles.assumptions
     ).checked(source)
 
 

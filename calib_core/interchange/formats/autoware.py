@@ -104,7 +104,11 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera", roles.axes
         )
     return ImportedCalibration(
-        "autoware", pose, frames=roles.frames, check_point=stated_check_point(content.text), notes=roles.notes
+        "autoware",
+        pose,
+        frames=roles.frames,
+        check_point=stated_check_point(content.text),
+        assumptions=roles.assumptions,
     ).checked(source)
 
 

@@ -70,13 +70,13 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             f"{source}: rig.sensors: {len(radars)} radars and {len(cameras)} cameras by protocol; keep one of each"
         )
     rig_from_radar, rig_from_link = (_posed(sensor, source=source) for sensor in (radars[0], cameras[0]))
-    pose, notes = rig_from_link, ["the format defines the camera axes as body axes (x forward, y left, z up)"]
+    pose, note = rig_from_link, "the format defines the camera axes as body axes (x forward, y left, z up)"
     if np.abs(rig_from_radar.as_written().as_matrix() - np.eye(4)).max() > 0:
         radar_from_link = rig_from_radar.as_written().inverse() @ rig_from_link.as_written()
         pose = WrittenPose(
             "matrix", radar_from_link.rotation, radar_from_link.translation_m, "radar_from_camera", "link"
         )
-    return ImportedCalibration("driveworks", pose, notes=tuple(notes)).checked(source)
+    return ImportedCalibration("driveworks", pose, notes=(note,)).checked(source)
 
 
 def _posed(sensor: Mapping[str, Any], *, source: str) -> WrittenPose:

@@ -92,7 +92,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         WrittenPose("quaternion_xyzw", np.array(numbers[1]), np.array(numbers[0]), roles.direction, roles.axes),
         camera=cameras[0].camera(image_size_px=None, source=source) if cameras else None,
         frames=roles.frames,
-        notes=roles.notes,
+        assumptions=roles.assumptions,
     ).checked(source)
 
 

@@ -16,6 +16,7 @@ _NOTES = (
     "Tr_velo_to_cam maps radar points to the camera frame: p_camera = R p_radar + t (as in View-of-Delft)",
     "a comment would break KITTI readers, so the check point is only in calibration.json",
 )
+_ASSUMPTION = "the format names no frames and assumes undistorted images"
 _POSE_KEYS = ("Tr_velo_to_cam", "Tr_radar_to_cam", "Tr_velo_cam")
 
 
@@ -47,7 +48,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     if key is None:
         raise InputError(f"{source}: no Tr_velo_to_cam in it; add that line")
     pose = np.reshape(floats(lines[key].split(), source=source, place=key, length=12), (3, 4))
-    notes = ["the format names no frames and assumes undistorted images"]
+    notes = []
     rectified = "R0_rect" in lines
     if rectified:
         rotation = np.reshape(floats(lines["R0_rect"].split(), source=source, place="R0_rect", length=9), (3, 3))
@@ -62,7 +63,9 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             pose = pose + np.column_stack([np.zeros((3, 3)), _offset_m(projection, source=source)])
             notes.append("the offset in P2 was applied; the camera is the one of image_2")
     written = WrittenPose("matrix", pose[:, :3], pose[:, 3], "camera_from_radar")
-    return ImportedCalibration("kitti", written, notes=tuple(notes), matrix_px=matrix_px).checked(source)
+    return ImportedCalibration(
+        "kitti", written, assumptions=(_ASSUMPTION,), notes=tuple(notes), matrix_px=matrix_px
+    ).checked(source)
 
 
 def _offset_m(projection: np.ndarray, *, source: str) -> np.ndarray:

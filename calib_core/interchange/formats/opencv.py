@@ -76,14 +76,14 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     frames = stated_frames(content.text)
     if values.get("radar_frame") and values.get("camera_frame"):
         frames = FrameNames(str(values["radar_frame"]), str(values["camera_frame"]))
-    notes = () if frames else ("the file does not name its frames; assumed p_camera = R p_radar + T",)
+    assumptions = () if frames else ("the file does not name its frames; assumed p_camera = R p_radar + T",)
     return ImportedCalibration(
         "opencv",
         WrittenPose("matrix", np.reshape(rotation, (3, 3)), np.array(translation_m), "camera_from_radar"),
         camera=cameras[0].camera(image_size_px=None, source=source) if has_size else None,
         frames=frames,
         check_point=_check_point(values, source) or stated_check_point(content.text),
-        notes=notes,
+        assumptions=assumptions,
     ).checked(source)
 
 

@@ -1,4 +1,4 @@
-"""The comment in every file that allows comments: both frames, the equation, the order, the check point."""
+"""The comment in every file that allows comments: both frames, the equation, the order, the check point, the origin."""
 
 import json
 import re
@@ -8,6 +8,7 @@ import numpy as np
 
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
 from calib_core.interchange.imported import StatedCheckPoint
+from calib_core.interchange.origin import origin_lines
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.radar import RadarErrors
 
@@ -49,6 +50,7 @@ def statement(file: CalibrationFile, meaning: str) -> tuple[str, ...]:
             "p_radar is a true position; first take the radar's errors out of a reported one, as in docs/formats.md: "
             + ", ".join(f"{one.name} {getattr(errors, one.name):.6g}" for one in fields(errors))
         )
+    lines += origin_lines(file)
     # The version in a file may be any text; the frame names are checked and kept unchanged, including spaces.
     version = " ".join((file.provenance.version or "").split())
     lines.append(f"cocalib{f' {version}' if version else ''}: read it back with: cocalib check THIS_FILE")

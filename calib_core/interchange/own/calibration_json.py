@@ -1,6 +1,7 @@
 """Write and read calibration-1, the file of a solved calibration."""
 
 import dataclasses
+import hashlib
 from collections.abc import Iterable
 
 import msgspec
@@ -44,6 +45,7 @@ __all__ = [
     "COVARIANCE_CONVENTION",
     "calibration_file",
     "calibration_file_of",
+    "calibration_sha256",
     "calibration_text",
     "kept_results",
     "read_calibration",
@@ -98,7 +100,13 @@ def calibration_file(
         check_point=choose_check_point(stamped),
         provenance=provenance or Provenance(),
         verdict=verdict_on(stamped, unconfirmed=unconfirmed),
+        evidence="clicked",
     )
+
+
+def calibration_sha256(file: CalibrationFile) -> str:
+    """Return the SHA-256 of a calibration's file, in hexadecimal: what exports name as their origin."""
+    return hashlib.sha256(write_calibration(file).encode()).hexdigest()
 
 
 def write_calibration(file: CalibrationFile) -> str:
@@ -124,6 +132,7 @@ def write_calibration(file: CalibrationFile) -> str:
         radar_angle_map=angle_map_document(calibration.angle_map),
         paper=documents.PaperDocument(finite_or_none(calibration.iterative_px), finite_or_none(calibration.sqpnp_px)),
         verdict=_verdict_document(file.verdict),
+        evidence=file.evidence,
         warnings=[documents.WarningDocument(c.code, c.message, c.hint) for c in calibration.warnings],
         unpaired=[documents.UnpairedDocument(u.id, u.code, u.reason, u.hint) for u in calibration.unpaired],
         pairs=[solved_pair_document(pair) for pair in calibration.pairs],
@@ -140,6 +149,7 @@ def write_calibration(file: CalibrationFile) -> str:
                 del pair[key]
     absent = set() if calibration.angle_map is not None else {"radar_angle_map"}
     absent |= {"verdict"} if file.verdict is None else set()
+    absent |= {"evidence"} if file.evidence is None else set()
     if not calibration.systematic_errors and calibration.radar_errors == RadarErrors():
         absent |= {"radar_errors", "systematic_errors"}
     known = encodable({key: content[key] for key in _KEY_ORDER if key not in absent})
@@ -155,6 +165,7 @@ _KEY_ORDER = (
         "radar_from_camera",
         "check_point",
         "verdict",
+        "evidence",
         "sigma",
         "covariance",
     ),
@@ -226,6 +237,7 @@ def calibration_file_of(
         check_point=CheckPoint(np.array(check.radar_m), np.array(check.pixel_px)) if check else None,
         provenance=provenance_of(document.provenance),
         verdict=_verdict_of(document.verdict),
+        evidence=document.evidence,
     )
 
 

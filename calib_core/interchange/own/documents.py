@@ -9,6 +9,7 @@ import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType, field
 
 from calib_core.camera import CameraModel
+from calib_core.interchange.evidence import Evidence
 from calib_core.measurements import Mark
 from calib_core.options import CalibrationOptions
 from calib_core.verdict import VerdictLevel
@@ -391,6 +392,7 @@ class CalibrationDocument(Struct, frozen=True):
     radar_angle_map: AngleMapDocument | None = None
     paper: PaperDocument = field(default_factory=PaperDocument)
     verdict: VerdictDocument | None = None
+    evidence: Evidence | None = None
     warnings: list[WarningDocument] = []
     unpaired: list[UnpairedDocument] = []
     pairs: list[SolvedPairDocument] = []

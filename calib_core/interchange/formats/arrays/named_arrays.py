@@ -44,7 +44,7 @@ def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> Importe
             camera=_camera(arrays),
             frames=FrameNames(str(arrays["radar_frame"]), str(arrays["camera_frame"])) if named else None,
             check_point=check,
-            notes=() if named else ("the file does not name its frames; assumed p_camera = R p_radar + t",),
+            assumptions=() if named else ("the file does not name its frames; assumed p_camera = R p_radar + t",),
         ).checked(source)
     except (KeyError, ValueError, TypeError, IndexError) as error:
         raise InputError(f"{source}: needs camera_from_radar (4x4), or R and t ({error}); export it again") from None

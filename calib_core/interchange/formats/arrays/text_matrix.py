@@ -61,7 +61,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         WrittenPose("matrix", rows[:3, :3], rows[:3, 3], "camera_from_radar"),
         frames=frames,
         check_point=stated_check_point(content.text),
-        notes=() if frames else ("the file does not say what the matrix is; assumed p_camera = R p_radar + t",),
+        assumptions=() if frames else ("the file does not say what the matrix is; assumed p_camera = R p_radar + t",),
     ).checked(source)
 
 

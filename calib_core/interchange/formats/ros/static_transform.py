@@ -82,7 +82,7 @@ def _from_arguments(arguments: list[str], text: str, *, source: str, name: str) 
         pose=WrittenPose(form, np.array(rotation), np.array(translation), roles.direction, roles.axes),
         frames=roles.frames,
         check_point=stated_check_point(text),
-        notes=roles.notes,
+        assumptions=roles.assumptions,
     ).checked(source)
 
 

@@ -92,17 +92,17 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     roles = posed_between(parent, child, stated)
     camera_end = child if roles.direction == "radar_from_camera" else parent
     optical = next((j for j in joints if _ends(j)[0] == camera_end and "optical" in _ends(j)[1]), None)
-    frames, axes, notes = roles.frames, roles.axes, roles.notes
+    frames, axes, assumptions = roles.frames, roles.axes, roles.assumptions
     if optical is not None:
         _refuse_nonstandard_optical(optical, source=source)
-        frames, axes, notes = FrameNames(roles.frames.radar, _ends(optical)[1]), "link", ()
+        frames, axes, assumptions = FrameNames(roles.frames.radar, _ends(optical)[1]), "link", ()
     translation_m, rpy_rad = _origin(joint, source=source)
     return ImportedCalibration(
         format="urdf",
         pose=WrittenPose("rpy", np.array(rpy_rad), np.array(translation_m), roles.direction, axes),
         frames=frames,
         check_point=stated_check_point(content.text),
-        notes=notes,
+        assumptions=assumptions,
     ).checked(source)
 
 
