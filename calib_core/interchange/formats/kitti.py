@@ -43,10 +43,12 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     Raises:
         InputError: a line is missing or has too few or too many numbers.
     """
-    lines = dict(line.split(":", 1) for line in content.text.splitlines() if ":" in line and not line.startswith("#"))
-    key = next((key for key in _POSE_KEYS if key in lines), None)
-    if key is None:
+    lines = _values_by_key(content, source=source)
+    key, *others = [key for key in _POSE_KEYS if key in lines] or [""]
+    if not key:
         raise InputError(f"{source}: no Tr_velo_to_cam in it; add that line")
+    if others:
+        raise InputError(f"{source}: both {key} and {others[0]} are in it; keep only the radar's")
     pose = np.reshape(floats(lines[key].split(), source=source, place=key, length=12), (3, 4))
     notes = []
     rectified = "R0_rect" in lines
@@ -66,6 +68,23 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     return ImportedCalibration(
         "kitti", written, assumptions=(_ASSUMPTION,), notes=tuple(notes), matrix_px=matrix_px
     ).checked(source)
+
+
+def _values_by_key(content: Content, *, source: str) -> dict[str, str]:
+    """Return what follows each key.
+
+    Raises:
+        InputError: a key appears twice, so that readers disagree on which line counts.
+    """
+    values: dict[str, str] = {}
+    for line in content.text.splitlines():
+        key, colon, value = line.partition(":")
+        if not colon or line.startswith("#"):
+            continue
+        if key in values:
+            raise InputError(f"{source}: {key} appears twice; keep only the intended line")
+        values[key] = value
+    return values
 
 
 def _offset_m(projection: np.ndarray, *, source: str) -> np.ndarray:

@@ -280,7 +280,7 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
         (b"PK\x03\x04broken", "a damaged zip archive"),
         (b"MATLAB 5.0 MAT-file", "not a mat file of level 5; save it with -v7 or -v6"),
         ("1 0 0 0\n0 1 0 0\n", "expected 12 or 16 finite numbers, found 8"),
-        ("1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 2\n", "the last row must be 0 0 0 1"),
+        ("1 0 0 1\n0 1 0 2\n0 0 1 3\n0 0 0 2\n", "the last row of the matrix is 0 0 0 2, not 0 0 0 1"),
         ("1 0 0 0\n0 2 0 0\n0 0 1 0\n", "not orthonormal"),
         ("ros2 run tf2_ros static_transform_publisher --x 1\n", "a frame's name is missing"),
         ("ros2 run tf2_ros static_transform_publisher 1 2 3\n", "no static_transform_publisher with a pose"),

@@ -9,6 +9,7 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
+from calib_core.interchange.rotations import upper_rows
 
 __all__ = ["from_arrays"]
 
@@ -26,8 +27,8 @@ def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> Importe
     """
     try:
         if "camera_from_radar" in arrays:
-            rows = np.asarray(arrays["camera_from_radar"], dtype=np.float64).reshape(-1, 4)
-            rotation, translation_m = rows[:3, :3], rows[:3, 3]
+            rows = upper_rows(arrays["camera_from_radar"])
+            rotation, translation_m = rows[:, :3], rows[:, 3]
         else:
             rotation = np.asarray(arrays["R"], dtype=np.float64)
             translation_m = np.asarray(arrays["t"], dtype=np.float64).ravel()
