@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance, choose_check_point
@@ -65,7 +66,7 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
     assumed = tuple(DataWarning("assumed", note, "verify this assumption") for note in found.assumptions)
     return Calibration(
         camera_from_radar=found.camera_from_radar,
-        covariance=found.file.calibration.covariance if found.file else np.full((6, 6), _UNKNOWN),
+        covariance=_covariance(found),
         camera=camera,
         metrics=Metrics(_UNKNOWN, _UNKNOWN, _UNKNOWN, 0),
         pairs=(),
@@ -75,6 +76,12 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
         radar_errors=found.file.calibration.radar_errors if found.file else RadarErrors(),
         systematic_errors=found.file.calibration.systematic_errors if found.file else (),
     )
+
+
+def _covariance(found: ImportedCalibration) -> Matrix66:
+    if found.file is not None:
+        return found.file.calibration.covariance
+    return np.full((6, 6), _UNKNOWN) if found.covariance is None else found.covariance
 
 
 def _imported_warning(found: ImportedCalibration, source: str) -> DataWarning:

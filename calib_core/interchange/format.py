@@ -11,7 +11,7 @@ from calib_core.interchange.syntax.content import Content
 
 __all__ = ["CameraShare", "Comment", "Format", "Reads"]
 
-Comment = Literal["#", "<!-- -->", "keys", "none"]
+Comment = Literal["#", "<!-- -->", "keys", "numbers", "none"]
 CameraShare = Literal["none", "matrix", "lens"]
 """How much of the camera a format stores: nothing, its matrix without distortion, or the whole lens."""
 
@@ -40,7 +40,8 @@ class Format:
         numbers: what the numbers in the file mean, in one line: the direction of the transform and the order of the numbers.
         file_name: the default file name.
         camera: how much of the camera it stores.
-        comment: where it states its frames and check point: in comments ("#", "<!-- -->"), in keys of its own, or nowhere.
+        comment: where it states its frames and check point: in comments ("#", "<!-- -->"), in keys of its own, as
+            numbers without the frames (in formats that hold nothing else), or nowhere.
         write: returns the file content for a calibration; raises InputError for what the format cannot represent. None
             if the format can only be read.
         reads: how it is recognized and read; None if the format can only be written.

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Vector2, Vector3, frozen_array
+from calib_core.arrays import Matrix33, Matrix66, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
@@ -147,6 +147,8 @@ class ImportedCalibration:
         matrix_px: (3, 3) K of undistorted pictures whose size the file does not state; None if it has none.
         evidence: what the pose rests on, as the file states it; None if it states nothing.
         calibration_sha256: of the calibration-1 file that it says it was exported from; None if it states none.
+        covariance: (6, 6) of camera_from_radar, in the order of calibration-1; None if it states none. That of a
+            calibration-1 file is in `file`.
     """
 
     format: str
@@ -161,6 +163,7 @@ class ImportedCalibration:
     matrix_px: Matrix33 | None = None
     evidence: Evidence | None = None
     calibration_sha256: str | None = None
+    covariance: Matrix66 | None = None
 
     def camera_for(self, image_size_px: tuple[int, int]) -> Camera | None:
         """Return the camera; one whose size the file does not state gets that of the pictures. None if there is none.

@@ -80,6 +80,9 @@ def _refusal(content: Content, source: str) -> InputError:
         return InputError(f"{source}: neither text nor an archive; {_KNOWN}")
     if content.syntax == "xml" and content.value is None:
         return InputError(f"{source}: XML with <{content.root.tag}>; expected OpenCV's <opencv_storage>")
+    if content.syntax == "mcap":
+        names = ", ".join(message.schema_name for message in content.mcap.messages[:12])
+        return InputError(f"{source}: MCAP without foxglove.FrameTransforms (found {names or 'no message'}); {_KNOWN}")
     value = content.value
     found = ", ".join(map(str, list(value)[:12])) if isinstance(value, dict) else type(value).__name__
     return InputError(f"{source}: no pose of a camera and a radar in it (found {found or 'nothing'}); {_KNOWN}")

@@ -239,17 +239,23 @@ def test_import_takes_the_camera_matrix_of_a_kitti_calibration(
     np.testing.assert_allclose(np.ravel(cameras[0]["matrix_px"])[[0, 2]], [float(written[0]), float(written[2])])
 
 
-def test_a_format_without_a_place_for_distortion_requires_rectified_pictures(
+def test_a_format_without_a_place_for_distortion_is_written_for_rectified_pictures_with_the_maps_beside_it(
     cocalib: Cocalib, calibration: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "calib.txt"
-    refused = cocalib("export", calibration, "--to", "kitti", "--out", out)
+    refused = cocalib("export", calibration, "--to", "kitti")
     assert refused.code == 2
-    assert "kitti stores a camera matrix but not the distortion of this plumb_bob lens" in refused.err
-    assert "opencv or numpy" in refused.err
-    assert "--rectified" in refused.err
-    assert len(refused.err.splitlines()) == 1
-    assert not out.exists()
+    assert "kitti comes with rectification.npz and needs a file or folder: --out calib.txt" in refused.err
+    written = cocalib("export", calibration, "--to", "kitti", "--out", out)
+    assert written.code == 0
+    assert f"written to {tmp_path / 'rectification.npz'}" in written.out
+    assert "make them with the maps in rectification.npz" in written.err
+    assert "say so with --rectified" in written.err
+    assert cocalib("check", out, "--against", calibration).code == 0
+    with np.load(tmp_path / "rectification.npz") as maps:
+        matrix_px = maps["K_new"]
+        assert maps["map_x"].shape == tuple(maps["image_size_px"][::-1])
+    assert f"P2: {float(matrix_px[0, 0])!r} " in out.read_text()
 
     written = cocalib("export", calibration, "--to", "kitti", "--rectified", "--out", out)
     assert written.code == 0

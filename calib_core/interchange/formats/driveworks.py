@@ -10,6 +10,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_lines, statement, with_statement
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, rpy_from_matrix
 from calib_core.interchange.syntax.content import Content
@@ -20,8 +21,8 @@ __all__ = ["DRIVEWORKS"]
 _NOTES = (
     "nominalSensor2Rig_FLU is the sensor's pose in the rig: metres, roll-pitch-yaw in degrees about fixed axes, the camera with "
     "body axes (x forward, y left, z up); the radar is at the rig's origin unless parent_from_radar places it elsewhere",
-    "contains the pose only: copy the two poses into your own rig file; JSON has no comments, so the check "
-    "point is only in calibration.json",
+    "contains the pose only: copy the two poses into your own rig file; the check point, the evidence and the calibration's "
+    "hash are in the camera's properties, as a text that DriveWorks does not read",
 )
 _POSE = "nominalSensor2Rig_FLU"
 _CORRECTIONS = ("correction_rig_T", "correction_sensor_R_FLU")
@@ -35,17 +36,22 @@ def _write(file: CalibrationFile) -> str:
 def _write_in_rig(file: CalibrationFile, rig_from_radar: RigidTransform) -> str:
     """Write rig.json: a radar and a camera, each posed in the rig."""
     rig_from_link = rig_from_radar @ file.calibration.camera_from_radar.inverse() @ LINK_FROM_OPTICAL.inverse()
+    meaning = (
+        f"{_POSE} is each sensor's pose in the rig, roll-pitch-yaw in degrees about fixed axes, "
+        f"R = Rz(yaw) Ry(pitch) Rx(roll); {file.frames.camera_link} has body axes (x forward, y left, z up)"
+    )
+    stated = {STATEMENT_KEY: "\n".join(statement(file, meaning))}
     sensors = [
-        _sensor(file.frames.radar, "radar.virtual", rig_from_radar),
-        _sensor(file.frames.camera_link, "camera.virtual", rig_from_link),
+        _sensor(file.frames.radar, "radar.virtual", rig_from_radar, {}),
+        _sensor(file.frames.camera_link, "camera.virtual", rig_from_link, stated),
     ]
     return json_text({"rig": {"sensors": sensors}, "version": 7})
 
 
-def _sensor(name: str, protocol: str, rig_from_sensor: RigidTransform) -> dict[str, Any]:
+def _sensor(name: str, protocol: str, rig_from_sensor: RigidTransform, properties: dict[str, str]) -> dict[str, Any]:
     angles_deg = np.rad2deg(rpy_from_matrix(rig_from_sensor.rotation))
     pose = {"roll-pitch-yaw": (angles_deg + 0.0).tolist(), "t": (rig_from_sensor.translation_m + 0.0).tolist()}
-    return {"name": name, "protocol": protocol, "parameter": "", "properties": {}, _POSE: pose}
+    return {"name": name, "protocol": protocol, "parameter": "", "properties": properties, _POSE: pose}
 
 
 def _recognizes(content: Content) -> bool:
@@ -76,7 +82,9 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         pose = WrittenPose(
             "matrix", radar_from_link.rotation, radar_from_link.translation_m, "radar_from_camera", "link"
         )
-    return ImportedCalibration("driveworks", pose, notes=(note,)).checked(source)
+    properties = cameras[0].get("properties")
+    text = stated_lines(properties.get(STATEMENT_KEY)) if isinstance(properties, Mapping) else ""
+    return with_statement(ImportedCalibration("driveworks", pose, notes=(note,)), text).checked(source)
 
 
 def _posed(sensor: Mapping[str, Any], *, source: str) -> WrittenPose:
@@ -103,7 +111,7 @@ DRIVEWORKS = Format(
     numbers="pose of each sensor in the rig, roll pitch yaw in degrees about fixed axes; the camera with body axes",
     file_name="rig.json",
     camera="none",
-    comment="none",
+    comment="keys",
     notes=_NOTES,
     write=_write,
     write_in_parent=_write_in_rig,
