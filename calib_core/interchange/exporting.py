@@ -98,7 +98,8 @@ def export(
         raise InputError(f"the format {name} has no third frame to place the radar in; formats that have one: {able}")
     else:
         content = chosen.write_in_parent(prepared.file, parent_from_radar)
-    return Export(chosen.file_name, content, (*chosen.notes, *prepared.notes), prepared.extra_files)
+    notes_on = chosen.notes_on(file) if chosen.notes_on else ()
+    return Export(chosen.file_name, content, (*chosen.notes, *notes_on, *prepared.notes), prepared.extra_files)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -47,6 +47,7 @@ class Format:
         reads: how it is recognized and read; None if the format can only be written.
         notes: what a user of the file must know, one sentence each.
         write_in_parent: like write, with a given pose of the radar in a third frame (kit, ego); None if it has none.
+        notes_on: returns more notes, which depend on the calibration; None if there are none.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Format:
     reads: Reads | None
     notes: tuple[str, ...] = ()
     write_in_parent: Callable[[CalibrationFile, RigidTransform], str | bytes] | None = None
+    notes_on: Callable[[CalibrationFile], tuple[str, ...]] | None = None
 
     @property
     def is_for_rectified(self) -> bool:

@@ -151,8 +151,7 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_the_picture
     page.click(f'{DIALOG} [data-export="kitti"]')
     expect(page.locator(RECTIFIED)).to_be_checked()
     page.uncheck(RECTIFIED)
-    expect(page.locator(f"{DIALOG} .reason")).to_contain_text("not the distortion of this")
-    expect(page.locator(f"{DIALOG} .first")).to_be_disabled()
+    expect(page.locator(f"{DIALOG} .notes")).to_contain_text("the maps in rectification.npz")
 
 
 def test_a_keyboard_is_enough_and_stays_in_the_panel(solved: Driver) -> None:
