@@ -154,7 +154,22 @@ class _Found:
 
 
 def _records(data: bytes) -> Iterator[tuple[int | None, bytes]]:
-    """Yield the records and those in uncompressed chunks; the kind of a compressed chunk is None."""
+    """Yield the records and those in uncompressed chunks; the kind of a compressed chunk is None.
+
+    A chunk within a chunk is not allowed and is not looked into.
+    """
+    for kind, body in _top_records(data):
+        if kind != _CHUNK:
+            yield kind, body
+            continue
+        compression, start = _text_at(body, _CHUNK_HEAD.size)
+        if compression:
+            yield None, b""
+            return
+        yield from _top_records(body[start + 8 :])
+
+
+def _top_records(data: bytes) -> Iterator[tuple[int, bytes]]:
     at = 0
     while at + _RECORD.size <= len(data):
         kind, length = _RECORD.unpack_from(data, at)
@@ -163,14 +178,7 @@ def _records(data: bytes) -> Iterator[tuple[int | None, bytes]]:
         if len(body) < length:
             raise struct.error(f"a record at byte {at} is longer than the file")
         at += length
-        if kind != _CHUNK:
-            yield kind, body
-            continue
-        compression, start = _text_at(body, _CHUNK_HEAD.size)
-        if compression:
-            yield None, b""
-            return
-        yield from _records(body[start + 8 :])
+        yield kind, body
 
 
 def _record(kind: int, body: bytes) -> bytes:
