@@ -51,7 +51,10 @@ class Export:
             raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
         path = self.calibration[0]
         parent = parent_pose(self.parent_from_radar) if self.parent_from_radar else None
-        written = export(_own_calibration(path), self.to, parent_from_radar=parent, rectified=self.rectified)
+        file = _own_calibration(path)
+        written = export(file, self.to, parent_from_radar=parent, rectified=self.rectified)
+        for warning in file.calibration.warnings:
+            print(f"warning of the calibration: {warning.message}; {warning.hint}", file=sys.stderr)
         for note in written.notes:
             print(f"note: {note}", file=sys.stderr)
         if self.out is not None:

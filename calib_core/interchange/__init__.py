@@ -1,6 +1,6 @@
 """Read and write files: clicks, pairs, cameras, calibrations, and the formats of other tools."""
 
-from calib_core.interchange.adopting import adopt, adopted_calibration
+from calib_core.interchange.adopting import Adoption, adopt, adopted_calibration, adoption
 from calib_core.interchange.calibration_file import (
     AssumptionNote,
     CalibrationFile,
@@ -29,6 +29,7 @@ from calib_core.interchange.syntax.content import Content
 __all__ = [
     "CALIBRATION_SCHEMA",
     "FORMATS",
+    "Adoption",
     "AssumptionNote",
     "CalibrationFile",
     "CameraFile",
@@ -50,6 +51,7 @@ __all__ = [
     "WrittenPose",
     "adopt",
     "adopted_calibration",
+    "adoption",
     "calibration_bytes",
     "calibration_text",
     "camera_info_text",
