@@ -9,6 +9,7 @@ import tyro
 
 from app.cli.flags import File, Switch, called
 from app.cli.output import write_whole
+from app.cli.unpacking import is_meant_as_folder, write_unpacked
 from app.terminal import print_exactly
 from calib_core.errors import InputError
 
@@ -27,7 +28,7 @@ class Export:
     to: Annotated[str, tyro.conf.arg(metavar="FORMAT")] = "list"
     """Output format: tf2, urdf, ...; "list" lists them all."""
     out: File = None
-    """Output file or folder; without it, text formats go to stdout."""
+    """Output file or folder; without it, text formats go to stdout. pack: NAME.zip, or a folder for its files."""
     parent_from_radar: Annotated[
         tuple[float, float, float, float, float, float, float] | None,
         called("X Y Z QX QY QZ QW"),
@@ -54,7 +55,10 @@ class Export:
         written = export(_own_calibration(path), self.to, parent_from_radar=parent, rectified=self.rectified)
         for note in written.notes:
             print(f"note: {note}", file=sys.stderr)
-        if self.out is not None:
+        if self.out is not None and format_named(self.to).is_unpacked and is_meant_as_folder(self.out):
+            names = write_unpacked(self.out, written.data)
+            print(f"written to {self.out}: {', '.join(names)}")
+        elif self.out is not None:
             target = self.out / written.file_name if self.out.is_dir() else self.out
             write_whole(target, written.data)
             print(f"written to {target}")
@@ -66,7 +70,7 @@ class Export:
 
 
 def _own_calibration(path: Path) -> "CalibrationFile":
-    from calib_core.interchange import calibration_bytes, read_any, read_calibration
+    from calib_core.interchange import adopt, calibration_bytes, read_any, read_calibration
 
     data = calibration_bytes(path)
     found = read_any(data, str(path))
@@ -75,7 +79,7 @@ def _own_calibration(path: Path) -> "CalibrationFile":
             f"{path}: is {found.format}, but export takes calibration-1; convert it first: "
             f"cocalib import {path.name} --out calibration.json"
         )
-    return read_calibration(data, str(path))
+    return read_calibration(data, str(path)) if found.format == "json" else adopt(found, str(path))
 
 
 @dataclass(frozen=True, slots=True)

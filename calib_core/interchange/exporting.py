@@ -8,6 +8,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.format import Format
 from calib_core.interchange.formats.registry import format_named, written_formats
+from calib_core.interchange.origin import missing_map
 
 __all__ = ["Export", "export"]
 
@@ -24,7 +25,7 @@ class Export:
     Attributes:
         file_name: the default name.
         content: text, or bytes if the format is binary.
-        notes: what a user of the file must know.
+        notes: what a user of the file must know; the missing angle map first.
     """
 
     file_name: str
@@ -66,8 +67,9 @@ def export(
         raise InputError(f"the format {name} has no third frame to place the radar in; formats that have one: {able}")
     else:
         content = chosen.write_in_parent(file, parent_from_radar)
-    notes = (*chosen.notes, _RECTIFIED_NOTE) if chosen.is_for_rectified and camera.is_distorted else chosen.notes
-    return Export(chosen.file_name, content, notes)
+    lost = () if chosen.holds_angle_map else missing_map(file.calibration)
+    rectified_note = (_RECTIFIED_NOTE,) if chosen.is_for_rectified and camera.is_distorted else ()
+    return Export(chosen.file_name, content, (*lost, *chosen.notes, *rectified_note))
 
 
 def _check_lens(chosen: Format, camera: Camera, *, rectified: bool) -> None:
