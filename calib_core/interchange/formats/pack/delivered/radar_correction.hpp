@@ -36,6 +36,19 @@ struct Point {
 
 namespace detail {
 
+struct Polar {
+  double range_m, azimuth_rad, elevation_rad;
+};
+
+inline Polar polar(const Point& p) {
+  return {std::hypot(p.x, p.y, p.z), std::atan2(p.y, p.x), std::atan2(p.z, std::hypot(p.x, p.y))};
+}
+
+inline Point cartesian(const Polar& p) {
+  const double level_m = p.range_m * std::cos(p.elevation_rad);
+  return {level_m * std::cos(p.azimuth_rad), level_m * std::sin(p.azimuth_rad), p.range_m * std::sin(p.elevation_rad)};
+}
+
 // Reads a number with a decimal point, whatever the locale of the program.
 inline double number(const std::string& text, const std::string& file) {
   std::istringstream stream(text);
@@ -103,23 +116,26 @@ class AngleMap {
     return map;
   }
 
-  // What to add to a measured azimuth and elevation [rad].
-  struct Correction {
-    double azimuth_rad, elevation_rad;
-  };
-
-  Correction at(double azimuth_rad, double elevation_rad) const {
-    const Cell column = cell(azimuth_rad_, azimuth_rad), row = cell(elevation_rad_, elevation_rad);
+  // The position with its angles corrected and its range kept.
+  Point corrected(const Point& point) const {
+    detail::Polar p = detail::polar(point);
+    const Cell column = cell(azimuth_rad_, p.azimuth_rad), row = cell(elevation_rad_, p.elevation_rad);
     const auto between = [&](double Correction::*angle) {
       const auto along = [&](const std::vector<Correction>& line) {
         return line[column.below].*angle * (1.0 - column.share) + line[column.below + 1].*angle * column.share;
       };
       return along(table_[row.below]) * (1.0 - row.share) + along(table_[row.below + 1]) * row.share;
     };
-    return {between(&Correction::azimuth_rad), between(&Correction::elevation_rad)};
+    p.azimuth_rad += between(&Correction::azimuth_rad);
+    p.elevation_rad += between(&Correction::elevation_rad);
+    return detail::cartesian(p);
   }
 
  private:
+  struct Correction {
+    double azimuth_rad, elevation_rad;  // to add to a measured direction
+  };
+
   // The grid line below a value, and the value's share of the way to the next one, 0 to 1.
   struct Cell {
     std::size_t below;
@@ -170,18 +186,14 @@ struct RadarCorrection {
 
   // The true position of a reported one.
   Point corrected(const Point& reported) const {
-    double range_m = std::hypot(reported.x, reported.y, reported.z) - range_bias_m;
+    detail::Polar p = detail::polar(reported);
+    p.range_m -= range_bias_m;
     if (squared_height_m2 != 0.0)
-      range_m = std::sqrt(std::max(range_m * range_m - squared_height_m2, 0.25 * range_m * range_m));
-    double azimuth_rad = std::atan2(reported.y, reported.x) / (1.0 + azimuth_scale);
-    double elevation_rad = std::atan2(reported.z, std::hypot(reported.x, reported.y)) / (1.0 + elevation_scale);
-    if (angle_map) {
-      const AngleMap::Correction add = angle_map->at(azimuth_rad, elevation_rad);
-      azimuth_rad += add.azimuth_rad;
-      elevation_rad += add.elevation_rad;
-    }
-    const double across_m = range_m * std::cos(elevation_rad);
-    return {across_m * std::cos(azimuth_rad), across_m * std::sin(azimuth_rad), range_m * std::sin(elevation_rad)};
+      p.range_m = std::sqrt(std::max(p.range_m * p.range_m - squared_height_m2, 0.25 * p.range_m * p.range_m));
+    p.azimuth_rad /= 1.0 + azimuth_scale;
+    p.elevation_rad /= 1.0 + elevation_scale;
+    const Point point = detail::cartesian(p);
+    return angle_map ? angle_map->corrected(point) : point;
   }
 };
 

@@ -60,16 +60,35 @@ class AngleMap:
         ]
         return cls(azimuth_rad, elevation_rad, *tables)
 
-    def corrections_rad(self, azimuth_rad: float, elevation_rad: float) -> Tuple[float, float]:  # noqa: UP006
-        """Return what to add to a measured azimuth and elevation."""
+    def corrected(self, point_m: Sequence[float]) -> Tuple[float, float, float]:  # noqa: UP006
+        """Return a position (x, y, z) [m] with its angles corrected and its range kept."""
+        range_m, azimuth_rad, elevation_rad = _polar(point_m)
         column, across = _cell(self.azimuth_rad, azimuth_rad)
         row, up = _cell(self.elevation_rad, elevation_rad)
-        found = []
+        add_rad = []
         for table in (self.add_azimuth_rad, self.add_elevation_rad):
             lower = table[row][column] * (1.0 - across) + table[row][column + 1] * across
             upper = table[row + 1][column] * (1.0 - across) + table[row + 1][column + 1] * across
-            found.append(lower * (1.0 - up) + upper * up)
-        return found[0], found[1]
+            add_rad.append(lower * (1.0 - up) + upper * up)
+        return _cartesian(range_m, azimuth_rad + add_rad[0], elevation_rad + add_rad[1])
+
+    def corrected_array(self, points_m: Any) -> Any:
+        """Return positions (n, 3) [m] with their angles corrected, as a NumPy array."""
+        import numpy as np
+
+        x, y, z = np.asarray(points_m, dtype=np.float64).reshape(-1, 3).T
+        range_m, azimuth, elevation = np.sqrt(x * x + y * y + z * z), np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
+        columns, rows = np.asarray(self.azimuth_rad), np.asarray(self.elevation_rad)
+        column = np.clip(np.searchsorted(columns, azimuth, side="right") - 1, 0, len(columns) - 2)
+        row = np.clip(np.searchsorted(rows, elevation, side="right") - 1, 0, len(rows) - 2)
+        across = np.clip((azimuth - columns[column]) / (columns[column + 1] - columns[column]), 0.0, 1.0)
+        up = np.clip((elevation - rows[row]) / (rows[row + 1] - rows[row]), 0.0, 1.0)
+        add = np.stack([self.add_azimuth_rad, self.add_elevation_rad])
+        lower = add[:, row, column] * (1.0 - across) + add[:, row, column + 1] * across
+        upper = add[:, row + 1, column] * (1.0 - across) + add[:, row + 1, column + 1] * across
+        azimuth, elevation = np.stack([azimuth, elevation]) + lower * (1.0 - up) + upper * up
+        level_m = range_m * np.cos(elevation)
+        return np.stack([level_m * np.cos(azimuth), level_m * np.sin(azimuth), range_m * np.sin(elevation)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -111,17 +130,14 @@ class RadarCorrection:
 
     def corrected(self, reported_m: Sequence[float]) -> Tuple[float, float, float]:  # noqa: UP006
         """Return the true position (x, y, z) [m] of a reported one."""
-        x, y, z = reported_m
-        range_m = math.hypot(x, y, z) - self.range_bias_m
+        range_m, azimuth_rad, elevation_rad = _polar(reported_m)
+        range_m -= self.range_bias_m
         if self.squared_height_m2:
             range_m = math.sqrt(max(range_m**2 - self.squared_height_m2, 0.25 * range_m**2))
-        azimuth_rad = math.atan2(y, x) / (1.0 + self.azimuth_scale)
-        elevation_rad = math.atan2(z, math.hypot(x, y)) / (1.0 + self.elevation_scale)
-        if self.angle_map is not None:
-            add_azimuth_rad, add_elevation_rad = self.angle_map.corrections_rad(azimuth_rad, elevation_rad)
-            azimuth_rad, elevation_rad = azimuth_rad + add_azimuth_rad, elevation_rad + add_elevation_rad
-        across_m = range_m * math.cos(elevation_rad)
-        return across_m * math.cos(azimuth_rad), across_m * math.sin(azimuth_rad), range_m * math.sin(elevation_rad)
+        point_m = _cartesian(
+            range_m, azimuth_rad / (1.0 + self.azimuth_scale), elevation_rad / (1.0 + self.elevation_scale)
+        )
+        return point_m if self.angle_map is None else self.angle_map.corrected(point_m)
 
     def corrected_array(self, reported_m: Any) -> Any:
         """Return the true positions (n, 3) [m] of reported ones, as a NumPy array."""
@@ -133,18 +149,20 @@ class RadarCorrection:
             range_m = np.sqrt(np.maximum(range_m**2 - self.squared_height_m2, 0.25 * range_m**2))
         azimuth = np.arctan2(y, x) / (1.0 + self.azimuth_scale)
         elevation = np.arctan2(z, np.hypot(x, y)) / (1.0 + self.elevation_scale)
-        if self.angle_map is not None and x.size:
-            columns, rows = np.asarray(self.angle_map.azimuth_rad), np.asarray(self.angle_map.elevation_rad)
-            column = np.clip(np.searchsorted(columns, azimuth, side="right") - 1, 0, len(columns) - 2)
-            row = np.clip(np.searchsorted(rows, elevation, side="right") - 1, 0, len(rows) - 2)
-            across = np.clip((azimuth - columns[column]) / (columns[column + 1] - columns[column]), 0.0, 1.0)
-            up = np.clip((elevation - rows[row]) / (rows[row + 1] - rows[row]), 0.0, 1.0)
-            grid = np.stack([self.angle_map.add_azimuth_rad, self.angle_map.add_elevation_rad])
-            lower = grid[:, row, column] * (1.0 - across) + grid[:, row, column + 1] * across
-            upper = grid[:, row + 1, column] * (1.0 - across) + grid[:, row + 1, column + 1] * across
-            azimuth, elevation = np.stack([azimuth, elevation]) + lower * (1.0 - up) + upper * up
-        across_m = range_m * np.cos(elevation)
-        return np.stack([across_m * np.cos(azimuth), across_m * np.sin(azimuth), range_m * np.sin(elevation)], axis=1)
+        level_m = range_m * np.cos(elevation)
+        points_m = np.stack([level_m * np.cos(azimuth), level_m * np.sin(azimuth), range_m * np.sin(elevation)], axis=1)
+        return points_m if self.angle_map is None else self.angle_map.corrected_array(points_m)
+
+
+def _polar(point_m: Sequence[float]) -> Tuple[float, float, float]:  # noqa: UP006
+    """Return range [m], azimuth and elevation [rad]."""
+    x, y, z = point_m
+    return math.hypot(x, y, z), math.atan2(y, x), math.atan2(z, math.hypot(x, y))
+
+
+def _cartesian(range_m: float, azimuth_rad: float, elevation_rad: float) -> Tuple[float, float, float]:  # noqa: UP006
+    level_m = range_m * math.cos(elevation_rad)
+    return level_m * math.cos(azimuth_rad), level_m * math.sin(azimuth_rad), range_m * math.sin(elevation_rad)
 
 
 def _csv_rows(path: Union[str, Path]) -> List[Dict[str, str]]:  # noqa: UP006, UP007
