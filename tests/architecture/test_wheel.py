@@ -55,10 +55,12 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_wheel_contains_the_page_and_the_sample(wheel: Path) -> None:
+def test_the_wheel_contains_the_page_the_sample_and_the_code_of_the_pack(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {"app/static/index.html", "app/sample_data/rooftop/radar.bag", "app/sample_data/rooftop/camera.bag"} <= names
     assert "calib_core/interchange/published/calibration-1.schema.json" in names
+    delivered = "calib_core/interchange/formats/pack/delivered"
+    assert {f"{delivered}/{name}" for name in ("selftest.cpp", "selftest.py", "radar_correction.hpp")} <= names
     assert {"app/py.typed", "calib_core/py.typed"} <= names
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {
         "app",

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile
+from calib_core.interchange.evidence import Evidence
 from calib_core.interchange.origin import missing_map, origin_lines
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.radar import RadarErrors
@@ -30,6 +31,12 @@ _FILES = {
     "selftest.cpp": "the same in C++17",
     "README.txt": "this file",
     "SHA256SUMS": "the hash of every other file",
+}
+
+_EVIDENCE: dict[Evidence, str] = {
+    "clicked": "solved from clicks on a reflector",
+    "imported_proven": "read from another tool's file, whose meaning a check point, pairs or another calibration proved",
+    "imported_assumed": "read from another tool's file, whose meaning was assumed; check it on a recording before you use it",
 }
 
 
@@ -77,6 +84,7 @@ def _pose_lines(file: CalibrationFile) -> Iterator[str]:
 def _trust_lines(file: CalibrationFile) -> Iterator[str]:
     not_here = missing_map(file.calibration)
     yield from (line for line in origin_lines(file) if line not in not_here)
+    yield f"{file.rests_on} means: {_EVIDENCE[file.rests_on]}"
     for warning in file.calibration.warnings:
         yield f"warning {warning.code}: {warning.message}; {warning.hint}"
 

@@ -27,6 +27,7 @@ from calib_core.interchange import (
     read_camera,
     write_calibration,
 )
+from calib_core.interchange.evidence import EVIDENCE_LEVELS
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.lens_models.registry import LENS_MODELS
@@ -98,6 +99,17 @@ def test_the_readme_says_what_is_in_the_pack(corrected, members) -> None:
         assert expected in words
     assert "NOT IN THIS FILE" not in text
     assert max(map(len, text.splitlines())) <= 110
+
+
+@pytest.mark.parametrize("evidence", EVIDENCE_LEVELS)
+def test_the_readme_explains_what_the_pose_rests_on(evidence, golden) -> None:
+    data = export(replace(golden, evidence=evidence), "pack").data
+
+    words = " ".join(unpack(data, source="pack")["README.txt"].decode().split())
+
+    assert f"evidence: {evidence}; from the calibration" in words
+    assert ("check it on a recording before you use it" in words) == (evidence == "imported_assumed")
+    assert read_any(data).evidence == evidence
 
 
 def test_sha256sum_verifies_the_manifest(corrected, unpacked) -> None:

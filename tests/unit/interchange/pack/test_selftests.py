@@ -35,8 +35,12 @@ def through_opencv(file: CalibrationFile, points_radar_m: np.ndarray) -> np.ndar
 
 @pytest.mark.parametrize("lens", LENS_MODELS)
 def test_they_pass_through_every_lens(lens, through_lens, unpacked, selftest) -> None:
-    answer = selftest(unpacked(through_lens(lens)))
+    folder = unpacked(through_lens(lens))
+    before = sorted(folder.rglob("*"))
 
+    answer = selftest(folder)
+
+    assert sorted(folder.rglob("*")) == before
     assert answer.code == 0, answer.out
     assert answer.out.splitlines()[-1].startswith("PASS")
     assert len(answer.out.splitlines()) == 11
