@@ -10,6 +10,9 @@ from typing import Any
 
 import pytest
 
+from calib_core.interchange import FORMATS, export_all, read_calibration
+from calib_core.interchange.formats.statement import POSE_ONLY
+
 Cocalib = Callable[..., Any]
 
 
@@ -78,3 +81,41 @@ def test_an_export_without_the_angle_map_says_so_on_stderr(cocalib: Cocalib, cal
         assert "22.9 px off, with it 2 px" in first
     for name in ("json", "pack"):
         assert "NOT IN THIS FILE" not in cocalib("export", mapped, "--to", name, "--out", tmp_path / f"{name}.zip").err
+
+
+def test_all_formats_are_written_and_those_that_cannot_hold_the_calibration_say_why(
+    cocalib: Cocalib, calibration: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "exports"
+    answer = cocalib("export", calibration, "--to", "all", "--out", folder)
+    assert answer.code == 0
+    lines = dict(line.split(": ", 1) for line in answer.out.splitlines())
+    assert set(lines) == {known.name for known in FORMATS}
+    written, refused = export_all(read_calibration(calibration.read_bytes()))
+    for name, made in written.items():
+        assert lines[name] == f"written to {folder / made.file_name}"
+        assert (folder / made.file_name).read_bytes() == made.data
+    for one in refused:
+        assert lines[one.name] == f"not written: {one.reason}"
+    assert {path.name for path in folder.iterdir()} == {made.file_name for made in written.values()}
+    (note,) = (line for line in answer.err.splitlines() if line.endswith(POSE_ONLY))
+    assert note.startswith("note: tf2, tf2-launch-py, ")
+
+
+def test_all_formats_take_the_parent_and_the_rectified_pictures_where_they_apply(
+    cocalib: Cocalib, calibration: Path, tmp_path: Path
+) -> None:
+    parent = ["--parent-from-radar", "1.5", "0", "0.25", "0", "0", "0", "1"]
+    answer = cocalib("export", calibration, "--to", "all", "--out", tmp_path / "a", "--rectified", *parent)
+    assert answer.code == 0
+    assert "kitti: written to" in answer.out
+    assert "x: 1.5" in (tmp_path / "a" / "sensor_kit_calibration.yaml").read_text()
+
+
+def test_all_formats_need_a_folder(cocalib: Cocalib, calibration: Path, tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    for flags in ([], ["--out", file], ["--out", file / "inside"]):
+        refused = cocalib("export", calibration, "--to", "all", *flags)
+        assert (refused.code, refused.out) == (2, "")
+        assert len(refused.err.splitlines()) == 1

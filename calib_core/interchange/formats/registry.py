@@ -58,7 +58,7 @@ _TRIED_FIRST = (
     TF2_LAUNCH_PY,  # mentions the publisher, as TF2 does
 )
 _TRIED_LAST = (MATLAB, NUMPY)  # accept any mat file and any archive, to report what is wrong with it
-_RESERVED = frozenset({"list", TRUTH.name, *(known.name for known in FORMATS)})
+_RESERVED = frozenset({"list", "all", TRUTH.name, *(known.name for known in FORMATS)})
 
 
 def written_formats() -> tuple[Format, ...]:
