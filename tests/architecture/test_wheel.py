@@ -136,7 +136,7 @@ def test_the_installed_command_serves_its_page(installed: Path, tmp_path: Path) 
         server.communicate()
 
 
-def test_the_installed_command_solves_its_sample(installed: Path, tmp_path: Path) -> None:
+def test_the_installed_command_solves_its_sample_and_packs_it(installed: Path, tmp_path: Path) -> None:
     code = "from app import resources; print(resources.sample_folder() / 'rooftop')"
     sample = Path(
         subprocess.run(
@@ -161,3 +161,6 @@ def test_the_installed_command_solves_its_sample(installed: Path, tmp_path: Path
     )
     assert done.returncode == 0, done.stderr
     assert json.loads(out.read_text())["schema"] == "cocalib/calibration-1"
+    command = [installed / "bin" / "cocalib", "export", out, "--to", "pack", "--out", tmp_path / "pack"]
+    assert subprocess.run(command, cwd=tmp_path, capture_output=True).returncode == 0
+    assert subprocess.run([sys.executable, "-I", "-S", tmp_path / "pack" / "selftest.py"]).returncode == 0

@@ -30,7 +30,7 @@ _TRANSFORMS = (TF2, TF2_LAUNCH_PY, TF2_LAUNCH_XML, TF1_LAUNCH, URDF)
 _LENSES_OF_THE_SELFTEST = ("pinhole", "plumb_bob", "rational_polynomial", "equidistant")
 _DELIVERED = ("radar_correction.py", "radar_correction.hpp", "selftest.py", "selftest.cpp")
 _NOTES = (
-    "one zip archive; with --out FOLDER its files are written into the folder; README.txt says what each is; "
+    "one zip archive, which --out FOLDER writes unpacked; its README.txt says what each file is; "
     "run python3 selftest.py on the robot",
 )
 
