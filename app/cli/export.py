@@ -62,6 +62,7 @@ class Export:
         from calib_core.interchange import export, format_named
 
         written = export(file, self.to, parent_from_radar=parent_from_radar, rectified=self.rectified)
+        _print_warnings(file)
         for note in written.notes:
             print(f"note: {note}", file=sys.stderr)
         if self.out is not None and format_named(self.to).is_unpacked and is_meant_as_folder(self.out):
@@ -96,10 +97,16 @@ def _write_all(
         print(f"{name}: written to {folder / made.file_name}")
     for one in refused:
         print(f"{one.name}: not written: {one.reason}")
+    _print_warnings(file)
     for note in dict.fromkeys(note for made in written.values() for note in made.notes):
         names = ", ".join(name for name, made in written.items() if note in made.notes)
         print(f"note: {names}: {note}", file=sys.stderr)
     return 0
+
+
+def _print_warnings(file: "CalibrationFile") -> None:
+    for warning in file.calibration.warnings:
+        print(f"warning of the calibration: {warning.message}; {warning.hint}", file=sys.stderr)
 
 
 def _own_calibration(path: Path) -> "CalibrationFile":

@@ -76,7 +76,7 @@ def test_an_export_without_the_angle_map_says_so_on_stderr(cocalib: Cocalib, cal
     for name in ("tf2", "kitti"):
         answer = cocalib("export", mapped, "--to", name, "--out", tmp_path / name, *["--rectified"][: name == "kitti"])
         assert answer.code == 0
-        first = answer.err.splitlines()[0]
+        first = next(line for line in answer.err.splitlines() if line.startswith("note: "))
         assert first.startswith("note: NOT IN THIS FILE: the radar's angle map")
         assert "22.9 px off, with it 2 px" in first
     for name in ("json", "pack"):
@@ -100,6 +100,7 @@ def test_all_formats_are_written_and_those_that_cannot_hold_the_calibration_say_
     assert {path.name for path in folder.iterdir()} == {made.file_name for made in written.values()}
     (note,) = (line for line in answer.err.splitlines() if line.endswith(POSE_ONLY))
     assert note.startswith("note: tf2, tf2-launch-py, ")
+    assert "warning of the calibration: the pairs span 5 m to 15 m" in answer.err
 
 
 def test_all_formats_take_the_parent_and_the_rectified_pictures_where_they_apply(
