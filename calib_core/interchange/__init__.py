@@ -14,7 +14,7 @@ from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
 from calib_core.interchange.check.report import CheckReport, Verdict, check
 from calib_core.interchange.contents import contents_text
-from calib_core.interchange.exporting import Export, export
+from calib_core.interchange.exporting import Export, NotExported, export, export_all
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.registry import FORMATS, format_named, written_formats
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
@@ -42,6 +42,7 @@ __all__ = [
     "Format",
     "FrameNames",
     "ImportedCalibration",
+    "NotExported",
     "PairsFile",
     "PixelDifference",
     "Provenance",
@@ -60,6 +61,7 @@ __all__ = [
     "compare",
     "contents_text",
     "export",
+    "export_all",
     "format_named",
     "imported",
     "names_schema",
