@@ -8,10 +8,11 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.format import Format
 from calib_core.interchange.formats.registry import format_named, written_formats
+from calib_core.interchange.origin import missing_map
 from calib_core.interchange.rectification import maps_npz, rectified_camera, rectified_file
 from calib_core.interchange.syntax.zip_archives import pack
 
-__all__ = ["Export", "ExtraFile", "export"]
+__all__ = ["Export", "ExtraFile", "NotExported", "export", "export_all"]
 
 _MAPS_NAME = "rectification.npz"
 _SAME_MATRIX_NOTE = (
@@ -46,7 +47,7 @@ class Export:
     Attributes:
         file_name: the default name.
         content: text, or bytes if the format is binary.
-        notes: what a user of the file must know.
+        notes: what a user of the file must know; the missing angle map first.
         extra_files: what belongs beside it.
     """
 
@@ -67,6 +68,50 @@ class Export:
             return ExtraFile(self.file_name, self.data)
         files = {self.file_name: self.data, **{extra.file_name: extra.data for extra in self.extra_files}}
         return ExtraFile(f"{self.file_name.partition('.')[0]}_and_maps.zip", pack(files))
+
+
+@dataclass(frozen=True, slots=True)
+class NotExported:
+    """A format that cannot represent a calibration.
+
+    Attributes:
+        name: of the format.
+        reason: why, and what to use instead.
+    """
+
+    name: str
+    reason: str
+
+
+def export_all(
+    file: CalibrationFile, *, parent_from_radar: RigidTransform | None = None, rectified: bool = False
+) -> tuple[dict[str, Export], tuple[NotExported, ...]]:
+    """Export a calibration to every format that can represent it.
+
+    Args:
+        file: what to export.
+        parent_from_radar: as for `export`; used by the formats that have a third frame.
+        rectified: as for `export`; used by the formats that cannot store distortion.
+
+    Returns:
+        The files by the name of their format, and the formats that cannot represent it.
+    """
+    written: dict[str, Export] = {}
+    refused = []
+    for known in written_formats():
+        parent = parent_from_radar if known.write_in_parent else None
+        try:
+            made = export(file, known.name, parent_from_radar=parent, rectified=rectified and known.is_for_rectified)
+        except InputError as error:
+            refused.append(NotExported(known.name, str(error)))
+            continue
+        if made.file_name in {other.file_name for other in written.values()}:
+            refused.append(
+                NotExported(known.name, f"its file {made.file_name} is that of another format; export it alone")
+            )
+        else:
+            written[known.name] = made
+    return written, tuple(refused)
 
 
 def export(
@@ -98,8 +143,10 @@ def export(
         raise InputError(f"the format {name} has no third frame to place the radar in; formats that have one: {able}")
     else:
         content = chosen.write_in_parent(prepared.file, parent_from_radar)
+    lost = () if chosen.holds_angle_map else missing_map(file.calibration)
     notes_on = chosen.notes_on(file) if chosen.notes_on else ()
-    return Export(chosen.file_name, content, (*chosen.notes, *notes_on, *prepared.notes), prepared.extra_files)
+    notes = (*lost, *chosen.notes, *notes_on, *prepared.notes)
+    return Export(chosen.file_name, content, notes, prepared.extra_files)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
