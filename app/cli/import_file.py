@@ -35,12 +35,19 @@ class Import:
 
     def run(self) -> int:
         """Write the calibration; return the exit code."""
-        from calib_core.interchange import Provenance, adopt, calibration_bytes, read_any, read_camera_file
+        from calib_core.interchange import (
+            Provenance,
+            adopt,
+            calibration_bytes,
+            files_beside,
+            read_any,
+            read_camera_file,
+        )
         from calib_core.interchange import write_calibration as write
         from calib_core.results import InputFile
 
         data = calibration_bytes(self.calibration)
-        found = read_any(data, str(self.calibration))
+        found = read_any(data, str(self.calibration), beside=files_beside(self.calibration))
         camera = (
             read_camera_file(self.camera) if self.camera else _sized_camera(found, self.calibration, self.image_size)
         )

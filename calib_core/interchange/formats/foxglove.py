@@ -10,6 +10,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
@@ -61,17 +62,30 @@ def _camera_message(camera: Camera, frame: str) -> dict[str, Any]:
 
 
 def _recognizes(content: Content) -> bool:
-    return "FrameTransform" in content.json_mapping or "parent_frame_id" in content.json_mapping
+    return (
+        "FrameTransform" in content.json_mapping or bool(_listed(content)) or "parent_frame_id" in content.json_mapping
+    )
+
+
+def _listed(content: Content) -> list[Mapping[str, Any]]:
+    """Return the transforms of a FrameTransforms message, alone or under its name; none if it is another message."""
+    named = content.json_mapping.get("FrameTransforms")
+    transforms = (named if isinstance(named, Mapping) else content.json_mapping).get("transforms")
+    listed = transforms if isinstance(transforms, list) else []
+    return [one for one in listed if isinstance(one, Mapping) and "parent_frame_id" in one]
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read a FrameTransform, alone or with a CameraCalibration.
+    """Read a FrameTransform, or the one of FrameTransforms between a radar and a camera; a CameraCalibration may be with it.
 
     Raises:
         InputError: a frame name or a number is missing.
     """
     messages = content.mapping
-    message = messages.get("FrameTransform", messages)
+    message, listed = messages.get("FrameTransform", messages), _listed(content)
+    if listed:
+        ends = [Ends(str(one.get("parent_frame_id") or ""), str(one.get("child_frame_id") or "")) for one in listed]
+        message = listed[choose_transform(ends, None, source=source)]
     if not isinstance(message, Mapping):
         message = {}
     parent, child = (str(message.get(key) or "") for key in ("parent_frame_id", "child_frame_id"))

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +13,22 @@ from calib_core.interchange.origin import origin_lines
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.radar import RadarErrors
 
-__all__ = ["POSE_ONLY", "hash_comment", "stated_check_point", "stated_frames", "statement", "xml_comment"]
+__all__ = [
+    "POSE_ONLY",
+    "STATEMENT_KEY",
+    "hash_comment",
+    "keyed_statement",
+    "stated_check_point",
+    "stated_frames",
+    "statement",
+    "xml_comment",
+]
 
 POSE_ONLY = "contains the pose only: keep your camera_info, or also export opencv, which contains the camera"
 """A note for every format that stores nothing of the camera."""
+
+STATEMENT_KEY = "cocalib"
+"""The key of the statement's lines in formats without comments whose readers ignore unknown keys."""
 
 _STRING = r'"(?:[^"\\]|\\.)*"'
 _FRAMES = re.compile(rf"radar frame ({_STRING}) \(.*?\), camera frame ({_STRING}) \(")
@@ -66,6 +79,11 @@ def xml_comment(lines: tuple[str, ...]) -> str:
     """Return lines as one XML comment, which must not contain two adjacent hyphens; JSON decodes the second one in the names."""
     body = "\n     ".join(lines).replace("--", "-\\u002d")
     return f"<!-- {body} -->\n"
+
+
+def keyed_statement(value: Any) -> str:
+    """Return the lines under STATEMENT_KEY as one text; empty if there are none."""
+    return "\n".join(map(str, value)) if isinstance(value, list) else ""
 
 
 def stated_frames(text: str) -> FrameNames | None:

@@ -33,6 +33,7 @@ class Content:
         value: of JSON, of YAML, or of OpenCV's FileStorage XML.
         root: of XML.
         lines: of text, without comments (#) and empty lines.
+        beside: files in the same folder that complete it, by name.
     """
 
     syntax: Syntax
@@ -43,6 +44,7 @@ class Content:
     value: Any = None
     root: Element = _NO_XML
     lines: tuple[str, ...] = ()
+    beside: Mapping[str, bytes] = field(default_factory=dict)
 
     @property
     def mapping(self) -> Mapping[str, Any]:
