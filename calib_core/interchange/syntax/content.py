@@ -1,5 +1,6 @@
 """The content of a file, its syntax parsed once; every format reads this instead of bytes."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -18,6 +19,7 @@ Syntax = Literal["archive", "mat", "bytes", "json", "xml", "lines", "yaml"]
 """zip archive, MATLAB's mat, bytes that are not text, JSON, XML, text by its lines, text as YAML."""
 
 _NO_XML = Element("")
+_LOGGED = re.compile(r"\s*\[(DEBUG|INFO|WARN|ERROR|FATAL)\]")  # a line of ROS's log, as tf2_echo prints first
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +98,7 @@ def decoded(content: str | bytes, *, source: str) -> str:
 
 def _text_readings(text: str, *, source: str) -> Iterator[Content]:
     start = text.lstrip()[:1]
-    if start in ("{", "["):
+    if start in ("{", "[") and not _LOGGED.match(text):
         yield Content("json", text=text, value=json_value(text, source=source))
     elif start == "<":
         root = parse_xml(text, source=source)

@@ -61,7 +61,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             f"{source}: the printed text names no frames; put the command above it (tf2_echo RADAR_FRAME CAMERA_FRAME)"
         )
     order = "tf2_echo RADAR CAMERA" if direction == "radar_from_camera" else "tf2_echo CAMERA RADAR"
-    assumption = f"the text names no frames; assumed {order} with the optical frame, because the camera then looks where the radar does"
+    assumption = f"the text names no frames; assumed {order}, because its optical axis then looks where the radar does"
     pose = WrittenPose(first.pose.form, first.pose.rotation, first.pose.translation_m, direction)
     return ImportedCalibration("tf-echo", pose, assumptions=(assumption,), notes=(_PRINTED,)).checked(source)
 
