@@ -3,14 +3,26 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from calib_core.errors import InputError
+from calib_core.interchange import read_any, read_any_file
 from tests.corpus_calibrations.data_sets import DATA_SETS
 from tests.corpus_calibrations.reading import Reading, read
 from tests.corpus_calibrations.ros import ROS
 from tests.corpus_calibrations.tools import TOOLS
 
 CALIBRATIONS = {calibration.name: calibration for calibration in (*ROS, *TOOLS, *DATA_SETS)}
+
+
+def refusal(data: bytes) -> str:
+    """Return the message with which a file is refused; empty if it is read."""
+    try:
+        read_any(data, "file")
+    except InputError as error:
+        return str(error)
+    return ""
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +70,20 @@ def test_the_folder_of_a_file_is_looked_at_for_what_completes_it(tmp_path: Path)
     calibration = CALIBRATIONS["KITTI raw"]
     together = read(calibration, tmp_path)
     (tmp_path / "calib_cam_to_cam.txt").write_text("R_rect_00: 1 0 0\n", encoding="utf-8")
-    from calib_core.errors import InputError
-    from calib_core.interchange import read_any_file
 
     assert together.outcome == "right"
     with pytest.raises(InputError, match="R_rect_00: expected 9 numbers, found 3"):
         read_any_file(tmp_path / calibration.file_name)
+
+
+@pytest.mark.parametrize("name", CALIBRATIONS)
+def test_a_damaged_file_is_read_or_refused(name: str) -> None:
+    content = CALIBRATIONS[name].content
+    data = content.encode() if isinstance(content, str) else content
+    rng = np.random.default_rng(len(data))
+    for _ in range(8):
+        at, cut = int(rng.integers(len(data))), int(rng.integers(1, 40))
+        junk = rng.choice([b"", b"-", b"0", b"nan", b"[", b"{}", b": ", b"\n", b"\xff", b'"'])
+        refused = refusal(data[:at] + bytes(junk) + data[at + cut :])
+        assert not refused or refused.startswith("file: ")
+        assert "\n" not in refused

@@ -58,7 +58,7 @@ def _read_raw(content: Content, source: str) -> ImportedCalibration:
     lines = _keyed(content.text, source=source)
     rotation = _numbers(lines, "R", 9, source=source)
     translation_m = _numbers(lines, "T", 3, source=source)
-    camera0_from_radar = rigid("matrix", rotation.reshape(3, 3), translation_m, source=source)  # type: ignore[arg-type]
+    camera0_from_radar = rigid("matrix", rotation.reshape(3, 3), translation_m, source=source)
     if _CAMERAS not in content.beside:
         return _found(
             camera0_from_radar,
@@ -67,7 +67,7 @@ def _read_raw(content: Content, source: str) -> ImportedCalibration:
         )
     beside = _keyed(content.beside[_CAMERAS].decode("utf-8", errors="replace"), source=_CAMERAS)
     rectifying = _numbers(beside, "R_rect_00", 9, source=_CAMERAS).reshape(3, 3)
-    rectified_from_camera0 = rigid("matrix", rectifying, np.zeros(3), source=_CAMERAS)  # type: ignore[arg-type]
+    rectified_from_camera0 = rigid("matrix", rectifying, np.zeros(3), source=_CAMERAS)
     projection = _numbers(beside, "P_rect_02", 12, source=_CAMERAS).reshape(3, 4)
     size = _numbers(beside, "S_rect_02", 2, source=_CAMERAS)
     return _projected(
@@ -90,7 +90,7 @@ def _read_odometry(content: Content, source: str) -> ImportedCalibration:
     """
     lines = _keyed(content.text, source=source)
     matrix = _numbers(lines, "Tr", 12, source=source).reshape(3, 4)
-    camera0_from_radar = rigid("matrix", matrix[:, :3], matrix[:, 3], source=source)  # type: ignore[arg-type]
+    camera0_from_radar = rigid("matrix", matrix[:, :3], matrix[:, 3], source=source)
     if "P2" not in lines:
         return _found(camera0_from_radar, "no P2 in the file: the camera is the rectified camera 0", source=source)
     projection = _numbers(lines, "P2", 12, source=source).reshape(3, 4)

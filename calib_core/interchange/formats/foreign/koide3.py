@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import FoundCamera, floats, lens_model_named
@@ -92,7 +94,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     camera, notes = _camera(content.mapping.get("camera"), source=source)
     found = ImportedCalibration(
         "koide3",
-        WrittenPose("quaternion_xyzw", numbers[3:], numbers[:3], "radar_from_camera"),  # type: ignore[arg-type]
+        WrittenPose("quaternion_xyzw", np.array(numbers[3:]), np.array(numbers[:3]), "radar_from_camera"),
         frames=frames,
         check_point=stated_check_point(text),
         assumptions=() if frames else (f"assumed that {points} are the radar's, x forward, y left, z up",),

@@ -105,11 +105,11 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     stated = stated_frames(text)
     radar = stated.radar if stated and stated.radar in systems else _one(systems, streams, "radar", source=source)
     camera = stated.camera if stated and stated.camera in systems else _one(systems, streams, "camera", source=source)
-    radar_root, root_from_radar = _rooted(radar, systems, source=source)
-    camera_root, root_from_camera = _rooted(camera, systems, source=source)
-    if radar_root != camera_root:
+    radar_parent, parent_from_radar = _rooted(radar, systems, source=source)
+    camera_parent, parent_from_camera = _rooted(camera, systems, source=source)
+    if radar_parent != camera_parent:
         raise InputError(f"{source}: {radar!r} and {camera!r} have no common parent; give both in one frame")
-    radar_from_camera = root_from_radar.inverse() @ root_from_camera
+    radar_from_camera = parent_from_radar.inverse() @ parent_from_camera
     if stated is None and direction_by_facing(radar_from_camera.rotation) == "camera_from_radar":
         raise InputError(
             f"{source}: coordinate_systems: {camera!r} looks away from {radar!r}, and would not if pose_wrt_parent were "
@@ -146,12 +146,12 @@ def _one(systems: Mapping[str, Any], streams: Mapping[str, Any], role: str, *, s
 
 def _rooted(name: str, systems: Mapping[str, Any], *, source: str) -> tuple[str, RigidTransform]:
     """Return the topmost parent of a coordinate system, and its pose there."""
-    root_from_named, seen = RigidTransform.identity(), {name}
+    parent_from_sensor, seen = RigidTransform.identity(), {name}
     while name in systems:
         system = systems[name]
         if not isinstance(system, Mapping):
             raise InputError(f"{source}: coordinate_systems.{name}: not an object; correct it")
-        root_from_named = _pose(system.get("pose_wrt_parent"), name, source=source) @ root_from_named
+        parent_from_sensor = _pose(system.get("pose_wrt_parent"), name, source=source) @ parent_from_sensor
         parent = str(system.get("parent") or "")
         if not parent:
             break
@@ -159,7 +159,7 @@ def _rooted(name: str, systems: Mapping[str, Any], *, source: str) -> tuple[str,
             raise InputError(f"{source}: coordinate_systems.{name}: its parents form a circle; correct parent")
         seen.add(parent)
         name = parent
-    return name, root_from_named
+    return name, parent_from_sensor
 
 
 def _pose(value: Any, name: str, *, source: str) -> RigidTransform:
@@ -170,7 +170,7 @@ def _pose(value: Any, name: str, *, source: str) -> RigidTransform:
         value = {"matrix4x4": value}  # as before version 1.0
     if "matrix4x4" in value:
         matrix = rigid_matrix(value["matrix4x4"], source=source, place=f"{place}.matrix4x4")
-        return rigid("matrix", matrix[:3, :3], matrix[:3, 3], source=source)  # type: ignore[arg-type]
+        return rigid("matrix", matrix[:3, :3], matrix[:3, 3], source=source)
     if "quaternion" in value:
         quaternion = floats(value["quaternion"], source=source, place=f"{place}.quaternion", length=4)
         translation_m = floats(value.get("translation"), source=source, place=f"{place}.translation", length=3)

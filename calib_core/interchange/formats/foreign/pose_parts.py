@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from calib_core.arrays import Matrix33
 from calib_core.errors import InputError
@@ -39,13 +40,13 @@ def named_numbers(block: Any, keys: Sequence[str], *, source: str, place: str) -
     return tuple(floats(block.get(key), source=source, place=f"{place}.{key}", length=1)[0] for key in keys)
 
 
-def rigid(form: Form, rotation: Sequence[float], translation_m: Sequence[float], *, source: str) -> RigidTransform:
+def rigid(form: Form, rotation: ArrayLike, translation_m: ArrayLike, *, source: str) -> RigidTransform:
     """Return the transform of a rotation as it is written and a translation [m].
 
     Raises:
         InputError: the rotation is invalid.
     """
-    pose = WrittenPose(form, np.array(rotation), np.array(translation_m), "radar_from_camera")
+    pose = WrittenPose(form, np.asarray(rotation), np.asarray(translation_m), "radar_from_camera")
     try:
         return pose.as_written()
     except ValueError as error:

@@ -41,7 +41,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     if len(content.lines) > 1:
         raise InputError(f"{source}: a trajectory of {len(content.lines)} poses, not a calibration; keep one line")
     numbers = np.array(content.lines[0].split(), dtype=np.float64)
-    pose = rigid("quaternion_xyzw", numbers[4:], numbers[1:4], source=source)  # type: ignore[arg-type]
+    pose = rigid("quaternion_xyzw", numbers[4:], numbers[1:4], source=source)
     direction = direction_by_facing(pose.rotation)
     if direction is None:
         raise InputError(
