@@ -7,7 +7,7 @@ import numpy as np
 
 from calib_core.errors import InputError
 from calib_core.interchange.format import Reads
-from calib_core.interchange.formats.foreign.pose_parts import named_numbers, roles_by_name
+from calib_core.interchange.formats.foreign.pose_parts import between_named_frames, named_numbers
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
@@ -39,13 +39,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     if not parent or not child:
         raise InputError(f"{source}: parameters: the frame of the robot or of the camera has no name; name both")
     name, translation_m, rotation = _numbers(content.mapping, source=source)
-    roles = roles_by_name(parent, child, source=source)
-    return ImportedCalibration(
-        name,
-        WrittenPose("quaternion_xyzw", np.array(rotation), np.array(translation_m), roles.direction, roles.axes),
-        frames=roles.frames,
-        assumptions=roles.assumptions,
-    ).checked(source)
+    written = WrittenPose("quaternion_xyzw", np.array(rotation), np.array(translation_m), "radar_from_camera")
+    return between_named_frames(name, written, parent, child, source=source)
 
 
 def _numbers(values: Mapping[str, Any], *, source: str) -> tuple[str, tuple[float, ...], tuple[float, ...]]:

@@ -1,6 +1,7 @@
 """What files of other tools have in common: numbers by name, 4x4 matrices, roles by frame name, a direction by facing."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,14 @@ from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.imported import (
     Direction,
     Form,
-    Roles,
+    ImportedCalibration,
     WrittenPose,
     looks_like_camera,
     looks_like_radar,
     posed_between,
 )
 
-__all__ = ["AXES_ASSUMED", "direction_by_facing", "named_numbers", "rigid", "rigid_matrix", "roles_by_name"]
+__all__ = ["AXES_ASSUMED", "between_named_frames", "direction_by_facing", "named_numbers", "rigid", "rigid_matrix"]
 
 AXES_ASSUMED = "assumed a radar frame with x forward, y left, z up, and a camera frame with optical axes (z forward)"
 """For formats that name both sensors but say nothing of their axes."""
@@ -65,11 +66,21 @@ def rigid_matrix(value: Any, *, source: str, place: str) -> np.ndarray:
     return matrix
 
 
-def roles_by_name(parent: str, child: str, *, source: str) -> Roles:
-    """Interpret "the pose of child in parent" where one of the two must be a radar and the other a camera by name.
+def between_named_frames(
+    name: str, written: WrittenPose, parent: str, child: str, *, source: str, notes: tuple[str, ...] = ()
+) -> ImportedCalibration:
+    """Read "the pose of child in parent" where one of the two must be a radar and the other a camera by name.
+
+    Args:
+        name: of the format.
+        written: the numbers; the direction and axes in it are replaced by those that the names give.
+        parent: name of the frame the pose is given in.
+        child: name of the other.
+        source: the name of the file in error messages.
+        notes: what reading did with the numbers.
 
     Raises:
-        InputError: they are not.
+        InputError: the names are not a radar's and a camera's, or the rotation is invalid.
     """
     parent, child = parent.strip().lstrip("/"), child.strip().lstrip("/")
     is_pair = any(
@@ -80,7 +91,11 @@ def roles_by_name(parent: str, child: str, *, source: str) -> Roles:
             f"{source}: is the pose of {child!r} in {parent!r}, which by name are not a radar and a camera; rename the "
             "frames if they are, or give the transform between the two"
         )
-    return posed_between(parent, child, None)
+    roles = posed_between(parent, child, None)
+    pose = replace(written, direction=roles.direction, axes=roles.axes)
+    return ImportedCalibration(name, pose, frames=roles.frames, assumptions=roles.assumptions, notes=notes).checked(
+        source
+    )
 
 
 def direction_by_facing(rotation: Matrix33) -> Direction | None:

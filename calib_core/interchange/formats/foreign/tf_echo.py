@@ -1,7 +1,7 @@
 """What `tf_echo` (ROS 1) and `tf2_echo` (ROS 2) print: the pose of the second frame in the first."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Reads
-from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing, rigid, roles_by_name
+from calib_core.interchange.formats.foreign.pose_parts import between_named_frames, direction_by_facing, rigid
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content
 
@@ -50,11 +50,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     for other in printed[1:]:
         _refuse_moving(first.transform, other.transform, source=source)
     if named is not None:
-        roles = roles_by_name(named[1], named[2], source=source)
-        pose = WrittenPose(first.pose.form, first.pose.rotation, first.pose.translation_m, roles.direction, roles.axes)
-        return ImportedCalibration(
-            "tf-echo", pose, frames=roles.frames, assumptions=roles.assumptions, notes=(_PRINTED,)
-        ).checked(source)
+        return between_named_frames("tf-echo", first.pose, named[1], named[2], source=source, notes=(_PRINTED,))
     direction = direction_by_facing(first.transform.rotation)
     if direction is None:
         raise InputError(
@@ -62,7 +58,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         )
     order = "tf2_echo RADAR CAMERA" if direction == "radar_from_camera" else "tf2_echo CAMERA RADAR"
     assumption = f"the text names no frames; assumed {order}, because its optical axis then looks where the radar does"
-    pose = WrittenPose(first.pose.form, first.pose.rotation, first.pose.translation_m, direction)
+    pose = replace(first.pose, direction=direction)
     return ImportedCalibration("tf-echo", pose, assumptions=(assumption,), notes=(_PRINTED,)).checked(source)
 
 
