@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.cli.flags import File, NewFile, called
+from app.cli.flags import File, NewFile, Switch, called
 from app.cli.output import write_whole
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
@@ -25,39 +25,64 @@ class Import:
     """Convert a calibration from any known format to cocalib/calibration-1 JSON."""
 
     calibration: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A calibration in any format that export writes, from any program."""
+    """A calibration in any format that `cocalib check` reads, from any program."""
     out: NewFile
     """Output file (calibration-1 JSON)."""
     camera: File = None
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     image_size: Annotated[tuple[int, int] | None, called("WIDTH HEIGHT")] = None
     """Size of the pictures [px], if the file has a camera matrix but no size; by default that of the pictures beside it."""
+    pairs: File = None
+    """Pairs that prove what the file means: a pairs-1 file, or a calibration-1 file with pairs."""
+    against: File = None
+    """A calibration of the same sensors that proves what the file means."""
+    replace_camera: Switch = False
+    """Take --camera although the file states another camera."""
 
     def run(self) -> int:
-        """Write the calibration; return the exit code."""
+        """Write the calibration; return the exit code: 3 if it was converted but looks wrong, and nothing proves it."""
         from calib_core.interchange import (
             Provenance,
-            adopt,
+            adoption,
             calibration_bytes,
             files_beside,
             read_any,
+            read_any_file,
             read_camera_file,
+            read_check_pairs_file,
         )
         from calib_core.interchange import write_calibration as write
         from calib_core.results import InputFile
 
-        data = calibration_bytes(self.calibration)
-        found = read_any(data, str(self.calibration), beside=files_beside(self.calibration))
+        data, source = calibration_bytes(self.calibration), str(self.calibration)
+        found = read_any(data, source, beside=files_beside(self.calibration))
         camera = (
             read_camera_file(self.camera) if self.camera else _sized_camera(found, self.calibration, self.image_size)
         )
+        against = read_any_file(self.against) if self.against else None
+        pairs = read_check_pairs_file(self.pairs) if self.pairs else None
         origin = InputFile(name_text(self.calibration.name), len(data), hashlib.sha256(data).hexdigest())
-        file = adopt(found, str(self.calibration), camera=camera, provenance=Provenance(inputs=(origin,)))
-        for note in found.notes:
-            print(f"note: {note}", file=sys.stderr)
+        adopted = adoption(
+            found,
+            source,
+            camera=camera,
+            provenance=Provenance(inputs=(origin,)),
+            against=against,
+            pairs=pairs,
+            replace_camera=self.replace_camera,
+        )
+        file, report = adopted.file, adopted.report
         write_whole(self.out, write(file))
-        print(f"{self.calibration.name} read as {found.format}; written to {self.out}")
-        return 0
+        print("\n".join(line for line in report.lines()[1:] if not line.startswith("ok: ")), file=sys.stderr)
+        print(f"{self.calibration.name} read as {found.format}, {_RESTS_ON[file.rests_on]}; written to {self.out}")
+        return 3 if report.verdict == "doubtful" else 0
+
+
+_RESTS_ON = {
+    "clicked": "solved from clicks",
+    "imported_proven": "its meaning proven",
+    "imported_assumed": "its meaning assumed, not proven",
+}
 
 
 def _sized_camera(found: "ImportedCalibration", path: Path, image_size_px: tuple[int, int] | None) -> "Camera | None":

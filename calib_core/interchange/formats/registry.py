@@ -32,6 +32,7 @@ from calib_core.interchange.formats.kalibr import KALIBR
 from calib_core.interchange.formats.kitti import KITTI
 from calib_core.interchange.formats.nuscenes import NUSCENES
 from calib_core.interchange.formats.opencv import OPENCV
+from calib_core.interchange.formats.pack.deployment_pack import PACK
 from calib_core.interchange.formats.plugins import plugin_formats
 from calib_core.interchange.formats.ros.camera_info import CAMERA_INFO
 from calib_core.interchange.formats.ros.launch_files import TF1_LAUNCH, TF2_LAUNCH_PY, TF2_LAUNCH_XML
@@ -44,6 +45,7 @@ __all__ = ["CAMERA_ONLY", "FORMATS", "format_named", "readers", "written_formats
 
 FORMATS: tuple[Format, ...] = (
     CALIBRATION_1,
+    PACK,
     TF2,
     TF2_LAUNCH_PY,
     TF2_LAUNCH_XML,
@@ -85,7 +87,7 @@ _ONLY_READ = (
     *(KALIBR_CHAIN, KITTI_CAMERAS, K_RADAR_CAMERA, K_RADAR_OFFSET),  # refused in words
 )
 _TRIED_LAST = (MATLAB, NUMPY)  # accept any mat file and any archive, to report what is wrong with it
-_RESERVED = frozenset({"list", TRUTH.name, *(known.name for known in (*FORMATS, *CAMERA_ONLY))})
+_RESERVED = frozenset({"list", "all", TRUTH.name, *(known.name for known in (*FORMATS, *CAMERA_ONLY))})
 
 
 def written_formats() -> tuple[Format, ...]:

@@ -1,7 +1,6 @@
 """What files of other tools have in common: numbers by name, 4x4 matrices, roles by frame name, a direction by facing."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -91,11 +90,10 @@ def between_named_frames(
             f"{source}: is the pose of {child!r} in {parent!r}, which by name are not a radar and a camera; rename the "
             "frames if they are, or give the transform between the two"
         )
-    roles = posed_between(parent, child, None)
-    pose = replace(written, direction=roles.direction, axes=roles.axes)
-    return ImportedCalibration(name, pose, frames=roles.frames, assumptions=roles.assumptions, notes=notes).checked(
-        source
-    )
+    roles = posed_between(parent, child, None, written)
+    return ImportedCalibration(
+        name, roles.pose, frames=roles.frames, assumptions=roles.assumptions, notes=notes
+    ).checked(source)
 
 
 def direction_by_facing(rotation: Matrix33) -> Direction | None:
