@@ -167,7 +167,9 @@ def _refuse_another_camera(found: ImportedCalibration, given: Camera, *, source:
     stated, compared = found.camera, given
     if stated is None and found.matrix_px is not None:
         size = given.width_px, given.height_px
-        stated, compared = Camera("pinhole", *size, found.matrix_px), Camera("pinhole", *size, given.matrix_px)
+        stated = found.camera_for(size)
+        if not found.distortion.any() and found.lens_model == "pinhole":
+            compared = Camera("pinhole", *size, given.matrix_px)
     apart_px = largest_difference_px(stated, compared) if stated is not None else 0.0
     if stated is None or apart_px <= _SAME_LENS_PX:
         return

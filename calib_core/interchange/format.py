@@ -24,10 +24,12 @@ class Reads:
         recognizes: returns whether a file's content is of this format; raises nothing.
         read: returns the calibration in recognized content, given the name of the file for error messages; raises
             InputError if the content is invalid.
+        beside: names of files that complete one, if they are in the same folder; they arrive in `Content.beside`.
     """
 
     recognizes: Callable[[Content], bool]
     read: Callable[[Content, str], ImportedCalibration]
+    beside: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,7 +17,11 @@ from app.cli import demo
 from app.cli.serving_flags import ServingFlags
 from app.opening import Choice, Serving
 from calib_core.geometry import rotation_angle_rad
+from calib_core.interchange import read_calibration
 from tests.cli.conftest import Made
+from tests.corpus_calibrations.data_sets import DATA_SETS
+from tests.corpus_calibrations.tools import TOOLS
+from tests.corpus_calibrations.truth import CAMERA_FROM_RADAR, SIZE
 
 Cocalib = Callable[..., Any]
 
@@ -215,6 +219,43 @@ def test_import_converts_another_tools_file_to_a_calibration(
     checked = cocalib("check", back, "--against", calibration)
     assert checked.code == 0
     assert "0 deg apart" in checked.out
+
+
+def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_a_kitti_calibration(
+    cocalib: Cocalib, tmp_path: Path
+) -> None:
+    files = {file.name: file for file in (*TOOLS, *DATA_SETS)}
+    for name in ("koide3", "Scale frame", "Segments.ai", "KITTI odometry", "KITTI raw"):
+        folder, file = tmp_path / name, files[name]
+        folder.mkdir()
+        for path, content in {**file.beside, file.file_name: file.content}.items():
+            (folder / path).write_text(str(content), encoding="utf-8")
+        out = folder / "calibration.json"
+        has_size = "size" in file.holds_camera
+        if not has_size:
+            refused = cocalib("import", folder / file.file_name, "--out", out)
+            assert "give it with --image-size WIDTH HEIGHT" in refused.err
+        size = [] if has_size else ["--image-size", *map(str, SIZE)]
+        assert cocalib("import", folder / file.file_name, "--out", out, *size).code == 0
+        written = read_calibration(out.read_text(encoding="utf-8")).calibration
+        np.testing.assert_allclose(written.camera_from_radar.as_matrix(), CAMERA_FROM_RADAR, atol=1e-6)
+        assert (written.camera.width_px, written.camera.height_px) == SIZE
+        assert len(written.camera.distortion) == (5 if "lens" in file.holds_camera else 0)
+
+
+def test_camera_info_is_exported_and_read_by_the_camera_option(
+    cocalib: Cocalib, calibration: Path, tmp_path: Path
+) -> None:
+    info, back = tmp_path / "camera_info.yaml", tmp_path / "back.json"
+    written = cocalib("export", calibration, "--to", "camera-info", "--out", info)
+    assert written.code == 0
+    assert "contains the camera only, without the pose" in written.err
+    assert "no pose of a camera and a radar in it" in cocalib("check", info).err
+    tf2 = tmp_path / "tf.sh"
+    assert cocalib("export", calibration, "--to", "tf2", "--out", tf2).code == 0
+    assert cocalib("import", tf2, "--camera", info, "--out", back).code == 0
+    cameras = [read_calibration(path.read_text()).calibration.camera for path in (calibration, back)]
+    assert np.array_equal(cameras[0].matrix_px, cameras[1].matrix_px)
 
 
 def test_import_takes_the_camera_matrix_of_a_kitti_calibration(

@@ -12,6 +12,7 @@ from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_frames, statement, with_statement
+from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
@@ -83,24 +84,35 @@ def _camera_message(camera: Camera, frame: str) -> dict[str, Any]:
 def _recognizes(content: Content) -> bool:
     if content.syntax == "mcap":
         return any(message.schema_name in _READ_SCHEMAS for message in content.mcap.messages)
-    return "FrameTransform" in content.json_mapping or "parent_frame_id" in content.json_mapping
+    messages = content.json_mapping
+    return "FrameTransform" in messages or bool(_listed(messages)) or "parent_frame_id" in messages
+
+
+def _listed(messages: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the transforms of a FrameTransforms message, alone or under its name; none if it is another message."""
+    named = messages.get("FrameTransforms")
+    transforms = (named if isinstance(named, Mapping) else messages).get("transforms")
+    listed = transforms if isinstance(transforms, list) else []
+    return [one for one in listed if isinstance(one, Mapping) and "parent_frame_id" in one]
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read an MCAP file that we wrote, or a FrameTransform as JSON, alone or with a CameraCalibration.
+    """Read an MCAP file that we wrote, or as JSON a FrameTransform or the one of FrameTransforms between a radar and a camera.
+
+    A CameraCalibration may be with it.
 
     Raises:
         InputError: a frame name or a number is missing, or there are several transforms.
     """
     if content.syntax != "mcap":
-        return _read_messages(content.mapping, None, source)
+        return _read_messages(content.json_mapping, None, source)
     text = content.mcap.metadata.get(STATEMENT_KEY, {}).get(_TEXT, "")
     found = _read_messages(_messages(content.mcap, source=source), stated_frames(text), source)
     return with_statement(found, text)
 
 
 def _messages(file: McapFile, *, source: str) -> dict[str, Any]:
-    """Return the one FrameTransform and the CameraCalibration of an MCAP file, as they are called in JSON."""
+    """Return the transforms and the CameraCalibration of an MCAP file, as they are called in JSON."""
     found: dict[str, Any] = {}
     transforms: list[Any] = []
     for message in file.messages:
@@ -112,15 +124,14 @@ def _messages(file: McapFile, *, source: str) -> dict[str, Any]:
             transforms.append(value)
         elif message.schema_name == _CAMERA:
             found["CameraCalibration"] = value
-    if len(transforms) != 1:
-        raise InputError(
-            f"{source}: contains {len(transforms)} transforms; keep only the one of the radar and the camera"
-        )
-    return {"FrameTransform": transforms[0], **found}
+    return {"FrameTransforms": {"transforms": transforms}, **found}
 
 
 def _read_messages(messages: Mapping[str, Any], stated: FrameNames | None, source: str) -> ImportedCalibration:
-    message = messages.get("FrameTransform", messages)
+    message, listed = messages.get("FrameTransform", messages), _listed(messages)
+    if listed:
+        ends = [Ends(str(one.get("parent_frame_id") or ""), str(one.get("child_frame_id") or "")) for one in listed]
+        message = listed[choose_transform(ends, stated, source=source)]
     if not isinstance(message, Mapping):
         message = {}
     parent, child = (str(message.get(key) or "") for key in ("parent_frame_id", "child_frame_id"))

@@ -28,7 +28,7 @@ POSE_ONLY = "contains the pose only: keep your camera_info, or also export openc
 """A note for every format that stores nothing of the camera."""
 
 STATEMENT_KEY = "cocalib"
-"""The key of the statement in formats that have keys but no comments."""
+"""The key of the statement in formats that have keys but no comments, and whose readers ignore unknown keys."""
 
 _OF_RECTIFIED = " of the rectified picture"
 _STRING = r'"(?:[^"\\]|\\.)*"'

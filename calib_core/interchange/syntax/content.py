@@ -1,5 +1,6 @@
 """The content of a file, its syntax parsed once; every format reads this instead of bytes."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -20,6 +21,7 @@ Syntax = Literal["archive", "mat", "mcap", "bytes", "json", "xml", "lines", "yam
 
 _NO_XML = Element("")
 _NO_MCAP = McapFile((), {})
+_LOGGED = re.compile(r"\s*\[(DEBUG|INFO|WARN|ERROR|FATAL)\]")  # a line of ROS's log, as tf2_echo prints first
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,6 +38,7 @@ class Content:
         value: of JSON, of YAML, or of OpenCV's FileStorage XML.
         root: of XML.
         lines: of text, without comments (#) and empty lines.
+        beside: files in the same folder that complete it, by name.
     """
 
     syntax: Syntax
@@ -47,6 +50,7 @@ class Content:
     value: Any = None
     root: Element = _NO_XML
     lines: tuple[str, ...] = ()
+    beside: Mapping[str, bytes] = field(default_factory=dict)
 
     @property
     def mapping(self) -> Mapping[str, Any]:
@@ -101,7 +105,7 @@ def decoded(content: str | bytes, *, source: str) -> str:
 
 def _text_readings(text: str, *, source: str) -> Iterator[Content]:
     start = text.lstrip()[:1]
-    if start in ("{", "["):
+    if start in ("{", "[") and not _LOGGED.match(text):
         yield Content("json", text=text, value=json_value(text, source=source))
     elif start == "<":
         root = parse_xml(text, source=source)
