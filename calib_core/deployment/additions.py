@@ -70,7 +70,9 @@ class Additions:
     _template: InfoTemplate = field(init=False)
     _clouds: Iterator[CloudTopic] = field(init=False)
     _cloud: CloudTopic | None = field(init=False)
+    _cloud_channels: dict[str, StoredChannel] = field(default_factory=dict)
     _transform_due_ns: int | None = None
+    _first_ns: int = 0
 
     def __post_init__(self) -> None:
         plan = self.plan
@@ -88,10 +90,13 @@ class Additions:
 
     def before(self, message: StoredMessage) -> Iterator[StoredMessage]:
         """Yield what belongs before a recorded message."""
+        if self._transform_due_ns is None:  # the transform comes first of all
+            self._first_ns = message.log_time
+            yield from self._transforms(message.log_time)
+        yield from self._due_clouds(message.log_time)
         yield from self._transforms(message.log_time)
         if message.channel.topic == self.recording.image_topic and self.plan.info.written:
             yield self._counted(self._info, self._template.stamped(self._stamp(message)), message.log_time)
-        yield from self._due_clouds(message.log_time)
 
     def rest(self, last_ns: int) -> Iterator[StoredMessage]:
         """Yield what remains after the last recorded message."""
@@ -99,18 +104,21 @@ class Additions:
             yield from self._due_clouds(max(last_ns, self._cloud.log_time))
 
     def _transforms(self, log_time: int) -> Iterator[StoredMessage]:
-        joint = self.plan.frames.joint
-        if joint is None or joint.parent_from_child is None:
+        if self._transform_due_ns is not None and log_time < self._transform_due_ns:
             return
-        if self._transform_due_ns is None or log_time >= self._transform_due_ns:
-            self._transform_due_ns = log_time + _REPEAT_NS
+        self._transform_due_ns = log_time + _REPEAT_NS
+        joint = self.plan.frames.joint
+        if joint is not None and joint.parent_from_child is not None:
             body = TransformMessage(TimeNs(log_time), joint.parent, joint.child, joint.parent_from_child)
             yield self._counted(self._transform, self.build.serialised(body), log_time)
 
     def _due_clouds(self, log_time: int) -> Iterator[StoredMessage]:
         while self._cloud is not None and self._cloud.log_time <= log_time:
-            channel = self.build.channel(self._cloud.topic, CloudMessage)
-            yield self._counted(channel, self.build.serialised(self._cloud.cloud), self._cloud.log_time)
+            cloud, topic = self._cloud.cloud, self._cloud.topic
+            if topic not in self._cloud_channels:
+                self._cloud_channels[topic] = self.build.channel(topic, CloudMessage)
+            due_ns = max(self._cloud.log_time, self._first_ns)
+            yield self._counted(self._cloud_channels[topic], self.build.serialised(cloud), due_ns)
             self._cloud = next(self._clouds, None)
 
     def _counted(self, channel: StoredChannel, data: bytes, log_time: int) -> StoredMessage:

@@ -14,7 +14,7 @@ from calib_core.errors import InputError, RecordingError
 from calib_core.interchange import CalibrationFile, write_calibration
 from calib_core.interchange.formats.statement import statement
 from calib_core.recordings import Recording
-from calib_core.recordings.containers.copying import CopiedFile, Losses, copied_file, merged_messages
+from calib_core.recordings.containers.copying import CopiedFile, Losses, StoredMessage, copied_file, merged_messages
 from calib_core.recordings.containers.mcap.writing import ChunkCompression, McapWriter
 from calib_core.recordings.containers.message_building import MessageBuilder
 from calib_core.recordings.containers.sources import MessageIndex
@@ -111,13 +111,7 @@ def write_into_recording(
     losses = Losses()
     copied, last_ns = _copy(original, additions, writer, losses, progress)
     for message in additions.rest(last_ns):
-        writer.message(
-            writer.channel(message.channel),
-            message.data,
-            log_time=message.log_time,
-            publish_time=message.publish_time,
-            sequence=message.sequence,
-        )
+        _write(writer, message)
     writer.finish()
     notes.extend(f"{warning.message} ({warning.code})" for warning in recording.warnings if warning.code in _DAMAGE)
     return RecordingWritten(
@@ -260,17 +254,21 @@ def _copy(
     total = original.count
     for message in merged_messages(original.files, original.rows, losses):
         for one in (*additions.before(message), message):
-            writer.message(
-                writer.channel(one.channel),
-                one.data,
-                log_time=one.log_time,
-                publish_time=one.publish_time,
-                sequence=one.sequence,
-            )
+            _write(writer, one)
         copied, last_ns = copied + 1, max(last_ns, message.log_time)
         if copied % _PROGRESS_MESSAGES == 0:
             progress(copied, total)
     return copied, last_ns
+
+
+def _write(writer: McapWriter, message: StoredMessage) -> None:
+    writer.message(
+        writer.channel(message.channel),
+        message.data,
+        log_time=message.log_time,
+        publish_time=message.publish_time,
+        sequence=message.sequence,
+    )
 
 
 def _layout(recording: Recording, plan: Plan) -> str:
