@@ -54,14 +54,14 @@ def place_transform(
         return _beside(camera_from_radar, camera, frames, why)
     if above_camera.root == above_radar.root:
         return _joined(camera_from_radar, above_camera, above_radar, frames)
-    if above_camera.root_from_frame is not None:
-        link, link_from_camera = above_camera.root, above_camera.root_from_frame
+    if above_camera.pose_in_root is not None:
+        link, link_from_camera = above_camera.root, above_camera.pose_in_root
         radar_from_link = (link_from_camera @ camera_from_radar).inverse()
         joint = Joint(radar, link, radar_from_link)
         return SensorFrames(camera, radar, joint, _about_link(above_camera, joint))
-    if above_radar.root_from_frame is not None:
-        camera_from_link = camera_from_radar @ above_radar.root_from_frame.inverse()
-        joint = Joint(camera, above_radar.root, camera_from_link)
+    if above_radar.pose_in_root is not None:
+        link_from_radar = above_radar.pose_in_root
+        joint = Joint(camera, above_radar.root, camera_from_radar @ link_from_radar.inverse())
         note = f"{camera} moves in the recording's own tree, so {joint.child} is written as its child"
         return SensorFrames(camera, radar, joint, (note,))
     return _beside(camera_from_radar, camera, frames, "camera and radar both move in the recording's own transforms")
@@ -81,11 +81,11 @@ def _joined(
 ) -> SensorFrames:
     """Compare with what the recording states, and keep clear of it if it differs."""
     camera, radar = above_camera.frames[0], above_radar.frames[0]
-    if above_camera.root_from_frame is None or above_radar.root_from_frame is None:
+    if above_camera.pose_in_root is None or above_radar.pose_in_root is None:
         why = f"the recording's own transforms connect {radar} and {camera} already, through a joint that moves"
         return _beside(camera_from_radar, camera, frames, why)
-    root_from_camera, root_from_radar = above_camera.root_from_frame, above_radar.root_from_frame
-    recorded_camera_from_radar = root_from_camera.inverse() @ root_from_radar
+    base_from_camera, base_from_radar = above_camera.pose_in_root, above_radar.pose_in_root
+    recorded_camera_from_radar = base_from_camera.inverse() @ base_from_radar
     turned_rad = rotation_angle_rad(recorded_camera_from_radar.rotation.T @ camera_from_radar.rotation)
     recorded_m, calibrated_m = (one.inverse().translation_m for one in (recorded_camera_from_radar, camera_from_radar))
     moved_m = float(np.linalg.norm(recorded_m - calibrated_m))

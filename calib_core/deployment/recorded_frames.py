@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import reduce
 
 import numpy as np
 
@@ -39,12 +40,12 @@ class Chain:
 
     Attributes:
         frames: from the frame itself to the root.
-        root_from_frame: the pose of the frame in the root; None if it changes, or the chain is broken.
+        pose_in_root: the pose of the frame in the root; None if it changes, or if the chain is broken.
         fault: what is wrong with the chain; "" if nothing.
     """
 
     frames: tuple[str, ...]
-    root_from_frame: RigidTransform | None
+    pose_in_root: RigidTransform | None
     fault: str = ""
 
     @property
@@ -78,8 +79,7 @@ class RecordedFrames:
 
     def chain(self, frame: str) -> Chain:
         """Follow the parents of a frame to the root."""
-        frames, root_from_frame, fault = [frame], RigidTransform.identity(), ""
-        moving = False
+        frames, steps, moving, fault = [frame], [], False, ""
         while parents := self.joints.get(frames[-1]):
             if len(parents) > 1:
                 fault = f"{frames[-1]} has several parents: {', '.join(parents)}"
@@ -89,9 +89,14 @@ class RecordedFrames:
             if joint.parent_from_child is None:
                 moving = True
             else:
-                root_from_frame = joint.parent_from_child @ root_from_frame
+                steps.append(joint.parent_from_child)
             frames.append(joint.parent)
-        return Chain(tuple(frames), None if moving or fault else root_from_frame, fault)
+        whole = reduce(_above, steps, RigidTransform.identity())
+        return Chain(tuple(frames), None if moving or fault else whole, fault)
+
+
+def _above(below: RigidTransform, step: RigidTransform) -> RigidTransform:
+    return step @ below
 
 
 def is_transforms(kind: str) -> bool:
