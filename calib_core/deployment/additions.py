@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 from calib_core.deployment.camera_info import ChosenTopic, InfoTemplate
 from calib_core.deployment.placing import SensorFrames
-from calib_core.deployment.radar_points import CloudTopic, clouds
+from calib_core.deployment.radar_points import CloudTopic, clouds, stampable
 from calib_core.deployment.recorded_frames import is_transforms
-from calib_core.measurements import TimeNs, time_parts
+from calib_core.measurements import time_parts
 from calib_core.recordings import Recording
 from calib_core.recordings.containers.copying import StoredMessage
 from calib_core.recordings.containers.message_building import MessageBuilder
@@ -109,7 +109,7 @@ class Additions:
         self._transform_due_ns = log_time + _REPEAT_NS
         joint = self.plan.frames.joint
         if joint is not None and joint.parent_from_child is not None:
-            body = TransformMessage(TimeNs(log_time), joint.parent, joint.child, joint.parent_from_child)
+            body = TransformMessage(stampable(log_time), joint.parent, joint.child, joint.parent_from_child)
             yield self._counted(self._transform, self.build.serialised(body), log_time)
 
     def _due_clouds(self, log_time: int) -> Iterator[StoredMessage]:
@@ -130,7 +130,7 @@ class Additions:
         place = self.plan.stamp_offset
         stamp = b"" if place is None else message.data[place : place + _STAMP.size]
         if len(stamp) < _STAMP.size:
-            return _STAMP.pack(*time_parts(TimeNs(message.log_time)))
+            return _STAMP.pack(*time_parts(stampable(message.log_time)))
         if message.channel.encoding == "cdr" and message.data[1] == 0:
             return stamp[3::-1] + stamp[:3:-1]
         return stamp

@@ -139,7 +139,7 @@ def _original(recording: Recording) -> _Original:
         found.rows.append({})
     for topic in join_topics(recording.sources)[0]:
         for number, (source, channel) in enumerate(topic.parts):
-            mine = topic.take((topic.part == number).nonzero()[0])
+            mine = topic if len(topic.parts) == 1 else topic.take((topic.part == number).nonzero()[0])
             index = MessageIndex(mine.receive_ns, mine.chunk, mine.offset)
             found.rows[places[id(source)]][channel.id] = index
     found.files = [_with_definitions(one) for one in found.files]
@@ -161,7 +161,7 @@ def _plan(recording: Recording, file: CalibrationFile) -> tuple[Plan, list[str]]
     _require_same_pictures(recording, file)
     frames, notes = _frames(recording, file)
     info = choose_topic(recording, file.calibration.camera, frames.camera)
-    notes.extend(note for note in (info.note, _about_distortion(file)) if note)
+    notes.extend(note for note in (info.note, _about_distortion(file), _about_players(recording)) if note)
     drawn = recording.has_plain_clouds and frames.radar == recording.radar_frame
     corrected = has_corrections(file.calibration) and recording.radar_topic is not None
     as_reported = not drawn and recording.radar_topic is not None
@@ -223,6 +223,15 @@ def _about_distortion(file: CalibrationFile) -> str:
     return (
         "the lens distorts: Foxglove straightens the pictures itself; RViz draws returns without distortion, so give its Camera "
         "display rectified pictures (image_proc)"
+    )
+
+
+def _about_players(recording: Recording) -> str:
+    if not any("ROS 1" in source.container for source in recording.sources):
+        return ""
+    return (
+        "ROS 1 has no player for MCAP: open the file in Foxglove, or, for RViz, convert the recording to ROS 2 "
+        "(rosbags-convert) and export into that"
     )
 
 

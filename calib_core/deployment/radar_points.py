@@ -6,16 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Points3
-from calib_core.measurements import TimeNs
+from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import RadarErrors
 from calib_core.recordings import Recording
 from calib_core.recordings.containers.recorded_messages import CloudMessage
 from calib_core.results import Calibration
 
-__all__ = ["CORRECTED_TOPIC", "POINTS_TOPIC", "CloudTopic", "clouds", "has_corrections"]
+__all__ = ["CORRECTED_TOPIC", "POINTS_TOPIC", "CloudTopic", "clouds", "has_corrections", "stampable"]
 
 POINTS_TOPIC = "/cocalib/radar_points"
 CORRECTED_TOPIC = "/cocalib/radar_points_corrected"
+_LAST_STAMP_NS = (2**31 - 1) * NS_PER_S
 _NAMES = ("x", "y", "z", "intensity", "velocity")
 
 
@@ -63,6 +64,11 @@ def clouds(
                 yield CloudTopic(CORRECTED_TOPIC, log_time, _cloud(scan.time, frame, corrected_m, *rest))
 
 
+def stampable(time: int) -> TimeNs:
+    """Return a time as a stamp of ROS can hold it, from 1970 to 2038; damaged recordings have others."""
+    return TimeNs(min(max(time, 0), _LAST_STAMP_NS))
+
+
 def _corrected(calibration: Calibration, points_radar_m: Points3) -> Points3:
     if not len(points_radar_m):
         return points_radar_m
@@ -73,4 +79,4 @@ def _corrected(calibration: Calibration, points_radar_m: Points3) -> Points3:
 def _cloud(
     time: TimeNs, frame: str, points_radar_m: Points3, snr_db: np.ndarray, doppler_mps: np.ndarray
 ) -> CloudMessage:
-    return CloudMessage(time, frame, _NAMES, np.column_stack([points_radar_m, snr_db, doppler_mps]))
+    return CloudMessage(stampable(time), frame, _NAMES, np.column_stack([points_radar_m, snr_db, doppler_mps]))

@@ -93,6 +93,12 @@ class CopiedFile:
             columns = (places.channel[some], places.receive_ns[some], *np.divmod(places.place[some], places.span))
             for number, receive_ns, chunk, offset in zip(*(one.tolist() for one in columns), strict=True):
                 channel = self.channels[number]
+                if receive_ns < 0:
+                    losses.note(
+                        channel.topic,
+                        f"{self.source.path}: a message was received before 1970, which MCAP cannot store",
+                    )
+                    continue
                 try:
                     data = self.source.read(chunk, offset)
                     sequence, publish_time = self._sent(chunk, offset, receive_ns)
@@ -121,9 +127,10 @@ class _Places:
         nothing = np.zeros(0, dtype=np.int64)
         span = 1 + max((int(index.offset.max()) for index in indexes if len(index)), default=0)
         place = np.concatenate([nothing, *(index.chunk * span + index.offset for index in indexes)])
-        channel = np.repeat(np.array(list(rows), dtype=np.int64), [len(index) for index in indexes])
+        channel = np.repeat(np.array(list(rows), dtype=np.int32), [len(index) for index in indexes])
         receive_ns = np.concatenate([nothing, *(index.receive_ns for index in indexes)])
-        return cls(channel, receive_ns, place, span, np.argsort(place, kind="stable"))
+        order = np.argsort(place, kind="stable").astype(np.uint32)
+        return cls(channel, receive_ns, place, span, order)
 
 
 def copied_file(source: Source) -> CopiedFile | None:
