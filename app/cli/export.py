@@ -1,14 +1,16 @@
 """`cocalib export` and `cocalib check`: write a calibration in another tool's format, and check a calibration file."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from app.cli.export_recording import MCAP, export_recording
 from app.cli.flags import File, Switch, called
 from app.cli.output import write_whole
+from app.cli.recording_flags import TopicFlags, Topics
 from app.cli.unpacking import is_meant_as_folder, write_unpacked
 from app.terminal import print_exactly
 from calib_core.errors import InputError
@@ -39,14 +41,23 @@ class Export:
     rectified: Switch = False
     """Your pictures are rectified already, with the same camera matrix; else kitti and nuscenes get maps and a matrix of ours."""
 
+    recording: Annotated[tuple[Path, ...], called("RECORDING...")] = ()
+    """For `--to mcap`: write this ROS recording again with the calibration in it, so that viewers draw returns on pictures."""
+    force: Switch = False
+    """For `--to mcap`: overwrite existing files, but never the recording itself."""
+    topics: Topics = field(default_factory=TopicFlags)
+
     def run(self) -> int:
         """Write the export; return the exit code."""
+        if self.to == MCAP or self.recording or self.force or self.topics != TopicFlags():
+            return self._export_recording()
         from calib_core.interchange import format_named, parent_pose, written_formats
 
         if self.to == "list":
             formats = written_formats()
             width = max(len(known.name) for known in formats)
             print("\n".join(f"{known.name:<{width}}  {known.title}" for known in formats))
+            print(f"{MCAP:<{width}}  a ROS recording with the calibration in it (--recording), for Foxglove and RViz")
             return 0
         if self.to != "all":
             format_named(self.to)
@@ -83,6 +94,19 @@ class Export:
         else:
             print_exactly(written.content)
         return 0
+
+    def _export_recording(self) -> int:
+        """Write the recording again with the calibration in it; return the exit code."""
+        if self.to != MCAP:
+            raise InputError(f"--recording, --force and the options of a recording are for --to {MCAP}")
+        if self.parent_from_radar is not None or self.rectified:
+            raise InputError(f"--parent-from-radar and --rectified do not apply to --to {MCAP}")
+        if len(self.calibration) != 1 or not self.recording or self.out is None:
+            raise InputError(
+                f"export into a recording: cocalib export CALIBRATION.json --to {MCAP} --recording RECORDING... --out NEW.mcap"
+            )
+        file = _own_calibration(self.calibration[0])
+        return export_recording(file, self.recording, self.out, topics=self.topics, force=self.force)
 
 
 def _write_all(
