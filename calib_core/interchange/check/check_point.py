@@ -7,7 +7,7 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.check.explanation import CheckResult, explain, explained
-from calib_core.interchange.check.rounding import rounding_of
+from calib_core.interchange.check.rounding import Rounding, rounding_of
 from calib_core.interchange.imported import StatedCheckPoint, WrittenPose
 
 __all__ = ["CHECK_POINT_UNUSED", "by_check_point"]
@@ -44,19 +44,22 @@ def by_check_point(
     missed = miss(pose.camera_from_radar())
     if missed <= 1.0:
         return _by_own_lens(pose, stated, own, point)
-    rounded = _by_rounding(pose, stated, camera, point)
-    if rounded is not None:
-        return rounded
+    rounding = rounding_of(pose)
+    rounded = _explains(rounding, pose, stated, camera)
+    if rounded and rounding.is_harmless:
+        return CheckResult("good", "check-point", f"the check point {point} is reproduced; {rounding.text}")
     undone = explain(pose, miss, 1.0)
-    mismatch = _mismatch(pose.camera_from_radar(), stated, camera)
-    if undone is None:
-        return CheckResult(
-            "error",
-            "check-point-missed",
-            f"the check point {point} {mismatch}, and no known slip explains it",
-            "the numbers were changed; export the file again",
-        )
-    return explained(undone, f"the check point {point} {mismatch}")
+    mismatch = f"the check point {point} {_mismatch(pose.camera_from_radar(), stated, camera)}"
+    if undone is not None:
+        return explained(undone, mismatch)
+    if rounded:
+        return CheckResult("error", "rounded", f"{mismatch}: {rounding.text}", "write all the digits")
+    return CheckResult(
+        "error",
+        "check-point-missed",
+        f"{mismatch}, and no known slip explains it",
+        "the numbers were changed; export the file again",
+    )
 
 
 def _by_own_lens(pose: WrittenPose, stated: StatedCheckPoint, own: Camera | None, point: str) -> CheckResult:
@@ -74,22 +77,19 @@ def _by_own_lens(pose: WrittenPose, stated: StatedCheckPoint, own: Camera | None
     return CheckResult("good", "check-point", f"the check point {point} is reproduced")
 
 
-def _by_rounding(pose: WrittenPose, stated: StatedCheckPoint, camera: Camera | None, point: str) -> CheckResult | None:
-    """Return the result if rounding explains that the point is missed; None if it does not."""
-    rounding, camera_from_radar = rounding_of(pose), pose.camera_from_radar()
+def _explains(rounding: Rounding, pose: WrittenPose, stated: StatedCheckPoint, camera: Camera | None) -> bool:
+    """Return whether rounding alone can have moved the check point as far as it is from where it should be."""
+    camera_from_radar = pose.camera_from_radar()
     point_camera_m = camera_from_radar @ stated.radar_m
-    missed_m = _miss(camera_from_radar, stated, camera) * _CLOSE * float(np.linalg.norm(point_camera_m))
-    if stated.camera_m is None and camera is not None:
+    missed = _miss(camera_from_radar, stated, camera)
+    if stated.camera_m is not None:
+        missed_m = missed * _CLOSE * float(np.linalg.norm(stated.camera_m))
+    elif camera is not None:
         px_per_m = float(np.linalg.norm(camera.project_with_jacobian(point_camera_m[None])[1]))
-        missed_m = _miss(camera_from_radar, stated, camera) * _CLOSE_PX / px_per_m if px_per_m else float("inf")
-    if not missed_m <= rounding.at(stated.radar_m, camera_from_radar):
-        return None
-    if rounding.is_harmless:
-        return CheckResult("good", "check-point", f"the check point {point} is reproduced; {rounding.text}")
-    mismatch = _mismatch(camera_from_radar, stated, camera)
-    return CheckResult(
-        "error", "rounded", f"the check point {point} {mismatch}: {rounding.text}", "write all the digits"
-    )
+        missed_m = missed * _CLOSE_PX / px_per_m if px_per_m else float("inf")
+    else:
+        return False
+    return missed_m <= rounding.at(stated.radar_m, camera_from_radar)
 
 
 def _miss(candidate: RigidTransform, stated: StatedCheckPoint, camera: Camera | None) -> float:

@@ -16,7 +16,7 @@ __all__ = ["by_other_calibration"]
 _COARSE_RAD = np.radians(10.0)
 _COARSE_M = 0.5
 _CLEARLY_BETTER = 0.2
-_EXACT_FIT = 1e-3
+_EXACT_FIT, _EXACT = 1e-3, 1e-2
 _ROUNDING = 1e-4
 
 
@@ -63,7 +63,7 @@ def _slipped(
 ) -> CheckResult | None:
     coarse = _misses(other, _COARSE_RAD, _COARSE_M)
     missed = coarse(pose.camera_from_radar())
-    exact = explain(pose, coarse, _EXACT_FIT * missed) if missed > _ROUNDING else None
+    exact = explain(pose, coarse, min(_EXACT_FIT * missed, _EXACT)) if missed > _ROUNDING else None
     if exact is not None:
         return explained(exact, difference)
     if agree:

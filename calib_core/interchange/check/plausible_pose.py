@@ -12,6 +12,7 @@ __all__ = ["by_plausibility"]
 _FAR_M = 20.0
 _SIDEWAYS_RAD = np.radians(60.0)
 _FORWARD_RAD = np.radians(35.0)
+_NAMED = 3
 
 
 def by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
@@ -26,7 +27,7 @@ def by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
     if off > _SIDEWAYS_RAD and not verified:
         likely = [s for s in undone_slips(pose) if len(s.slips) == 1 and _is_forward(s.pose)]
         hint = "if it is not mounted like that, perhaps " + ", or ".join(
-            dict.fromkeys(s.slips[0].message for s in likely)
+            list(dict.fromkeys(s.slips[0].message for s in likely))[:_NAMED]
         )
         message = f"the camera points {np.degrees(off):.0f} deg away from the radar's x axis"
         results.append(

@@ -12,7 +12,7 @@ from calib_core.interchange.own.calibration_json import calibration_sha256
 __all__ = ["by_its_calibration"]
 
 _TINY = 1e-6
-_SLIP_FIT = 1e-3
+_SLIP_FIT, _CLOSE = 1e-3, 1e-3
 
 
 def by_its_calibration(imported: ImportedCalibration, origin: ImportedCalibration) -> list[CheckResult]:
@@ -41,7 +41,7 @@ def _by_pose(imported: ImportedCalibration, origin: ImportedCalibration) -> Chec
     missed = _miss(found, right)
     if missed <= _TINY * (1.0 + float(np.linalg.norm(right.translation_m))):
         return CheckResult("good", "same-pose", "the pose is that calibration's")
-    undone = explain(pose, lambda candidate: _miss(candidate, right), max(_TINY, _SLIP_FIT * missed))
+    undone = explain(pose, lambda candidate: _miss(candidate, right), max(_TINY, min(_SLIP_FIT * missed, _CLOSE)))
     if undone is not None:
         return explained(undone, difference)
     rounding = rounding_of(pose)
