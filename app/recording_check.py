@@ -17,7 +17,7 @@ from calib_core.results import Calibration, InputFile
 
 __all__ = ["clicks_in", "other_camera", "stale_inputs", "with_recording"]
 
-_LEAST_P = 0.05
+_LEAST_P = 0.01
 _MOST_MISFITS = 0.2
 _NEAR_PX = 10.0
 _NAMED = 5
@@ -116,8 +116,10 @@ def _result(test: ResidualTest, calibration: Calibration) -> CheckResult:
         holds, judged = median_px <= _NEAR_PX, f"the file states no uncertainty, so {_NEAR_PX:g} px decide"
     else:
         holds = misfits <= _MOST_MISFITS * count and test.p_value >= _LEAST_P
-        together = f"chi2 {test.chi2:.3g} for {test.degrees_of_freedom} degrees of freedom, p = {test.p_value:.2g}"
-        judged = f"{int(test.outside.sum())} outside their stated 95 %, {together}{_named(test)}"
+        together = f", chi2 {test.chi2:.3g} for {test.degrees_of_freedom} degrees of freedom, p = {test.p_value:.2g}"
+        if misfits == count:
+            together = ""
+        judged = f"{int(test.outside.sum())} outside their stated 95 %{together}{_named(test)}"
     if holds:
         return CheckResult("good", "holds", f"holds: {residuals}; {judged}")
     return CheckResult(
@@ -131,4 +133,4 @@ def _result(test: ResidualTest, calibration: Calibration) -> CheckResult:
 def _named(test: ResidualTest) -> str:
     misfits = [name for name, misfit in zip(test.ids, test.misfits, strict=True) if misfit]
     more = ", ..." if len(misfits) > _NAMED else ""
-    return f", without {', '.join(misfits[:_NAMED])}{more}, far off" if misfits else ""
+    return f"; far off: {', '.join(misfits[:_NAMED])}{more}" if misfits else ""

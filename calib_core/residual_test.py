@@ -16,6 +16,7 @@ from calib_core.results import Calibration
 
 __all__ = ["ResidualTest", "residual_test"]
 
+_QUANTILE = 12.591587243743977  # the 95 % quantile of chi2 with 6 degrees of freedom
 _OUTSIDE = 5.991464547107979  # the 95 % quantile of chi2 with 2 degrees of freedom
 _MISFIT = 13.815510557964274  # its 99.9 % quantile: no noise of this pair explains it
 
@@ -67,7 +68,9 @@ def residual_test(pairs: Sequence[Pair], calibration: Calibration) -> ResidualTe
     if not np.isfinite(calibration.firm_covariance).all():
         return ResidualTest(ids, distances_px, none, ~seen, float("nan"), 0, float("nan"))
     jacobian = calibration.camera.pose_jacobian(calibration.camera_from_radar, points_radar_m)
-    return _tested(ids, distances_px, residuals_px, residual_covariances(model), jacobian, calibration.firm_covariance)
+    heavier = max(1.0, float(np.nan_to_num(calibration.covariance_quantile)) / _QUANTILE)  # tails than a normal error's
+    covariance = calibration.firm_covariance * heavier
+    return _tested(ids, distances_px, residuals_px, residual_covariances(model), jacobian, covariance)
 
 
 def _corrected(pair: Pair, radar_errors: RadarErrors) -> Pair:
