@@ -15,7 +15,7 @@ from calib_core.errors import CalibrationError, InputError
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
-    from calib_core.interchange import CheckedFile, CheckPairs, CheckReport, ImportedCalibration, Limits
+    from calib_core.interchange import AgreementLimits, CheckedFile, CheckPairs, CheckReport, ImportedCalibration
     from calib_core.measurements import ReflectorClick
     from calib_core.recordings import Recording
 
@@ -28,7 +28,7 @@ class Against:
 
     of: "ImportedCalibration | None"
     against: "ImportedCalibration | None"
-    limits: "Limits"
+    limits: "AgreementLimits"
     camera: "Camera | None"
     pairs: "CheckPairs | None"
 
@@ -102,12 +102,12 @@ class Check:
             )
 
     def _against(self) -> Against:
-        from calib_core.interchange import Limits, read_any_file, read_camera_file, read_check_pairs_file
+        from calib_core.interchange import AgreementLimits, read_any_file, read_camera_file, read_check_pairs_file
 
         return Against(
             of=read_any_file(self.of) if self.of else None,
             against=read_any_file(self.against) if self.against else None,
-            limits=Limits(self.max_deg, self.max_cm, self.max_px, self.max_sigma),
+            limits=AgreementLimits(self.max_deg, self.max_cm, self.max_px, self.max_sigma),
             camera=read_camera_file(self.camera) if self.camera else None,
             pairs=read_check_pairs_file(self.pairs) if self.pairs else None,
         )

@@ -9,7 +9,7 @@ from calib_core.interchange.calibration_file import (
     choose_check_point,
 )
 from calib_core.interchange.cameras.files import CameraFile, camera_info_text, read_camera, read_camera_file
-from calib_core.interchange.check.agreement import Criterion, Judgement, Limits
+from calib_core.interchange.check.agreement import AgreementLimits, Criterion, Judgement
 from calib_core.interchange.check.comparison import Comparison, compare
 from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
@@ -32,6 +32,7 @@ from calib_core.interchange.syntax.content import Content
 __all__ = [
     "CALIBRATION_SCHEMA",
     "FORMATS",
+    "AgreementLimits",
     "AssumptionNote",
     "CalibrationFile",
     "CameraFile",
@@ -47,7 +48,6 @@ __all__ = [
     "FrameNames",
     "ImportedCalibration",
     "Judgement",
-    "Limits",
     "PairsFile",
     "PixelDifference",
     "Provenance",

@@ -9,7 +9,7 @@ from calib_core.input_files import file_text, read_input
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance
 from calib_core.interchange.cameras.files import read_camera_file
 from calib_core.interchange.check import report as reports
-from calib_core.interchange.check.agreement import Limits
+from calib_core.interchange.check.agreement import AgreementLimits
 from calib_core.interchange.check.pair_residuals import read_check_pairs_file
 from calib_core.interchange.exporting import Export
 from calib_core.interchange.exporting import export as export_file
@@ -152,7 +152,7 @@ def check(
     camera: Camera | None = None,
     pairs: PathLike | None = None,
     of: PathLike | Calibration | CalibrationFile | None = None,
-    limits: Limits | None = None,
+    limits: AgreementLimits | None = None,
 ) -> reports.CheckReport:
     """Check a calibration against its check point, another calibration and pairs, and for plausibility.
 

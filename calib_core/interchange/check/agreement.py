@@ -8,7 +8,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.check.comparison import Comparison
 from calib_core.interchange.check.pixel_differences import LOST_TEXT, shown
 
-__all__ = ["Criterion", "Judgement", "Limits", "judge"]
+__all__ = ["AgreementLimits", "Criterion", "Judgement", "judge"]
 
 WITHOUT_COVARIANCE = {"deg": 1.0, "cm": 5.0, "px": 10.0}
 _JUDGED_AT_M = 20.0
@@ -16,7 +16,7 @@ _MAX_LENS_PX = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class AgreementLimits:
     """The largest differences that count as agreement; None where no limit is given.
 
     Attributes:
@@ -97,7 +97,7 @@ class Judgement:
         return said
 
 
-def judge(comparison: Comparison, limits: Limits) -> Judgement:
+def judge(comparison: Comparison, limits: AgreementLimits) -> Judgement:
     """Judge a comparison by the limits; without any by the covariances, and without these by 1 deg, 5 cm and 10 px at 20 m.
 
     Raises:
@@ -110,7 +110,7 @@ def judge(comparison: Comparison, limits: Limits) -> Judgement:
     elif tested:
         criteria, basis = [_by_covariance(comparison)], "95 % test under the stated covariances"
     else:
-        criteria = _by_limits(comparison, Limits(WITHOUT_COVARIANCE["deg"], WITHOUT_COVARIANCE["cm"]))
+        criteria = _by_limits(comparison, AgreementLimits(WITHOUT_COVARIANCE["deg"], WITHOUT_COVARIANCE["cm"]))
         criteria += _pixels_at(comparison, _JUDGED_AT_M, WITHOUT_COVARIANCE["px"])
         basis = "usual limits, because no covariance is known; give yours with --max-deg, --max-cm and --max-px"
     return Judgement((*criteria, *_by_lens(comparison, limits)), basis, significant)
@@ -122,7 +122,7 @@ def _by_covariance(comparison: Comparison) -> Criterion:
     return Criterion("chi2", comparison.chi2, comparison.chi2_limit, text)
 
 
-def _by_limits(comparison: Comparison, limits: Limits) -> list[Criterion]:
+def _by_limits(comparison: Comparison, limits: AgreementLimits) -> list[Criterion]:
     criteria = []
     if limits.max_deg is not None:
         criteria.append(_criterion("deg", comparison.rotation_deg, limits.max_deg, "deg"))
@@ -152,7 +152,7 @@ def _pixels_at(comparison: Comparison, distance_m: float, limit_px: float) -> li
     return found
 
 
-def _by_lens(comparison: Comparison, limits: Limits) -> list[Criterion]:
+def _by_lens(comparison: Comparison, limits: AgreementLimits) -> list[Criterion]:
     lens = comparison.lens
     if lens is None or lens.same:
         return []

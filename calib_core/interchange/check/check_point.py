@@ -7,6 +7,7 @@ import numpy as np
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.check.explanation import CheckResult, explain, explained
+from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside
 from calib_core.interchange.check.rounding import Rounding, rounding_of
 from calib_core.interchange.imported import StatedCheckPoint, WrittenPose
 
@@ -35,7 +36,7 @@ def by_check_point(
             "warning",
             CHECK_POINT_UNUSED,
             f"the check point {point} is given as a pixel, but there is no camera to project it with",
-            "check it with --against calibration.json, which has the camera",
+            "check it with --of calibration.json, which has the camera",
         )
 
     def miss(candidate: RigidTransform) -> float:
@@ -107,7 +108,8 @@ def _mismatch(candidate: RigidTransform, stated: StatedCheckPoint, camera: Camer
     point_camera_m = candidate @ stated.radar_m[None]
     if stated.pixel_px is not None and camera is not None:
         pixel = camera.project(point_camera_m)[0]
-        there = f"to ({pixel[0]:.1f}, {pixel[1]:.1f})" if np.isfinite(pixel).all() else "behind the camera"
+        lost = far_outside(np.linalg.norm((pixel - stated.pixel_px)[None], axis=1), camera)[0]
+        there = LOST_TEXT if lost else f"to ({pixel[0]:.1f}, {pixel[1]:.1f})"
         return f"projects {there} instead of to pixel ({stated.pixel_px[0]:.1f}, {stated.pixel_px[1]:.1f})"
     wanted = stated.camera_m if stated.camera_m is not None else np.full(3, np.nan)
     got, want = (", ".join(f"{value:.3f}" for value in point) for point in (point_camera_m[0], wanted))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from calib_core.geometry import RigidTransform, rotation_angle_rad
-from calib_core.interchange.check.agreement import WITHOUT_COVARIANCE, Judgement, Limits
+from calib_core.interchange.check.agreement import WITHOUT_COVARIANCE, AgreementLimits, Judgement
 from calib_core.interchange.check.comparison import Comparison
 from calib_core.interchange.check.explanation import CheckResult, explain, explained
 from calib_core.interchange.check.pixel_differences import shown
@@ -25,7 +25,7 @@ def by_other_calibration(
     other: ImportedCalibration,
     comparison: Comparison,
     judgement: Judgement,
-    limits: Limits,
+    limits: AgreementLimits,
 ) -> list[CheckResult]:
     """Return whether the two agree as judged; a slip that explains their difference is named, however small its effect.
 
@@ -59,7 +59,7 @@ def by_other_calibration(
 
 
 def _slipped(
-    pose: WrittenPose, other: RigidTransform, limits: Limits, difference: str, *, agree: bool
+    pose: WrittenPose, other: RigidTransform, limits: AgreementLimits, difference: str, *, agree: bool
 ) -> CheckResult | None:
     coarse = _misses(other, _COARSE_RAD, _COARSE_M)
     missed = coarse(pose.camera_from_radar())

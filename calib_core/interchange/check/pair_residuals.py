@@ -12,7 +12,7 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.input_files import file_text, read_input
 from calib_core.interchange.check.explanation import CheckResult, explain, explained
-from calib_core.interchange.check.pixel_differences import lenses_of, shown
+from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of, shown
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA
@@ -55,7 +55,7 @@ class CheckPairs:
         return replace(self, radar_errors=calibration.radar_errors)
 
     def misses_px(self, camera_from_radar: RigidTransform, camera: Camera | None = None) -> Values:
-        """Return the distances (n,) between the projected points and their pixels; infinite behind the camera.
+        """Return the distances (n,) between the projected points and their pixels; infinite behind the camera or nearly so.
 
         Args:
             camera_from_radar: the pose.
@@ -65,7 +65,7 @@ class CheckPairs:
         apart = np.linalg.norm(
             (camera or self.camera).project(camera_from_radar @ points_radar_m) - self.pixels_px, axis=1
         )
-        return np.asarray(np.where(np.isfinite(apart), apart, np.inf))
+        return np.where(far_outside(apart, self.camera), np.inf, apart)
 
     def median_miss_px(self, camera_from_radar: RigidTransform) -> float:
         """Return the median of these distances."""
@@ -130,14 +130,14 @@ def by_pairs(imported: ImportedCalibration, pairs: CheckPairs) -> list[CheckResu
 
 def _half_within(misses_px: Values) -> str:
     missed_px = float(np.median(misses_px))
-    return f"half of the pairs within {shown(missed_px)} px" if np.isfinite(missed_px) else "half behind the camera"
+    return f"half of the pairs within {shown(missed_px)} px" if np.isfinite(missed_px) else f"half {LOST_TEXT}"
 
 
 def _by_pose(pose: WrittenPose, pairs: CheckPairs, camera: Camera | None) -> CheckResult:
     near_px = _NEAR * float(np.hypot(pairs.camera.width_px, pairs.camera.height_px))
     misses_px = pairs.misses_px(pose.camera_from_radar(), camera)
     missed_px, count = float(np.median(misses_px)), len(pairs.points_radar_m)
-    where = f"{shown(missed_px)} px or more from their pixels" if np.isfinite(missed_px) else "behind the camera"
+    where = f"{shown(missed_px)} px or more from their pixels" if np.isfinite(missed_px) else LOST_TEXT
     aed = f", AED {shown(float(misses_px.mean()))} px" if np.isfinite(misses_px).all() else ""
     mismatch = f"half of the {count} pairs project {where}"
     if missed_px <= near_px:

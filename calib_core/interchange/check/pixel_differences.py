@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Matrix66, Points2, Points3, Values
+from calib_core.arrays import Flags, Matrix66, Points2, Points3, Values
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform, skew
 from calib_core.interchange.imported import ImportedCalibration
@@ -15,6 +15,7 @@ __all__ = [
     "LensDifference",
     "Lenses",
     "PixelDifference",
+    "far_outside",
     "lenses_of",
     "pixel_difference",
     "pixels_text",
@@ -185,12 +186,16 @@ def _grid(camera: Camera) -> tuple[Points2, Points3]:
     return camera.project(rays[seen]), rays[seen]
 
 
-def _apart(camera: Camera, points_camera_m: Points3, pixels: Points2) -> tuple[Values, np.ndarray]:
+def _apart(camera: Camera, points_camera_m: Points3, pixels: Points2) -> tuple[Values, Flags]:
     """Return how far (n,) points project from given pixels, and which of them (n,) the camera does not see at all."""
     apart = np.linalg.norm(camera.project(points_camera_m) - pixels, axis=1)
+    return apart, far_outside(apart, camera)
+
+
+def far_outside(apart_px: Values, camera: Camera) -> Flags:
+    """Return which distances (n,) from a pixel in the picture are of points behind the camera, or nearly beside it."""
     with np.errstate(invalid="ignore"):
-        lost = ~(apart <= _FAR_OUTSIDE * np.hypot(camera.width_px, camera.height_px))
-    return apart, lost
+        return np.asarray(~(apart_px <= _FAR_OUTSIDE * np.hypot(camera.width_px, camera.height_px)))
 
 
 def _rms_and_max(apart: Values, lost: np.ndarray) -> tuple[float, float]:

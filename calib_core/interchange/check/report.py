@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from calib_core.camera import Camera
-from calib_core.interchange.check.agreement import Judgement, Limits, judge
+from calib_core.interchange.check.agreement import AgreementLimits, Judgement, judge
 from calib_core.interchange.check.check_point import CHECK_POINT_UNUSED, by_check_point
 from calib_core.interchange.check.comparison import Comparison, compare
 from calib_core.interchange.check.explanation import CheckResult
@@ -100,7 +100,7 @@ def check(
     *,
     against: ImportedCalibration | None = None,
     of: ImportedCalibration | None = None,
-    limits: Limits | None = None,
+    limits: AgreementLimits | None = None,
     camera: Camera | None = None,
     pairs: CheckPairs | None = None,
 ) -> CheckReport:
@@ -128,9 +128,9 @@ def check(
     if of is not None:
         results += by_its_calibration(imported, of)
     comparison = compare(against, imported, camera=camera) if against is not None else None
-    judgement = judge(comparison, limits or Limits()) if comparison is not None else None
+    judgement = judge(comparison, limits or AgreementLimits()) if comparison is not None else None
     if against is not None and comparison is not None and judgement is not None:
-        results += by_other_calibration(imported, against, comparison, judgement, limits or Limits())
+        results += by_other_calibration(imported, against, comparison, judgement, limits or AgreementLimits())
     if pairs is not None:
         results += by_pairs(imported, pairs.under(imported.file.calibration) if imported.file else pairs)
     results += by_own_pairs(imported)

@@ -9,9 +9,9 @@ import pytest
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import (
+    AgreementLimits,
     CalibrationFile,
     ImportedCalibration,
-    Limits,
     check,
     compare,
     export,
@@ -87,12 +87,20 @@ def test_limits_given_replace_the_test_and_a_significant_difference_is_said(file
     other = imported(moved(file, 0, 0, 0, 0, 0.02, 0))
 
     assert check(other, against=imported(file)).verdict == "wrong"
-    passed = check(other, against=imported(file), limits=Limits(max_deg=2.0, max_cm=5.0))
+    passed = check(other, against=imported(file), limits=AgreementLimits(max_deg=2.0, max_cm=5.0))
     assert passed.verdict == "right"
     assert "significant under the covariances, but within the limits" in str(passed)
 
 
-@pytest.mark.parametrize("limits", [Limits(max_deg=0.5), Limits(max_cm=1.0), Limits(max_px=3.0), Limits(max_sigma=3.0)])
+@pytest.mark.parametrize(
+    "limits",
+    [
+        AgreementLimits(max_deg=0.5),
+        AgreementLimits(max_cm=1.0),
+        AgreementLimits(max_px=3.0),
+        AgreementLimits(max_sigma=3.0),
+    ],
+)
 def test_each_limit_alone_finds_the_difference(file, limits):
     other = imported(moved(file, 0.05, 0, 0, 0, 0.02, 0))
 
@@ -105,11 +113,11 @@ def test_each_limit_alone_finds_the_difference(file, limits):
 
 def test_a_limit_that_cannot_be_tested_is_refused(file):
     with pytest.raises(InputError, match="--max-sigma needs a covariance"):
-        check(bare(file), against=bare(file), limits=Limits(max_sigma=3.0))
+        check(bare(file), against=bare(file), limits=AgreementLimits(max_sigma=3.0))
     with pytest.raises(InputError, match=r"--max-px needs the intrinsics.*--camera FILE"):
-        check(bare(file), against=bare(file), limits=Limits(max_px=3.0))
+        check(bare(file), against=bare(file), limits=AgreementLimits(max_px=3.0))
     with pytest.raises(InputError, match="--max-deg -1: a limit is a number of at least 0"):
-        Limits(max_deg=-1.0)
+        AgreementLimits(max_deg=-1.0)
 
 
 def test_standard_deviations_are_those_of_one_normal_variable(file):
@@ -165,8 +173,8 @@ def test_pictures_of_another_size_are_another_camera(file):
 def test_a_limit_in_pixels_applies_to_the_lens(file):
     other = imported(seen_by(moved(file), longer_focal_length(file.calibration.camera, 1.02)))
 
-    assert check(other, against=imported(file), limits=Limits(max_px=20.0)).verdict == "right"
-    assert check(other, against=imported(file), limits=Limits(max_px=0.5)).verdict == "wrong"
+    assert check(other, against=imported(file), limits=AgreementLimits(max_px=20.0)).verdict == "right"
+    assert check(other, against=imported(file), limits=AgreementLimits(max_px=0.5)).verdict == "wrong"
 
 
 def test_pairs_seen_by_another_camera_are_named(file):
