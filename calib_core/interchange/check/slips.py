@@ -109,15 +109,15 @@ def _opengl_axes(pose: WrittenPose) -> tuple[WrittenPose, ...]:
     return (dataclasses.replace(_as_matrix(optical, _HALF_TURN_ABOUT_X @ rotation), translation_m=turned_m),)
 
 
-def _other_radar_axes(written_from_right: np.ndarray) -> Callable[[WrittenPose], tuple[WrittenPose, ...]]:
-    """Return what undoes other axes of the radar, given the rotation from x forward, y left, z up to them."""
+def _other_radar_axes(turn: np.ndarray) -> Callable[[WrittenPose], tuple[WrittenPose, ...]]:
+    """Return what undoes other axes of the radar, given the rotation (3, 3) from x forward, y left, z up to them."""
 
     def undo(pose: WrittenPose) -> tuple[WrittenPose, ...]:
         rotation = pose.rotation_matrix()
         if pose.direction == "camera_from_radar":
-            return (_as_matrix(pose, rotation @ written_from_right),)
-        right_m = written_from_right.T @ pose.translation_m
-        return (dataclasses.replace(_as_matrix(pose, written_from_right.T @ rotation), translation_m=right_m),)
+            return (_as_matrix(pose, rotation @ turn),)
+        right_m = turn.T @ pose.translation_m
+        return (dataclasses.replace(_as_matrix(pose, turn.T @ rotation), translation_m=right_m),)
 
     return undo
 
