@@ -20,7 +20,15 @@ if TYPE_CHECKING:
     from calib_core.camera import Camera
     from calib_core.errors import CalibrationError, InputError, OptionError, RecordingError, UnsolvableError
     from calib_core.geometry import RigidTransform
-    from calib_core.interchange import CalibrationFile, CheckReport, Export, FrameNames, PairsFile, Provenance
+    from calib_core.interchange import (
+        AgreementLimits,
+        CalibrationFile,
+        CheckReport,
+        Export,
+        FrameNames,
+        PairsFile,
+        Provenance,
+    )
     from calib_core.interchange.files import (
         check,
         export,
@@ -54,6 +62,7 @@ if TYPE_CHECKING:
     from calib_core.verdict import Verdict, verdict_on
 
 __all__ = [
+    "AgreementLimits",
     "AngleMap",
     "Calibration",
     "CalibrationError",
@@ -125,7 +134,15 @@ _MODULES = {
     "camera": ("Camera",),
     "errors": ("CalibrationError", "InputError", "OptionError", "RecordingError", "UnsolvableError"),
     "geometry": ("RigidTransform",),
-    "interchange": ("CalibrationFile", "CheckReport", "Export", "FrameNames", "PairsFile", "Provenance"),
+    "interchange": (
+        "AgreementLimits",
+        "CalibrationFile",
+        "CheckReport",
+        "Export",
+        "FrameNames",
+        "PairsFile",
+        "Provenance",
+    ),
     "interchange.files": (
         *("check", "export", "read_calibration", "read_camera", "read_clicks", "read_pairs"),
         *("write_calibration", "write_clicks", "write_pairs"),

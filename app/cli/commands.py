@@ -75,8 +75,8 @@ COMMANDS: Mapping[str, Command] = {
         ),
         Command(
             "check",
-            "app.cli.export:Check",
-            "Check a calibration file for errors, or compare two. Exit code 1: wrong; 3: looks wrong, not proven.",
+            "app.cli.check:Check",
+            "Check calibration files for errors, or compare them. Exit code 1: wrong; 3: looks wrong, not proven.",
         ),
         Command(
             "import",

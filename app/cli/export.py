@@ -1,4 +1,4 @@
-"""`cocalib export` and `cocalib check`: write a calibration in another tool's format, and check a calibration file."""
+"""`cocalib export`: write a calibration in another tool's format."""
 
 import sys
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from calib_core.geometry import RigidTransform
     from calib_core.interchange import CalibrationFile
 
-__all__ = ["Check", "Export"]
+__all__ = ["Export"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,28 +152,3 @@ def _own_calibration(path: Path) -> "CalibrationFile":
             f"cocalib import {path.name} --out calibration.json"
         )
     return read_calibration(data, str(path)) if found.format == "json" else adopt(found, str(path))
-
-
-@dataclass(frozen=True, slots=True)
-class Check:
-    """Check a calibration file for errors, or compare two. Exit code 1: wrong; 3: looks wrong, not proven."""
-
-    calibration: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CALIBRATION")]
-    """A calibration in any format that export writes."""
-    against: File = None
-    """Another calibration to compare with: in degrees, centimetres, and pixels at 5, 20 and 60 m."""
-    camera: File = None
-    """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
-    pairs: File = None
-    """Pairs to test it with: a pairs-1 file, or a calibration-1 file with pairs."""
-
-    def run(self) -> int:
-        """Print the results; return 0 if nothing is wrong, 1 if something is, 3 if it looks wrong but that is not proven."""
-        from calib_core.interchange import check, read_any_file, read_camera_file, read_check_pairs_file
-
-        other = read_any_file(self.against) if self.against else None
-        camera = read_camera_file(self.camera) if self.camera else None
-        pairs = read_check_pairs_file(self.pairs) if self.pairs else None
-        report = check(read_any_file(self.calibration), against=other, camera=camera, pairs=pairs)
-        print("\n".join(report.lines()))
-        return {"wrong": 1, "doubtful": 3}.get(report.verdict, 0)

@@ -17,7 +17,7 @@ from calib_core.options import CalibrationOptions
 from calib_core.radar import cartesian_from_polar
 from calib_core.results import Metrics, PairResult
 
-__all__ = ["excluded_pair_results", "fit_metrics", "used_pair_results"]
+__all__ = ["excluded_pair_results", "fit_metrics", "residual_covariances", "used_pair_results"]
 
 
 def fit_metrics(measurements: PairMeasurements, refined: ErrorsInVariablesFit, left_out: LeaveOneOut) -> Metrics:
@@ -43,7 +43,7 @@ def used_pair_results(
     measurements = refined.measurements
     points = cartesian_from_polar(measurements.polar[refined.rows])
     projected = measurements.camera.project(refined.camera_from_radar @ points)
-    inliers, expected = refined.inliers, _residual_covariances(refined.model)
+    inliers, expected = refined.inliers, residual_covariances(refined.model)
     return {
         pair.id: PairResult(
             id=pair.id,
@@ -64,7 +64,7 @@ def used_pair_results(
     }
 
 
-def _residual_covariances(model: Linearization) -> np.ndarray:
+def residual_covariances(model: Linearization) -> np.ndarray:
     """Recover S = W^-1 W^-T of each pair (n, 2, 2); NaN where the camera does not see the position."""
     unseen = np.asarray(~model.whitening.any(axis=(1, 2)))
     inverse = np.linalg.inv(np.where(unseen[:, None, None], np.eye(2), model.whitening))
@@ -86,7 +86,7 @@ def excluded_pair_results(
     measurements = pair_measurements(omitted, camera, options).scaled(refined.noise_scale)
     measurements = replace(measurements, errors=refined.measurements.errors)
     rows, model = associate(measurements, refined.camera_from_radar)
-    expected = _residual_covariances(model)
+    expected = residual_covariances(model)
     results = {}
     for i, pair in enumerate(omitted):
         chosen = int(rows[i] - measurements.first[i])

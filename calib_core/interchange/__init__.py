@@ -9,10 +9,13 @@ from calib_core.interchange.calibration_file import (
     choose_check_point,
 )
 from calib_core.interchange.cameras.files import CameraFile, camera_info_text, read_camera, read_camera_file
-from calib_core.interchange.check.comparison import Comparison, PixelDifference, compare
+from calib_core.interchange.check.agreement import AgreementLimits, Criterion, Judgement
+from calib_core.interchange.check.comparison import Comparison, compare
 from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
+from calib_core.interchange.check.pixel_differences import PixelDifference
 from calib_core.interchange.check.report import CheckReport, Verdict, check
+from calib_core.interchange.check.report_json import CheckedFile, check_json, check_junit, exit_code
 from calib_core.interchange.contents import contents_text
 from calib_core.interchange.exporting import Export, NotExported, export, export_all
 from calib_core.interchange.format import Format, Reads
@@ -31,18 +34,22 @@ __all__ = [
     "CAMERA_ONLY",
     "FORMATS",
     "Adoption",
+    "AgreementLimits",
     "AssumptionNote",
     "CalibrationFile",
     "CameraFile",
     "CheckPairs",
     "CheckReport",
     "CheckResult",
+    "CheckedFile",
     "Comparison",
     "Content",
+    "Criterion",
     "Export",
     "Format",
     "FrameNames",
     "ImportedCalibration",
+    "Judgement",
     "NotExported",
     "PairsFile",
     "PixelDifference",
@@ -58,9 +65,12 @@ __all__ = [
     "calibration_text",
     "camera_info_text",
     "check",
+    "check_json",
+    "check_junit",
     "choose_check_point",
     "compare",
     "contents_text",
+    "exit_code",
     "export",
     "export_all",
     "files_beside",

@@ -9,6 +9,7 @@ from calib_core.input_files import file_text, read_input
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance
 from calib_core.interchange.cameras.files import read_camera_file
 from calib_core.interchange.check import report as reports
+from calib_core.interchange.check.agreement import AgreementLimits
 from calib_core.interchange.check.pair_residuals import read_check_pairs_file
 from calib_core.interchange.exporting import Export
 from calib_core.interchange.exporting import export as export_file
@@ -150,6 +151,8 @@ def check(
     against: PathLike | Calibration | CalibrationFile | None = None,
     camera: Camera | None = None,
     pairs: PathLike | None = None,
+    of: PathLike | Calibration | CalibrationFile | None = None,
+    limits: AgreementLimits | None = None,
 ) -> reports.CheckReport:
     """Check a calibration against its check point, another calibration and pairs, and for plausibility.
 
@@ -158,15 +161,19 @@ def check(
         against: a calibration of the same sensors that is known to be right.
         camera: the intrinsics, if the file has none.
         pairs: a pairs-1 or calibration-1 file: radar positions and the pixels where they were seen.
+        of: the calibration that the file should have been made from: is it that calibration's file?
+        limits: what counts as agreement with `against`; None judges by the covariances.
 
     Raises:
-        InputError: a file cannot be read, or contains no pose.
+        InputError: a file cannot be read, or contains no pose, or a limit cannot be tested with these files.
     """
     return reports.check(
         _imported(calibration),
         against=None if against is None else _imported(against),
         camera=camera,
         pairs=None if pairs is None else read_check_pairs_file(Path(pairs)),
+        of=None if of is None else _imported(of),
+        limits=limits,
     )
 
 

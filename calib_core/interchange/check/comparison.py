@@ -1,4 +1,4 @@
-"""The difference between two calibrations in degrees, in centimetres, and in pixels at typical distances."""
+"""The difference between two calibrations, in degrees, centimetres, pixels and standard deviations; computed only here."""
 
 from dataclasses import dataclass
 
@@ -7,30 +7,24 @@ import numpy as np
 from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
 from calib_core.geometry import skew
+from calib_core.interchange.check.pixel_differences import (
+    DISTANCES_M,
+    LOST_TEXT,
+    LensDifference,
+    PixelDifference,
+    lenses_of,
+    pixel_difference,
+    pixels_text,
+    shown,
+)
 from calib_core.interchange.imported import ImportedCalibration
 
-__all__ = ["ComparedFigure", "Comparison", "PixelDifference", "compare", "shown"]
+__all__ = ["CHI2_95", "ComparedFigure", "Comparison", "compare"]
 
-DISTANCES_M = (5.0, 20.0, 60.0)
-_GRID = 7
+CHI2_95 = 12.591587243743977
+"""The 95 % quantile of chi2 with 6 degrees of freedom."""
+
 _ZERO_LENGTH = 1e-9
-
-
-@dataclass(frozen=True, slots=True)
-class PixelDifference:
-    """How far apart two calibrations project points at one distance.
-
-    Attributes:
-        distance_m: distance from the camera.
-        rms_px: root mean square over the image.
-        max_px: maximum over the image.
-        sigma_px: root mean square expected from the two covariances; NaN if neither is known.
-    """
-
-    distance_m: float
-    rms_px: float
-    max_px: float
-    sigma_px: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +51,12 @@ class Comparison:
         position_sigma_cm: its standard deviation along its own direction; NaN if neither is known.
         pixels: at 5, 20 and 60 m; empty without a camera.
         chi2: squared Mahalanobis distance under the known covariances, 6 degrees of freedom; NaN if neither is known.
-        p_value: probability of a chi2 this large if the two are independent and right; NaN if chi2 is.
+        chi2_limit: what chi2 is below in 95 % of cases if the two are independent and right: the largest quantile they state.
+        p_value: probability of a chi2 this large in that case; NaN if chi2 is.
         covariances: how many of the two covariances are known.
+        sigmas: the same as p_value, as the standard deviations that one normal variable exceeds as rarely; NaN if chi2 is.
+        lens: how far the two lenses are apart; None if one of the two states none.
+        lens_note: what of the lenses is compared, if that is not all of them; else "".
         beyond: for each of the two, whether the other's pose is outside its 95 % ellipsoid; None if it states no uncertainty.
     """
 
@@ -71,6 +69,10 @@ class Comparison:
     p_value: float
     covariances: int
     beyond: tuple[bool | None, bool | None]
+    sigmas: float = float("nan")
+    lens: LensDifference | None = None
+    lens_note: str = ""
+    chi2_limit: float = CHI2_95
 
     @property
     def figures(self) -> tuple[ComparedFigure, ...]:
@@ -83,12 +85,15 @@ class Comparison:
                 "camera position", f"{shown(self.position_cm)} cm apart{_plus_minus(self.position_sigma_cm, 'cm')}"
             ),
         ]
+        other_lens = self.lens is not None and not self.lens.same
+        if self.lens is not None and other_lens:
+            rows.append(ComparedFigure("lens", _lens_text(self.lens)))
         for at in self.pixels:
+            by_pose = f", {_by_pose(at)} by the pose alone" if other_lens else ""
             expected = "" if np.isnan(at.sigma_px) else f", expected {at.sigma_px:.3g} px from the covariances"
-            rms_and_max = f"{shown(at.rms_px)} px rms, {shown(at.max_px)} px max{expected}"
-            rows.append(ComparedFigure(f"at {at.distance_m:g} m", rms_and_max))
+            rows.append(ComparedFigure(f"at {at.distance_m:g} m", f"{pixels_text(at)}{by_pose}{expected}"))
         if np.isfinite(self.chi2):
-            independent = f"(p = {self.p_value:.2g} if the two are independent)"
+            independent = f"(p = {self.p_value:.2g} if the two are independent, {self.sigmas:.3g} sigma)"
             rows.append(ComparedFigure("overall", f"chi2 {shown(self.chi2)} for 6 degrees of freedom {independent}"))
         return tuple(rows)
 
@@ -110,14 +115,21 @@ class Comparison:
         """Return the comparison as readable lines; the first of the two is called the other."""
         rows = [f"{row.label}: {row.text}" for row in self.figures]
         rows.append(self.verdict("the other", "this one"))
+        if self.lens_note:
+            rows.append(self.lens_note)
         if self.covariances == 1:
             rows.append("only one of the two uncertainties is known; the standard deviations come from that one alone")
         return tuple(rows)
 
 
-def shown(value: float) -> str:
-    """Format a number with three significant digits; anything up to a millionth is rounding and shown as 0."""
-    return f"{value if abs(value) > 1e-6 else 0:.3g}"
+def _lens_text(lens: LensDifference) -> str:
+    if np.isnan(lens.rms_px):
+        return f"another camera: {lens.text}"
+    return f"{shown(lens.rms_px)} px rms, {shown(lens.max_px)} px max by the lens alone ({lens.text})"
+
+
+def _by_pose(at: PixelDifference) -> str:
+    return LOST_TEXT if np.isinf(at.pose_rms_px) else f"{shown(at.pose_rms_px)} px rms"
 
 
 def _plus_minus(sigma: float, unit: str) -> str:
@@ -125,7 +137,7 @@ def _plus_minus(sigma: float, unit: str) -> str:
 
 
 def compare(a: ImportedCalibration, b: ImportedCalibration, *, camera: Camera | None = None) -> Comparison:
-    """Compare two calibrations of the same sensors; the covariances are added, as for independent data.
+    """Compare two calibrations of the same sensors, each through its own lens; covariances are added, as for independent data.
 
     Args:
         a: one of them.
@@ -139,18 +151,25 @@ def compare(a: ImportedCalibration, b: ImportedCalibration, *, camera: Camera | 
     a_position_m, b_position_m = a_pose.inverse().translation_m, b_pose.inverse().translation_m
     position_jacobian = -a_pose.rotation.T @ np.hstack([np.eye(3), skew(a_pose.translation_m)])
     moved_m = b_position_m - a_position_m
-    chi2, p_value = _chi2(error, covariance)
-    camera = a.camera or b.camera or camera
+    chi2, limit = _chi2(error, covariance), _chi2_limit(a, b)
+    likelihood = chi2 * CHI2_95 / limit  # a larger quantile stands for heavier tails: 5 % are beyond it
+    lenses = lenses_of(a, b, camera)
     return Comparison(
         rotation_deg=float(np.degrees(np.linalg.norm(error[3:]))),
         rotation_sigma_deg=float(np.degrees(_sigma_along(error[3:], covariance[3:, 3:]))),
         position_cm=float(np.linalg.norm(moved_m)) * 100.0,
         position_sigma_cm=_sigma_along(moved_m, position_jacobian @ covariance @ position_jacobian.T) * 100.0,
-        pixels=tuple(_pixels(a, b, camera, distance_m, covariance) for distance_m in DISTANCES_M) if camera else (),
+        pixels=tuple(pixel_difference(a_pose, b_pose, lenses, distance_m, covariance) for distance_m in DISTANCES_M)
+        if lenses
+        else (),
         chi2=chi2,
-        p_value=p_value,
+        p_value=_p_value(likelihood),
         covariances=len(known),
         beyond=(_beyond(a, error), _beyond(b, a_pose.error_from(b_pose))),
+        sigmas=_sigmas(likelihood),
+        chi2_limit=limit,
+        lens=lenses.difference if lenses else None,
+        lens_note=lenses.note if lenses else "",
     )
 
 
@@ -158,7 +177,7 @@ def _beyond(side: ImportedCalibration, error: np.ndarray) -> bool | None:
     """Return whether an error (6,) of a pose is outside its 95 % ellipsoid; None if it states none."""
     if side.file is None:
         return None
-    squared = _chi2(error, side.file.calibration.covariance)[0]
+    squared = _chi2(error, side.file.calibration.covariance)
     quantile = side.file.calibration.covariance_quantile
     return squared > quantile if np.isfinite(squared) and np.isfinite(quantile) else None
 
@@ -177,32 +196,27 @@ def _sigma_along(direction: np.ndarray, covariance: np.ndarray) -> float:
     return float(np.sqrt(variance)) if variance >= 0 else float("nan")
 
 
-def _chi2(error: np.ndarray, covariance: Matrix66) -> tuple[float, float]:
+def _chi2(error: np.ndarray, covariance: Matrix66) -> float:
+    if not np.isfinite(covariance).all() or np.linalg.matrix_rank(covariance, hermitian=True) < 6:
+        return float("nan")
+    return float(error @ np.linalg.solve(covariance, error))
+
+
+def _chi2_limit(a: ImportedCalibration, b: ImportedCalibration) -> float:
+    quantiles = [side.file.calibration.covariance_quantile for side in (a, b) if side.file is not None]
+    return max(CHI2_95, *(quantile for quantile in quantiles if np.isfinite(quantile)), CHI2_95)
+
+
+def _p_value(chi2: float) -> float:
     from scipy.special import chdtrc
 
-    if not np.isfinite(covariance).all() or np.linalg.matrix_rank(covariance, hermitian=True) < 6:
-        return float("nan"), float("nan")
-    chi2 = float(error @ np.linalg.solve(covariance, error))
-    return chi2, float(chdtrc(6, chi2))
+    return float(chdtrc(6, chi2)) if np.isfinite(chi2) else float("nan")
 
 
-def _pixels(
-    a: ImportedCalibration, b: ImportedCalibration, camera: Camera, distance_m: float, covariance: Matrix66
-) -> PixelDifference:
-    """Compare the projections of points at one distance along the rays of a pixel grid."""
-    columns, rows = np.linspace(0, camera.width_px - 1, _GRID), np.linspace(0, camera.height_px - 1, _GRID)
-    grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-    points_camera_m = camera.rays(grid) * distance_m
-    points_camera_m = points_camera_m[np.isfinite(points_camera_m).all(axis=1)]
-    pixels, jacobian = camera.project_with_jacobian(points_camera_m)
-    moved = camera.project(b.camera_from_radar @ (a.camera_from_radar.inverse() @ points_camera_m))
-    apart = np.linalg.norm(moved - pixels, axis=1)
-    apart = apart[np.isfinite(apart)]
-    if not len(apart):
-        return PixelDifference(distance_m, float("inf"), float("inf"), float("nan"))
-    motion = np.stack([np.hstack([np.eye(3), -skew(point)]) for point in points_camera_m])
-    by_pose = jacobian @ motion
-    variances = np.einsum("nij,jk,nik->n", by_pose, covariance, by_pose)
-    return PixelDifference(
-        distance_m, float(np.sqrt(np.mean(apart**2))), float(apart.max()), float(np.sqrt(np.mean(variances)))
-    )
+def _sigmas(chi2: float) -> float:
+    """Return how many standard deviations one normal variable exceeds as rarely as chi2 of 6 degrees of freedom is exceeded."""
+    from scipy.special import ndtri_exp
+
+    half = chi2 / 2.0
+    tail = np.log1p(half + half**2 / 2.0) - half  # of 6 degrees of freedom; p itself is 0 in floating point beyond 1500
+    return max(0.0, float(-ndtri_exp(tail - np.log(2.0)))) if np.isfinite(chi2) else float("nan")

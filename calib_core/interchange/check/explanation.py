@@ -28,10 +28,21 @@ class CheckResult:
     hint: str = ""
 
 
-def explain(pose: WrittenPose, miss: Callable[[RigidTransform], float], limit: float) -> UndoneSlips | None:
-    """Find the fewest slips that, undone, bring the miss within the limit; among equally few, the best."""
+def explain(
+    pose: WrittenPose, miss: Callable[[RigidTransform], float], limit: float, *, most: int = 2
+) -> UndoneSlips | None:
+    """Find the fewest slips that, undone, bring the miss within the limit; among equally few, the best.
+
+    Args:
+        pose: as written.
+        miss: how far a pose is from the right one, in any unit.
+        limit: in the same unit.
+        most: how many slips may have happened at once, 1 or 2.
+    """
     best: tuple[int, float, UndoneSlips] | None = None
     for undone in undone_slips(pose):
+        if len(undone.slips) > most or (best is not None and len(undone.slips) > best[0]):
+            break
         try:
             missed = miss(undone.pose.camera_from_radar())
         except ValueError:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -10,9 +11,9 @@ from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.input_files import file_text, read_input
-from calib_core.interchange.check.comparison import shown
 from calib_core.interchange.check.explanation import CheckResult, explain, explained
-from calib_core.interchange.imported import WrittenPose
+from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of, shown
+from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.own.calibration_json import read_calibration
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA
 from calib_core.interchange.own.pairs_json import read_pairs
@@ -25,6 +26,7 @@ __all__ = ["CheckPairs", "by_pairs", "read_check_pairs", "read_check_pairs_file"
 
 _NEAR = 0.03
 _CLEARLY_BETTER = 0.2
+_OTHER_LENS_PX = 2.0
 _MAX_BYTES = 64 * 1024 * 1024
 
 
@@ -52,11 +54,18 @@ class CheckPairs:
         """Take out of the positions what a calibration says that this radar gets wrong."""
         return replace(self, radar_errors=calibration.radar_errors)
 
-    def misses_px(self, camera_from_radar: RigidTransform) -> Values:
-        """Return the distances (n,) between the projected points and their pixels; infinite behind the camera."""
+    def misses_px(self, camera_from_radar: RigidTransform, camera: Camera | None = None) -> Values:
+        """Return the distances (n,) between the projected points and their pixels; infinite behind the camera or nearly so.
+
+        Args:
+            camera_from_radar: the pose.
+            camera: what projects; None uses the camera of the pairs.
+        """
         points_radar_m = self.radar_errors.corrected(self.points_radar_m)
-        apart = np.linalg.norm(self.camera.project(camera_from_radar @ points_radar_m) - self.pixels_px, axis=1)
-        return np.asarray(np.where(np.isfinite(apart), apart, np.inf))
+        apart = np.linalg.norm(
+            (camera or self.camera).project(camera_from_radar @ points_radar_m) - self.pixels_px, axis=1
+        )
+        return np.where(far_outside(apart, self.camera), np.inf, apart)
 
     def median_miss_px(self, camera_from_radar: RigidTransform) -> float:
         """Return the median of these distances."""
@@ -99,12 +108,36 @@ def read_check_pairs(text: str, source: str = "pairs") -> CheckPairs:
     return CheckPairs(np.array(points), np.array(pixels), camera, radar_errors)
 
 
-def by_pairs(pose: WrittenPose, pairs: CheckPairs) -> CheckResult:
-    """Check a pose against pairs: it fits, a slip explains why not, or nothing does."""
+def by_pairs(imported: ImportedCalibration, pairs: CheckPairs) -> list[CheckResult]:
+    """Check a calibration against pairs through its own lens: it fits, a slip explains why not, or nothing does.
+
+    Another lens than that of the pairs is named.
+    """
+    lenses = lenses_of(imported, ImportedCalibration("pairs", imported.pose, camera=pairs.camera), None)
+    lens = lenses.difference if lenses is not None else None
+    if lens is None or lens.same or (lenses is not None and lenses.note):
+        return [_by_pose(imported.pose, pairs, None)]
+    message = f"the file's intrinsics are not those of the camera that saw the pairs: {lens.text}"
+    if imported.camera is None or np.isnan(lens.rms_px):
+        hint = "use the pairs of the same camera; the pairs were projected through their own"
+        return [_by_pose(imported.pose, pairs, None), CheckResult("error", "other-lens", message, hint)]
+    by_pose = pairs.misses_px(imported.camera_from_radar)
+    alone = f"{shown(lens.rms_px)} px rms by the lens alone, {_half_within(by_pose)} by the pose alone"
+    level: Literal["warning", "error"] = "error" if lens.rms_px > _OTHER_LENS_PX else "warning"
+    found = CheckResult(level, "other-lens", f"{message}; {alone}", "give both the intrinsics of one camera")
+    return [_by_pose(imported.pose, pairs, imported.camera), found]
+
+
+def _half_within(misses_px: Values) -> str:
+    missed_px = float(np.median(misses_px))
+    return f"half of the pairs within {shown(missed_px)} px" if np.isfinite(missed_px) else f"half {LOST_TEXT}"
+
+
+def _by_pose(pose: WrittenPose, pairs: CheckPairs, camera: Camera | None) -> CheckResult:
     near_px = _NEAR * float(np.hypot(pairs.camera.width_px, pairs.camera.height_px))
-    misses_px = pairs.misses_px(pose.camera_from_radar())
+    misses_px = pairs.misses_px(pose.camera_from_radar(), camera)
     missed_px, count = float(np.median(misses_px)), len(pairs.points_radar_m)
-    where = f"{shown(missed_px)} px or more from their pixels" if np.isfinite(missed_px) else "behind the camera"
+    where = f"{shown(missed_px)} px or more from their pixels" if np.isfinite(missed_px) else LOST_TEXT
     aed = f", AED {shown(float(misses_px.mean()))} px" if np.isfinite(misses_px).all() else ""
     mismatch = f"half of the {count} pairs project {where}"
     if missed_px <= near_px:

@@ -9,6 +9,7 @@ import numpy as np
 
 from calib_core.geometry import matrix_from_quaternion_wxyz, quaternion_wxyz_from_matrix
 from calib_core.interchange.imported import Direction, Form, WrittenPose
+from calib_core.interchange.rotations import matrix_from_rpy, rpy_from_matrix
 
 __all__ = ["SLIPS", "Slip", "UndoneSlips", "undone_slips"]
 
@@ -73,26 +74,68 @@ def _degrees(pose: WrittenPose) -> tuple[WrittenPose, ...]:
 
 def _radians(pose: WrittenPose) -> tuple[WrittenPose, ...]:
     """Convert small angles to degrees, as if radians were converted twice or given instead of degrees."""
-    small = pose.form == "rpy" and np.abs(pose.rotation).max() <= np.radians(np.pi) * _ROUNDED
-    return (dataclasses.replace(pose, rotation=np.degrees(pose.rotation)),) if small else ()
+    angles = pose.rotation if pose.form == "rpy" else rpy_from_matrix(pose.rotation_matrix())
+    small = np.abs(angles).max() <= np.radians(np.pi) * _ROUNDED
+    return (dataclasses.replace(pose, form="rpy", rotation=np.degrees(angles)),) if small else ()
 
 
 def _reverse_angles(pose: WrittenPose) -> tuple[WrittenPose, ...]:
-    return (dataclasses.replace(pose, rotation=pose.rotation[::-1]),) if pose.form == "rpy" else ()
+    """Reverse the three angles, also if they have since been converted to a matrix or to a quaternion."""
+    angles = pose.rotation if pose.form == "rpy" else rpy_from_matrix(pose.rotation_matrix())
+    return (dataclasses.replace(pose, form="rpy", rotation=angles[::-1]),)
+
+
+def _turning_axes(pose: WrittenPose) -> tuple[WrittenPose, ...]:
+    """Take the angles about turning axes where they were taken about fixed axes, and the other way round.
+
+    About turning axes x, y, z in this order the rotation is Rx Ry Rz, the inverse of the fixed-axis one of the negated angles.
+    """
+    rotation = pose.rotation_matrix()
+    fixed = pose.rotation if pose.form == "rpy" else rpy_from_matrix(rotation)
+    turning = -rpy_from_matrix(rotation.T)
+    return _as_matrix(pose, matrix_from_rpy(-fixed).T), _as_matrix(pose, matrix_from_rpy(turning))
 
 
 def _swap_axes(pose: WrittenPose) -> tuple[WrittenPose, ...]:
     return (dataclasses.replace(pose, axes="link" if pose.axes == "optical" else "optical"),)
 
 
-def _millimetres(pose: WrittenPose) -> tuple[WrittenPose, ...]:
-    return (dataclasses.replace(pose, translation_m=pose.translation_m / 1000.0),)
+def _opengl_axes(pose: WrittenPose) -> tuple[WrittenPose, ...]:
+    """Turn a camera with x right, y up, z backward into one with x right, y down, z forward."""
+    rotation, optical = pose.rotation_matrix(), dataclasses.replace(pose, axes="optical")
+    if pose.direction == "radar_from_camera":
+        return (_as_matrix(optical, rotation @ _HALF_TURN_ABOUT_X),)
+    turned_m = _HALF_TURN_ABOUT_X @ pose.translation_m
+    return (dataclasses.replace(_as_matrix(optical, _HALF_TURN_ABOUT_X @ rotation), translation_m=turned_m),)
+
+
+def _other_radar_axes(turn: np.ndarray) -> Callable[[WrittenPose], tuple[WrittenPose, ...]]:
+    """Return what undoes other axes of the radar, given the rotation (3, 3) from x forward, y left, z up to them."""
+
+    def undo(pose: WrittenPose) -> tuple[WrittenPose, ...]:
+        rotation = pose.rotation_matrix()
+        if pose.direction == "camera_from_radar":
+            return (_as_matrix(pose, rotation @ turn),)
+        right_m = turn.T @ pose.translation_m
+        return (dataclasses.replace(_as_matrix(pose, turn.T @ rotation), translation_m=right_m),)
+
+    return undo
+
+
+def _divided_by(factor: float) -> Callable[[WrittenPose], tuple[WrittenPose, ...]]:
+    def undo(pose: WrittenPose) -> tuple[WrittenPose, ...]:
+        return (dataclasses.replace(pose, translation_m=pose.translation_m / factor),)
+
+    return undo
 
 
 def _position(pose: WrittenPose) -> tuple[WrittenPose, ...]:
     rotation = pose.rotation_matrix()
     return (dataclasses.replace(_as_matrix(pose, rotation), translation_m=-rotation @ pose.translation_m),)
 
+
+_HALF_TURN_ABOUT_X = np.diag([1.0, -1.0, -1.0])
+_RIGHT_FORWARD_UP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 SLIPS: tuple[Slip, ...] = (
     Slip(
@@ -137,12 +180,43 @@ SLIPS: tuple[Slip, ...] = (
         "use the pose of the named frame; camera_link and its optical frame differ by a fixed rotation",
         _swap_axes,
     ),
-    Slip("millimetres", "the translation is in millimetres", "divide the translation by 1000", _millimetres),
+    Slip("millimetres", "the translation is in millimetres", "divide the translation by 1000", _divided_by(1000.0)),
+    Slip("centimetres", "the translation is in centimetres", "divide the translation by 100", _divided_by(100.0)),
     Slip(
         "position-for-translation",
         "the translation is the position c of the target frame's origin in the source frame, not t = -R c",
         "write t = -R c",
         _position,
+    ),
+    Slip(
+        "translation-sign",
+        "the sign of the translation is reversed",
+        "negate the translation",
+        _divided_by(-1.0),
+    ),
+    Slip(
+        "opengl-axes",
+        "the camera has OpenGL's axes (x right, y up, z backward) instead of x right, y down, z forward",
+        "turn the camera frame by 180 deg about x: negate its y and z",
+        _opengl_axes,
+    ),
+    Slip(
+        "radar-y-right",
+        "the radar has y right and z down instead of y left and z up",
+        "turn the radar frame by 180 deg about x: negate its y and z",
+        _other_radar_axes(_HALF_TURN_ABOUT_X),
+    ),
+    Slip(
+        "radar-x-right",
+        "the radar has x right, y forward, z up instead of x forward, y left, z up",
+        "turn the radar frame by 90 deg about z",
+        _other_radar_axes(_RIGHT_FORWARD_UP),
+    ),
+    Slip(
+        "turning-axes",
+        "the angles are about turning axes where the format expects fixed axes, or vice versa",
+        "convert the angles: Rz(yaw) Ry(pitch) Rx(roll) is expected",
+        _turning_axes,
     ),
 )
 

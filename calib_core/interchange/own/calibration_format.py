@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from calib_core.errors import InputError
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.imported import ImportedCalibration, imported
+from calib_core.interchange.imported import ImportedCalibration, WrittenPose, imported
 from calib_core.interchange.own.calibration_json import (
     calibration_file_of,
     kept_results,
@@ -41,7 +43,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             faults.append("radar_from_camera has contradictory rotations, or an invalid one")
     file = calibration_file_of(document, pose, source=source)
     kept = kept_results(content.text, source=source)
-    return replace(imported(replace(file, unknown=kept)), faults=tuple(faults))
+    as_written = WrittenPose("matrix", np.array(stated.rotation), np.array(stated.translation_m), "camera_from_radar")
+    return replace(imported(replace(file, unknown=kept)), pose=as_written, faults=tuple(faults))
 
 
 CALIBRATION_1 = Format(

@@ -133,7 +133,7 @@ def test_it_is_listed_after_ours_by_the_command_and_on_the_page(
     assert (format_rows()[-1].key, format_rows()[-1].label) == ("acme-params", "ROS 2 parameters")
     assert export_preview(file, "acme-params", "", "drive").check_is_good
     assert run(["export", "--to", "list"]) == 0
-    assert capsys.readouterr().out.splitlines()[-1].split(None, 1) == ["acme-params", "ROS 2 parameters"]
+    assert capsys.readouterr().out.splitlines()[-2].split(None, 1) == ["acme-params", "ROS 2 parameters"]
 
 
 def test_one_entry_point_may_name_several(installed: Install) -> None:

@@ -132,8 +132,13 @@ def test_a_calibration_is_compared_with_the_truth_of_a_simulation_which_is_not_i
                 "rotation": file.calibration.camera_from_radar.rotation.tolist(),
                 "translation_m": file.calibration.camera_from_radar.translation_m.tolist(),
             },
-            "camera": json.loads(json.dumps({"model": "pinhole", "width_px": 64, "height_px": 48}))
-            | {"matrix_px": [[50, 0, 32], [0, 50, 24], [0, 0, 1]]},
+            "camera": {
+                "model": file.calibration.camera.model,
+                "width_px": file.calibration.camera.width_px,
+                "height_px": file.calibration.camera.height_px,
+                "matrix_px": file.calibration.camera.matrix_px.tolist(),
+                "distortion": file.calibration.camera.distortion.tolist(),
+            },
         }
     )
 

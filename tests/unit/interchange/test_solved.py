@@ -73,6 +73,21 @@ def test_solved_pairs_become_a_file_that_passes_its_check(truth, method):
     assert check(read_any(export(read_calibration(text), "tf2").data)).ok
 
 
+def test_a_paper_calibration_with_outliers_passes_its_check():
+    simulated = simulate_pairs(20, rng=np.random.default_rng(3), noise="imaging", outlier_share=0.2)
+    outcome = calibrate_pairs(simulated.pairs, simulated.camera, CalibrationOptions(method="paper"), frozenset({"p3"}))
+    assert isinstance(outcome, Calibration)
+    assert any(not pair.inlier and not pair.excluded for pair in outcome.pairs)
+
+    content = json.loads(calibration_text(outcome))
+    assert check(read_any(json.dumps(content))).ok
+
+    content["metrics"]["aed_px"] += 1.0
+    (wrong,) = (one for one in check(read_any(json.dumps(content))).results if one.level == "error")
+    assert wrong.code == "metrics-disagree"
+    assert "the pairs that are used average" in wrong.message
+
+
 def test_a_file_without_a_verdict_stays_without_one(project_root: Path):
     text = (project_root / "tests/golden/calibration-1-earlier.json").read_text(encoding="utf-8")
     assert read_calibration(text).verdict is None

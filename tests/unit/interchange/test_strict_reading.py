@@ -35,7 +35,9 @@ def file(project_root: Path) -> CalibrationFile:
 def with_camera(file: CalibrationFile, model: str, distortion: list[float]) -> CalibrationFile:
     camera = Camera(model, 640, 480, file.calibration.camera.matrix_px, np.array(distortion))
     calibration = dataclasses.replace(file.calibration, camera=camera, pairs=())
-    return dataclasses.replace(file, calibration=calibration, check_point=choose_check_point(calibration))
+    return dataclasses.replace(
+        file, calibration=calibration, check_point=choose_check_point(calibration), evidence="clicked"
+    )
 
 
 def in_npz(matrix: np.ndarray) -> bytes:

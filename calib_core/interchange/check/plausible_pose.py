@@ -1,0 +1,51 @@
+"""Does a pose look like that of two forward-looking sensors on one vehicle?"""
+
+import numpy as np
+
+from calib_core.geometry import RigidTransform
+from calib_core.interchange.check.explanation import CheckResult
+from calib_core.interchange.check.slips import undone_slips
+from calib_core.interchange.imported import WrittenPose
+
+__all__ = ["by_plausibility"]
+
+_FAR_M = 20.0
+_SIDEWAYS_RAD = np.radians(60.0)
+_FORWARD_RAD = np.radians(35.0)
+_NAMED = 3
+
+
+def by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
+    """Warn about poses that two forward-looking sensors on one vehicle do not have; other rigs may have them."""
+    results = []
+    camera_from_radar = pose.camera_from_radar()
+    distance_m = float(np.linalg.norm(camera_from_radar.translation_m))
+    if distance_m > _FAR_M:
+        message = f"the sensors are {distance_m:.4g} m apart"
+        results.append(CheckResult("warning", "far-apart", message, "is the translation in millimetres?"))
+    off = _off_forward(camera_from_radar)
+    if off > _SIDEWAYS_RAD and not verified:
+        likely = [s for s in undone_slips(pose) if len(s.slips) == 1 and _is_forward(s.pose)]
+        hint = "if it is not mounted like that, perhaps " + ", or ".join(
+            list(dict.fromkeys(s.slips[0].message for s in likely))[:_NAMED]
+        )
+        message = f"the camera points {np.degrees(off):.0f} deg away from the radar's x axis"
+        results.append(
+            CheckResult("warning", "looks-elsewhere", message, hint if likely else "is it mounted like that?")
+        )
+    return results
+
+
+def _off_forward(camera_from_radar: RigidTransform) -> float:
+    """Return the angle between the camera's viewing direction and the radar's x axis [rad]."""
+    return float(np.arccos(np.clip(camera_from_radar.rotation[2, 0], -1.0, 1.0)))
+
+
+def _is_forward(pose: WrittenPose) -> bool:
+    """Return whether the camera is upright and looks along the radar's x axis."""
+    try:
+        camera_from_radar = pose.camera_from_radar()
+    except ValueError:
+        return False
+    upright = -camera_from_radar.rotation[1, 2]
+    return _off_forward(camera_from_radar) < _FORWARD_RAD and upright > np.cos(_FORWARD_RAD)

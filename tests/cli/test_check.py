@@ -1,0 +1,148 @@
+"""`cocalib check` as a gate: exit codes, JSON, JUnit, several files, and a recording."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+Cocalib = Callable[..., Any]
+
+
+@pytest.fixture
+def solved(cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path) -> Path:
+    """Return a calibration solved from a recording, which is beside it as made.mcap."""
+    out = tmp_path / "calibration.json"
+    answer = cocalib("solve", made(), "--clicks", clicks_file, "--out", out)
+    assert answer.code == 0, answer.err
+    return out
+
+
+@pytest.fixture
+def moved(solved: Path, tmp_path: Path) -> Path:
+    """Return the pose turned by 5 degrees, as a bare matrix."""
+    content = json.loads(solved.read_text())["camera_from_radar"]
+    matrix = np.eye(4)
+    turn, angle = np.eye(3), np.radians(5.0)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    matrix[:3, :3] = turn @ np.array(content["rotation"])
+    matrix[:3, 3] = content["translation_m"]
+    np.savetxt(tmp_path / "moved.txt", matrix)
+    return tmp_path / "moved.txt"
+
+
+def test_a_file_is_that_calibrations_file_or_stale(cocalib: Cocalib, solved: Path, tmp_path: Path) -> None:
+    out = tmp_path / "tf.sh"
+    cocalib("export", solved, "--to", "tf2", "--out", out)
+
+    fresh = cocalib("check", out, "--of", solved)
+    assert fresh.code == 0, fresh.out
+    assert "ok: the pose is that calibration's" in fresh.out
+
+    content = json.loads(solved.read_text())
+    content["warnings"] = []
+    del content["verdict"]
+    other = tmp_path / "other.json"
+    other.write_text(json.dumps(content))
+    stale = cocalib("check", out, "--of", other)
+    assert "stale: exported from another calibration than this one (sha256 " in stale.out
+
+
+def test_a_difference_fails_the_gate_unless_the_limits_allow_it(cocalib: Cocalib, solved: Path, moved: Path) -> None:
+    differs = cocalib("check", moved, "--against", solved)
+    assert differs.code == 1
+    assert "DIFFERS: 5 deg" in differs.out
+    assert cocalib("check", moved, "--against", solved, "--max-deg", "6").code == 0
+    assert cocalib("check", moved, "--against", solved, "--max-deg", "6", "--max-px", "2").code == 1
+    assert cocalib("check", solved, "--against", solved, "--max-sigma", "1").code == 0
+
+
+def test_json_is_one_object_with_every_file(cocalib: Cocalib, solved: Path, moved: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.json"
+    broken.write_text("{}")
+
+    answer = cocalib("check", solved, moved, broken, "--against", solved, "--json")
+
+    assert answer.code == 1
+    found = json.loads(answer.out)
+    assert (found["schema"], found["exit_code"]) == ("cocalib/check-1", 1)
+    assert [one["verdict"] for one in found["files"]] == ["right", "wrong", "unreadable"]
+    right, wrong, unreadable = found["files"]
+    assert right["comparison"]["agree"] is True
+    assert wrong["comparison"]["rotation_deg"] == pytest.approx(5.0)
+    assert wrong["comparison"]["criteria"][0].keys() == {"name", "value", "limit", "met"}
+    assert [one["code"] for one in wrong["results"] if one["level"] == "error"] == ["disagrees"]
+    assert [at["distance_m"] for at in wrong["comparison"]["pixels"]] == [5.0, 20.0, 60.0]
+    assert "no pose of a camera and a radar" in unreadable["error"]
+
+
+def test_several_files_get_a_line_each(cocalib: Cocalib, solved: Path, moved: Path) -> None:
+    answer = cocalib("check", solved, moved, "--against", solved)
+
+    first, second = answer.out.splitlines()
+    assert first.startswith(f"{solved}: right: ")
+    assert second.startswith(f"{moved}: wrong: 5 deg")
+
+
+def test_junit_has_a_case_per_result_and_failures_with_words(
+    cocalib: Cocalib, solved: Path, moved: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "broken.json").write_text("{}")
+    out = tmp_path / "report.xml"
+
+    answer = cocalib("check", solved, moved, tmp_path / "broken.json", "--against", solved, "--junit", out)
+
+    assert answer.code == 1
+    suites = ElementTree.fromstring(out.read_text())
+    assert [suite.get("name") for suite in suites] == [str(solved), str(moved), str(tmp_path / "broken.json")]
+    assert [suite.get("failures") for suite in suites] == ["0", "1", "0"]
+    assert [suite.get("errors") for suite in suites] == ["0", "0", "1"]
+    for suite in suites:
+        assert int(suite.get("tests", "0")) == len(suite.findall("testcase")) > 0
+        assert all(case.get("name") and case.get("classname") for case in suite)
+    (failure,) = suites.iter("failure")
+    assert failure.get("type") == "disagrees"
+    assert "5 deg" in (failure.get("message") or "")
+
+
+def test_a_calibration_holds_on_its_own_recording_and_not_after_the_camera_moved(
+    cocalib: Cocalib, solved: Path, clicks_file: Path
+) -> None:
+    holds = cocalib("check", solved, "--recording", solved.with_name("made.mcap"), "--clicks", clicks_file)
+    assert holds.code == 0, holds.out
+    assert "ok: holds: residuals of 8 clicks on this recording" in holds.out
+
+    assert (
+        cocalib("check", solved, "--recording", solved.with_name("made.mcap")).code == 0
+    )  # the clicks that the calibration keeps
+
+    late = json.loads(clicks_file.read_text())
+    for click in late["clicks"]:
+        click["pixel_px"][0] += 20.0
+    clicks_file.write_text(json.dumps(late))
+    fails = cocalib("check", solved, "--recording", solved.with_name("made.mcap"), "--clicks", clicks_file)
+    assert fails.code == 1
+    assert "solve this recording" in fails.out
+
+
+def test_a_recording_without_clicks_says_what_is_needed(cocalib: Cocalib, solved: Path, tmp_path: Path) -> None:
+    cocalib("export", solved, "--to", "opencv", "--out", tmp_path / "camera.yaml")
+
+    answer = cocalib("check", tmp_path / "camera.yaml", "--recording", solved.with_name("made.mcap"))
+
+    assert answer.code == 2
+    assert "give --clicks CLICKS.json" in answer.err
+
+
+def test_another_recording_of_the_same_name_is_said(
+    cocalib: Cocalib, solved: Path, made: Callable[..., Path], clicks_file: Path
+) -> None:
+    solved.with_name("made.mcap").rename(solved.with_name("yesterday"))
+    again = made(nan_scans=1)
+
+    answer = cocalib("check", solved, "--recording", again, "--clicks", clicks_file)
+
+    assert f"warning: the calibration was made from another {again.name} (sha256 " in answer.out
