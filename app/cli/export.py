@@ -1,7 +1,7 @@
 """`cocalib export` and `cocalib check`: write a calibration in another tool's format, and check a calibration file."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,6 +9,7 @@ import tyro
 
 from app.cli.flags import File, Switch, called
 from app.cli.output import write_whole
+from app.cli.tree_flags import FrameFlags, Frames
 from app.terminal import print_exactly
 from calib_core.errors import InputError
 
@@ -90,6 +91,7 @@ class Check:
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     pairs: File = None
     """Pairs to test it with: a pairs-1 file, or a calibration-1 file with pairs."""
+    frames: Frames = field(default_factory=FrameFlags)
 
     def run(self) -> int:
         """Print the results; return 0 if nothing is wrong, 1 if something is, 3 if it looks wrong but that is not proven."""
@@ -98,6 +100,7 @@ class Check:
         other = read_any_file(self.against) if self.against else None
         camera = read_camera_file(self.camera) if self.camera else None
         pairs = read_check_pairs_file(self.pairs) if self.pairs else None
-        report = check(read_any_file(self.calibration), against=other, camera=camera, pairs=pairs)
+        found, _ = self.frames.read([self.calibration])
+        report = check(found, against=other, camera=camera, pairs=pairs)
         print("\n".join(report.lines()))
         return {"wrong": 1, "doubtful": 3}.get(report.verdict, 0)

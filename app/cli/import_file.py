@@ -1,8 +1,7 @@
 """`cocalib import`."""
 
-import hashlib
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,8 +9,8 @@ import tyro
 
 from app.cli.flags import File, NewFile, called
 from app.cli.output import write_whole
+from app.cli.tree_flags import FrameFlags, Frames
 from calib_core.errors import InputError
-from calib_core.input_files import name_text
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
@@ -24,32 +23,33 @@ __all__ = ["Import"]
 class Import:
     """Convert a calibration from any known format to cocalib/calibration-1 JSON."""
 
-    calibration: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A calibration in any format that export writes, from any program."""
     out: NewFile
     """Output file (calibration-1 JSON)."""
+    calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("FILE...")] = ()
+    """A calibration in any format that export writes, from any program; or files, a folder or a recording with a frame tree."""
     camera: File = None
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     image_size: Annotated[tuple[int, int] | None, called("WIDTH HEIGHT")] = None
     """Size of the pictures [px], if the file has a camera matrix but no size; by default that of the pictures beside it."""
+    frames: Frames = field(default_factory=FrameFlags)
 
     def run(self) -> int:
         """Write the calibration; return the exit code."""
-        from calib_core.interchange import Provenance, adopt, calibration_bytes, read_any, read_camera_file
+        from calib_core.interchange import Provenance, adopt, read_camera_file
         from calib_core.interchange import write_calibration as write
-        from calib_core.results import InputFile
 
-        data = calibration_bytes(self.calibration)
-        found = read_any(data, str(self.calibration))
-        camera = (
-            read_camera_file(self.camera) if self.camera else _sized_camera(found, self.calibration, self.image_size)
-        )
-        origin = InputFile(name_text(self.calibration.name), len(data), hashlib.sha256(data).hexdigest())
-        file = adopt(found, str(self.calibration), camera=camera, provenance=Provenance(inputs=(origin,)))
+        if not self.calibration:
+            raise InputError(
+                "import takes a calibration, or the files of one: cocalib import FILE... --out calibration.json"
+            )
+        path, source = self.calibration[0], ", ".join(map(str, self.calibration))
+        found, inputs = self.frames.read(self.calibration)
+        camera = read_camera_file(self.camera) if self.camera else _sized_camera(found, path, self.image_size)
+        file = adopt(found, source, camera=camera, provenance=Provenance(inputs=inputs))
         for note in found.notes:
             print(f"note: {note}", file=sys.stderr)
         write_whole(self.out, write(file))
-        print(f"{self.calibration.name} read as {found.format}; written to {self.out}")
+        print(f"{', '.join(one.name for one in self.calibration)} read as {found.format}; written to {self.out}")
         return 0
 
 

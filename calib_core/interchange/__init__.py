@@ -18,13 +18,24 @@ from calib_core.interchange.exporting import Export, export
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.registry import FORMATS, format_named, written_formats
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
-from calib_core.interchange.importing import calibration_bytes, read_any, read_any_file
+from calib_core.interchange.importing import (
+    calibration_bytes,
+    read_any,
+    read_any_file,
+    read_any_files,
+    read_together,
+    tree_files,
+)
 from calib_core.interchange.own.calibration_json import calibration_text, read_calibration, write_calibration
 from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
 from calib_core.interchange.own.pairs_json import PairsFile, read_pairs, write_pairs
 from calib_core.interchange.parent_pose import parent_pose
 from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.trees.frame_choice import WantedFrames
+from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place
+from calib_core.interchange.trees.posed_in_tree import calibration_in_tree
+from calib_core.interchange.trees.reading import joined_tree
 
 __all__ = [
     "CALIBRATION_SCHEMA",
@@ -40,17 +51,22 @@ __all__ = [
     "Export",
     "Format",
     "FrameNames",
+    "FrameTree",
     "ImportedCalibration",
+    "Joint",
     "PairsFile",
     "PixelDifference",
+    "Place",
     "Provenance",
     "Reads",
     "StatedCheckPoint",
     "Verdict",
+    "WantedFrames",
     "WrittenPose",
     "adopt",
     "adopted_calibration",
     "calibration_bytes",
+    "calibration_in_tree",
     "calibration_text",
     "camera_info_text",
     "check",
@@ -60,10 +76,12 @@ __all__ = [
     "export",
     "format_named",
     "imported",
+    "joined_tree",
     "names_schema",
     "parent_pose",
     "read_any",
     "read_any_file",
+    "read_any_files",
     "read_calibration",
     "read_camera",
     "read_camera_file",
@@ -71,6 +89,8 @@ __all__ = [
     "read_check_pairs_file",
     "read_clicks",
     "read_pairs",
+    "read_together",
+    "tree_files",
     "write_calibration",
     "write_clicks",
     "write_pairs",

@@ -2,11 +2,13 @@
 
 import json
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from calib_core.errors import InputError
 
-__all__ = ["load_yaml", "number_text", "numbers_text", "quoted"]
+__all__ = ["load_yaml", "load_yaml_documents", "number_text", "numbers_text", "quoted", "refuse_bad_yaml"]
 
 _MAX_CHARACTERS = 2 * 1024 * 1024
 _OPENCV_TAG = "tag:yaml.org,2002:opencv-matrix"
@@ -16,13 +18,24 @@ def load_yaml(text: str, *, source: str) -> Any:
     """Parse YAML of plain values; OpenCV's header and matrices (as mappings with rows, cols, data) are supported.
 
     Raises:
+        InputError: it is not YAML, has several documents, or is too large to be a calibration.
+    """
+    documents = load_yaml_documents(text, source=source)
+    if len(documents) > 1:
+        raise InputError(f"{source}: contains {len(documents)} YAML documents (separated by ---); keep one of them")
+    return documents[0] if documents else None
+
+
+def load_yaml_documents(text: str, *, source: str) -> tuple[Any, ...]:
+    """Parse each document of a YAML text; empty ones are left out, such as after the last --- of `ros2 topic echo`.
+
+    Raises:
         InputError: it is not YAML, or too large to be a calibration.
     """
     if len(text) > _MAX_CHARACTERS:
         raise InputError(f"{source}: {len(text):,} characters is too large for a calibration; is it the right file?")
     from ruamel.yaml import YAML
     from ruamel.yaml.constructor import SafeConstructor
-    from ruamel.yaml.error import YAMLError
 
     class Constructor(SafeConstructor):
         """The safe constructor with OpenCV's matrix tag."""
@@ -32,8 +45,17 @@ def load_yaml(text: str, *, source: str) -> Any:
     loader.Constructor = Constructor
     # OpenCV before 5 writes "%YAML:1.0", which is not a YAML directive, and may omit the "---" after it.
     plain = re.sub(r"\A\ufeff?%YAML[: ][\d.]+[^\n]*\n(---[^\n]*\n)?", "", text)
+    with refuse_bad_yaml(text, plain, source=source):
+        return tuple(document for document in loader.load_all(plain) if document is not None)
+
+
+@contextmanager
+def refuse_bad_yaml(text: str, plain: str, *, source: str) -> Iterator[None]:
+    """Turn a parser's errors about a text, from which a header may have been removed, into an InputError with the line."""
+    from ruamel.yaml.error import YAMLError
+
     try:
-        return loader.load(plain)
+        yield
     except (YAMLError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1 + text.count(chr(10)) - plain.count(chr(10))}: " if mark else ""
