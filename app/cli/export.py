@@ -9,7 +9,7 @@ import tyro
 
 from app.cli.flags import File, Switch, called
 from app.cli.output import write_whole
-from app.cli.tree_flags import FrameFlags, Frames
+from app.cli.tree_flags import FrameFlags, Frames, TreeFlags, Trees
 from app.terminal import print_exactly
 from calib_core.errors import InputError
 
@@ -37,22 +37,25 @@ class Export:
 
     rectified: Switch = False
     """Your pictures are rectified (undistorted, same camera matrix). kitti and nuscenes need this if the lens has distortion."""
+    trees: Trees = field(default_factory=TreeFlags)
+    frames: Frames = field(default_factory=FrameFlags)
 
     def run(self) -> int:
         """Write the export; return the exit code."""
-        from calib_core.interchange import export, format_named, parent_pose, written_formats
+        from calib_core.interchange import format_named, parent_pose, written_formats
 
+        if self.trees.into:
+            return self.trees.patch(self._calibration(), self.frames, to=self.to, out=self.out)
         if self.to == "list":
             formats = written_formats()
             width = max(len(known.name) for known in formats)
             print("\n".join(f"{known.name:<{width}}  {known.title}" for known in formats))
             return 0
         format_named(self.to)
-        if len(self.calibration) != 1:
-            raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
-        path = self.calibration[0]
+        file, frames = self._calibration(), self.frames
         parent = parent_pose(self.parent_from_radar) if self.parent_from_radar else None
-        written = export(_own_calibration(path), self.to, parent_from_radar=parent, rectified=self.rectified)
+        written = self.trees.export(frames.renamed(file), self.to, parent_from_radar=parent, rectified=self.rectified)
+        written = frames.with_origin(written, file)
         for note in written.notes:
             print(f"note: {note}", file=sys.stderr)
         if self.out is not None:
@@ -64,6 +67,11 @@ class Export:
         else:
             print_exactly(written.content)
         return 0
+
+    def _calibration(self) -> "CalibrationFile":
+        if len(self.calibration) != 1:
+            raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
+        return _own_calibration(self.calibration[0])
 
 
 def _own_calibration(path: Path) -> "CalibrationFile":

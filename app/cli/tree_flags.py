@@ -1,6 +1,8 @@
 """Flags about frame trees: which radar and which camera of several, and reading the tree of files and recordings."""
 
+import dataclasses
 import hashlib
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,15 +10,18 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import tyro
 
-from app.cli.flags import called
+from app.cli.flags import File, Switch, called
+from app.cli.output import write_whole
+from app.terminal import print_exactly
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
 
 if TYPE_CHECKING:
-    from calib_core.interchange import FrameTree, ImportedCalibration, WantedFrames
+    from calib_core.geometry import RigidTransform
+    from calib_core.interchange import CalibrationFile, Export, FrameTree, ImportedCalibration, WantedFrames
     from calib_core.results import InputFile
 
-__all__ = ["FrameFlags", "Frames", "tree_of"]
+__all__ = ["FrameFlags", "Frames", "TreeFlags", "Trees"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +62,90 @@ class FrameFlags:
         )
         return read_together(files, self.wanted), inputs
 
+    def renamed(self, file: "CalibrationFile") -> "CalibrationFile":
+        """Return a calibration with its frames called as the user says.
+
+        Raises:
+            InputError: a name cannot be used.
+        """
+        from calib_core.interchange import FrameNames
+
+        known = file.frames
+        frames = FrameNames(self.radar_frame or known.radar, self.camera_frame or known.camera)
+        return dataclasses.replace(file, frames=frames)
+
+    def with_origin(self, written: "Export", file: "CalibrationFile") -> "Export":
+        """Return a written text with the hash of the calibration as its file has it, before the frames were renamed."""
+        from calib_core.interchange import calibration_sha256
+
+        renamed = self.renamed(file)
+        if renamed.frames == file.frames or isinstance(written.content, bytes):
+            return written
+        text = written.content.replace(calibration_sha256(renamed), calibration_sha256(file))
+        return dataclasses.replace(written, content=text)
+
 
 Frames: TypeAlias = Annotated[FrameFlags, tyro.conf.arg(name="")]
+
+
+@dataclass(frozen=True, slots=True)
+class TreeFlags:
+    """Exports that fit into an existing frame tree."""
+
+    into: Annotated[tuple[Path, ...], called("FILE...")] = ()
+    """Solve for the free joint of this URDF, launch file, Autoware's two files or Apollo's folder; prints what would change."""
+    joint: Annotated[str | None, called("NAME")] = None
+    """With --into: the joint to solve for, by its name or its child frame; without it, the camera's mount."""
+    write: Switch = False
+    """With --into: change the file in place; with --out, the changed copy is written there instead."""
+    tree: Annotated[tuple[Path, ...], called("FILE...")] = ()
+    """Frames that exist already, such as the camera driver's: a URDF, a recording, what ros2 topic echo /tf_static printed."""
+
+    def patch(self, file: "CalibrationFile", frames: FrameFlags, *, to: str, out: File) -> int:
+        """Print what changes in the files of --into, or write it; return the exit code.
+
+        Raises:
+            InputError: the joint cannot be chosen or changed, or options contradict each other.
+        """
+        from calib_core.interchange import patched, tree_files
+
+        if to != "list":
+            raise InputError("--into changes an existing file, --to writes a new one; give one of them")
+        files = tree_files(self.into)
+        known = tree_of(self.tree).joints if self.tree else ()
+        change = patched(files, known, file, frames.wanted, joint=self.joint)
+        for line in (f"solved for {change.why}", *(f"note: {note}" for note in change.notes)):
+            print(line, file=sys.stderr)
+        if out is not None:
+            target = out / Path(change.source).name if out.is_dir() else out
+        elif self.write:
+            target = Path(change.source)
+        else:
+            print_exactly(change.diff())
+            print("nothing is written; --write changes the file, --out FILE writes a copy", file=sys.stderr)
+            return 0
+        write_whole(target, change.data)
+        print(f"written to {target}")
+        return 0
+
+    def export(
+        self, file: "CalibrationFile", to: str, *, parent_from_radar: "RigidTransform | None", rectified: bool
+    ) -> "Export":
+        """Export a calibration to a format, beside the frames of --tree if there are any.
+
+        Raises:
+            InputError: the format cannot represent it, or it does not fit into the tree.
+        """
+        from calib_core.interchange import attached_export, export
+
+        if self.joint is not None or self.write:
+            raise InputError("--joint and --write are for --into FILE; give that too")
+        if self.tree:
+            return attached_export(file, to, tree_of(self.tree))
+        return export(file, to, parent_from_radar=parent_from_radar, rectified=rectified)
+
+
+Trees: TypeAlias = Annotated[TreeFlags, tyro.conf.arg(name="")]
 
 
 def tree_of(paths: Sequence[Path]) -> "FrameTree":
@@ -72,7 +159,7 @@ def tree_of(paths: Sequence[Path]) -> "FrameTree":
 
     recordings = [path for path in paths if _holds_recording(path)]
     files = tree_files([path for path in paths if path not in recordings])
-    joints = []
+    joints: list[Joint] = []
     for path in recordings:
         for transform in frame_transforms([path]):
             place = Place(f"{path.name}, {transform.topic}")

@@ -26,14 +26,21 @@ from calib_core.interchange.importing import (
     read_together,
     tree_files,
 )
-from calib_core.interchange.own.calibration_json import calibration_text, read_calibration, write_calibration
+from calib_core.interchange.own.calibration_json import (
+    calibration_sha256,
+    calibration_text,
+    read_calibration,
+    write_calibration,
+)
 from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
 from calib_core.interchange.own.pairs_json import PairsFile, read_pairs, write_pairs
 from calib_core.interchange.parent_pose import parent_pose
 from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.trees.attaching import attached_export
 from calib_core.interchange.trees.frame_choice import WantedFrames
 from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place
+from calib_core.interchange.trees.patching import Patch, patched
 from calib_core.interchange.trees.posed_in_tree import calibration_in_tree
 from calib_core.interchange.trees.reading import joined_tree
 
@@ -55,6 +62,7 @@ __all__ = [
     "ImportedCalibration",
     "Joint",
     "PairsFile",
+    "Patch",
     "PixelDifference",
     "Place",
     "Provenance",
@@ -65,8 +73,10 @@ __all__ = [
     "WrittenPose",
     "adopt",
     "adopted_calibration",
+    "attached_export",
     "calibration_bytes",
     "calibration_in_tree",
+    "calibration_sha256",
     "calibration_text",
     "camera_info_text",
     "check",
@@ -79,6 +89,7 @@ __all__ = [
     "joined_tree",
     "names_schema",
     "parent_pose",
+    "patched",
     "read_any",
     "read_any_file",
     "read_any_files",

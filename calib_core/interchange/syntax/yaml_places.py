@@ -21,10 +21,12 @@ class PlacedValue:
         """The line it begins in, from 1."""
         return int(self.node.start_mark.line) + 1
 
-    @property
-    def span(self) -> tuple[int, int]:
-        """The indices in the text of its first character and after its last one."""
-        return int(self.node.start_mark.index), int(self.node.end_mark.index)
+    def span_in(self, text: str) -> tuple[int, int] | None:
+        """Return where a plain or quoted value stands in the text, without quotes; None if it has an anchor or is an alias."""
+        start, end = int(self.node.start_mark.index), int(self.node.end_mark.index)
+        if text[start : start + 1] in ("'", '"'):
+            start, end = start + 1, end - 1
+        return (start, end) if text[start:end] == self.text else None
 
     @property
     def text(self) -> str:

@@ -10,7 +10,7 @@ from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_places import PlacedValue, placed_yaml
-from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, Slot
+from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place
 from calib_core.interchange.trees.tree_part import TreePart
 
 __all__ = ["read_autoware", "recognizes_autoware"]
@@ -40,14 +40,14 @@ def read_autoware(text: str, source: str) -> TreePart:
     for document in placed_yaml(text, source=source):
         for parent, children in document.entries():
             joints += [
-                _joint(parent, child, entry, source)
+                _joint(parent, child, entry, text, source)
                 for child, entry in children.entries()
                 if entry.get("yaw") is not None
             ]
     return TreePart("autoware", tuple(joints))
 
 
-def _joint(parent: str, child: str, entry: PlacedValue, source: str) -> Joint:
+def _joint(parent: str, child: str, entry: PlacedValue, text: str, source: str) -> Joint:
     place = Place(source, entry.line)
     found = [entry.get(key) for key in _KEYS]
     missing = [key for key, value in zip(_KEYS, found, strict=True) if value is None]
@@ -55,11 +55,10 @@ def _joint(parent: str, child: str, entry: PlacedValue, source: str) -> Joint:
         raise InputError(f"{place}: {parent}.{child}: {', '.join(missing)} is missing; add it")
     values = [value for value in found if value is not None]
     numbers = np.array(floats([one.text for one in values], source=source, place=f"{parent}.{child}"))
-    slots = tuple(Slot(*one.span) for one in values)
     return Joint.posed(
         parent,
         child,
         WrittenPose("rpy", numbers[3:], numbers[:3], "radar_from_camera"),
         place,
-        numbers=JointNumbers("rpy", slots[:3], slots[3:]),
+        numbers=JointNumbers.at("rpy", [one.span_in(text) for one in values]),
     )

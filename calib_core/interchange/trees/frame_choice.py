@@ -12,7 +12,14 @@ from calib_core.errors import InputError
 from calib_core.interchange.imported import looks_like_camera, looks_like_radar
 from calib_core.interchange.trees.frame_tree import FrameTree
 
-__all__ = ["ChosenFrames", "WantedFrames", "cameras_in", "choose_frames", "is_of_camera", "is_of_radar", "radars_in"]
+__all__ = [
+    "ChosenFrames",
+    "WantedFrames",
+    "choose_frames",
+    "is_fixture",
+    "is_of_camera",
+    "is_of_radar",
+]
 
 _FIXTURE = re.compile(r"mount|bracket|holder|support|housing|plate|base|rig|bar\b|rack|mast", re.IGNORECASE)
 _NO_PICTURES = re.compile(r"imu|gyro|accel|lidar|velodyne|laser|gps|gnss", re.IGNORECASE)
@@ -52,7 +59,7 @@ def choose_frames(tree: FrameTree, wanted: WantedFrames, *, source: str) -> Chos
     Raises:
         InputError: a name is not in the tree, or there is not exactly one radar and one camera; the message lists them.
     """
-    radars = (_named(tree, wanted.radar, "--radar-frame", source),) if wanted.radar else radars_in(tree)
+    radars = (_named(tree, wanted.radar, "--radar-frame", source),) if wanted.radar else _radars_in(tree)
     if wanted.camera:
         named = _named(tree, wanted.camera, "--camera-frame", source)
         cameras = _optical_below(tree, named) or (named,)
@@ -61,7 +68,7 @@ def choose_frames(tree: FrameTree, wanted: WantedFrames, *, source: str) -> Chos
                 f"{source}: {named} carries several cameras: {_listed(cameras)}; name one of them with --camera-frame"
             )
     else:
-        cameras = cameras_in(tree)
+        cameras = _cameras_in(tree)
     cameras = tuple(camera for camera in cameras if camera not in radars) if len(radars) == 1 else cameras
     if len(radars) == 1 and len(cameras) == 1:
         note = f"{wanted.camera} carries {cameras[0]}, whose optical axes are used"
@@ -82,12 +89,12 @@ def _ambiguity(tree: FrameTree, radars: Sequence[str], cameras: Sequence[str]) -
     return f"{' and '.join(found)}{rest}{hint}; choose with {' and '.join(flags)}"
 
 
-def radars_in(tree: FrameTree) -> tuple[str, ...]:
+def _radars_in(tree: FrameTree) -> tuple[str, ...]:
     """Return the frames that are radars', one for each radar as far as names and poses tell."""
     return _without_fixtures(tree, [frame for frame in tree.frames if is_of_radar(tree, frame)])
 
 
-def cameras_in(tree: FrameTree) -> tuple[str, ...]:
+def _cameras_in(tree: FrameTree) -> tuple[str, ...]:
     """Return the frames that are cameras', the optical frame where there is one."""
     found = [frame for frame in tree.frames if is_of_camera(tree, frame)]
     return _without_fixtures(tree, [frame for frame in found if _is_optical(frame) or not _optical_below(tree, frame)])
@@ -105,6 +112,11 @@ def is_of_camera(tree: FrameTree, frame: str) -> bool:
     if sensor is not None:
         return sensor.kind == "camera"
     return looks_like_camera(frame) and not _NO_PICTURES.search(frame)
+
+
+def is_fixture(frame: str) -> bool:
+    """Return whether a frame is named as what sensors are mounted on."""
+    return bool(_FIXTURE.search(frame))
 
 
 def _is_optical(frame: str) -> bool:

@@ -1,6 +1,6 @@
 """Coordinate frames and the joints between them: one parent per frame, no cycles, any two frames chained."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -58,6 +58,12 @@ class JointNumbers:
     form: Form
     translation: tuple[Slot, ...]
     rotation: tuple[Slot, ...]
+
+    @classmethod
+    def at(cls, form: Form, spans: Sequence[tuple[int, int] | None]) -> "JointNumbers | None":
+        """Return the places of x, y, z and the rotation's numbers; None if one of them has none of its own."""
+        slots = tuple(Slot(*span) for span in spans if span is not None)
+        return cls(form, slots[:3], slots[3:]) if len(slots) == len(spans) else None
 
     @property
     def slots(self) -> tuple[Slot, ...]:

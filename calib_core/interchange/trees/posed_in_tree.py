@@ -11,8 +11,9 @@ from calib_core.interchange.imported import Axes, ImportedCalibration, StatedChe
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_choice import WantedFrames, choose_frames
-from calib_core.interchange.trees.frame_tree import FrameTree, Joint
+from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Sensor
 from calib_core.interchange.trees.reading import may_have_several_joints, tree_in
+from calib_core.interchange.trees.stated_joint import stated_joint
 from calib_core.interchange.trees.tree_part import joined
 
 __all__ = ["CameraAxes", "axes_of_camera", "calibration_in_tree", "chained_calibration"]
@@ -42,11 +43,16 @@ def chained_calibration(content: Content, frames: WantedFrames, *, source: str) 
     Raises:
         InputError: it is such a file, and the pose cannot be found in it; the message says what to do.
     """
-    if not frames.is_given and (stated_frames(content.text) is not None or not may_have_several_joints(content)):
+    stated, below = stated_frames(content.text), stated_joint(content.text, source)
+    if not frames.is_given and below is None and (stated is not None or not may_have_several_joints(content)):
         return None
     part = tree_in(content, content.text, source)
-    if part is None or not part.joints or (len(part.joints) < 2 and not frames.is_given):
+    if part is None or not part.joints or (len(part.joints) < 2 and below is None and not frames.is_given):
         return None
+    if below is not None and stated is not None:
+        sensor = Sensor(stated.camera, "camera", "optical")
+        part = replace(part, joints=(*part.joints, below), sensors=(*part.sensors, sensor))
+        frames = WantedFrames(frames.radar or stated.radar, frames.camera or stated.camera)
     return calibration_in_tree(joined([part]), frames, source=source, check_point=stated_check_point(content.text))
 
 

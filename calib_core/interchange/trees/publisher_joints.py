@@ -187,10 +187,7 @@ def _posed(parent: str, child: str, form: Form, translation: list[_Word], rotati
     if not parent or not child:
         raise InputError(f"{place}: a frame's name is missing; add --frame-id and --child-frame-id")
     words = [*translation, *rotation]
-    numbers = None
-    if all(word.end >= 0 for word in words):
-        slots = tuple(Slot(word.start, word.end) for word in words)
-        numbers = JointNumbers(form, slots[:3], slots[3:])
+    numbers = JointNumbers.at(form, [(word.start, word.end) if word.end >= 0 else None for word in words])
     wrong = next((word for word in words if not _is_number(word)), None)
     if wrong is not None:
         return Joint(

@@ -7,7 +7,7 @@ from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_places import PlacedValue, placed_yaml
-from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, Slot
+from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place
 from calib_core.interchange.trees.tree_part import TreePart
 
 __all__ = ["read_stamped", "recognizes_stamped"]
@@ -33,11 +33,11 @@ def read_stamped(text: str, source: str) -> TreePart:
     joints = []
     for document in placed_yaml(text, source=source):
         listed = document.get("transforms")
-        joints += [_joint(one, source) for one in ([document] if listed is None else listed.items())]
+        joints += [_joint(one, text, source) for one in ([document] if listed is None else listed.items())]
     return TreePart("apollo", tuple(joints))
 
 
-def _joint(stamped: PlacedValue, source: str) -> Joint:
+def _joint(stamped: PlacedValue, text: str, source: str) -> Joint:
     place = Place(source, stamped.line)
     parent, child = stamped.get("header", "frame_id"), stamped.get("child_frame_id")
     transform = stamped.get("transform")
@@ -52,11 +52,10 @@ def _joint(stamped: PlacedValue, source: str) -> Joint:
     translation, rotation = (
         np.array(floats([one.text for one in part], source=source, place=f"line {place.line}")) for part in values
     )
-    slots = [tuple(Slot(*one.span) for one in part) for part in values]
     return Joint.posed(
         parent.text,
         child.text,
         WrittenPose("quaternion_xyzw", rotation, translation, "radar_from_camera"),
         place,
-        numbers=JointNumbers("quaternion_xyzw", slots[0], slots[1]),
+        numbers=JointNumbers.at("quaternion_xyzw", [one.span_in(text) for part in values for one in part]),
     )
