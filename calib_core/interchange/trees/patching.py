@@ -10,7 +10,7 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.imported import Form, WrittenPose
+from calib_core.interchange.imported import Form
 from calib_core.interchange.origin import missing_map
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, quaternion_xyzw_from_matrix, rpy_from_matrix
 from calib_core.interchange.syntax.yaml_text import number_text
@@ -108,11 +108,7 @@ def _target(
     tree: FrameTree, chosen: ChosenFrames, calibration: CalibrationFile
 ) -> tuple[RigidTransform, tuple[str, ...]]:
     """Return radar_from_frame for the chosen camera frame, in its axes, and what was assumed about them."""
-    radar_from_frame = None
-    if not any(step.joint.problem for step in tree.path(chosen.radar, chosen.camera)):
-        between = tree.between(chosen.radar, chosen.camera)
-        radar_from_frame = WrittenPose("matrix", between.rotation, between.translation_m, "radar_from_camera")
-    known = axes_of_camera(tree, chosen.camera, radar_from_frame)
+    known = axes_of_camera(tree, chosen)
     notes = list(known.assumptions)
     if calibration.frames.camera not in tree.frames:
         notes.append(

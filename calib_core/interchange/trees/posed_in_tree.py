@@ -10,7 +10,7 @@ from calib_core.interchange.formats.statement import stated_check_point, stated_
 from calib_core.interchange.imported import Axes, ImportedCalibration, StatedCheckPoint, WrittenPose, posed_between
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.trees.frame_choice import WantedFrames, choose_frames
+from calib_core.interchange.trees.frame_choice import ChosenFrames, WantedFrames, choose_frames
 from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Sensor
 from calib_core.interchange.trees.reading import may_have_several_joints, tree_in
 from calib_core.interchange.trees.stated_joint import stated_joint
@@ -73,7 +73,7 @@ def calibration_in_tree(
     chosen = choose_frames(tree, wanted, source=source)
     try:
         pose, used = _pose(tree, chosen.radar, chosen.camera)
-        known = axes_of_camera(tree, chosen.camera, pose)
+        known = axes_of_camera(tree, chosen)
         frames = FrameNames(chosen.radar, known.optical_frame)
     except InputError as error:
         raise InputError(str(error) if str(error).startswith(source) else f"{source}: {error}") from None
@@ -90,23 +90,22 @@ def calibration_in_tree(
     ).checked(source)
 
 
-def axes_of_camera(tree: FrameTree, camera: str, pose: WrittenPose | None) -> CameraAxes:
-    """Return the axes of a camera's frame: as the files say, by its name, or by its numbers.
+def axes_of_camera(tree: FrameTree, chosen: ChosenFrames) -> CameraAxes:
+    """Return the axes of the camera's frame: as the files say, by its name, or by its numbers.
 
     Args:
         tree: of the files.
-        camera: the frame.
-        pose: between the radar and it; None if it cannot be read.
+        chosen: the radar's frame and the camera's.
 
     Raises:
         InputError: its name cannot be written to a file.
     """
-    sensor = tree.sensor_at(camera)
+    sensor = tree.sensor_at(chosen.camera)
     if sensor is not None and sensor.axes is not None:
-        optical = camera if sensor.axes == "optical" else FrameNames("radar", camera).camera
+        optical = chosen.camera if sensor.axes == "optical" else FrameNames("radar", chosen.camera).camera
         return CameraAxes(sensor.axes, optical)
     # The radar's frame is already chosen, so its real name decides nothing here.
-    roles = posed_between("radar", camera, None)
+    roles = posed_between("radar", chosen.camera, None)
     return CameraAxes(roles.axes, roles.frames.camera, roles.assumptions)
 
 
