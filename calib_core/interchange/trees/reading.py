@@ -6,15 +6,15 @@ from pathlib import Path
 
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.content import Content, decoded, readings
-from calib_core.interchange.trees.autoware_joints import read_autoware, recognizes_autoware
-from calib_core.interchange.trees.camera_frames import cameras_named_in
-from calib_core.interchange.trees.driveworks_joints import read_driveworks, recognizes_driveworks
 from calib_core.interchange.trees.frame_tree import FrameTree, Joint
-from calib_core.interchange.trees.nuscenes_joints import read_nuscenes, recognizes_poses, recognizes_sensors
-from calib_core.interchange.trees.publisher_joints import PUBLISHER, read_publishers, recognizes_publishers
-from calib_core.interchange.trees.stamped_joints import read_stamped, recognizes_stamped
+from calib_core.interchange.trees.readers.autoware import read_autoware, recognizes_autoware
+from calib_core.interchange.trees.readers.camera_frames import cameras_named_in
+from calib_core.interchange.trees.readers.driveworks import read_driveworks, recognizes_driveworks
+from calib_core.interchange.trees.readers.nuscenes import read_nuscenes, recognizes_poses, recognizes_sensors
+from calib_core.interchange.trees.readers.publishers import PUBLISHER, read_publishers, recognizes_publishers
+from calib_core.interchange.trees.readers.stamped import read_stamped, recognizes_stamped
+from calib_core.interchange.trees.readers.urdf import read_urdf, recognizes_urdf
 from calib_core.interchange.trees.tree_part import TreePart, joined
-from calib_core.interchange.trees.urdf_joints import read_urdf, recognizes_urdf
 
 __all__ = ["TreeFile", "files_of_trees", "joined_tree", "may_have_several_joints", "read_tree", "tree_in"]
 
