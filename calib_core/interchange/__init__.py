@@ -39,7 +39,8 @@ from calib_core.interchange.parent_pose import parent_pose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.attaching import attached_export
 from calib_core.interchange.trees.frame_choice import WantedFrames
-from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Place
+from calib_core.interchange.trees.frame_tree import FrameTree
+from calib_core.interchange.trees.joint import Joint, Place
 from calib_core.interchange.trees.patching import Patch, patched
 from calib_core.interchange.trees.posed_in_tree import calibration_in_tree
 from calib_core.interchange.trees.reading import joined_tree

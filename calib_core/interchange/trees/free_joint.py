@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from calib_core.errors import InputError
 from calib_core.interchange.trees.frame_choice import ChosenFrames, is_fixture, is_of_camera, is_of_radar
-from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Step
+from calib_core.interchange.trees.frame_tree import FrameTree, Step
+from calib_core.interchange.trees.joint import Joint
 
 __all__ = ["FreeJoint", "free_joint"]
 

@@ -15,8 +15,9 @@ from calib_core.interchange.origin import missing_map
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL, quaternion_xyzw_from_matrix, rpy_from_matrix
 from calib_core.interchange.syntax.yaml_text import number_text
 from calib_core.interchange.trees.frame_choice import ChosenFrames, WantedFrames, choose_frames
-from calib_core.interchange.trees.frame_tree import FrameTree, Joint, JointNumbers, Slot
+from calib_core.interchange.trees.frame_tree import FrameTree
 from calib_core.interchange.trees.free_joint import free_joint
+from calib_core.interchange.trees.joint import Joint, JointNumbers, Slot
 from calib_core.interchange.trees.posed_in_tree import axes_of_camera
 from calib_core.interchange.trees.reading import TreeFile, joined_tree
 

@@ -6,7 +6,7 @@ import re
 import numpy as np
 
 from calib_core.interchange.imported import WrittenPose
-from calib_core.interchange.trees.frame_tree import Joint, Place
+from calib_core.interchange.trees.joint import Joint, Place
 
 __all__ = ["stated_joint"]
 

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from calib_core.interchange.trees.frame_tree import FrameTree, Joint, Sensor
+from calib_core.interchange.trees.frame_tree import FrameTree, Sensor
+from calib_core.interchange.trees.joint import Joint
 
 __all__ = ["TreePart", "joined"]
 

@@ -8,7 +8,8 @@ import numpy as np
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.trees.frame_tree import Joint, Place, Sensor
+from calib_core.interchange.trees.frame_tree import Sensor
+from calib_core.interchange.trees.joint import Joint, Place
 from calib_core.interchange.trees.tree_part import TreePart
 
 __all__ = ["read_nuscenes", "recognizes_poses", "recognizes_sensors"]

@@ -9,7 +9,7 @@ from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.imported import WrittenPose
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.xml_places import PlacedElement, placed_xml
-from calib_core.interchange.trees.frame_tree import Joint, JointNumbers, Place, Slot
+from calib_core.interchange.trees.joint import Joint, JointNumbers, Place, Slot
 from calib_core.interchange.trees.tree_part import TreePart
 
 __all__ = ["XACRO_COMMAND", "read_urdf", "recognizes_urdf"]
