@@ -10,10 +10,12 @@ import tyro
 from app.cli.flags import File, Switch, called
 from app.cli.output import write_whole
 from app.cli.tree_flags import FrameFlags, Frames, TreeFlags, Trees
+from app.cli.unpacking import is_meant_as_folder, write_unpacked
 from app.terminal import print_exactly
 from calib_core.errors import InputError
 
 if TYPE_CHECKING:
+    from calib_core.geometry import RigidTransform
     from calib_core.interchange import CalibrationFile
 
 __all__ = ["Check", "Export"]
@@ -26,9 +28,9 @@ class Export:
     calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("CALIBRATION.json")] = ()
     """A calibration written by cocalib (cocalib/calibration-1 JSON)."""
     to: Annotated[str, tyro.conf.arg(metavar="FORMAT")] = "list"
-    """Output format: tf2, urdf, ...; "list" lists them all."""
+    """Output format: tf2, urdf, ...; "list" lists them, "all" writes every one that can hold the calibration into a folder."""
     out: File = None
-    """Output file or folder; without it, text formats go to stdout."""
+    """Output file or folder; without it, text formats go to stdout. pack: NAME.zip, or a folder for its files."""
     parent_from_radar: Annotated[
         tuple[float, float, float, float, float, float, float] | None,
         called("X Y Z QX QY QZ QW"),
@@ -51,14 +53,27 @@ class Export:
             width = max(len(known.name) for known in formats)
             print("\n".join(f"{known.name:<{width}}  {known.title}" for known in formats))
             return 0
-        format_named(self.to)
-        file, frames = self._calibration(), self.frames
+        if self.to != "all":
+            format_named(self.to)
+        file = self._calibration()
         parent = parent_pose(self.parent_from_radar) if self.parent_from_radar else None
-        written = self.trees.export(frames.renamed(file), self.to, parent_from_radar=parent, rectified=self.rectified)
-        written = frames.with_origin(written, file)
+        if self.to == "all":
+            return _write_all(self.frames.renamed(file), self.out, parent_from_radar=parent, rectified=self.rectified)
+        return self._write_one(file, parent)
+
+    def _write_one(self, file: "CalibrationFile", parent_from_radar: "RigidTransform | None") -> int:
+        from calib_core.interchange import format_named
+
+        renamed = self.frames.renamed(file)
+        written = self.trees.export(renamed, self.to, parent_from_radar=parent_from_radar, rectified=self.rectified)
+        written = self.frames.with_origin(written, file)
+        _print_warnings(file)
         for note in written.notes:
             print(f"note: {note}", file=sys.stderr)
-        if self.out is not None:
+        if self.out is not None and format_named(self.to).is_unpacked and is_meant_as_folder(self.out):
+            names = write_unpacked(self.out, written.data)
+            print(f"written to {self.out}: {', '.join(names)}")
+        elif self.out is not None:
             target = self.out / written.file_name if self.out.is_dir() else self.out
             write_whole(target, written.data)
             print(f"written to {target}")
@@ -74,8 +89,38 @@ class Export:
         return _own_calibration(self.calibration[0])
 
 
+def _write_all(
+    file: "CalibrationFile", folder: Path | None, *, parent_from_radar: "RigidTransform | None", rectified: bool
+) -> int:
+    """Write every format that can hold the calibration into a folder, and print why the others cannot."""
+    from calib_core.interchange import export_all
+
+    if folder is None or (folder.exists() and not folder.is_dir()):
+        raise InputError("--to all needs a folder: --out FOLDER")
+    written, refused = export_all(file, parent_from_radar=parent_from_radar, rectified=rectified)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be made: {(error.strerror or str(error)).lower()}") from error
+    for name, made in written.items():
+        write_whole(folder / made.file_name, made.data)
+        print(f"{name}: written to {folder / made.file_name}")
+    for one in refused:
+        print(f"{one.name}: not written: {one.reason}")
+    _print_warnings(file)
+    for note in dict.fromkeys(note for made in written.values() for note in made.notes):
+        names = ", ".join(name for name, made in written.items() if note in made.notes)
+        print(f"note: {names}: {note}", file=sys.stderr)
+    return 0
+
+
+def _print_warnings(file: "CalibrationFile") -> None:
+    for warning in file.calibration.warnings:
+        print(f"warning of the calibration: {warning.message}; {warning.hint}", file=sys.stderr)
+
+
 def _own_calibration(path: Path) -> "CalibrationFile":
-    from calib_core.interchange import calibration_bytes, read_any, read_calibration
+    from calib_core.interchange import adopt, calibration_bytes, read_any, read_calibration
 
     data = calibration_bytes(path)
     found = read_any(data, str(path))
@@ -84,7 +129,7 @@ def _own_calibration(path: Path) -> "CalibrationFile":
             f"{path}: is {found.format}, but export takes calibration-1; convert it first: "
             f"cocalib import {path.name} --out calibration.json"
         )
-    return read_calibration(data, str(path))
+    return read_calibration(data, str(path)) if found.format == "json" else adopt(found, str(path))
 
 
 @dataclass(frozen=True, slots=True)

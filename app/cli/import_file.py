@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.cli.flags import File, NewFile, called
+from app.cli.flags import File, NewFile, Switch, called
 from app.cli.output import write_whole
 from app.cli.tree_flags import FrameFlags, Frames
 from calib_core.errors import InputError
@@ -26,16 +26,28 @@ class Import:
     out: NewFile
     """Output file (calibration-1 JSON)."""
     calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("FILE...")] = ()
-    """A calibration in any format that export writes, from any program; or files, a folder or a recording with a frame tree."""
+    """A calibration in any format that `cocalib check` reads, from any program; or files, a folder or a recording with a tree."""
     camera: File = None
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     image_size: Annotated[tuple[int, int] | None, called("WIDTH HEIGHT")] = None
     """Size of the pictures [px], if the file has a camera matrix but no size; by default that of the pictures beside it."""
+    pairs: File = None
+    """Pairs that prove what the file means: a pairs-1 file, or a calibration-1 file with pairs."""
+    against: File = None
+    """A calibration of the same sensors that proves what the file means."""
+    replace_camera: Switch = False
+    """Take --camera although the file states another camera."""
     frames: Frames = field(default_factory=FrameFlags)
 
     def run(self) -> int:
-        """Write the calibration; return the exit code."""
-        from calib_core.interchange import Provenance, adopt, read_camera_file
+        """Write the calibration; return the exit code: 3 if it was converted but looks wrong, and nothing proves it."""
+        from calib_core.interchange import (
+            Provenance,
+            adoption,
+            read_any_file,
+            read_camera_file,
+            read_check_pairs_file,
+        )
         from calib_core.interchange import write_calibration as write
 
         if not self.calibration:
@@ -45,12 +57,30 @@ class Import:
         path, source = self.calibration[0], ", ".join(map(str, self.calibration))
         found, inputs = self.frames.read(self.calibration)
         camera = read_camera_file(self.camera) if self.camera else _sized_camera(found, path, self.image_size)
-        file = adopt(found, source, camera=camera, provenance=Provenance(inputs=inputs))
-        for note in found.notes:
-            print(f"note: {note}", file=sys.stderr)
+        against = read_any_file(self.against) if self.against else None
+        pairs = read_check_pairs_file(self.pairs) if self.pairs else None
+        adopted = adoption(
+            found,
+            source,
+            camera=camera,
+            provenance=Provenance(inputs=inputs),
+            against=against,
+            pairs=pairs,
+            replace_camera=self.replace_camera,
+        )
+        names = ", ".join(one.name for one in self.calibration)
+        file, report = adopted.file, adopted.report
         write_whole(self.out, write(file))
-        print(f"{', '.join(one.name for one in self.calibration)} read as {found.format}; written to {self.out}")
-        return 0
+        print("\n".join(line for line in report.lines()[1:] if not line.startswith("ok: ")), file=sys.stderr)
+        print(f"{names} read as {found.format}, {_RESTS_ON[file.rests_on]}; written to {self.out}")
+        return 3 if report.verdict == "doubtful" else 0
+
+
+_RESTS_ON = {
+    "clicked": "solved from clicks",
+    "imported_proven": "its meaning proven",
+    "imported_assumed": "its meaning assumed, not proven",
+}
 
 
 def _sized_camera(found: "ImportedCalibration", path: Path, image_size_px: tuple[int, int] | None) -> "Camera | None":

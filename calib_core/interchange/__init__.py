@@ -1,6 +1,6 @@
 """Read and write files: clicks, pairs, cameras, calibrations, and the formats of other tools."""
 
-from calib_core.interchange.adopting import adopt, adopted_calibration
+from calib_core.interchange.adopting import Adoption, adopt, adopted_calibration, adoption
 from calib_core.interchange.calibration_file import (
     AssumptionNote,
     CalibrationFile,
@@ -14,7 +14,7 @@ from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
 from calib_core.interchange.check.report import CheckReport, Verdict, check
 from calib_core.interchange.contents import contents_text
-from calib_core.interchange.exporting import Export, export
+from calib_core.interchange.exporting import Export, NotExported, export, export_all
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.registry import FORMATS, format_named, written_formats
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
@@ -48,6 +48,7 @@ from calib_core.interchange.trees.reading import joined_tree
 __all__ = [
     "CALIBRATION_SCHEMA",
     "FORMATS",
+    "Adoption",
     "AssumptionNote",
     "CalibrationFile",
     "CameraFile",
@@ -62,6 +63,7 @@ __all__ = [
     "FrameTree",
     "ImportedCalibration",
     "Joint",
+    "NotExported",
     "PairsFile",
     "Patch",
     "PixelDifference",
@@ -74,6 +76,7 @@ __all__ = [
     "WrittenPose",
     "adopt",
     "adopted_calibration",
+    "adoption",
     "attached_export",
     "calibration_bytes",
     "calibration_in_tree",
@@ -85,6 +88,7 @@ __all__ = [
     "compare",
     "contents_text",
     "export",
+    "export_all",
     "format_named",
     "imported",
     "joined_tree",

@@ -1,43 +1,150 @@
 """Convert a calibration written by another tool, in any known format, to a calibration-1 file."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance, choose_check_point
-from calib_core.interchange.check.report import check
+from calib_core.interchange.cameras.difference import largest_difference_px
+from calib_core.interchange.check.pair_residuals import CheckPairs
+from calib_core.interchange.check.report import CheckReport, check
+from calib_core.interchange.evidence import Evidence
 from calib_core.interchange.imported import TRUTH_FORMAT, ImportedCalibration
 from calib_core.options import CalibrationOptions
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, DataWarning, Metrics
 
-__all__ = ["adopt", "adopted_calibration"]
+__all__ = ["Adoption", "adopt", "adopted_calibration", "adoption"]
 
 _UNKNOWN = float("nan")
+_SAME_LENS_PX = 0.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Adoption:
+    """A converted calibration, and what was found when it was checked.
+
+    Attributes:
+        file: the calibration-1 file.
+        report: of the check; its verdict is never "wrong".
+    """
+
+    file: CalibrationFile
+    report: CheckReport
+
+
+def _judged(
+    found: ImportedCalibration,
+    source: str,
+    *,
+    camera: Camera | None = None,
+    against: ImportedCalibration | None = None,
+    pairs: CheckPairs | None = None,
+) -> CheckReport:
+    """Check what a reader found before it is converted.
+
+    Args:
+        found: what `read_any` returned.
+        source: the file's name, for error messages.
+        camera: the intrinsics, if the file has none.
+        against: a calibration of the same sensors that is known to be right.
+        pairs: radar positions and the pixels where they were seen.
+
+    Raises:
+        InputError: the file is a simulation's ground truth, contradicts itself, or fails a check; the message names the slip.
+    """
+    if found.format == TRUTH_FORMAT:
+        raise InputError(
+            f"{source}: is the ground truth of a simulation, not a calibration; compare with it: cocalib check FILE --against"
+        )
+    report = check(found, camera=camera, against=against, pairs=pairs)
+    for result in report.results:
+        if result.level == "error":
+            raise InputError(f"{source}: {result.message}; {result.hint}")
+    return report
+
+
+def _evidence(found: ImportedCalibration, report: CheckReport, *, tested: bool) -> Evidence:
+    """Return what an import rests on: reading alone never raises the level that a file states.
+
+    Args:
+        found: what was read.
+        report: of its check, which found no error.
+        tested: whether it was held against pairs or another calibration.
+    """
+    proven = report.verdict == "right"
+    if found.evidence == "imported_assumed" and not tested:
+        proven = False
+    return "imported_proven" if proven else "imported_assumed"
 
 
 def adopt(
     found: ImportedCalibration, source: str, *, camera: Camera | None = None, provenance: Provenance | None = None
 ) -> CalibrationFile:
-    """Convert what a reader found to a calibration-1 file; calibration-1 is returned unchanged.
+    """Convert what a reader found to a calibration-1 file; `adoption` without anything to hold it against.
+
+    Raises:
+        InputError: the file contradicts itself, fails its own check point, states another camera, or there is no camera.
+    """
+    return adoption(found, source, camera=camera, provenance=provenance).file
+
+
+def adoption(
+    found: ImportedCalibration,
+    source: str,
+    *,
+    camera: Camera | None = None,
+    provenance: Provenance | None = None,
+    against: ImportedCalibration | None = None,
+    pairs: CheckPairs | None = None,
+    replace_camera: bool = False,
+) -> Adoption:
+    """Convert what a reader found to a calibration-1 file; calibration-1 keeps everything that it contains.
 
     Args:
         found: what `read_any` returned.
         source: the file's name, for error messages.
         camera: the intrinsics, if the file has none.
         provenance: where the calibration comes from.
+        against: a calibration of the same sensors that is known to be right: agreeing with it proves the meaning of the file.
+        pairs: radar positions and the pixels where they were seen: fitting them proves it, too.
+        replace_camera: use the given camera although the file states another.
 
     Raises:
-        InputError: the file contradicts itself, fails its own check point, or there is no camera.
+        InputError: the file contradicts itself, fails a check, states another camera, or there is no camera.
     """
     if found.file is not None and camera is not None:
         raise InputError(
             f"{source}: is calibration-1 and contains the camera it was solved with; omit the other camera"
         )
-    _refuse_wrong(found, source, camera)
+    report = _judged(found, source, camera=camera, against=against, pairs=pairs)
+    tested = against is not None or pairs is not None
     if found.file is not None:
-        return found.file
-    known = found.camera or camera
+        raised = tested and found.file.rests_on == "imported_assumed" and report.verdict == "right"
+        return Adoption(replace(found.file, evidence="imported_proven") if raised else found.file, report)
+    known = _camera(found, camera, source=source, replace_camera=replace_camera)
+    calibration = adopted_calibration(found, source, camera=known)
+    file = CalibrationFile(
+        calibration,
+        found.frames or FrameNames(),
+        choose_check_point(calibration),
+        provenance or Provenance(),
+        evidence=_evidence(found, report, tested=tested),
+    )
+    return Adoption(file, report)
+
+
+def _camera(found: ImportedCalibration, given: Camera | None, *, source: str, replace_camera: bool) -> Camera:
+    """Return the camera of the file or the given one, which must not contradict each other.
+
+    Raises:
+        InputError: they image the same rays more than half a pixel apart, or there is neither.
+    """
+    if given is not None and not replace_camera:
+        _refuse_another_camera(found, given, source=source)
+    known = given or found.camera
     if known is None and found.matrix_px is not None:
         raise InputError(
             f"{source}: {found.format} states the camera matrix but not the image size; give it with --image-size WIDTH HEIGHT, "
@@ -45,9 +152,34 @@ def adopt(
         )
     if known is None:
         raise InputError(f"{source}: {found.format} contains no camera; give its intrinsics with --camera FILE")
-    calibration = adopted_calibration(found, source, camera=known)
-    frames = found.frames or FrameNames()
-    return CalibrationFile(calibration, frames, choose_check_point(calibration), provenance or Provenance())
+    return known
+
+
+def _refuse_another_camera(found: ImportedCalibration, given: Camera, *, source: str) -> None:
+    """Refuse a given camera that images the rays of the file's camera elsewhere.
+
+    A file with a camera matrix alone is for undistorted pictures; that matrix is compared.
+
+    Raises:
+        InputError: they image a ray more than half a pixel apart.
+    """
+    stated, compared = found.camera, given
+    if stated is None and found.matrix_px is not None:
+        size = given.width_px, given.height_px
+        stated, compared = Camera("pinhole", *size, found.matrix_px), Camera("pinhole", *size, given.matrix_px)
+    apart_px = largest_difference_px(stated, compared) if stated is not None else 0.0
+    if stated is None or apart_px <= _SAME_LENS_PX:
+        return
+    in_file, in_given = (
+        f"{one.width_px} x {one.height_px} px, fx {one.matrix_px[0, 0]:.6g}, cx {one.matrix_px[0, 2]:.6g}, "
+        f"cy {one.matrix_px[1, 2]:.6g}, {one.model}"
+        for one in (stated, compared)
+    )
+    apart = f", up to {apart_px:.3g} px apart" if np.isfinite(apart_px) else ""
+    raise InputError(
+        f"{source}: states a camera ({in_file}) other than the given one ({in_given}){apart}; omit --camera, or take the given "
+        "one with --replace-camera"
+    )
 
 
 def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Camera) -> Calibration:
@@ -61,7 +193,7 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
     Raises:
         InputError: the file contradicts itself, or fails its own check point.
     """
-    _refuse_wrong(found, source, camera)
+    _judged(found, source, camera=camera)
     assumed = tuple(DataWarning("assumed", note, "verify this assumption") for note in found.assumptions)
     return Calibration(
         camera_from_radar=found.camera_from_radar,
@@ -83,13 +215,3 @@ def _imported_warning(found: ImportedCalibration, source: str) -> DataWarning:
         f"imported from {source} ({found.format}): its pairs and input data are unknown",
         "check it with cocalib open RECORDING --calibration FILE: click the reflector",
     )
-
-
-def _refuse_wrong(found: ImportedCalibration, source: str, camera: Camera | None) -> None:
-    if found.format == TRUTH_FORMAT:
-        raise InputError(
-            f"{source}: is the ground truth of a simulation, not a calibration; compare with it: cocalib check FILE --against"
-        )
-    for result in check(found, camera=camera).results:
-        if result.level == "error":
-            raise InputError(f"{source}: {result.message}; {result.hint}")

@@ -30,6 +30,9 @@ def contents_text(written: Export) -> str:
 
 
 def _member(name: str, data: bytes) -> str:
+    if name.endswith(".npz"):
+        inside = unpack(data, source=name)
+        return f"[{name}]\n" + "\n".join(_member(inner, array) for inner, array in inside.items())
     if not name.endswith(".npy"):
         return f"[{name}]\n{data.decode('utf-8', errors='replace')}"
     array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)

@@ -8,8 +8,9 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.format import Format
 from calib_core.interchange.formats.registry import format_named, written_formats
+from calib_core.interchange.origin import missing_map
 
-__all__ = ["Export", "export"]
+__all__ = ["Export", "NotExported", "export", "export_all"]
 
 _RECTIFIED_NOTE = (
     "written for rectified pictures: undistorted with this same camera matrix, no distortion left; "
@@ -24,7 +25,7 @@ class Export:
     Attributes:
         file_name: the default name.
         content: text, or bytes if the format is binary.
-        notes: what a user of the file must know.
+        notes: what a user of the file must know; the missing angle map first.
     """
 
     file_name: str
@@ -35,6 +36,50 @@ class Export:
     def data(self) -> bytes:
         """The file's bytes."""
         return self.content.encode() if isinstance(self.content, str) else self.content
+
+
+@dataclass(frozen=True, slots=True)
+class NotExported:
+    """A format that cannot represent a calibration.
+
+    Attributes:
+        name: of the format.
+        reason: why, and what to use instead.
+    """
+
+    name: str
+    reason: str
+
+
+def export_all(
+    file: CalibrationFile, *, parent_from_radar: RigidTransform | None = None, rectified: bool = False
+) -> tuple[dict[str, Export], tuple[NotExported, ...]]:
+    """Export a calibration to every format that can represent it.
+
+    Args:
+        file: what to export.
+        parent_from_radar: as for `export`; used by the formats that have a third frame.
+        rectified: as for `export`; used by the formats that cannot store distortion.
+
+    Returns:
+        The files by the name of their format, and the formats that cannot represent it.
+    """
+    written: dict[str, Export] = {}
+    refused = []
+    for known in written_formats():
+        parent = parent_from_radar if known.write_in_parent else None
+        try:
+            made = export(file, known.name, parent_from_radar=parent, rectified=rectified and known.is_for_rectified)
+        except InputError as error:
+            refused.append(NotExported(known.name, str(error)))
+            continue
+        if made.file_name in {other.file_name for other in written.values()}:
+            refused.append(
+                NotExported(known.name, f"its file {made.file_name} is that of another format; export it alone")
+            )
+        else:
+            written[known.name] = made
+    return written, tuple(refused)
 
 
 def export(
@@ -66,8 +111,9 @@ def export(
         raise InputError(f"the format {name} has no third frame to place the radar in; formats that have one: {able}")
     else:
         content = chosen.write_in_parent(file, parent_from_radar)
-    notes = (*chosen.notes, _RECTIFIED_NOTE) if chosen.is_for_rectified and camera.is_distorted else chosen.notes
-    return Export(chosen.file_name, content, notes)
+    lost = () if chosen.holds_angle_map else missing_map(file.calibration)
+    rectified_note = (_RECTIFIED_NOTE,) if chosen.is_for_rectified and camera.is_distorted else ()
+    return Export(chosen.file_name, content, (*lost, *chosen.notes, *rectified_note))
 
 
 def _check_lens(chosen: Format, camera: Camera, *, rectified: bool) -> None:

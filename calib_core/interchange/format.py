@@ -46,6 +46,8 @@ class Format:
         reads: how it is recognized and read; None if the format can only be written.
         notes: what a user of the file must know, one sentence each.
         write_in_parent: like write, with a given pose of the radar in a third frame (kit, ego); None if it has none.
+        holds_angle_map: it stores the radar's angle map.
+        is_unpacked: it is a zip archive whose files are meant to be unpacked: written into a folder, if one is given.
     """
 
     name: str
@@ -58,6 +60,8 @@ class Format:
     reads: Reads | None
     notes: tuple[str, ...] = ()
     write_in_parent: Callable[[CalibrationFile, RigidTransform], str | bytes] | None = None
+    holds_angle_map: bool = False
+    is_unpacked: bool = False
 
     @property
     def is_for_rectified(self) -> bool:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -13,7 +13,7 @@ from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.evidence import Evidence
-from calib_core.interchange.rotations import LINK_FROM_OPTICAL, matrix_from_rpy, nearest_rotation
+from calib_core.interchange.rotations import LINK_FROM_OPTICAL, looks_forward, matrix_from_rpy, nearest_rotation
 
 __all__ = [
     "TRUTH_FORMAT",
@@ -204,23 +204,31 @@ def imported(file: CalibrationFile) -> ImportedCalibration:
     )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Roles:
-    """Which of two frames is the radar's and which the camera's, and what was assumed."""
+    """Which of two frames is the radar's and which the camera's, and what was assumed.
 
-    direction: Direction
-    axes: Axes
+    Attributes:
+        pose: the numbers with the meaning that the frames give them.
+        frames: of the radar, and of the camera's optical axes.
+        assumptions: what the names do not say, one sentence each.
+    """
+
+    pose: WrittenPose
     frames: FrameNames
     assumptions: tuple[str, ...]
 
 
-def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
+def posed_between(parent: str, child: str, stated: FrameNames | None, numbers: WrittenPose) -> Roles:
     """Interpret "the pose of child in parent": which frame is the radar's, and which axes the camera's has.
+
+    A camera frame has body axes unless its name says "optical" (REP 103), or its numbers fit optical axes alone.
 
     Args:
         parent: name of the frame the pose is given in; its numbers carry child points into it.
         child: name of the other.
         stated: the frames that the file states in a comment, if it does.
+        numbers: as written; the direction and axes in it are not looked at.
 
     Raises:
         InputError: a frame has no name.
@@ -233,17 +241,38 @@ def posed_between(parent: str, child: str, stated: FrameNames | None) -> Roles:
         radar, camera = (parent, child) if radar_first else (child, parent)
         if not (looks_like_radar(radar) and not looks_like_radar(camera)):
             assumptions.append(f"the file does not say which frame is the radar's; assumed {radar!r}")
+    pose = replace(numbers, direction="radar_from_camera" if parent == radar else "camera_from_radar", axes="optical")
+    axes: Axes = "optical"
     if stated is not None and camera in (stated.camera, stated.camera_link):
-        axes: Axes = "optical" if camera == stated.camera else "link"
-        frames = stated
+        frames, axes = stated, "optical" if camera == stated.camera else "link"
+    elif "optical" in camera:
+        frames = FrameNames(radar, camera)
     else:
-        axes = "link" if camera.endswith("_link") and "optical" not in camera else "optical"
-        if "optical" not in camera:
-            meant = "optical axes (z forward)" if axes == "optical" else "body axes (x forward)"
-            assumptions.append(f"assumed that {camera!r} has {meant}")
-        frames = FrameNames(radar, camera if axes == "optical" else camera.removesuffix("_link") + "_optical")
-    direction: Direction = "radar_from_camera" if parent == radar else "camera_from_radar"
-    return Roles(direction, axes, frames, tuple(assumptions))
+        axes = "optical" if _fits_optical_alone(pose) else "link"
+        assumptions.append(_ASSUMED_AXES[axes].format(camera))
+        frames = FrameNames(radar, camera if axes == "optical" else _optical_name(camera))
+    return Roles(replace(pose, axes=axes), frames, tuple(assumptions))
+
+
+_ASSUMED_AXES = {
+    "link": "assumed that {!r} has body axes (x forward), as frames without _optical in their name (REP 103)",
+    "optical": "assumed that {!r} has optical axes (z forward): its name does not say so, but its numbers fit no others",
+}
+
+
+def _fits_optical_alone(pose: WrittenPose) -> bool:
+    """Return whether the camera looks where the radar looks with optical axes, and does not with body axes."""
+    try:
+        with_optical, with_body = (replace(pose, axes=axes).camera_from_radar() for axes in ("optical", "link"))
+    except ValueError:  # not a rotation, which the reader reports
+        return False
+    return looks_forward(with_optical) and not looks_forward(with_body)
+
+
+def _optical_name(camera: str) -> str:
+    """Return what the optical frame of a camera's body frame is called by custom."""
+    stem = camera.removesuffix("_link")
+    return f"{stem.removesuffix('_frame')}_optical_frame" if stem.endswith("_frame") else f"{stem}_optical"
 
 
 def looks_like_camera(name: str) -> bool:

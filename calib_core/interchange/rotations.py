@@ -8,6 +8,7 @@ from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 __all__ = [
     "LINK_FROM_OPTICAL",
     "OPTICAL_RPY_RAD",
+    "looks_forward",
     "matrix_from_rpy",
     "nearest_rotation",
     "quaternion_xyzw_from_matrix",
@@ -19,6 +20,14 @@ LINK_FROM_OPTICAL = RigidTransform(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], 
 
 OPTICAL_RPY_RAD = (-np.pi / 2, 0.0, -np.pi / 2)
 """The same rotation as URDF's roll, pitch, yaw."""
+
+_FORWARD_COS = np.cos(np.radians(35.0))
+
+
+def looks_forward(camera_from_radar: RigidTransform) -> bool:
+    """Return whether the camera is upright and looks along the radar's x axis, each to within 35 degrees."""
+    along, upright = camera_from_radar.rotation[2, 0], -camera_from_radar.rotation[1, 2]
+    return bool(min(along, upright) > _FORWARD_COS)
 
 
 def matrix_from_rpy(rpy_rad: Vector3) -> Matrix33:

@@ -72,10 +72,10 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     parent, child = str(header.get("frame_id") or ""), str(one.get("child_frame_id") or "")
     if not parent or not child:
         raise InputError(f"{source}: header.frame_id or child_frame_id is missing; name both frames")
-    roles = posed_between(parent.lstrip("/"), child.lstrip("/"), stated_frames(text))
-    pose = WrittenPose("quaternion_xyzw", np.array(numbers[1]), np.array(numbers[0]), roles.direction, roles.axes)
+    written = WrittenPose("quaternion_xyzw", np.array(numbers[1]), np.array(numbers[0]), "radar_from_camera")
+    roles = posed_between(parent.lstrip("/"), child.lstrip("/"), stated_frames(text), written)
     return ImportedCalibration(
-        "apollo", pose, frames=roles.frames, check_point=stated_check_point(text), assumptions=roles.assumptions
+        "apollo", roles.pose, frames=roles.frames, check_point=stated_check_point(text), assumptions=roles.assumptions
     ).checked(source)
 
 

@@ -85,31 +85,29 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             f"{source}: {kit_name}: contains {len(radars)} radars and {len(cameras)} cameras by name; keep one of each"
         )
     radar, camera = radars[0], cameras[0]
-    roles = posed_between(radar, camera, stated)
-    radar_numbers, camera_numbers = (
-        np.array(
-            [
-                floats(kit[name].get(key), source=source, place=f"{kit_name}.{name}.{key}", length=1)[0]
-                for key in _POSE_KEYS
-            ]
-        )
-        for name in (radar, camera)
+    kit_from_radar, kit_from_camera = (
+        _posed(kit[name], source=source, place=f"{kit_name}.{name}") for name in (radar, camera)
     )
-    pose = WrittenPose("rpy", camera_numbers[3:], camera_numbers[:3], "radar_from_camera", roles.axes)
-    if radar_numbers.any():
-        kit_from_radar = WrittenPose("rpy", radar_numbers[3:], radar_numbers[:3], "radar_from_camera").as_written()
-        kit_from_camera = WrittenPose("rpy", camera_numbers[3:], camera_numbers[:3], "radar_from_camera").as_written()
-        radar_from_camera = kit_from_radar.inverse() @ kit_from_camera
-        pose = WrittenPose(
-            "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera", roles.axes
+    numbers = kit_from_camera
+    if np.any(kit_from_radar.as_written().as_matrix() != np.eye(4)):
+        radar_from_camera = kit_from_radar.as_written().inverse() @ kit_from_camera.as_written()
+        numbers = WrittenPose(
+            "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"
         )
+    roles = posed_between(radar, camera, stated, numbers)
     return ImportedCalibration(
         "autoware",
-        pose,
+        roles.pose,
         frames=roles.frames,
         check_point=stated_check_point(content.text),
         assumptions=roles.assumptions,
     ).checked(source)
+
+
+def _posed(entry: Mapping[str, Any], *, source: str, place: str) -> WrittenPose:
+    """Return the pose of a sensor in the kit."""
+    numbers = [floats(entry.get(key), source=source, place=f"{place}.{key}", length=1)[0] for key in _POSE_KEYS]
+    return WrittenPose("rpy", np.array(numbers[3:]), np.array(numbers[:3]), "radar_from_camera")
 
 
 def _is_kit(value: Any) -> bool:

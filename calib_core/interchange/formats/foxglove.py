@@ -7,7 +7,7 @@ import numpy as np
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose, posed_between
@@ -85,15 +85,23 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         numbers.append(
             [floats(block.get(k), source=source, place=f"FrameTransform.{part}.{k}", length=1)[0] for k in keys]
         )
-    roles = posed_between(parent, child, None)
+    written = WrittenPose("quaternion_xyzw", np.array(numbers[1]), np.array(numbers[0]), "radar_from_camera")
+    roles = posed_between(parent, child, _frames_of(messages, parent, child), written)
     cameras = find_cameras(messages, source=source) if "CameraCalibration" in messages else ()
     return ImportedCalibration(
         "foxglove",
-        WrittenPose("quaternion_xyzw", np.array(numbers[1]), np.array(numbers[0]), roles.direction, roles.axes),
+        roles.pose,
         camera=cameras[0].camera(image_size_px=None, source=source) if cameras else None,
         frames=roles.frames,
         assumptions=roles.assumptions,
     ).checked(source)
+
+
+def _frames_of(messages: Mapping[str, Any], parent: str, child: str) -> FrameNames | None:
+    """Return which of the two frames is the camera's: the frame of a CameraCalibration, which has optical axes by definition."""
+    camera = messages.get("CameraCalibration")
+    frame = str(camera.get("frame_id") or "") if isinstance(camera, Mapping) else ""
+    return FrameNames(parent if frame == child else child, frame) if frame in (parent, child) else None
 
 
 FOXGLOVE = Format(

@@ -74,10 +74,14 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             f"{source}: {len(cameras)} records with camera_intrinsic and {len(radars)} without; keep one camera and one radar"
         )
     camera_pose = _posed(cameras[0], source=source)
+    matrix = floats(cameras[0]["camera_intrinsic"], source=source, place="camera_intrinsic", length=9)
+    matrix_px = np.reshape(matrix, (3, 3))
     assumptions = ["the format names no frames and assumes undistorted images"]
     if not radars:
         assumptions.append("no radar record; assumed that the ego frame is the radar frame")
-        return ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions)).checked(source)
+        return ImportedCalibration(
+            "nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px
+        ).checked(source)
     ego_from_radar = _posed(radars[0], source=source).as_written()
     if np.abs(ego_from_radar.as_matrix() - np.eye(4)).max() > 0:
         ego_from_camera = camera_pose.as_written()
@@ -85,7 +89,9 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         camera_pose = WrittenPose(
             "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"
         )
-    return ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions)).checked(source)
+    return ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px).checked(
+        source
+    )
 
 
 def _posed(record: Mapping[str, Any], *, source: str) -> WrittenPose:

@@ -17,6 +17,7 @@ from calib_core.interchange.formats.kalibr import KALIBR
 from calib_core.interchange.formats.kitti import KITTI
 from calib_core.interchange.formats.nuscenes import NUSCENES
 from calib_core.interchange.formats.opencv import OPENCV
+from calib_core.interchange.formats.pack.deployment_pack import PACK
 from calib_core.interchange.formats.plugins import plugin_formats
 from calib_core.interchange.formats.ros.launch_files import TF1_LAUNCH, TF2_LAUNCH_PY, TF2_LAUNCH_XML
 from calib_core.interchange.formats.ros.tf2_command import TF2
@@ -28,6 +29,7 @@ __all__ = ["FORMATS", "format_named", "readers", "written_formats"]
 
 FORMATS: tuple[Format, ...] = (
     CALIBRATION_1,
+    PACK,
     TF2,
     TF2_LAUNCH_PY,
     TF2_LAUNCH_XML,
@@ -56,7 +58,7 @@ _TRIED_FIRST = (
     TF2_LAUNCH_PY,  # mentions the publisher, as TF2 does
 )
 _TRIED_LAST = (MATLAB, NUMPY)  # accept any mat file and any archive, to report what is wrong with it
-_RESERVED = frozenset({"list", TRUTH.name, *(known.name for known in FORMATS)})
+_RESERVED = frozenset({"list", "all", TRUTH.name, *(known.name for known in FORMATS)})
 
 
 def written_formats() -> tuple[Format, ...]:

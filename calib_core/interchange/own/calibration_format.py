@@ -57,4 +57,5 @@ CALIBRATION_1 = Format(
     comment="keys",
     write=write_calibration,
     reads=Reads(_recognizes, _read),
+    holds_angle_map=True,
 )

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.formats.statement import stated_check_point, stated_frames
 from calib_core.interchange.imported import Axes, ImportedCalibration, StatedCheckPoint, WrittenPose, posed_between
@@ -106,8 +107,15 @@ def axes_of_camera(tree: FrameTree, chosen: ChosenFrames) -> CameraAxes:
         optical = chosen.camera if sensor.axes == "optical" else FrameNames("radar", chosen.camera).camera
         return CameraAxes(sensor.axes, optical)
     # The radar's frame is already chosen, so its real name decides nothing here.
-    roles = posed_between("radar", chosen.camera, None)
-    return CameraAxes(roles.axes, roles.frames.camera, roles.assumptions)
+    roles = posed_between("radar", chosen.camera, None, _numbers(tree, chosen))
+    return CameraAxes(roles.pose.axes, roles.frames.camera, roles.assumptions)
+
+
+def _numbers(tree: FrameTree, chosen: ChosenFrames) -> WrittenPose:
+    """Return the camera frame's pose in the radar's; none, which fits no axes, if a joint between them cannot be used."""
+    usable = not any(step.joint.problem for step in tree.path(chosen.radar, chosen.camera))
+    between = tree.between(chosen.radar, chosen.camera) if usable else RigidTransform.identity()
+    return WrittenPose("matrix", between.rotation, between.translation_m, "radar_from_camera")
 
 
 def _pose(tree: FrameTree, radar: str, camera: str) -> tuple[WrittenPose, tuple[Joint, ...]]:

@@ -124,10 +124,11 @@ def _from_arguments(arguments: list[str], text: str, *, source: str, name: str) 
         raise InputError(f"{source}: no {PUBLISHER} with a pose and two frames in it; give a command or a launch file")
     if not parent or not child:
         raise InputError(f"{source}: a frame's name is missing; add --frame-id and --child-frame-id")
-    roles = posed_between(parent.lstrip("/"), child.lstrip("/"), stated_frames(text))
+    numbers = WrittenPose(form, np.array(rotation), np.array(translation), "radar_from_camera")
+    roles = posed_between(parent.lstrip("/"), child.lstrip("/"), stated_frames(text), numbers)
     return ImportedCalibration(
         format=name,
-        pose=WrittenPose(form, np.array(rotation), np.array(translation), roles.direction, roles.axes),
+        pose=roles.pose,
         frames=roles.frames,
         check_point=stated_check_point(text),
         assumptions=roles.assumptions,

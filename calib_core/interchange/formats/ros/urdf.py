@@ -1,5 +1,6 @@
 """URDF: the camera's body frame in the radar frame, and the optical frame attached to it."""
 
+from dataclasses import replace
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
@@ -108,17 +109,18 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     if joint.get("type") != "fixed":
         raise InputError(f"{source}: the joint {joint.get('name')!r} is not fixed; a calibration needs a fixed joint")
     parent, child = _ends(joint)
-    roles = posed_between(parent, child, stated)
-    camera_end = child if roles.direction == "radar_from_camera" else parent
+    translation_m, rpy_rad = _origin(joint, source=source)
+    numbers = WrittenPose("rpy", np.array(rpy_rad), np.array(translation_m), "radar_from_camera")
+    roles = posed_between(parent, child, stated, numbers)
+    camera_end = child if roles.pose.direction == "radar_from_camera" else parent
     optical = next((j for j in joints if _ends(j)[0] == camera_end and "optical" in _ends(j)[1]), None)
-    frames, axes, assumptions = roles.frames, roles.axes, roles.assumptions
+    pose, frames, assumptions = roles.pose, roles.frames, roles.assumptions
     if optical is not None:
         _refuse_nonstandard_optical(optical, source=source)
-        frames, axes, assumptions = FrameNames(roles.frames.radar, _ends(optical)[1]), "link", ()
-    translation_m, rpy_rad = _origin(joint, source=source)
+        pose, frames, assumptions = replace(pose, axes="link"), FrameNames(roles.frames.radar, _ends(optical)[1]), ()
     return ImportedCalibration(
         format="urdf",
-        pose=WrittenPose("rpy", np.array(rpy_rad), np.array(translation_m), roles.direction, axes),
+        pose=pose,
         frames=frames,
         check_point=stated_check_point(content.text),
         assumptions=assumptions,
