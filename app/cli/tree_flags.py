@@ -52,7 +52,7 @@ class FrameFlags:
         from calib_core.interchange import calibration_in_tree, read_together, tree_files
         from calib_core.results import InputFile
 
-        if any(map(_holds_recording, paths)):
+        if any(map(_holds_recording, paths)) and not _is_plain_mcap(paths):
             source = ", ".join(map(str, paths))
             return calibration_in_tree(tree_of(paths), self.wanted, source=source), ()
         files = tree_files(paths)
@@ -176,6 +176,13 @@ def tree_of(paths: Sequence[Path]) -> "FrameTree":
             f"{recordings[0]}: has no /tf_static and no /tf; give the file with the frames, such as the URDF"
         )
     return joined_tree(files, joints)
+
+
+def _is_plain_mcap(paths: Sequence[Path]) -> bool:
+    """Return whether this is one MCAP file without transforms of ROS, such as an exported calibration."""
+    from calib_core.recordings import frame_transforms
+
+    return len(paths) == 1 and paths[0].suffix == ".mcap" and not frame_transforms(paths)
 
 
 def _holds_recording(path: Path) -> bool:
