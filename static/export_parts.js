@@ -48,7 +48,7 @@ export function warningBox(rows) {
 
 const RECTIFIED = "cocalib-rectified";
 
-/** The user's statement that the pictures are rectified, required by formats that cannot hold distortion. It is kept for this
+/** The user's statement that the pictures are rectified already, asked by formats that cannot hold distortion. It is kept for this
  * browser session only: the pictures of the next recording may differ. @param {() => void} changed */
 export function rectifiedBox(changed) {
   const box = make("input", "", []);

@@ -38,7 +38,7 @@ class Export:
     """Pose of the radar in the parent frame of autoware (kit), driveworks (rig) or nuscenes (ego): metres, quaternion, w last."""
 
     rectified: Switch = False
-    """Your pictures are rectified (undistorted, same camera matrix). kitti and nuscenes need this if the lens has distortion."""
+    """Your pictures are rectified already, with the same camera matrix; else kitti and nuscenes get maps and a matrix of ours."""
     trees: Trees = field(default_factory=TreeFlags)
     frames: Frames = field(default_factory=FrameFlags)
 
@@ -77,8 +77,14 @@ class Export:
             target = self.out / written.file_name if self.out.is_dir() else self.out
             write_whole(target, written.data)
             print(f"written to {target}")
+            for extra in written.extra_files:
+                write_whole(target.parent / extra.file_name, extra.data)
+                print(f"written to {target.parent / extra.file_name}")
         elif isinstance(written.content, bytes):
             raise InputError(f"{self.to} is a binary format and needs a file: --out {written.file_name}")
+        elif written.extra_files:
+            beside = ", ".join(extra.file_name for extra in written.extra_files)
+            raise InputError(f"{self.to} comes with {beside} and needs a file or folder: --out {written.file_name}")
         else:
             print_exactly(written.content)
         return 0
@@ -105,6 +111,8 @@ def _write_all(
     for name, made in written.items():
         write_whole(folder / made.file_name, made.data)
         print(f"{name}: written to {folder / made.file_name}")
+        for extra in made.extra_files:
+            write_whole(folder / extra.file_name, extra.data)
     for one in refused:
         print(f"{one.name}: not written: {one.reason}")
     _print_warnings(file)

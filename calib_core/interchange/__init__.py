@@ -16,10 +16,11 @@ from calib_core.interchange.check.report import CheckReport, Verdict, check
 from calib_core.interchange.contents import contents_text
 from calib_core.interchange.exporting import Export, NotExported, export, export_all
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.registry import FORMATS, format_named, written_formats
+from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS, format_named, written_formats
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
 from calib_core.interchange.importing import (
     calibration_bytes,
+    files_beside,
     read_any,
     read_any_file,
     read_any_files,
@@ -47,6 +48,7 @@ from calib_core.interchange.trees.reading import joined_tree
 
 __all__ = [
     "CALIBRATION_SCHEMA",
+    "CAMERA_ONLY",
     "FORMATS",
     "Adoption",
     "AssumptionNote",
@@ -89,6 +91,7 @@ __all__ = [
     "contents_text",
     "export",
     "export_all",
+    "files_beside",
     "format_named",
     "imported",
     "joined_tree",

@@ -11,7 +11,7 @@ from calib_core.interchange.syntax.content import Content
 
 __all__ = ["CameraShare", "Comment", "Format", "Reads"]
 
-Comment = Literal["#", "<!-- -->", "keys", "none"]
+Comment = Literal["#", "<!-- -->", "keys", "numbers", "none"]
 CameraShare = Literal["none", "matrix", "lens"]
 """How much of the camera a format stores: nothing, its matrix without distortion, or the whole lens."""
 
@@ -24,10 +24,12 @@ class Reads:
         recognizes: returns whether a file's content is of this format; raises nothing.
         read: returns the calibration in recognized content, given the name of the file for error messages; raises
             InputError if the content is invalid.
+        beside: names of files that complete one, if they are in the same folder; they arrive in `Content.beside`.
     """
 
     recognizes: Callable[[Content], bool]
     read: Callable[[Content, str], ImportedCalibration]
+    beside: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,12 +42,14 @@ class Format:
         numbers: what the numbers in the file mean, in one line: the direction of the transform and the order of the numbers.
         file_name: the default file name.
         camera: how much of the camera it stores.
-        comment: where it states its frames and check point: in comments ("#", "<!-- -->"), in keys of its own, or nowhere.
+        comment: where it states its frames and check point: in comments ("#", "<!-- -->"), in keys of its own, as
+            numbers without the frames (in formats that hold nothing else), or nowhere.
         write: returns the file content for a calibration; raises InputError for what the format cannot represent. None
             if the format can only be read.
         reads: how it is recognized and read; None if the format can only be written.
         notes: what a user of the file must know, one sentence each.
         write_in_parent: like write, with a given pose of the radar in a third frame (kit, ego); None if it has none.
+        notes_on: returns more notes, which depend on the calibration; None if there are none.
         holds_angle_map: it stores the radar's angle map.
         is_unpacked: it is a zip archive whose files are meant to be unpacked: written into a folder, if one is given.
     """
@@ -60,6 +64,7 @@ class Format:
     reads: Reads | None
     notes: tuple[str, ...] = ()
     write_in_parent: Callable[[CalibrationFile, RigidTransform], str | bytes] | None = None
+    notes_on: Callable[[CalibrationFile], tuple[str, ...]] | None = None
     holds_angle_map: bool = False
     is_unpacked: bool = False
 

@@ -1,6 +1,6 @@
 """Read a calibration in any known format."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,13 +15,23 @@ from calib_core.interchange.trees.frame_choice import WantedFrames
 from calib_core.interchange.trees.posed_in_tree import calibration_in_tree, chained_calibration
 from calib_core.interchange.trees.reading import TreeFile, files_of_trees, read_tree
 
-__all__ = ["calibration_bytes", "read_any", "read_any_file", "read_any_files", "read_together", "tree_files"]
+__all__ = [
+    "calibration_bytes",
+    "files_beside",
+    "read_any",
+    "read_any_file",
+    "read_any_files",
+    "read_together",
+    "tree_files",
+]
 
 _MAX_BYTES = 256 * 1024 * 1024
+_MAX_BESIDE_BYTES = 1024 * 1024
 _KNOWN = (
     "known: calibration-1, static_transform_publisher in a command or launch file, URDF, Autoware, Apollo and "
-    "stamped transforms, Kalibr with T_cam_radar, OpenCV with R and T, KITTI, nuScenes, DriveWorks, Foxglove, "
-    "COLMAP, mat, npz, matrix"
+    "stamped transforms, tf_echo, Kalibr with T_cam_radar, OpenCV with R and T, KITTI, nuScenes, DriveWorks, Foxglove, "
+    "PJLab, direct_visual_lidar_calibration, easy_handeye, OpenLABEL, Scale, Segments.ai, Autoware.AI, TUM, COLMAP, mat, "
+    "npz, matrix"
 )
 
 
@@ -62,7 +72,7 @@ def read_together(files: Sequence[TreeFile], frames: WantedFrames | None = None)
         InputError: they contain no pose between a radar and a camera.
     """
     if len(files) == 1:
-        return read_any(files[0].data, files[0].source, frames)
+        return read_any(files[0].data, files[0].source, frames, beside=files_beside(files[0].source))
     source = ", ".join(file.source for file in files)
     return calibration_in_tree(read_tree(files), frames or WantedFrames(), source=source)
 
@@ -75,6 +85,20 @@ def tree_files(paths: Sequence[Path]) -> tuple[TreeFile, ...]:
     """
     files = (file for path in paths for file in files_of_trees(path))
     return tuple(TreeFile(calibration_bytes(file), str(file)) for file in files)
+
+
+def files_beside(path: str | Path) -> Mapping[str, bytes]:
+    """Return the files in the same folder that may complete a calibration, by name; those that cannot be read are left out."""
+    found = {}
+    for name in dict.fromkeys(name for reader in readers() for name in reader.beside):
+        file = Path(path).parent / name
+        if file.name == Path(path).name or not file.is_file():
+            continue
+        try:
+            found[name] = read_input(file, max_bytes=_MAX_BESIDE_BYTES, is_what="a calibration")
+        except (OSError, InputError):
+            continue
+    return found
 
 
 def calibration_bytes(path: str | Path) -> bytes:
@@ -91,7 +115,11 @@ def calibration_bytes(path: str | Path) -> bytes:
 
 
 def read_any(
-    content: str | bytes, source: str = "calibration", frames: WantedFrames | None = None
+    content: str | bytes,
+    source: str = "calibration",
+    frames: WantedFrames | None = None,
+    *,
+    beside: Mapping[str, bytes] | None = None,
 ) -> ImportedCalibration:
     """Read a calibration from the content of a file of any format in the registry; the content determines the format.
 
@@ -99,21 +127,23 @@ def read_any(
         content: of the file.
         source: its name, for messages.
         frames: which radar and which camera, if there are several; in a file that is no tree, what to call them.
+        beside: files in the same folder that may complete it, from `files_beside`.
 
     Raises:
         InputError: it contains no pose in a known format; the message says what was looked for.
     """
     try:
-        return _read(content, source, frames or WantedFrames())
+        return _read(content, source, frames or WantedFrames(), beside or {})
     except InputError as error:
         if str(error).startswith(f"{source}:"):
             raise
         raise InputError(f"{source}: {error}") from None  # FrameNames refuses a name without knowing the file
 
 
-def _read(content: str | bytes, source: str, frames: WantedFrames) -> ImportedCalibration:
+def _read(content: str | bytes, source: str, frames: WantedFrames, beside: Mapping[str, bytes]) -> ImportedCalibration:
     seen = []
-    for reading in readings(content, source=source):
+    for syntax in readings(content, source=source):
+        reading = replace(syntax, beside=beside)
         chained = chained_calibration(reading, frames, source=source)
         if chained is not None:
             return _with_origin(chained, reading)
@@ -147,6 +177,9 @@ def _refusal(content: Content, source: str) -> InputError:
         return InputError(f"{source}: neither text nor an archive; {_KNOWN}")
     if content.syntax == "xml" and content.value is None:
         return InputError(f"{source}: XML with <{content.root.tag}>; expected OpenCV's <opencv_storage>")
+    if content.syntax == "mcap":
+        names = ", ".join(message.schema_name for message in content.mcap.messages[:12])
+        return InputError(f"{source}: MCAP without foxglove.FrameTransforms (found {names or 'no message'}); {_KNOWN}")
     value = content.value
     found = ", ".join(map(str, list(value)[:12])) if isinstance(value, dict) else type(value).__name__
     return InputError(f"{source}: no pose of a camera and a radar in it (found {found or 'nothing'}); {_KNOWN}")

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from calib_core.interchange import FORMATS, export_all, read_calibration
+from calib_core.interchange import export_all, read_calibration, written_formats
 from calib_core.interchange.formats.statement import POSE_ONLY
 
 Cocalib = Callable[..., Any]
@@ -90,14 +90,16 @@ def test_all_formats_are_written_and_those_that_cannot_hold_the_calibration_say_
     answer = cocalib("export", calibration, "--to", "all", "--out", folder)
     assert answer.code == 0
     lines = dict(line.split(": ", 1) for line in answer.out.splitlines())
-    assert set(lines) == {known.name for known in FORMATS}
+    assert set(lines) == {known.name for known in written_formats()}
     written, refused = export_all(read_calibration(calibration.read_bytes()))
     for name, made in written.items():
         assert lines[name] == f"written to {folder / made.file_name}"
         assert (folder / made.file_name).read_bytes() == made.data
     for one in refused:
         assert lines[one.name] == f"not written: {one.reason}"
-    assert {path.name for path in folder.iterdir()} == {made.file_name for made in written.values()}
+    beside = {extra.file_name for made in written.values() for extra in made.extra_files}
+    assert beside == {"rectification.npz"}
+    assert {path.name for path in folder.iterdir()} == {made.file_name for made in written.values()} | beside
     (note,) = (line for line in answer.err.splitlines() if line.endswith(POSE_ONLY))
     assert note.startswith("note: tf2, tf2-launch-py, ")
     assert "warning of the calibration: the pairs span 5 m to 15 m" in answer.err

@@ -47,7 +47,7 @@ class FormatRow:
         key: what `--to` takes.
         label: one line for display.
         takes_parent: the radar can be posed in a third frame.
-        takes_rectified: the user may have to state that the pictures are rectified.
+        takes_rectified: the user may state that the pictures are rectified already.
     """
 
     key: str
@@ -68,7 +68,7 @@ class ExportPreview:
         size_bytes: of the file.
         numbers: what the file's numbers mean.
         notes: what a user of the file must know.
-        is_for_rectified: it is written only because the user stated that the pictures are rectified.
+        is_for_rectified: it is for rectified pictures: those that the user declared rectified, or those that its maps make.
         carries: direction of the pose in the file, as read back.
         axes: of the camera frame that the file uses: optical, or its body frame.
         check: what `cocalib check` says about the file.
@@ -166,22 +166,24 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         InputError: the format cannot hold this calibration, or has no third frame.
     """
     written, form = exported(file, key, query), format_named(key)
-    report = check(read_any(written.data, written.file_name), against=imported(file))
+    download = written.download
+    whole = imported(file)
+    report = check(read_any(written.data, written.file_name) if form.reads else whole, against=whole)
     pose = file.calibration.camera_from_radar
     wxyz = quaternion_wxyz_from_matrix(pose.rotation).tolist()
     warnings = file.calibration.warnings
     return ExportPreview(
         key=key,
-        file_name=f"{_slug(recording_name)}_{written.file_name}",
+        file_name=f"{_slug(recording_name)}_{download.file_name}",
         text=contents_text(written),
-        is_binary=isinstance(written.content, bytes),
-        size_bytes=len(written.data),
+        is_binary=isinstance(written.content, bytes) or bool(written.extra_files),
+        size_bytes=len(download.data),
         numbers=sentence(form.numbers),
         notes=tuple(sentence(note) for note in written.notes),
         is_for_rectified=form.is_for_rectified and file.calibration.camera.is_distorted,
         carries=report.imported.pose.direction,
         axes=report.imported.pose.axes,
-        check=_read_back(report),
+        check=_read_back(report) if form.reads else "Not read back: this format has no pose to read.",
         check_is_good=report.ok,
         radar_frame=file.frames.radar,
         camera_frame=file.frames.camera,

@@ -8,7 +8,15 @@ from typing import Any
 
 from calib_core.errors import InputError
 
-__all__ = ["load_yaml", "load_yaml_documents", "number_text", "numbers_text", "quoted", "refuse_bad_yaml"]
+__all__ = [
+    "joined_documents",
+    "load_yaml",
+    "load_yaml_documents",
+    "number_text",
+    "numbers_text",
+    "quoted",
+    "refuse_bad_yaml",
+]
 
 _MAX_CHARACTERS = 2 * 1024 * 1024
 _OPENCV_TAG = "tag:yaml.org,2002:opencv-matrix"
@@ -17,13 +25,12 @@ _OPENCV_TAG = "tag:yaml.org,2002:opencv-matrix"
 def load_yaml(text: str, *, source: str) -> Any:
     """Parse YAML of plain values; OpenCV's header and matrices (as mappings with rows, cols, data) are supported.
 
+    `topic echo` ends each message with "---": an empty document is left out, and messages of transforms become one.
+
     Raises:
         InputError: it is not YAML, has several documents, or is too large to be a calibration.
     """
-    documents = load_yaml_documents(text, source=source)
-    if len(documents) > 1:
-        raise InputError(f"{source}: contains {len(documents)} YAML documents (separated by ---); keep one of them")
-    return documents[0] if documents else None
+    return joined_documents(load_yaml_documents(text, source=source), source=source)
 
 
 def load_yaml_documents(text: str, *, source: str) -> tuple[Any, ...]:
@@ -60,6 +67,20 @@ def refuse_bad_yaml(text: str, plain: str, *, source: str) -> Iterator[None]:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1 + text.count(chr(10)) - plain.count(chr(10))}: " if mark else ""
         raise InputError(f"{source}: {where}not YAML ({_problem(error)}); correct it there") from None
+
+
+def joined_documents(documents: tuple[Any, ...], *, source: str) -> Any:
+    """Return the only document, or several messages of transforms as one.
+
+    Raises:
+        InputError: there are several that are no messages of transforms.
+    """
+    if len(documents) < 2:
+        return documents[0] if documents else None
+    listed = [document.get("transforms") if isinstance(document, dict) else None for document in documents]
+    if not all(isinstance(transforms, list) for transforms in listed):
+        raise InputError(f"{source}: contains {len(documents)} YAML documents; keep only the intended one")
+    return {"transforms": [transform for transforms in listed for transform in transforms or ()]}
 
 
 def _problem(error: Exception) -> str:

@@ -7,7 +7,7 @@ from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.exporting import Export, export
 from calib_core.interchange.formats.ros.launch_files import write_python, write_ros1_xml, write_ros2_xml
-from calib_core.interchange.formats.ros.static_transform import ChildFrame
+from calib_core.interchange.formats.ros.static_transform import ChildFrame, second_parent_notes
 from calib_core.interchange.formats.ros.tf2_command import write_command
 from calib_core.interchange.formats.ros.urdf import write_joint
 from calib_core.interchange.trees.frame_tree import FrameTree
@@ -60,4 +60,5 @@ def attached_export(file: CalibrationFile, name: str, tree: FrameTree) -> Export
         f"{camera} already has a parent, {tree.root_of(camera)} is the root of its chain: the transform leads from {radar} to "
         f"{root}, and the chain below it stays its driver's"
     )
-    return Export(plain.file_name, content, (*plain.notes, note))
+    notes = tuple(one for one in plain.notes if one not in second_parent_notes(file))
+    return Export(plain.file_name, content, (*notes, note))

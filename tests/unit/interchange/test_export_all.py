@@ -8,7 +8,6 @@ import pytest
 
 from calib_core.errors import InputError
 from calib_core.interchange import (
-    FORMATS,
     CalibrationFile,
     choose_check_point,
     export,
@@ -16,6 +15,7 @@ from calib_core.interchange import (
     format_named,
     read_any,
     read_calibration,
+    written_formats,
 )
 from calib_core.interchange.formats import registry
 
@@ -33,11 +33,11 @@ def file(project_root: Path) -> CalibrationFile:
 def test_each_format_is_written_as_alone_or_refused_as_alone(file: CalibrationFile, rectified: bool) -> None:
     written, refused = export_all(file, rectified=rectified)
 
-    assert {*written, *(one.name for one in refused)} == {known.name for known in FORMATS}
+    assert {*written, *(one.name for one in refused)} == {known.name for known in written_formats()}
     assert "kalibr" in {one.name for one in refused}
     for name, made in written.items():
         assert made == export(file, name, rectified=rectified and format_named(name).is_for_rectified)
-        assert read_any(made.data).format == name
+        assert format_named(name).reads is None or read_any(made.data).format == name
     for one in refused:
         with pytest.raises(InputError) as alone:
             export(file, one.name, rectified=rectified and format_named(one.name).is_for_rectified)

@@ -26,9 +26,11 @@ __all__ = [
     "meaning",
     "pose_numbers",
     "radar_from_child",
+    "second_parent_notes",
 ]
 
 PUBLISHER = "static_transform_publisher"
+_DRIVERS_ENDING = "_optical_frame"
 LABELS = ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")
 NUMBERS = "pose of the child (camera, optical) in the parent (radar); quaternion x y z w"
 
@@ -67,6 +69,17 @@ def meaning(file: CalibrationFile, child: ChildFrame | None = None) -> str:
     return (
         f"the numbers are the pose of the child {posed.name} in the parent {parent}; quaternion order x y z w"
         f"{posed.stated(file.frames.camera)}"
+    )
+
+
+def second_parent_notes(file: CalibrationFile) -> tuple[str, ...]:
+    """Return a note if the camera frame is called as drivers call it, who publish that frame themselves."""
+    camera = file.frames.camera
+    if not camera.endswith(_DRIVERS_ENDING):
+        return ()
+    return (
+        f"a camera's driver usually publishes {camera} under its camera_link already, and a frame cannot have two parents: with "
+        "--tree the transform is written to camera_link instead",
     )
 
 
