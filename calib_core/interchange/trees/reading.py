@@ -10,7 +10,7 @@ from calib_core.interchange.trees.frame_tree import FrameTree
 from calib_core.interchange.trees.joint import Joint
 from calib_core.interchange.trees.readers.autoware import read_autoware, recognizes_autoware
 from calib_core.interchange.trees.readers.camera_frames import cameras_named_in
-from calib_core.interchange.trees.readers.driveworks import read_driveworks, recognizes_driveworks
+from calib_core.interchange.trees.readers.driveworks import has_one_of_each, read_driveworks, recognizes_driveworks
 from calib_core.interchange.trees.readers.nuscenes import read_nuscenes, recognizes_poses, recognizes_sensors
 from calib_core.interchange.trees.readers.publishers import PUBLISHER, read_publishers, recognizes_publishers
 from calib_core.interchange.trees.readers.stamped import read_stamped, recognizes_stamped
@@ -99,6 +99,8 @@ def may_have_several_joints(content: Content) -> bool:
     """Return whether a file may contain more than one joint, judged without reading it."""
     if recognizes_publishers(content):
         return content.text.count(PUBLISHER) > 1
+    if recognizes_driveworks(content):
+        return not has_one_of_each(content)
     if recognizes_stamped(content):
         return len(content.documents) > 1 or len(content.mapping.get("transforms") or ()) > 1
     return True

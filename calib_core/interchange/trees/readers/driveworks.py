@@ -12,7 +12,7 @@ from calib_core.interchange.trees.frame_tree import Sensor
 from calib_core.interchange.trees.joint import Joint, Place
 from calib_core.interchange.trees.tree_part import TreePart
 
-__all__ = ["read_driveworks", "recognizes_driveworks"]
+__all__ = ["has_one_of_each", "read_driveworks", "recognizes_driveworks"]
 
 _POSE = "nominalSensor2Rig_FLU"
 _RIG = "rig"
@@ -23,6 +23,13 @@ def recognizes_driveworks(content: Content) -> bool:
     """Return whether JSON is a rig file."""
     rig = content.json_mapping.get("rig")
     return isinstance(rig, Mapping) and isinstance(rig.get("sensors"), list)
+
+
+def has_one_of_each(content: Content) -> bool:
+    """Return whether a rig has exactly one radar and one camera, which the format's own reader reads."""
+    sensors = [one for one in content.mapping["rig"]["sensors"] if isinstance(one, Mapping)]
+    kinds = [str(one.get("protocol", "")).lower()[:5] for one in sensors]
+    return kinds.count("radar") == 1 and kinds.count("camer") == 1
 
 
 def read_driveworks(content: Content, source: str) -> TreePart:
