@@ -10,6 +10,7 @@ import tyro
 from app.cli.flags import File, Switch, called
 from app.cli.output import read_text, told_clicks_at_frames, write_whole
 from app.cli.recording_flags import TopicFlags, Topics
+from app.cli.tree_flags import FrameFlags, Frames
 from app.terminal import print_exactly
 from calib_core.errors import CalibrationError, InputError
 
@@ -67,6 +68,7 @@ class Check:
     junit: File = None
     """Also write the results as JUnit XML: one test case per result."""
     topics: Topics = field(default_factory=TopicFlags)
+    frames: Frames = field(default_factory=FrameFlags)
 
     def run(self) -> int:
         """Print the results; return the exit code."""
@@ -114,11 +116,12 @@ class Check:
 
     def _checked(self, path: Path, context: Against) -> "CheckedFile":
         """Check one file; if it cannot be read, say so instead."""
-        from calib_core.interchange import CheckedFile, check, read_any_file
+        from calib_core.interchange import CheckedFile, check
 
         try:
+            found, _ = self.frames.read([path])
             report = check(
-                read_any_file(path),
+                found,
                 of=context.of,
                 against=context.against,
                 limits=context.limits,

@@ -11,6 +11,7 @@ from app.cli.export_recording import MCAP, export_recording
 from app.cli.flags import File, Switch, called
 from app.cli.output import write_whole
 from app.cli.recording_flags import TopicFlags, Topics
+from app.cli.tree_flags import FrameFlags, Frames, TreeFlags, Trees
 from app.cli.unpacking import is_meant_as_folder, write_unpacked
 from app.terminal import print_exactly
 from calib_core.errors import InputError
@@ -40,6 +41,8 @@ class Export:
 
     rectified: Switch = False
     """Your pictures are rectified already, with the same camera matrix; else kitti and nuscenes get maps and a matrix of ours."""
+    trees: Trees = field(default_factory=TreeFlags)
+    frames: Frames = field(default_factory=FrameFlags)
 
     recording: Annotated[tuple[Path, ...], called("RECORDING...")] = ()
     """For `--to mcap`: write this ROS recording again with the calibration in it, so that viewers draw returns on pictures."""
@@ -49,10 +52,12 @@ class Export:
 
     def run(self) -> int:
         """Write the export; return the exit code."""
-        if self.to == MCAP or self.recording or self.force or self.topics != TopicFlags():
-            return self._export_recording()
         from calib_core.interchange import format_named, parent_pose, written_formats
 
+        if self.to == MCAP or self.recording or self.force or self.topics != TopicFlags():
+            return self._export_recording()
+        if self.trees.into:
+            return self.trees.patch(self._calibration(), self.frames, to=self.to, out=self.out)
         if self.to == "list":
             formats = written_formats()
             width = max(len(known.name) for known in formats)
@@ -61,18 +66,17 @@ class Export:
             return 0
         if self.to != "all":
             format_named(self.to)
-        if len(self.calibration) != 1:
-            raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
+        file = self._calibration()
         parent = parent_pose(self.parent_from_radar) if self.parent_from_radar else None
-        file = _own_calibration(self.calibration[0])
         if self.to == "all":
-            return _write_all(file, self.out, parent_from_radar=parent, rectified=self.rectified)
+            return _write_all(self.frames.renamed(file), self.out, parent_from_radar=parent, rectified=self.rectified)
         return self._write_one(file, parent)
 
     def _write_one(self, file: "CalibrationFile", parent_from_radar: "RigidTransform | None") -> int:
-        from calib_core.interchange import export, format_named
+        from calib_core.interchange import format_named
 
-        written = export(file, self.to, parent_from_radar=parent_from_radar, rectified=self.rectified)
+        renamed = self.frames.renamed(file)
+        written = self.trees.export(renamed, self.to, parent_from_radar=parent_from_radar, rectified=self.rectified)
         _print_warnings(file)
         for note in written.notes:
             print(f"note: {note}", file=sys.stderr)
@@ -94,6 +98,11 @@ class Export:
         else:
             print_exactly(written.content)
         return 0
+
+    def _calibration(self) -> "CalibrationFile":
+        if len(self.calibration) != 1:
+            raise InputError("export takes one calibration: cocalib export CALIBRATION.json --to FORMAT [--out FILE]")
+        return _own_calibration(self.calibration[0])
 
     def _export_recording(self) -> int:
         """Write the recording again with the calibration in it; return the exit code."""

@@ -1,8 +1,7 @@
 """`cocalib import`."""
 
-import hashlib
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,8 +9,8 @@ import tyro
 
 from app.cli.flags import File, NewFile, Switch, called
 from app.cli.output import write_whole
+from app.cli.tree_flags import FrameFlags, Frames
 from calib_core.errors import InputError
-from calib_core.input_files import name_text
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
@@ -24,10 +23,10 @@ __all__ = ["Import"]
 class Import:
     """Convert a calibration from any known format to cocalib/calibration-1 JSON."""
 
-    calibration: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
-    """A calibration in any format that `cocalib check` reads, from any program."""
     out: NewFile
     """Output file (calibration-1 JSON)."""
+    calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("FILE...")] = ()
+    """A calibration in any format that `cocalib check` reads, from any program; or files, a folder or a recording with a tree."""
     camera: File = None
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     image_size: Annotated[tuple[int, int] | None, called("WIDTH HEIGHT")] = None
@@ -38,43 +37,42 @@ class Import:
     """A calibration of the same sensors that proves what the file means."""
     replace_camera: Switch = False
     """Take --camera although the file states another camera."""
+    frames: Frames = field(default_factory=FrameFlags)
 
     def run(self) -> int:
         """Write the calibration; return the exit code: 3 if it was converted but looks wrong, and nothing proves it."""
         from calib_core.interchange import (
             Provenance,
             adoption,
-            calibration_bytes,
-            files_beside,
-            read_any,
             read_any_file,
             read_camera_file,
             read_check_pairs_file,
         )
         from calib_core.interchange import write_calibration as write
-        from calib_core.results import InputFile
 
-        data, source = calibration_bytes(self.calibration), str(self.calibration)
-        found = read_any(data, source, beside=files_beside(self.calibration))
-        camera = (
-            read_camera_file(self.camera) if self.camera else _sized_camera(found, self.calibration, self.image_size)
-        )
+        if not self.calibration:
+            raise InputError(
+                "import takes a calibration, or the files of one: cocalib import FILE... --out calibration.json"
+            )
+        path, source = self.calibration[0], ", ".join(map(str, self.calibration))
+        found, inputs = self.frames.read(self.calibration)
+        camera = read_camera_file(self.camera) if self.camera else _sized_camera(found, path, self.image_size)
         against = read_any_file(self.against) if self.against else None
         pairs = read_check_pairs_file(self.pairs) if self.pairs else None
-        origin = InputFile(name_text(self.calibration.name), len(data), hashlib.sha256(data).hexdigest())
         adopted = adoption(
             found,
             source,
             camera=camera,
-            provenance=Provenance(inputs=(origin,)),
+            provenance=Provenance(inputs=inputs),
             against=against,
             pairs=pairs,
             replace_camera=self.replace_camera,
         )
+        names = ", ".join(one.name for one in self.calibration)
         file, report = adopted.file, adopted.report
         write_whole(self.out, write(file))
         print("\n".join(line for line in report.lines()[1:] if not line.startswith("ok: ")), file=sys.stderr)
-        print(f"{self.calibration.name} read as {found.format}, {_RESTS_ON[file.rests_on]}; written to {self.out}")
+        print(f"{names} read as {found.format}, {_RESTS_ON[file.rests_on]}; written to {self.out}")
         return 3 if report.verdict == "doubtful" else 0
 
 

@@ -21,13 +21,33 @@ from calib_core.interchange.exporting import Export, NotExported, export, export
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS, format_named, written_formats
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
-from calib_core.interchange.importing import calibration_bytes, files_beside, read_any, read_any_file
-from calib_core.interchange.own.calibration_json import calibration_text, read_calibration, write_calibration
+from calib_core.interchange.importing import (
+    calibration_bytes,
+    files_beside,
+    read_any,
+    read_any_file,
+    read_any_files,
+    read_together,
+    tree_files,
+)
+from calib_core.interchange.own.calibration_json import (
+    calibration_sha256,
+    calibration_text,
+    read_calibration,
+    write_calibration,
+)
 from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
 from calib_core.interchange.own.pairs_json import PairsFile, read_pairs, write_pairs
 from calib_core.interchange.parent_pose import parent_pose
 from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.trees.attaching import attached_export
+from calib_core.interchange.trees.frame_choice import WantedFrames
+from calib_core.interchange.trees.frame_tree import FrameTree
+from calib_core.interchange.trees.joint import Joint, Place
+from calib_core.interchange.trees.patching import Patch, patched
+from calib_core.interchange.trees.posed_in_tree import calibration_in_tree
+from calib_core.interchange.trees.reading import joined_tree
 
 __all__ = [
     "CALIBRATION_SCHEMA",
@@ -48,20 +68,28 @@ __all__ = [
     "Export",
     "Format",
     "FrameNames",
+    "FrameTree",
     "ImportedCalibration",
+    "Joint",
     "Judgement",
     "NotExported",
     "PairsFile",
+    "Patch",
     "PixelDifference",
+    "Place",
     "Provenance",
     "Reads",
     "StatedCheckPoint",
     "Verdict",
+    "WantedFrames",
     "WrittenPose",
     "adopt",
     "adopted_calibration",
     "adoption",
+    "attached_export",
     "calibration_bytes",
+    "calibration_in_tree",
+    "calibration_sha256",
     "calibration_text",
     "camera_info_text",
     "check",
@@ -76,10 +104,13 @@ __all__ = [
     "files_beside",
     "format_named",
     "imported",
+    "joined_tree",
     "names_schema",
     "parent_pose",
+    "patched",
     "read_any",
     "read_any_file",
+    "read_any_files",
     "read_calibration",
     "read_camera",
     "read_camera_file",
@@ -87,6 +118,8 @@ __all__ = [
     "read_check_pairs_file",
     "read_clicks",
     "read_pairs",
+    "read_together",
+    "tree_files",
     "write_calibration",
     "write_clicks",
     "write_pairs",

@@ -1,17 +1,29 @@
 """Read a calibration in any known format."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from calib_core.errors import InputError
 from calib_core.input_files import read_input
+from calib_core.interchange.calibration_file import FrameNames
 from calib_core.interchange.formats.registry import readers
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.origin import stated_origin
 from calib_core.interchange.syntax.content import Content, readings
+from calib_core.interchange.trees.frame_choice import WantedFrames
+from calib_core.interchange.trees.posed_in_tree import calibration_in_tree, chained_calibration
+from calib_core.interchange.trees.reading import TreeFile, files_of_trees, read_tree
 
-__all__ = ["calibration_bytes", "files_beside", "read_any", "read_any_file"]
+__all__ = [
+    "calibration_bytes",
+    "files_beside",
+    "read_any",
+    "read_any_file",
+    "read_any_files",
+    "read_together",
+    "tree_files",
+]
 
 _MAX_BYTES = 256 * 1024 * 1024
 _MAX_BESIDE_BYTES = 1024 * 1024
@@ -23,13 +35,56 @@ _KNOWN = (
 )
 
 
-def read_any_file(path: str | Path) -> ImportedCalibration:
-    """Read a calibration from a file of any format in the registry.
+def read_any_file(path: str | Path, frames: WantedFrames | None = None) -> ImportedCalibration:
+    """Read a calibration from a file of any format in the registry, or from a folder with the files of one frame tree.
+
+    Args:
+        path: of the file or folder.
+        frames: which radar and which camera, if there are several.
 
     Raises:
         InputError: the file cannot be read, or contains no pose.
     """
-    return read_any(calibration_bytes(path), str(Path(path)), beside=files_beside(path))
+    return read_any_files((Path(path),), frames)
+
+
+def read_any_files(paths: Sequence[Path], frames: WantedFrames | None = None) -> ImportedCalibration:
+    """Read a calibration from one file of any format, or from several files, or a folder, that make one frame tree.
+
+    Args:
+        paths: at least one.
+        frames: which radar and which camera, if there are several.
+
+    Raises:
+        InputError: a file cannot be read, or they contain no pose between a radar and a camera.
+    """
+    return read_together(tree_files(paths), frames)
+
+
+def read_together(files: Sequence[TreeFile], frames: WantedFrames | None = None) -> ImportedCalibration:
+    """Read a calibration from the content of one file of any format, or of several files that make one frame tree.
+
+    Args:
+        files: at least one.
+        frames: which radar and which camera, if there are several.
+
+    Raises:
+        InputError: they contain no pose between a radar and a camera.
+    """
+    if len(files) == 1:
+        return read_any(files[0].data, files[0].source, frames, beside=files_beside(files[0].source))
+    source = ", ".join(file.source for file in files)
+    return calibration_in_tree(read_tree(files), frames or WantedFrames(), source=source)
+
+
+def tree_files(paths: Sequence[Path]) -> tuple[TreeFile, ...]:
+    """Read the files that make a frame tree; of a folder, those whose names say that they belong to one.
+
+    Raises:
+        InputError: one cannot be read, or a folder contains none.
+    """
+    files = (file for path in paths for file in files_of_trees(path))
+    return tuple(TreeFile(calibration_bytes(file), str(file)) for file in files)
 
 
 def files_beside(path: str | Path) -> Mapping[str, bytes]:
@@ -60,35 +115,52 @@ def calibration_bytes(path: str | Path) -> bytes:
 
 
 def read_any(
-    content: str | bytes, source: str = "calibration", *, beside: Mapping[str, bytes] | None = None
+    content: str | bytes,
+    source: str = "calibration",
+    frames: WantedFrames | None = None,
+    *,
+    beside: Mapping[str, bytes] | None = None,
 ) -> ImportedCalibration:
     """Read a calibration from the content of a file of any format in the registry; the content determines the format.
 
     Args:
         content: of the file.
-        source: its name, for error messages.
+        source: its name, for messages.
+        frames: which radar and which camera, if there are several; in a file that is no tree, what to call them.
         beside: files in the same folder that may complete it, from `files_beside`.
 
     Raises:
         InputError: it contains no pose in a known format; the message says what was looked for.
     """
     try:
-        return _read(content, source, beside or {})
+        return _read(content, source, frames or WantedFrames(), beside or {})
     except InputError as error:
-        if str(error).startswith(f"{source}: "):
+        if str(error).startswith(f"{source}:"):
             raise
         raise InputError(f"{source}: {error}") from None  # FrameNames refuses a name without knowing the file
 
 
-def _read(content: str | bytes, source: str, beside: Mapping[str, bytes]) -> ImportedCalibration:
+def _read(content: str | bytes, source: str, frames: WantedFrames, beside: Mapping[str, bytes]) -> ImportedCalibration:
     seen = []
     for syntax in readings(content, source=source):
         reading = replace(syntax, beside=beside)
+        chained = chained_calibration(reading, frames, source=source)
+        if chained is not None:
+            return _with_origin(chained, reading)
         for reader in readers():
             if reader.recognizes(reading):
-                return _with_origin(reader.read(reading, source), reading)
+                return _with_origin(_renamed(reader.read(reading, source), frames), reading)
         seen.append(reading)
     raise _refusal(seen[-1], source)
+
+
+def _renamed(found: ImportedCalibration, wanted: WantedFrames) -> ImportedCalibration:
+    """Call the frames of a file that is no tree as the user says."""
+    if not wanted.is_given:
+        return found
+    known = found.frames or FrameNames()
+    frames = FrameNames(wanted.radar or known.radar, wanted.camera or known.camera)
+    return replace(found, frames=frames, file=replace(found.file, frames=frames) if found.file else None)
 
 
 def _with_origin(found: ImportedCalibration, content: Content) -> ImportedCalibration:

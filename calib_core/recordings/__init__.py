@@ -2,9 +2,11 @@
 
 from calib_core.recordings.assumptions import about_assumptions, assumption_hint
 from calib_core.recordings.camera.images import EncodedImage
+from calib_core.recordings.containers.opening import holds_recording
 from calib_core.recordings.description import clock_lines, describe
 from calib_core.recordings.first_picture import first_picture
 from calib_core.recordings.following import AwaitedRecording, FollowedRecording, Growth
+from calib_core.recordings.frame_transforms import FrameTransform, frame_transforms
 from calib_core.recordings.plain_files.folder_cameras import size_of_pictures_beside
 from calib_core.recordings.radar_choice import figures_text
 from calib_core.recordings.recording import Recording, inspect_recording, open_recording, require_files
@@ -21,6 +23,7 @@ __all__ = [
     "ClockDiagnosis",
     "EncodedImage",
     "FollowedRecording",
+    "FrameTransform",
     "Growth",
     "Recording",
     "RecordingOptions",
@@ -34,6 +37,8 @@ __all__ = [
     "describe",
     "figures_text",
     "first_picture",
+    "frame_transforms",
+    "holds_recording",
     "inspect_recording",
     "open_recording",
     "recording_summary",

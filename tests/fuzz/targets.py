@@ -34,6 +34,7 @@ from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.radar.layouts import recognise
 from calib_core.recordings.time.written_times import read_time, time_from_name
 from tests.fuzz.fuzzing import Target
+from tests.fuzz.tree_target import SEEDS, tree_reader
 from tests.unit.recordings.conftest import START_NS, Ros, plain_rows, write_rows
 from tests.unit.recordings.containers.malformed import CASES, Kit
 
@@ -290,6 +291,7 @@ TARGETS: tuple[Target, ...] = (
     _folder_target("jpeg", ".jpg", _fixed(_jpeg(), _jpeg(8, 8)), b"\xff\xd8", b"\xff\xe1", b"\xff\xd9", b"\xff\xc0"),
     Target("definition", _definition, _fixed(_DEFINITION + b"\0" + bytes(64), b"float64 x\nfloat64 y\n\0")),
     Target("calibration", lambda data, _: _swallow(lambda: read_any(data, "input")), _exported, (b"NaN", b"xyzw", b"1e308")),
+    Target("frame-tree", tree_reader(_swallow), _fixed(*SEEDS), (b"${", b"&x", b"xacro:", b"<origin", b"1e999", b"---\n")),
     Target("own-files", _own, _own_files, (b'"pairs"', b'"clicks"', b'"cocalib/pairs-1"', b'"cocalib/clicks-1"')),
     Target("session", _session, _sessions, (b'"n"', b'"step"', b'"undo"', b"\n")),
     Target("messages", _messages, _fixed(*_MESSAGES), (b'"type"', b'"request"', b'"click_moved"', b'"import"')),

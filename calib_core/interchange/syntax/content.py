@@ -11,7 +11,7 @@ from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.mcap_file import MCAP_MAGIC, McapFile, load_mcap
 from calib_core.interchange.syntax.opencv_xml import is_file_storage, opencv_values, parse_xml
 from calib_core.interchange.syntax.strict_json import json_value
-from calib_core.interchange.syntax.yaml_text import load_yaml
+from calib_core.interchange.syntax.yaml_text import joined_documents, load_yaml_documents
 from calib_core.interchange.syntax.zip_archives import unpack
 
 __all__ = ["Content", "Syntax", "decoded", "readings"]
@@ -35,7 +35,8 @@ class Content:
         members: of an archive, by name.
         variables: of a mat file, by name: arrays, str, and dicts of them.
         mcap: the messages and metadata of an MCAP file.
-        value: of JSON, of YAML, or of OpenCV's FileStorage XML.
+        value: of JSON, of YAML with one document, or of OpenCV's FileStorage XML.
+        documents: of YAML, such as the messages that `ros2 topic echo` prints.
         root: of XML.
         lines: of text, without comments (#) and empty lines.
         beside: files in the same folder that complete it, by name.
@@ -48,6 +49,7 @@ class Content:
     variables: Mapping[str, Any] = field(default_factory=dict)
     mcap: McapFile = _NO_MCAP
     value: Any = None
+    documents: tuple[Any, ...] = ()
     root: Element = _NO_XML
     lines: tuple[str, ...] = ()
     beside: Mapping[str, bytes] = field(default_factory=dict)
@@ -113,4 +115,6 @@ def _text_readings(text: str, *, source: str) -> Iterator[Content]:
     else:
         lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
         yield Content("lines", text=text, lines=tuple(lines))
-        yield Content("yaml", text=text, value=load_yaml(text, source=source))
+        documents = load_yaml_documents(text, source=source)
+        value = joined_documents(documents, source=source)
+        yield Content("yaml", text=text, value=value, documents=documents)

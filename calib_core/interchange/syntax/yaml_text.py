@@ -2,11 +2,21 @@
 
 import json
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from calib_core.errors import InputError
 
-__all__ = ["load_yaml", "number_text", "numbers_text", "quoted"]
+__all__ = [
+    "joined_documents",
+    "load_yaml",
+    "load_yaml_documents",
+    "number_text",
+    "numbers_text",
+    "quoted",
+    "refuse_bad_yaml",
+]
 
 _MAX_CHARACTERS = 2 * 1024 * 1024
 _OPENCV_TAG = "tag:yaml.org,2002:opencv-matrix"
@@ -18,13 +28,21 @@ def load_yaml(text: str, *, source: str) -> Any:
     `topic echo` ends each message with "---": an empty document is left out, and messages of transforms become one.
 
     Raises:
-        InputError: it is not YAML, too large to be a calibration, or several documents.
+        InputError: it is not YAML, has several documents, or is too large to be a calibration.
+    """
+    return joined_documents(load_yaml_documents(text, source=source), source=source)
+
+
+def load_yaml_documents(text: str, *, source: str) -> tuple[Any, ...]:
+    """Parse each document of a YAML text; empty ones are left out, such as after the last --- of `ros2 topic echo`.
+
+    Raises:
+        InputError: it is not YAML, or too large to be a calibration.
     """
     if len(text) > _MAX_CHARACTERS:
         raise InputError(f"{source}: {len(text):,} characters is too large for a calibration; is it the right file?")
     from ruamel.yaml import YAML
     from ruamel.yaml.constructor import SafeConstructor
-    from ruamel.yaml.error import YAMLError
 
     class Constructor(SafeConstructor):
         """The safe constructor with OpenCV's matrix tag."""
@@ -34,17 +52,29 @@ def load_yaml(text: str, *, source: str) -> Any:
     loader.Constructor = Constructor
     # OpenCV before 5 writes "%YAML:1.0", which is not a YAML directive, and may omit the "---" after it.
     plain = re.sub(r"\A\ufeff?%YAML[: ][\d.]+[^\n]*\n(---[^\n]*\n)?", "", text)
+    with refuse_bad_yaml(text, plain, source=source):
+        return tuple(document for document in loader.load_all(plain) if document is not None)
+
+
+@contextmanager
+def refuse_bad_yaml(text: str, plain: str, *, source: str) -> Iterator[None]:
+    """Turn a parser's errors about a text, from which a header may have been removed, into an InputError with the line."""
+    from ruamel.yaml.error import YAMLError
+
     try:
-        documents = [document for document in loader.load_all(plain) if document is not None]
+        yield
     except (YAMLError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1 + text.count(chr(10)) - plain.count(chr(10))}: " if mark else ""
         raise InputError(f"{source}: {where}not YAML ({_problem(error)}); correct it there") from None
-    return _joined(documents, source=source)
 
 
-def _joined(documents: list[Any], *, source: str) -> Any:
-    """Return the only document, or several messages of transforms as one."""
+def joined_documents(documents: tuple[Any, ...], *, source: str) -> Any:
+    """Return the only document, or several messages of transforms as one.
+
+    Raises:
+        InputError: there are several that are no messages of transforms.
+    """
     if len(documents) < 2:
         return documents[0] if documents else None
     listed = [document.get("transforms") if isinstance(document, dict) else None for document in documents]

@@ -16,7 +16,7 @@ from calib_core.recordings.containers.sources import Source
 from calib_core.recordings.containers.sqlite import reader as sqlite_bag
 from calib_core.results import DataWarning
 
-__all__ = ["open_beginnings", "open_sources"]
+__all__ = ["holds_recording", "open_beginnings", "open_sources"]
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _MORE_SUFFIXES = (".active", ".zstd", ".zst", ".gz", ".bz2", ".lz4")
@@ -53,6 +53,14 @@ class _Found:
 
 
 _AnySource: TypeAlias = Rosbag1Source | mcap.McapSource | sqlite_bag.SqliteSource
+
+
+def holds_recording(path: Path) -> bool:
+    """Return whether a path is, by its names, a recording of ROS messages or a folder that contains one."""
+    if not path.is_dir():
+        return _is_recording(path)
+    folders = [path, *(folder for folder in path.iterdir() if folder.is_dir())]
+    return any((folder / _METADATA).is_file() for folder in folders) or any(map(_is_recording, path.iterdir()))
 
 
 def open_sources(paths: Sequence[Path]) -> tuple[Source, ...]:

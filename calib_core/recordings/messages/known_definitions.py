@@ -56,4 +56,13 @@ KNOWN_DEFINITIONS: Mapping[str, str] = {
         f"{_SEPARATOR}MSG: geometry_msgs/Point\n{_POINT}"
         f"{_SEPARATOR}MSG: geometry_msgs/Vector3\n{_POINT}"
     ),
+    "tf2_msgs/TFMessage": (
+        "geometry_msgs/TransformStamped[] transforms\n"
+        f"{_SEPARATOR}MSG: geometry_msgs/TransformStamped\n"
+        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform\n"
+        f"{_SEPARATOR}MSG: geometry_msgs/Transform\n"
+        "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"
+        f"{_SEPARATOR}MSG: geometry_msgs/Vector3\n{_POINT}"
+        f"{_SEPARATOR}MSG: geometry_msgs/Quaternion\n{_POINT}float64 w\n"
+    ),
 }

@@ -506,12 +506,10 @@ def test_several_possible_transforms_are_refused_with_their_names(file):
     text = without_comments(text_of(file, "tf2"))
     left, right = text.replace("camera_optical", "cam_left"), text.replace("camera_optical", "cam_right")
 
-    with pytest.raises(
-        InputError, match=r"file: contains 2 transforms \(radar to cam_left, radar to cam_right\), 2 of them"
-    ):
+    with pytest.raises(InputError, match=r"2 camera frames: cam_left, cam_right; choose with --camera-frame NAME"):
         read_any(left + right, "file")
     joint = '<joint name="j" type="fixed"><parent link="radar"/><child link="cam_{}"/></joint>'
-    with pytest.raises(InputError, match="contains 2 transforms"):
+    with pytest.raises(InputError, match="2 camera frames: cam_1, cam_2"):
         read_any(f"<robot>{joint.format(1)}{joint.format(2)}</robot>", "file")
     chain = text_of(file, "kalibr")
     with pytest.raises(InputError, match="T_cam_radar appears in cam0, cam1; keep only the intended camera"):
@@ -520,5 +518,5 @@ def test_several_possible_transforms_are_refused_with_their_names(file):
     members["images.txt"] += b"2 1 0 0 0 0 0 0 1 other\n\n"
     with pytest.raises(InputError, match="contains 2 images"):
         read_any(pack(members))
-    with pytest.raises(InputError, match="0 of them between a radar and a camera"):
+    with pytest.raises(InputError, match=r"file:2: a stamped transform needs header.frame_id"):
         read_any("transforms:\n- {child_frame_id: a}\n- {child_frame_id: b}\n", "file")

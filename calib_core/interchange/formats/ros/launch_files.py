@@ -11,6 +11,8 @@ from calib_core.interchange.formats.ros.static_transform import (
     LABELS,
     NUMBERS,
     PUBLISHER,
+    ChildFrame,
+    child_of,
     from_publishers,
     meaning,
     pose_numbers,
@@ -20,16 +22,16 @@ from calib_core.interchange.formats.statement import POSE_ONLY, hash_comment, st
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["TF1_LAUNCH", "TF2_LAUNCH_PY", "TF2_LAUNCH_XML"]
+__all__ = ["TF1_LAUNCH", "TF2_LAUNCH_PY", "TF2_LAUNCH_XML", "write_python", "write_ros1_xml", "write_ros2_xml"]
 
 
-def _write_python(file: CalibrationFile) -> str:
+def write_python(file: CalibrationFile, child: ChildFrame | None = None) -> str:
     """Write a ROS 2 launch file in Python."""
-    arguments = [part for pair in zip(LABELS, pose_numbers(file), strict=True) for part in pair]
-    arguments += ["--frame-id", file.frames.radar, "--child-frame-id", file.frames.camera]
+    arguments = [part for pair in zip(LABELS, pose_numbers(file, child), strict=True) for part in pair]
+    arguments += ["--frame-id", file.frames.radar, "--child-frame-id", child_of(file, child).name]
     rows = [f"                    {a!a}, {b!a},\n" for a, b in zip(arguments[::2], arguments[1::2], strict=True)]
     return (
-        hash_comment(statement(file, meaning(file)))
+        hash_comment(statement(file, meaning(file, child)))
         + "from launch import LaunchDescription\n"
         + "from launch_ros.actions import Node\n\n\n"
         + "def generate_launch_description():\n"
@@ -41,25 +43,25 @@ def _write_python(file: CalibrationFile) -> str:
     )
 
 
-def _write_ros2_xml(file: CalibrationFile) -> str:
+def write_ros2_xml(file: CalibrationFile, child: ChildFrame | None = None) -> str:
     """Write a ROS 2 launch file in XML."""
-    flags = [f"{label} {number}" for label, number in zip(LABELS, pose_numbers(file), strict=True)]
-    frames = f"--frame-id {shlex.quote(file.frames.radar)} --child-frame-id {shlex.quote(file.frames.camera)}"
+    flags = [f"{label} {number}" for label, number in zip(LABELS, pose_numbers(file, child), strict=True)]
+    frames = f"--frame-id {shlex.quote(file.frames.radar)} --child-frame-id {shlex.quote(child_of(file, child).name)}"
     arguments = quoteattr(" ".join([*flags, frames]))
     return (
         '<?xml version="1.0"?>\n'
-        + xml_comment(statement(file, meaning(file)))
+        + xml_comment(statement(file, meaning(file, child)))
         + f'<launch>\n  <node pkg="tf2_ros" exec="{PUBLISHER}" args={arguments}/>\n</launch>\n'
     )
 
 
-def _write_ros1_xml(file: CalibrationFile) -> str:
+def write_ros1_xml(file: CalibrationFile, child: ChildFrame | None = None) -> str:
     """Write a ROS 1 launch file; tf2_ros takes x y z qx qy qz qw parent child, and latches it."""
-    names = [shlex.quote(name) for name in (file.frames.radar, file.frames.camera)]
-    arguments = quoteattr(" ".join([*pose_numbers(file), *names]))
+    names = [shlex.quote(name) for name in (file.frames.radar, child_of(file, child).name)]
+    arguments = quoteattr(" ".join([*pose_numbers(file, child), *names]))
     return (
         '<?xml version="1.0"?>\n'
-        + xml_comment(statement(file, meaning(file)))
+        + xml_comment(statement(file, meaning(file, child)))
         + f'<launch>\n  <node pkg="tf2_ros" type="{PUBLISHER}" name="camera_in_radar" args={arguments}/>\n</launch>\n'
     )
 
@@ -122,7 +124,7 @@ TF2_LAUNCH_PY = Format(
     comment="#",
     notes=(POSE_ONLY,),
     notes_on=second_parent_notes,
-    write=_write_python,
+    write=write_python,
     reads=Reads(_recognizes_python, _read_python),
 )
 
@@ -135,7 +137,7 @@ TF2_LAUNCH_XML = Format(
     comment="<!-- -->",
     notes=(POSE_ONLY,),
     notes_on=second_parent_notes,
-    write=_write_ros2_xml,
+    write=write_ros2_xml,
     reads=_READS_XML,
 )
 
@@ -148,6 +150,6 @@ TF1_LAUNCH = Format(
     comment="<!-- -->",
     notes=(POSE_ONLY,),
     notes_on=second_parent_notes,
-    write=_write_ros1_xml,
+    write=write_ros1_xml,
     reads=_READS_XML,
 )

@@ -2,19 +2,32 @@
 
 import re
 import shlex
+from dataclasses import dataclass
 
 import numpy as np
 
 from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.formats.statement import stated_check_point, stated_frames
 from calib_core.interchange.formats.transform_choice import Ends, choose_transform
 from calib_core.interchange.imported import Form, ImportedCalibration, WrittenPose, posed_between
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
-from calib_core.interchange.syntax.yaml_text import number_text
+from calib_core.interchange.syntax.yaml_text import number_text, numbers_text, quoted
 
-__all__ = ["LABELS", "NUMBERS", "PUBLISHER", "from_publishers", "meaning", "pose_numbers", "second_parent_notes"]
+__all__ = [
+    "LABELS",
+    "NUMBERS",
+    "PUBLISHER",
+    "ChildFrame",
+    "child_of",
+    "from_publishers",
+    "meaning",
+    "pose_numbers",
+    "radar_from_child",
+    "second_parent_notes",
+]
 
 PUBLISHER = "static_transform_publisher"
 _DRIVERS_ENDING = "_optical_frame"
@@ -22,10 +35,41 @@ LABELS = ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")
 NUMBERS = "pose of the child (camera, optical) in the parent (radar); quaternion x y z w"
 
 
-def meaning(file: CalibrationFile) -> str:
+@dataclass(frozen=True, slots=True, eq=False)
+class ChildFrame:
+    """The frame that a file poses in the radar's.
+
+    Attributes:
+        name: of the frame: the camera's, or the root of the chain in which its driver publishes it.
+        child_from_camera: the camera's pose in it.
+    """
+
+    name: str
+    child_from_camera: RigidTransform
+
+    def stated(self, camera: str) -> str:
+        """Return the words about the chain below it, which reading the file needs; "" if it is the camera's own frame."""
+        if self.name == camera:
+            return ""
+        numbers = (
+            *self.child_from_camera.translation_m,
+            *quaternion_xyzw_from_matrix(self.child_from_camera.rotation),
+        )
+        return f"; {quoted(camera)} is fixed in {quoted(self.name)} at x y z qx qy qz qw [{numbers_text(numbers)}]"
+
+
+def child_of(file: CalibrationFile, child: ChildFrame | None) -> ChildFrame:
+    """Return the child frame to write: the camera's own unless another is given."""
+    return child or ChildFrame(file.frames.camera, RigidTransform.identity())
+
+
+def meaning(file: CalibrationFile, child: ChildFrame | None = None) -> str:
     """Return what the numbers mean, for the comment at the top of a file."""
-    parent, child = file.frames.radar, file.frames.camera
-    return f"the numbers are the pose of the child {child} in the parent {parent}; quaternion order x y z w"
+    parent, posed = file.frames.radar, child_of(file, child)
+    return (
+        f"the numbers are the pose of the child {posed.name} in the parent {parent}; quaternion order x y z w"
+        f"{posed.stated(file.frames.camera)}"
+    )
 
 
 def second_parent_notes(file: CalibrationFile) -> tuple[str, ...]:
@@ -39,11 +83,16 @@ def second_parent_notes(file: CalibrationFile) -> tuple[str, ...]:
     )
 
 
-def pose_numbers(file: CalibrationFile) -> list[str]:
-    """Return x, y, z [m] and the quaternion x, y, z, w of the camera in the radar frame, in the order of LABELS."""
-    radar_from_camera = file.calibration.camera_from_radar.inverse()
-    quaternion = quaternion_xyzw_from_matrix(radar_from_camera.rotation)
-    return [number_text(value) for value in (*radar_from_camera.translation_m, *quaternion)]
+def radar_from_child(file: CalibrationFile, child: ChildFrame | None = None) -> RigidTransform:
+    """Return the pose of the child frame in the radar frame."""
+    return file.calibration.camera_from_radar.inverse() @ child_of(file, child).child_from_camera.inverse()
+
+
+def pose_numbers(file: CalibrationFile, child: ChildFrame | None = None) -> list[str]:
+    """Return x, y, z [m] and the quaternion x, y, z, w of the child in the radar frame, in the order of LABELS."""
+    posed = radar_from_child(file, child)
+    quaternion = quaternion_xyzw_from_matrix(posed.rotation)
+    return [number_text(value) for value in (*posed.translation_m, *quaternion)]
 
 
 def from_publishers(found: list[list[str]], text: str, *, source: str, name: str) -> ImportedCalibration:

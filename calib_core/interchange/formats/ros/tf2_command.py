@@ -9,6 +9,8 @@ from calib_core.interchange.formats.ros.static_transform import (
     LABELS,
     NUMBERS,
     PUBLISHER,
+    ChildFrame,
+    child_of,
     from_publishers,
     meaning,
     pose_numbers,
@@ -18,18 +20,18 @@ from calib_core.interchange.formats.statement import POSE_ONLY, hash_comment, st
 from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.syntax.content import Content
 
-__all__ = ["TF2"]
+__all__ = ["TF2", "write_command"]
 
 
-def _write(file: CalibrationFile) -> str:
+def write_command(file: CalibrationFile, child: ChildFrame | None = None) -> str:
     """Write the ROS 2 command that publishes the camera's pose in the radar frame."""
-    flags = [f"{label} {number}" for label, number in zip(LABELS, pose_numbers(file), strict=True)]
+    flags = [f"{label} {number}" for label, number in zip(LABELS, pose_numbers(file, child), strict=True)]
     return (
         "#!/bin/sh\n"
-        + hash_comment(statement(file, meaning(file)))
+        + hash_comment(statement(file, meaning(file, child)))
         + f"ros2 run tf2_ros {PUBLISHER} {' '.join(flags[:3])} \\\n"
         + f"  {' '.join(flags[3:])} \\\n"
-        + f"  --frame-id {shlex.quote(file.frames.radar)} --child-frame-id {shlex.quote(file.frames.camera)}\n"
+        + f"  --frame-id {shlex.quote(file.frames.radar)} --child-frame-id {shlex.quote(child_of(file, child).name)}\n"
     )
 
 
@@ -62,6 +64,6 @@ TF2 = Format(
     comment="#",
     notes=(POSE_ONLY,),
     notes_on=second_parent_notes,
-    write=_write,
+    write=write_command,
     reads=Reads(_recognizes, _read),
 )

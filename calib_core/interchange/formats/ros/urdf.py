@@ -11,7 +11,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.ros.static_transform import second_parent_notes
+from calib_core.interchange.formats.ros.static_transform import ChildFrame, radar_from_child, second_parent_notes
 from calib_core.interchange.formats.statement import (
     POSE_ONLY,
     stated_check_point,
@@ -36,7 +36,7 @@ from calib_core.interchange.rotations import (
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
-__all__ = ["URDF"]
+__all__ = ["URDF", "write_joint"]
 
 
 def _write(file: CalibrationFile) -> str:
@@ -56,6 +56,24 @@ def _write(file: CalibrationFile) -> str:
         + links
         + _joint(frames.radar, frames.camera_link, radar_from_link, rpy_from_matrix(radar_from_link.rotation))
         + _joint(frames.camera_link, frames.camera, RigidTransform.identity(), np.array(OPTICAL_RPY_RAD))
+        + "</robot>\n"
+    )
+
+
+def write_joint(file: CalibrationFile, child: ChildFrame) -> str:
+    """Write a robot of two links, whose joint can be copied into another URDF that has the camera's own chain."""
+    frames, posed = file.frames, radar_from_child(file, child)
+    links = "".join(f"  <link name={quoteattr(name)}/>\n" for name in (frames.radar, child.name))
+    meaning = (
+        f"the origin is the pose of the child {child.name} in the parent {frames.radar}; rpy in radians about fixed axes, "
+        f"R = Rz(yaw) Ry(pitch) Rx(roll){child.stated(frames.camera)}"
+    )
+    return (
+        '<?xml version="1.0"?>\n'
+        + xml_comment(statement(file, meaning))
+        + '<robot name="radar_camera">\n'
+        + links
+        + _joint(frames.radar, child.name, posed, rpy_from_matrix(posed.rotation))
         + "</robot>\n"
     )
 

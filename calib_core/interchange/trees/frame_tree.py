@@ -1,0 +1,196 @@
+"""Coordinate frames and the joints between them: one parent per frame, no cycles, any two frames chained."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from calib_core.arrays import Matrix33
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
+from calib_core.interchange.imported import Axes
+from calib_core.interchange.trees.joint import Joint
+
+__all__ = ["FrameTree", "Sensor", "Step"]
+
+_LISTED = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensor:
+    """What a file says about the sensor at a frame, besides its pose.
+
+    Attributes:
+        frame: its name.
+        kind: which sensor.
+        axes: of a camera's frame; None if the file does not say.
+        matrix_px: (3, 3) K of a camera whose image size the file does not state; None if it has none.
+    """
+
+    frame: str
+    kind: Literal["radar", "camera", "other"]
+    axes: Axes | None = None
+    matrix_px: Matrix33 | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A joint on the way between two frames, and whether the way leads from its parent to its child."""
+
+    joint: Joint
+    down: bool
+
+    @property
+    def transform(self) -> RigidTransform:
+        """From the frame it leads to, into the frame it comes from.
+
+        Raises:
+            InputError: the joint cannot be used.
+        """
+        return self.joint.transform if self.down else self.joint.transform.inverse()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameTree:
+    """Joints with their sensors. A joint that is given twice alike is kept once.
+
+    Attributes:
+        joints: in the order of the files.
+        sensors: what the files say about the sensors.
+        format: of the files; of several formats the first.
+        hint: what may be missing from it, such as macros that were not expanded; "" if nothing.
+        notes: what a user of it must know, one sentence each.
+
+    Raises:
+        InputError: a frame has two parents, or is its own ancestor.
+    """
+
+    joints: tuple[Joint, ...]
+    sensors: tuple[Sensor, ...] = ()
+    format: str = "tf2"
+    hint: str = ""
+    notes: tuple[str, ...] = ()
+    _above: dict[str, Joint] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        above: dict[str, Joint] = {}
+        for joint in self.joints:
+            known = above.setdefault(joint.child, joint)
+            if known is not joint and not joint.repeats(known):
+                raise InputError(_two_parents(known, joint))
+        object.__setattr__(self, "joints", tuple(above.values()))
+        object.__setattr__(self, "_above", above)
+        _refuse_cycles(above)
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """Every frame, in the order of the joints."""
+        return tuple(dict.fromkeys(name for joint in self.joints for name in (joint.parent, joint.child)))
+
+    def joint_above(self, frame: str) -> Joint | None:
+        """Return the joint between a frame and its parent; None if it has no parent."""
+        return self._above.get(frame)
+
+    def root_of(self, frame: str) -> str:
+        """Return the frame at the top of a frame's chain: itself if it has no parent."""
+        return self._upwards(frame)[-1]
+
+    def below(self, frame: str) -> tuple[str, ...]:
+        """Return every frame that moves with a frame, without itself."""
+        return tuple(name for name in self.frames if name != frame and frame in self._upwards(name))
+
+    def path(self, first: str, last: str) -> tuple[Step, ...]:
+        """Return the joints on the way from one frame to another.
+
+        Raises:
+            InputError: a frame is not in the tree, or they are not connected.
+        """
+        for frame in (first, last):
+            if frame not in self.frames:
+                raise InputError(f"there is no frame {frame!r} among {self.listed()}{self._hinted()}")
+        up, down = self._upwards(first), self._upwards(last)
+        if up[-1] != down[-1]:
+            raise InputError(
+                f"{first} and {last} are not connected: one hangs from {up[-1]}, the other from {down[-1]}; give the file "
+                f"with the transform between them as well{self._hinted()}"
+            )
+        meeting = next(frame for frame in up if frame in down)
+        return (
+            *(Step(self._above[frame], down=False) for frame in up[: up.index(meeting)]),
+            *(Step(self._above[frame], down=True) for frame in reversed(down[: down.index(meeting)])),
+        )
+
+    def between(self, target: str, source: str) -> RigidTransform:
+        """Return target_from_source, chained over the joints between two frames.
+
+        Raises:
+            InputError: they are not connected, or a joint between them cannot be used.
+        """
+        target_from_source = RigidTransform.identity()
+        for step in self.path(target, source):
+            target_from_source = target_from_source @ step.transform
+        return target_from_source
+
+    def sensor_at(self, frame: str) -> Sensor | None:
+        """Return what the files say about the sensor at a frame; None if they say nothing."""
+        return next((sensor for sensor in self.sensors if sensor.frame == frame), None)
+
+    def completed_by(self, other: "FrameTree") -> "FrameTree":
+        """Add the joints of frames that have no parent here, such as a driver's below its base frame.
+
+        Raises:
+            InputError: a frame has another parent there.
+        """
+        added = []
+        for joint in other.joints:
+            known = self._above.get(joint.child)
+            if known is None:
+                added.append(joint)
+            elif known.parent != joint.parent:
+                raise InputError(_two_parents(known, joint))
+        return replace(self, joints=(*self.joints, *added), sensors=(*self.sensors, *other.sensors))
+
+    def listed(self) -> str:
+        """Return the names of its frames for a message."""
+        more = len(self.frames) - _LISTED
+        return ", ".join(self.frames[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+    def _hinted(self) -> str:
+        return f" ({self.hint})" if self.hint else ""
+
+    def _upwards(self, frame: str) -> list[str]:
+        return list(_upwards(frame, self._above))
+
+
+def _upwards(frame: str, above: dict[str, Joint]) -> Iterator[str]:
+    yield frame
+    while frame in above:
+        frame = above[frame].parent
+        yield frame
+
+
+def _two_parents(first: Joint, second: Joint) -> str:
+    if first.parent == second.parent:
+        return (
+            f"{second.place}: the pose of {second.child!r} in {second.parent!r} is given twice, and differs from {first.place}; "
+            "keep one of them"
+        )
+    return (
+        f"{second.place}: {second.child!r} gets a second parent, {second.parent!r}; its parent is {first.parent!r} "
+        f"({first.place}), and a frame has one: remove one of the two joints"
+    )
+
+
+def _refuse_cycles(above: dict[str, Joint]) -> None:
+    cleared: set[str] = set()
+    for start in above:
+        seen: dict[str, None] = {}
+        for frame in _upwards(start, above):
+            if frame in cleared:
+                break
+            if frame in seen:
+                loop = [*list(seen)[list(seen).index(frame) :], frame]
+                raise InputError(
+                    f"{above[frame].place}: the frames {' -> '.join(reversed(loop))} form a circle; remove one of these joints"
+                )
+            seen[frame] = None
+        cleared.update(seen)

@@ -1,0 +1,1 @@
+"""Readers of joints, one file per kind of file."""

@@ -1,0 +1,107 @@
+"""The joints of nuScenes' tables: each record of calibrated_sensor.json is a sensor in the ego frame, named by sensor.json."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.imported import WrittenPose
+from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.trees.frame_tree import Sensor
+from calib_core.interchange.trees.joint import Joint, Place
+from calib_core.interchange.trees.tree_part import TreePart
+
+__all__ = ["read_nuscenes", "recognizes_poses", "recognizes_sensors"]
+
+_EGO = "ego"
+_NOTE = "nuScenes' camera frames have optical axes, and its pictures are undistorted"
+
+
+def recognizes_poses(content: Content) -> bool:
+    """Return whether JSON is the table calibrated_sensor."""
+    return _is_table(content, {"sensor_token", "rotation", "translation"})
+
+
+def recognizes_sensors(content: Content) -> bool:
+    """Return whether JSON is the table sensor, which names them."""
+    return _is_table(content, {"token", "channel", "modality"})
+
+
+def _is_table(content: Content, keys: set[str]) -> bool:
+    records = content.value
+    is_list = content.syntax == "json" and isinstance(records, list) and bool(records)
+    return is_list and all(isinstance(record, Mapping) and keys <= set(record) for record in records)
+
+
+def read_nuscenes(poses: Content, source: str, sensors: Content | None) -> TreePart:
+    """Read the pose of every sensor.
+
+    A sensor that is calibrated several times alike is one frame, called as its channel; otherwise each calibration is a frame
+    of its own, CHANNEL@TOKEN with the first eight characters of the token.
+
+    Args:
+        poses: of calibrated_sensor.json.
+        source: its name, for messages.
+        sensors: of sensor.json; None if it was not given, and the frames are then called by their tokens.
+
+    Raises:
+        InputError: a number is missing, or is none.
+    """
+    named = {str(record["token"]): record for record in sensors.value} if sensors is not None else {}
+    by_channel: dict[str, list[Joint]] = {}
+    records: dict[int, Mapping[str, Any]] = {}
+    for record in poses.value:
+        sensor = named.get(str(record["sensor_token"]), {})
+        channel = str(sensor.get("channel") or str(record["sensor_token"])[:8])
+        joint = _joint(record, channel, poses.text, source)
+        same = by_channel.setdefault(channel, [])
+        if not any(joint.repeats(other) for other in same):
+            same.append(joint)
+            records[id(joint)] = {**record, "modality": sensor.get("modality")}
+    joints, known = [], []
+    for channel, found in by_channel.items():
+        for joint in found:
+            record = records[id(joint)]
+            frame = channel if len(found) == 1 else f"{channel}@{str(record.get('token'))[:8]}"
+            joints.append(_named(joint, frame))
+            known.append(_sensor(record, frame, source))
+    return TreePart("nuscenes", tuple(joints), tuple(known), notes=(_NOTE,))
+
+
+def _joint(record: Mapping[str, Any], channel: str, text: str, source: str) -> Joint:
+    place = Place(source, _line_of(record, text))
+    translation, rotation = (
+        _numbers(record.get(key), length, f"{channel}: {key}", place)
+        for key, length in (("translation", 3), ("rotation", 4))
+    )
+    written = WrittenPose("quaternion_wxyz", rotation, translation, "radar_from_camera")
+    return Joint.posed(_EGO, channel, written, place)
+
+
+def _numbers(value: Any, length: int, what: str, place: Place) -> np.ndarray:
+    return np.array(floats(value, source=str(place), place=what, length=length))
+
+
+def _line_of(record: Mapping[str, Any], text: str) -> int | None:
+    at = text.find(f'"{record.get("token")}"')
+    return text.count("\n", 0, at) + 1 if at >= 0 else None
+
+
+def _named(joint: Joint, frame: str) -> Joint:
+    if joint.written is None:
+        return Joint(joint.parent, frame, None, joint.place, problem=joint.problem)
+    return Joint.posed(joint.parent, frame, joint.written, joint.place)
+
+
+def _sensor(record: Mapping[str, Any], frame: str, source: str) -> Sensor:
+    intrinsic: Sequence[Any] = record.get("camera_intrinsic") or ()
+    modality = str(record.get("modality") or ("camera" if intrinsic else "other"))
+    if modality == "camera":
+        matrix = None
+        if intrinsic:
+            matrix = np.array(floats(intrinsic, source=source, place=f"{frame}: camera_intrinsic", length=9)).reshape(
+                3, 3
+            )
+        return Sensor(frame, "camera", "optical", matrix)
+    return Sensor(frame, "radar" if modality == "radar" else "other")

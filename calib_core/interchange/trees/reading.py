@@ -1,0 +1,178 @@
+"""Read the frame tree in one file, several files or a folder: URDF, transforms of ROS, Autoware, Apollo, nuScenes, DriveWorks."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from calib_core.errors import InputError
+from calib_core.interchange.syntax.content import Content, decoded, readings
+from calib_core.interchange.trees.frame_tree import FrameTree
+from calib_core.interchange.trees.joint import Joint
+from calib_core.interchange.trees.readers.autoware import read_autoware, recognizes_autoware
+from calib_core.interchange.trees.readers.camera_frames import cameras_named_in
+from calib_core.interchange.trees.readers.driveworks import has_one_of_each, read_driveworks, recognizes_driveworks
+from calib_core.interchange.trees.readers.nuscenes import read_nuscenes, recognizes_poses, recognizes_sensors
+from calib_core.interchange.trees.readers.publishers import PUBLISHER, read_publishers, recognizes_publishers
+from calib_core.interchange.trees.readers.stamped import read_stamped, recognizes_stamped
+from calib_core.interchange.trees.readers.urdf import read_urdf, recognizes_urdf
+from calib_core.interchange.trees.tree_part import TreePart, joined
+
+__all__ = ["TreeFile", "files_of_trees", "joined_tree", "may_have_several_joints", "read_tree", "tree_in"]
+
+_PATTERNS = ("*.urdf", "*.xacro", "*calibration.yaml", "*extrinsics*.yaml", "*intrinsics*.yaml", "sensor.json")
+_POSES = "calibrated_sensor.json"
+_DEPTH = 4
+_MOST_FILES = 300
+
+
+@dataclass(frozen=True, slots=True)
+class TreeFile:
+    """A file as it was read.
+
+    Attributes:
+        data: its bytes.
+        source: its name, for messages.
+    """
+
+    data: bytes
+    source: str
+
+    @property
+    def text(self) -> str:
+        """Its text, as it is written.
+
+        Raises:
+            InputError: it is not text.
+        """
+        return decoded(self.data, source=self.source)
+
+
+def files_of_trees(path: Path) -> tuple[Path, ...]:
+    """Return the files of a folder that may contain joints, by their names; a file is returned as it is.
+
+    Raises:
+        InputError: the folder contains none, or very many.
+    """
+    if not path.is_dir():
+        return (path,)
+    found = sorted(_named_in(path, _DEPTH))
+    if not found:
+        raise InputError(
+            f"{path}: no file of frames in this folder (looked for {', '.join((*_PATTERNS, _POSES))}); give the files themselves"
+        )
+    if len(found) > _MOST_FILES:
+        raise InputError(f"{path}: {len(found)} files that may contain frames; give the folder of one vehicle")
+    return tuple(found)
+
+
+def _named_in(folder: Path, depth: int) -> Iterator[Path]:
+    for path in sorted(folder.iterdir()):
+        if path.is_dir():
+            if depth > 1 and not path.name.startswith("."):
+                yield from _named_in(path, depth - 1)
+        elif any(path.match(pattern) for pattern in (*_PATTERNS, _POSES)):
+            yield path
+
+
+def tree_in(content: Content, text: str, source: str) -> TreePart | None:
+    """Return the joints of one file that needs no other; None if it contains no joints.
+
+    Raises:
+        InputError: it contains joints that cannot be read.
+    """
+    if recognizes_urdf(content):
+        return read_urdf(text, source)
+    if recognizes_publishers(content):
+        return read_publishers(content, text, source)
+    if recognizes_stamped(content):
+        return read_stamped(text, source)
+    if recognizes_autoware(content):
+        return read_autoware(text, source)
+    if recognizes_driveworks(content):
+        return read_driveworks(content, source)
+    if recognizes_poses(content) and len(content.value) > 2:
+        return next(_posed_by_tables([(content, source)], {}))
+    return None
+
+
+def may_have_several_joints(content: Content) -> bool:
+    """Return whether a file may contain more than one joint, judged without reading it."""
+    if recognizes_publishers(content):
+        return content.text.count(PUBLISHER) > 1
+    if recognizes_driveworks(content):
+        return not has_one_of_each(content)
+    if recognizes_stamped(content):
+        return len(content.documents) > 1 or len(content.mapping.get("transforms") or ()) > 1
+    return True
+
+
+def read_tree(files: Sequence[TreeFile]) -> FrameTree:
+    """Read the frame tree that files say together.
+
+    Args:
+        files: each with joints, except sensor.json of nuScenes and Apollo's intrinsics, which say which frames are cameras.
+
+    Raises:
+        InputError: a file contains no joints, or the joints make no tree.
+    """
+    return joined_tree(files, ())
+
+
+def joined_tree(files: Sequence[TreeFile], recorded: Sequence[Joint]) -> FrameTree:
+    """Read the frame tree that files and a recording say together.
+
+    A joint that was recorded is left out if a file poses the same frame in the same parent: the file is what is edited.
+
+    Args:
+        files: as for `read_tree`; may be empty.
+        recorded: the joints of the recording.
+
+    Raises:
+        InputError: a file contains no joints, or the joints make no tree.
+    """
+    parts: list[TreePart] = []
+    tables: dict[str, Content] = {}
+    poses: list[tuple[Content, str]] = []
+    for file in files:
+        for content in _contents(file):
+            if recognizes_sensors(content):
+                tables[str(Path(file.source).parent)] = content
+            elif recognizes_poses(content):
+                poses.append((content, file.source))
+            else:
+                part = tree_in(content, file.text.lstrip("\ufeff"), file.source) or cameras_named_in(content)
+                if part is None:
+                    continue
+                parts.append(part)
+            break
+        else:
+            raise InputError(
+                f"{file.source}: no transforms between frames in it; leave it out, or give the file that has them"
+            )
+    parts += _posed_by_tables(poses, tables)
+    posed = {(joint.parent, joint.child) for part in parts for joint in part.joints}
+    parts.append(TreePart("tf2", tuple(one for one in recorded if (one.parent, one.child) not in posed)))
+    if not any(part.joints for part in parts):
+        raise InputError(
+            f"{', '.join(file.source for file in files)}: no transforms between frames; give the files with them"
+        )
+    return joined(sorted(parts, key=_without_joints))
+
+
+def _contents(file: TreeFile) -> Iterable[Content]:
+    return readings(file.data, source=file.source)
+
+
+def _without_joints(part: TreePart) -> bool:
+    return not part.joints
+
+
+def _posed_by_tables(poses: list[tuple[Content, str]], tables: Mapping[str, Content]) -> Iterator[TreePart]:
+    for content, source in poses:
+        beside = tables.get(str(Path(source).parent))
+        table = beside or (next(iter(tables.values())) if len(tables) == 1 else None)
+        if table is None and len(content.value) > 2:
+            raise InputError(
+                f"{source}: does not name its {len(content.value)} sensors; give sensor.json of the same folder as well"
+            )
+        yield read_nuscenes(content, source, table)

@@ -1,0 +1,160 @@
+"""`cocalib import`, `check` and `export` with the frame tree of a vehicle."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from app.cli import run
+from calib_core.interchange import read_any, read_calibration
+from calib_core.interchange.trees.reading import TreeFile, read_tree
+from tests.unit.interchange.trees import vehicles
+
+KIND = "tf2_msgs/msg/TFMessage"
+DRIVER = (
+    ("camera_link", "camera_color_frame", (0.0, 0.015, 0.0), (0.0, 0.0, 0.0, 1.0)),
+    ("camera_color_frame", "camera_color_optical_frame", (0.0, 0.0, 0.0), (-0.5, 0.5, -0.5, 0.5)),
+)
+
+
+@pytest.fixture
+def calibration(project_root: Path, tmp_path: Path) -> Path:
+    """A calibration of the frames radar_front and camera_front_optical_frame."""
+    content = json.loads((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+    content["frames"].update(radar="radar_front", camera="camera_front_optical_frame")
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(content), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def car(tmp_path: Path) -> Path:
+    path = tmp_path / "car.urdf"
+    path.write_text(vehicles.CAR_URDF, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """A recording with the driver's /tf_static."""
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", KIND))
+    types = store.types
+    stamped = [
+        types["geometry_msgs/msg/TransformStamped"](
+            header=types["std_msgs/msg/Header"](
+                seq=0, stamp=types["builtin_interfaces/msg/Time"](sec=1, nanosec=0), frame_id=parent
+            ),
+            child_frame_id=child,
+            transform=types["geometry_msgs/msg/Transform"](
+                translation=types["geometry_msgs/msg/Vector3"](*shift),
+                rotation=types["geometry_msgs/msg/Quaternion"](*turn),
+            ),
+        )
+        for parent, child, shift, turn in DRIVER
+    ]
+    path = tmp_path / "drive.bag"
+    with Writer(path) as writer:
+        connection = writer.add_connection("/tf_static", KIND, typestore=store)
+        writer.write(connection, 1, bytes(store.serialize_ros1(types[KIND](transforms=stamped), KIND)))
+    return path
+
+
+def test_import_names_the_flags_and_chains_what_they_choose(car, project_root, tmp_path, capsys):
+    out = tmp_path / "imported.json"
+    camera = project_root / "tests/golden/calibration-1.json"
+    arguments = ["import", str(car), "--out", str(out), "--camera", str(camera)]
+
+    assert run(arguments) == 2
+    assert "choose with --radar-frame NAME and --camera-frame NAME" in capsys.readouterr().err
+    assert run([*arguments, "--radar-frame", "radar_front", "--camera-frame", "camera_front_link"]) == 0
+    file = read_calibration(out.read_text(encoding="utf-8"))
+    assert (file.frames.radar, file.frames.camera) == ("radar_front", "camera_front_optical_frame")
+    assert [one.name for one in file.provenance.inputs] == ["car.urdf"]
+
+
+def test_check_chains_a_folder_and_a_recording(calibration, recording, tmp_path, capsys):
+    kit = tmp_path / "kit"
+    kit.mkdir()
+    (kit / "sensors_calibration.yaml").write_text(vehicles.SENSORS_CALIBRATION, encoding="utf-8")
+    (kit / "sensor_kit_calibration.yaml").write_text(vehicles.SENSOR_KIT_CALIBRATION, encoding="utf-8")
+
+    assert run(["check", str(kit), "--camera-frame", "camera0/camera_link"]) in (0, 3)
+    assert "chained over 3 joints" in capsys.readouterr().out
+    assert run(["check", str(recording)]) == 2
+    assert "no frame named like a radar" in capsys.readouterr().err
+
+
+def test_into_prints_a_diff_and_writes_only_when_told(calibration, car, tmp_path, capsys):
+    arguments = ["export", str(calibration), "--into", str(car)]
+
+    assert run(arguments) == 0
+    shown = capsys.readouterr()
+    assert car.read_text(encoding="utf-8") == vehicles.CAR_URDF
+    assert [line[0] for line in shown.out.splitlines()[3:] if line[0] in "+-"] == ["-", "+"]
+    assert "solved for joint camera_front_joint, roof_rack -> camera_front_link" in shown.err
+    assert "nothing is written" in shown.err
+    assert run([*arguments, "--out", str(tmp_path / "copy.urdf")]) == 0
+    assert run([*arguments, "--write"]) == 0
+    assert car.read_bytes() == (tmp_path / "copy.urdf").read_bytes()
+    capsys.readouterr()
+    frames = ["--radar-frame", "radar_front", "--camera-frame", "camera_front_link"]
+    assert run(["check", str(car), "--against", str(calibration), *frames]) == 0
+    assert run([*arguments, "--to", "urdf"]) == 2
+    assert "give one of them" in capsys.readouterr().err
+
+
+def test_into_respects_the_drivers_chain_of_a_recording(calibration, recording, tmp_path):
+    cart = tmp_path / "cart.urdf"
+    cart.write_text(vehicles.REALSENSE_URDF, encoding="utf-8")
+    frames = ["--radar-frame", "radar", "--camera-frame", "camera_color_optical_frame"]
+
+    assert run(["export", str(calibration), "--into", str(cart), "--tree", str(recording), *frames, "--write"]) == 0
+    expected = read_calibration(calibration.read_text(encoding="utf-8")).calibration.camera_from_radar
+    frames[-1] = "camera_color_optical_frame"
+    out = tmp_path / "again.json"
+    assert run(["import", str(cart), str(recording), *frames, "--camera", str(calibration), "--out", str(out)]) == 0
+    again = read_calibration(out.read_text(encoding="utf-8")).calibration.camera_from_radar
+    np.testing.assert_allclose(again.as_matrix(), expected.as_matrix(), rtol=0, atol=1e-6)
+
+
+def test_a_static_transform_leads_to_the_root_of_the_drivers_chain(calibration, recording, capsys):
+    arguments = ["export", str(calibration), "--to", "tf2", "--tree", str(recording)]
+
+    assert run([*arguments, "--camera-frame", "camera_color_optical_frame"]) == 0
+    shown = capsys.readouterr()
+    assert "--frame-id radar_front --child-frame-id camera_link" in shown.out
+    assert "leads from radar_front to camera_link" in shown.err
+    joint = read_tree([TreeFile(shown.out.encode(), "tf.sh")]).joints[0]
+    assert (joint.parent, joint.child) == ("radar_front", "camera_link")
+
+
+def test_frames_are_renamed_and_the_origin_stays(calibration, capsys):
+    original = read_any(calibration.read_bytes())
+    hashes = []
+    for names in ([], ["--radar-frame", "bumper_radar", "--camera-frame", "cam0_optical"]):
+        assert run(["export", str(calibration), "--to", "tf2", *names]) == 0
+        text = capsys.readouterr().out
+        hashes.append(re.findall(r"sha256 (\w+)", text))
+    found = read_any(text)
+
+    assert (found.frames.radar, found.frames.camera) == ("bumper_radar", "cam0_optical")
+    assert hashes[0] == hashes[1]
+    np.testing.assert_allclose(
+        found.camera_from_radar.as_matrix(), original.camera_from_radar.as_matrix(), rtol=0, atol=1e-9
+    )
+    assert run(["export", str(calibration), "--to", "tf2", "--radar-frame", "a$b"]) == 2
+    assert "use a name without" in capsys.readouterr().err
+
+
+def test_an_expression_is_refused_with_its_line_and_the_numbers(calibration, car, capsys):
+    car.write_text(vehicles.CAR_URDF.replace('"0.25 -0.02 0.11"', '"${x} -0.02 0.11"'), encoding="utf-8")
+
+    assert run(["export", str(calibration), "--into", str(car)]) == 2
+    assert re.search(
+        r'car\.urdf:32: .*its origin is an expression.*Write there by hand: xyz="', capsys.readouterr().err
+    )
