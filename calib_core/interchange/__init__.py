@@ -19,6 +19,7 @@ from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.registry import FORMATS, format_named, written_formats
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
 from calib_core.interchange.importing import calibration_bytes, read_any, read_any_file
+from calib_core.interchange.origin import missing_map
 from calib_core.interchange.own.calibration_json import calibration_text, read_calibration, write_calibration
 from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
 from calib_core.interchange.own.documents import CALIBRATION_SCHEMA, names_schema
@@ -62,6 +63,7 @@ __all__ = [
     "export",
     "format_named",
     "imported",
+    "missing_map",
     "names_schema",
     "parent_pose",
     "read_any",

@@ -1,11 +1,11 @@
 """Export a calibration to another format, or refuse with a clear error if the format cannot represent it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.format import Format
 from calib_core.interchange.formats.registry import format_named, written_formats
 
@@ -25,11 +25,13 @@ class Export:
         file_name: the default name.
         content: text, or bytes if the format is binary.
         notes: what a user of the file must know.
+        extra_files: further files that belong to it, each a name and its bytes.
     """
 
     file_name: str
     content: str | bytes
     notes: tuple[str, ...] = ()
+    extra_files: tuple[tuple[str, bytes], ...] = ()
 
     @property
     def data(self) -> bytes:
@@ -38,7 +40,12 @@ class Export:
 
 
 def export(
-    file: CalibrationFile, name: str, *, parent_from_radar: RigidTransform | None = None, rectified: bool = False
+    file: CalibrationFile,
+    name: str,
+    *,
+    parent_from_radar: RigidTransform | None = None,
+    rectified: bool = False,
+    frames: FrameNames | None = None,
 ) -> Export:
     """Export a calibration to another format; the same calibration gives the same bytes.
 
@@ -48,11 +55,14 @@ def export(
         parent_from_radar: the radar's pose in the third frame of "autoware" (kit), "driveworks" (rig) or "nuscenes" (ego).
         rectified: the file is for pictures undistorted with this same camera matrix, no distortion left; required for
             a distorted lens by "kitti" and "nuscenes", which cannot store distortion.
+        frames: the frame names to write; None for the calibration's own.
 
     Raises:
         InputError: no such format, or it cannot represent this calibration; the message says why and what to use instead.
     """
     chosen = format_named(name)
+    if frames is not None:
+        file = replace(file, frames=frames)
     if chosen.write is None:
         raise InputError(
             f"the format {name} can only be read; cocalib export --to list shows those that can be written"

@@ -46,6 +46,9 @@ class Format:
         reads: how it is recognized and read; None if the format can only be written.
         notes: what a user of the file must know, one sentence each.
         write_in_parent: like write, with a given pose of the radar in a third frame (kit, ego); None if it has none.
+        used_in: where its files are used: the heading in lists.
+        also: other words that someone may search for.
+        holds_angle_map: it stores the radar's angle map.
     """
 
     name: str
@@ -58,6 +61,9 @@ class Format:
     reads: Reads | None
     notes: tuple[str, ...] = ()
     write_in_parent: Callable[[CalibrationFile, RigidTransform], str | bytes] | None = None
+    used_in: str = "Other tools"
+    also: str = ""
+    holds_angle_map: bool = False
 
     @property
     def is_for_rectified(self) -> bool:

@@ -107,6 +107,8 @@ def _frames_of(messages: Mapping[str, Any], parent: str, child: str) -> FrameNam
 FOXGLOVE = Format(
     name="foxglove",
     title="Foxglove messages",
+    used_in="Data sets and viewers",
+    also="Studio MCAP viewer",
     numbers="FrameTransform: pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
     file_name="foxglove.json",
     camera="lens",
