@@ -26,8 +26,7 @@ function row(name, content) {
       error.textContent = words;
       error.hidden = !words;
       for (const input of element.querySelectorAll("input")) {
-        input.toggleAttribute("aria-invalid", words !== "");
-        if (words) input.setAttribute("aria-invalid", "true");
+        input.setAttribute("aria-invalid", String(words !== ""));
         if (words) input.setAttribute("aria-describedby", error.id);
         else input.removeAttribute("aria-describedby");
       }
@@ -75,7 +74,7 @@ export function nameFields(changed) {
         if (!typed.has(key)) input.value = preview[key];
         input.disabled = !preview.names_frames;
       }
-      made.element.dataset.hint = preview.names_frames ? "The names of the two frames in this file. They start as the calibration's." : "This format holds no frame names.";
+      made.element.dataset.hint = preview.names_frames ? "" : "This format holds no frame names.";
     },
   };
 }
