@@ -24,7 +24,7 @@ export function lines(content) {
 /** The file's own numbers, with the calibration's folded below. @param {Record<string, any>} preview */
 export function numbers(preview) {
   const own = table(preview.pose.numbers);
-  own.dataset.hint = "Read back from the file: its own numbers in its own order and units. Matrices are rounded to 9 decimals here.";
+  own.dataset.hint = "Read back from the file: its own numbers in its own order and units. Matrices are rounded to 9 decimals here; the file has all digits.";
   const ours = make("details", "ours", [make("summary", "", preview.our_pose.title), table(preview.our_pose)]);
   return [own, ours];
 }
