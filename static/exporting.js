@@ -165,9 +165,7 @@ function drawPreview(preview) {
   show(preview.text, preview.file_name, preview.is_binary);
   notes.replaceChildren(...preview.notes.map((/** @type {string} */ note) => make("li", "", note)));
   side.replaceChildren(
-    frameDrawing(preview.pose),
-    make("p", "direction", preview.pose.words),
-    ...numbers(preview),
+    ...(preview.pose ? [frameDrawing(preview.pose), make("p", "direction", preview.pose.words), ...numbers(preview)] : []),
     ...checkPoint(preview.check_point),
     make("div", `check ${preview.check_is_good ? "good" : "bad"}`, [make("b", "", preview.check_is_good ? "✓" : "!"), make("span", "", preview.check)]),
   );

@@ -48,9 +48,9 @@ class ExportPreview:
         numbers: what the file's numbers mean.
         notes: what a user of the file must know.
         is_for_rectified: it is written only because the user stated that the pictures are rectified.
-        pose: the pose in the file, as read back: its direction, its frames and its numbers.
+        pose: the pose in the file, as read back: its direction, its frames and its numbers; None if it holds none.
         our_pose: camera_from_radar of the calibration.
-        check_point: what a reader of the file must get; None if the calibration has none.
+        check_point: what a reader of the file must get; None if the calibration has none, or the file no pose.
         check: what `cocalib check` says about the file.
         check_is_good: whether it found no problem.
         radar_frame: the calibration's name of the radar's frame.
@@ -69,7 +69,7 @@ class ExportPreview:
     numbers: str
     notes: tuple[str, ...]
     is_for_rectified: bool
-    pose: PoseInFile
+    pose: PoseInFile | None
     our_pose: FileNumbers
     check_point: CheckPointRow | None
     check: str
@@ -121,7 +121,8 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
     fields = fields_in(query, file.frames)
     written, form = _exported(file, key, fields), format_named(key)
     named = replace(file, frames=fields.frames)
-    report = check(read_any(written.data, written.file_name), against=imported(named))
+    whole = imported(named)
+    report = check(read_any(written.data, written.file_name) if form.reads else whole, against=whole)
     saved = _as_one_file(written)
     lost = () if form.holds_angle_map else missing_map(file.calibration)
     return ExportPreview(
@@ -133,10 +134,12 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         numbers=sentence(form.numbers),
         notes=tuple(sentence(note) for note in written.notes if note not in lost),
         is_for_rectified=form.is_for_rectified and file.calibration.camera.is_distorted,
-        pose=pose_in_file(report.imported.pose, fields.frames, in_third_frame=fields.parent_from_radar is not None),
+        pose=pose_in_file(report.imported.pose, fields.frames, in_third_frame=fields.parent_from_radar is not None)
+        if form.reads
+        else None,
         our_pose=our_numbers(file.calibration.camera_from_radar),
-        check_point=check_point_row(named, form, report.imported),
-        check=_read_back(report),
+        check_point=check_point_row(named, form, report.imported) if form.reads else None,
+        check=_read_back(report) if form.reads else "Not read back: this format has no pose to read.",
         check_is_good=report.ok,
         radar_frame=file.frames.radar,
         camera_frame=file.frames.camera,
