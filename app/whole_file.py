@@ -4,9 +4,12 @@ import errno
 import os
 import secrets
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
-__all__ = ["write_whole"]
+__all__ = ["write_whole", "writing_whole"]
 
 _PATIENCE_S = 2.0
 
@@ -31,6 +34,32 @@ def write_whole(path: Path, data: bytes) -> None:
     try:
         with temporary.open("xb") as file:
             file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    _sync_folder(path.parent)
+
+
+@contextmanager
+def writing_whole(path: Path) -> Iterator[BinaryIO]:
+    """Write a file of any size in one step: it takes its name once it is complete, and nothing is left if it is not.
+
+    A symbolic link is followed.
+
+    Raises:
+        OSError: it cannot be written; the old file stays.
+    """
+    path = path.resolve()
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "is not a regular file; name a file", str(path))
+    if not path.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, f"the folder {path.parent} does not exist; create it", str(path))
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(6)}")
+    try:
+        with temporary.open("xb", buffering=1 << 20) as file:
+            yield file
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)

@@ -98,7 +98,7 @@ export function parentFields(values, changed) {
   return row("parent", [label, make("div", "", inputs.map((input, index) => make("label", "", [PARENT[index], input])))]);
 }
 
-/** The user's statement that the pictures are rectified, required by formats that cannot hold distortion. It is kept for this
+/** The user's statement that the pictures are rectified already, asked by formats that cannot hold distortion. It is kept for this
  * browser session only: the pictures of the next recording may differ. @param {() => void} changed */
 export function rectifiedBox(changed) {
   const box = make("input", "", []);

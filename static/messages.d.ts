@@ -264,6 +264,7 @@ export interface SessionOffer {
   clicks: number;
   recording: string;
   continues: boolean;
+  plan: "continue" | "new" | "copy";
 }
 
 /** A recording that was opened before and still exists. */

@@ -79,7 +79,7 @@ export function takeChoices(message) {
   const isNew = message.question !== choices?.question;
   choices = message;
   if (isNew) {
-    draft = { ...emptyDraft(), radar: message.radar_topic, image: message.image_topic };
+    draft = { ...emptyDraft(), radar: message.radar_topic, image: message.image_topic, session: message.session.plan };
     folder = null;
     busy = false;
     problem = "";

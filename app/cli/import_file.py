@@ -45,6 +45,7 @@ class Import:
             Provenance,
             adoption,
             calibration_bytes,
+            files_beside,
             read_any,
             read_any_file,
             read_camera_file,
@@ -54,7 +55,7 @@ class Import:
         from calib_core.results import InputFile
 
         data, source = calibration_bytes(self.calibration), str(self.calibration)
-        found = read_any(data, source)
+        found = read_any(data, source, beside=files_beside(self.calibration))
         camera = (
             read_camera_file(self.camera) if self.camera else _sized_camera(found, self.calibration, self.image_size)
         )

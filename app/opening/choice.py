@@ -1,15 +1,50 @@
 """What is to be opened, and how: given on the command line, chosen in the page, or both."""
 
+import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 from app.web.messages import OpenWith, SessionPlan
+from calib_core.errors import CalibrationError, InputError
 from calib_core.input_files import name_text
 from calib_core.interchange import CameraFile
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import RecordingOptions
 
-__all__ = ["Choice", "GivenClicks"]
+__all__ = ["Choice", "ChoicePart", "GivenClicks", "UnusablePartError", "part_of_choice"]
+
+ChoicePart: TypeAlias = Literal["camera", "calibration", "clicks", "session"]
+"""What is opened together with a recording, and can be left out."""
+
+
+class UnusablePartError(InputError):
+    """One part of a choice cannot be used; the recording may open without it.
+
+    Attributes:
+        part: which one.
+    """
+
+    def __init__(self, part: ChoicePart, words: str) -> None:
+        super().__init__(words)
+        self.part: ChoicePart = part
+
+
+@contextlib.contextmanager
+def part_of_choice(part: ChoicePart) -> Iterator[None]:
+    """Say of an error in the `with` block which part of the choice it is about.
+
+    Raises:
+        UnusablePartError: in the words of the error.
+    """
+    try:
+        yield
+    except CalibrationError as error:
+        raise UnusablePartError(part, str(error)) from error
+    except OSError as error:
+        words = f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}"
+        raise UnusablePartError(part, words) from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +104,21 @@ class Choice:
     def settled(self) -> "Choice":
         """Return the same choice after it was opened: what belongs to a new session has been done."""
         return replace(self, fresh=False, clicks=None, options=None, session_plan="continue", copy_from=None)
+
+    def without(self, part: ChoicePart) -> "Choice":
+        """Return the same recording without a part that cannot be used; opening it does not fail again for the same reason.
+
+        A session that was not named but found next to the recording is left alone, and a new one is started.
+        """
+        if part == "camera":
+            return replace(self, camera_file=None)
+        if part == "calibration":
+            return replace(self, calibration_file=None)
+        if part == "clicks":
+            return replace(self, clicks=None)
+        if self.session is not None:
+            return replace(self, session=None, session_plan="continue", copy_from=None)
+        return replace(self, session_plan="new", copy_from=None)
 
     def read_as(self, command: OpenWith, camera_file: CameraFile | None, copy_from: Path | None) -> "Choice":
         """Return the same recording, read as a page wants it.

@@ -10,11 +10,11 @@ from pathlib import Path
 from time import sleep
 
 import calib_core.recordings as recordings
-from app.opening.choice import Choice, GivenClicks
+from app.opening.choice import Choice, ChoicePart, GivenClicks, UnusablePartError, part_of_choice
 from app.opening.reference import camera_in, reference_from
 from app.opening.sessions import FittingClicks, fitting_clicks, session_folder
 from app.session import AssumptionsConfirmed, ClicksImported, ColumnsMapped, OptionsChanged
-from app.session.click_stamps import clicks_at_frames
+from app.session.click_stamps import ClicksAtFrames, clicks_at_frames
 from app.session.file import FoundFolder, recording_session_folder, remembered_map
 from app.solving import camera_for
 from app.view import sentence
@@ -73,6 +73,8 @@ def open_choice(choice: Choice, stack: ExitStack, tell: Callable[[str], None]) -
         _require_nothing_to_calibrate(recording, choice)
     if recording.radar_choice:
         print(f"radar: {recording.radar_choice}")
+    with part_of_choice("clicks"):
+        clicks = _clicks_at_frames(recording, choice.clicks)
     workspace = _workspace(choice, recording)
     stack.push(partial(_close, workspace))
     _remember(workspace, recording)
@@ -80,8 +82,8 @@ def open_choice(choice: Choice, stack: ExitStack, tell: Callable[[str], None]) -
         print(f"{sentence(warning.message)} {sentence(warning.hint)}")
     if choice.options is not None and choice.options != CalibrationOptions():
         workspace.dispatch(OptionsChanged(choice.options))
-    if choice.clicks is not None:
-        _import_clicks(workspace, recording, choice.clicks)
+    if choice.clicks is not None and clicks is not None:
+        _import_clicks(workspace, choice.clicks, clicks)
     return Opened(recording, workspace)
 
 
@@ -129,21 +131,25 @@ def _require_unmoved(choice: Choice) -> None:
 def _workspace(choice: Choice, recording: Recording) -> Workspace:
     camera = _camera(choice, recording)
     calibration = choice.calibration_file
-    reference = reference_from(calibration, camera) if calibration and camera else None
+    with part_of_choice("calibration"):
+        reference = reference_from(calibration, camera) if calibration and camera else None
     facts = recording_facts(recording, choice.title)
-    copied = fitting_clicks(choice.copy_from, facts) if choice.copy_from is not None else None
-    found = session_folder(choice, facts)
     from_calibration = camera is not None and choice.camera_file is None and recording.camera() is None
-    workspace = open_workspace(
-        recording,
-        camera=camera,
-        session_folder=found.path,
-        name=choice.title,
-        reference=reference,
-        warnings=_warnings(found, copied, calibration if reference is None and len(recording.image_times) else None),
-        camera_file=choice.camera_file,
-        intrinsics=name_text(calibration.name) if from_calibration and calibration else "",
-    )
+    with part_of_choice("session"):
+        copied = fitting_clicks(choice.copy_from, facts) if choice.copy_from is not None else None
+        found = session_folder(choice, facts)
+        workspace = open_workspace(
+            recording,
+            camera=camera,
+            session_folder=found.path,
+            name=choice.title,
+            reference=reference,
+            warnings=_warnings(
+                found, copied, calibration if reference is None and len(recording.image_times) else None
+            ),
+            camera_file=choice.camera_file,
+            intrinsics=name_text(calibration.name) if from_calibration and calibration else "",
+        )
     if copied is not None and copied.clicks and workspace.restored.steps == 0:
         workspace.dispatch(ClicksImported(copied.clicks))
     return workspace
@@ -171,23 +177,33 @@ def _camera(choice: Choice, recording: Recording) -> Camera | None:
     calibration = choice.calibration_file
     if choice.camera_file is None and calibration is not None and recording.camera() is None:
         picture = recording.image_bytes(0)
-        found = camera_in(calibration, picture.width_px, picture.height_px)
+        with part_of_choice("calibration"):
+            found = camera_in(calibration, picture.width_px, picture.height_px)
         if found is not None:
             return found
-    return camera_for(recording, choice.camera_file)
+    if choice.camera_file is None:
+        return camera_for(recording, None)
+    with part_of_choice("camera"):
+        return camera_for(recording, choice.camera_file)
 
 
-def _import_clicks(workspace: Workspace, recording: Recording, given: GivenClicks) -> None:
-    """Start a new session with the clicks of a file.
+def _clicks_at_frames(recording: Recording, given: GivenClicks | None) -> ClicksAtFrames | None:
+    """Read the clicks of a file before anything is done to a session.
 
     Raises:
         InputError: they are not clicks of this recording.
     """
+    if given is None:
+        return None
+    clicks = read_clicks(given.text, source=given.source)
+    return clicks_at_frames(clicks, recording.image_times, source=given.source)
+
+
+def _import_clicks(workspace: Workspace, given: GivenClicks, found: ClicksAtFrames) -> None:
+    """Start a new session with the clicks of a file; one that has steps already goes on as it is."""
     if workspace.restored.steps > 0:
         print(f"Continuing the existing session; {given.source} was not imported (start over with --fresh)")
         return
-    clicks = read_clicks(given.text, source=given.source)
-    found = clicks_at_frames(clicks, recording.image_times, source=given.source)
     for line in found.moved:
         print(f"note: {line}", file=sys.stderr)
     workspace.dispatch(ClicksImported(found.clicks))
@@ -220,16 +236,20 @@ def _require_nothing_to_calibrate(recording: Recording, choice: Choice) -> None:
     """Say that there is no camera; refuse files that need one.
 
     Raises:
-        InputError: a file of intrinsics, of a calibration or of clicks was given.
+        UnusablePartError: a file of intrinsics, of a calibration or of clicks was given.
     """
     name, found = recording.paths[0].name, _unusable_pictures(recording)
     camera, clicks = choice.camera_file, choice.clicks
-    given = (camera and camera.source, choice.calibration_file, clicks and clicks.source)
-    needless = [str(file) for file in given if file]
-    if needless:
-        raise InputError(
-            f"{name}: no pictures{found}, so {needless[0]} cannot be used; give the camera's recording as well"
-        )
+    given: dict[ChoicePart, str | Path | None] = {
+        "camera": camera.source if camera else None,
+        "calibration": choice.calibration_file,
+        "clicks": clicks.source if clicks else None,
+    }
+    for part, file in given.items():
+        if file:
+            raise UnusablePartError(
+                part, f"{name}: no pictures{found}, so {file} cannot be used; give the camera's recording as well"
+            )
     print(f"{name}: no pictures{found}: showing the radar only. To calibrate, give the camera's recording as well.")
 
 

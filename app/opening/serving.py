@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from app.error_boundary import error_boundary
-from app.opening.choice import Choice
+from app.opening.choice import Choice, ChoicePart, UnusablePartError
 from app.opening.choices import choices_after, choices_of
 from app.opening.desk import OpeningDesk
 from app.opening.opened import open_choice, with_remembered
@@ -73,6 +73,8 @@ def serve(first: Choice | None, serving: Serving) -> int:
                 with problem.kept() if serving.asks else contextlib.nullcontext():
                     if choice is not None and _served_to_the_end(choice, service, desk, serving):
                         return 0
+                if choice is not None and problem.part is not None:
+                    choice = choice.without(problem.part)
                 if choice is None or problem.words:
                     _ask(choice, problem.words, service, desk)
                 else:
@@ -92,9 +94,11 @@ class _Problem:
 
     Attributes:
         words: in sentences; "" if nothing did.
+        part: of the choice that it is about; None if it is the recording itself.
     """
 
     words: str = ""
+    part: ChoicePart | None = None
 
     @contextlib.contextmanager
     def kept(self) -> Iterator[None]:
@@ -104,6 +108,7 @@ class _Problem:
                 yield
             except CalibrationError as error:
                 self._keep(str(error))
+                self.part = error.part if isinstance(error, UnusablePartError) else None
             except OSError as error:
                 self._keep(f"{error.filename or 'a file'}: {(error.strerror or str(error)).lower()}")
 

@@ -89,6 +89,6 @@ def session_offer(choice: Choice, facts: RecordingFacts | None, opened_in: Path 
     try:
         found = inspect_session(folder)
     except (SessionFileError, OSError):
-        return SessionOffer()
+        return SessionOffer(plan=choice.session_plan)
     continues = opened_in is not None or (facts is not None and has_session_of(folder, facts))
-    return SessionOffer(str(folder), len(found.clicks), found.recording, continues)
+    return SessionOffer(str(folder), len(found.clicks), found.recording, continues, choice.session_plan)

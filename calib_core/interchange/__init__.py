@@ -14,11 +14,11 @@ from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.pair_residuals import CheckPairs, read_check_pairs, read_check_pairs_file
 from calib_core.interchange.check.report import CheckReport, Verdict, check
 from calib_core.interchange.contents import contents_text
-from calib_core.interchange.exporting import Export, export
+from calib_core.interchange.exporting import Export, NotExported, export, export_all
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.registry import FORMATS, format_named, written_formats
+from calib_core.interchange.formats.registry import CAMERA_ONLY, FORMATS, format_named, written_formats
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose, imported
-from calib_core.interchange.importing import calibration_bytes, read_any, read_any_file
+from calib_core.interchange.importing import calibration_bytes, files_beside, read_any, read_any_file
 from calib_core.interchange.origin import missing_map
 from calib_core.interchange.own.calibration_json import calibration_text, read_calibration, write_calibration
 from calib_core.interchange.own.clicks_json import read_clicks, write_clicks
@@ -29,6 +29,7 @@ from calib_core.interchange.syntax.content import Content
 
 __all__ = [
     "CALIBRATION_SCHEMA",
+    "CAMERA_ONLY",
     "FORMATS",
     "Adoption",
     "AssumptionNote",
@@ -43,6 +44,7 @@ __all__ = [
     "Format",
     "FrameNames",
     "ImportedCalibration",
+    "NotExported",
     "PairsFile",
     "PixelDifference",
     "Provenance",
@@ -61,6 +63,8 @@ __all__ = [
     "compare",
     "contents_text",
     "export",
+    "export_all",
+    "files_beside",
     "format_named",
     "imported",
     "missing_map",

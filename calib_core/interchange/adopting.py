@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames, Provenance, choose_check_point
@@ -166,7 +167,9 @@ def _refuse_another_camera(found: ImportedCalibration, given: Camera, *, source:
     stated, compared = found.camera, given
     if stated is None and found.matrix_px is not None:
         size = given.width_px, given.height_px
-        stated, compared = Camera("pinhole", *size, found.matrix_px), Camera("pinhole", *size, given.matrix_px)
+        stated = found.camera_for(size)
+        if not found.distortion.any() and found.lens_model == "pinhole":
+            compared = Camera("pinhole", *size, given.matrix_px)
     apart_px = largest_difference_px(stated, compared) if stated is not None else 0.0
     if stated is None or apart_px <= _SAME_LENS_PX:
         return
@@ -197,7 +200,7 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
     assumed = tuple(DataWarning("assumed", note, "verify this assumption") for note in found.assumptions)
     return Calibration(
         camera_from_radar=found.camera_from_radar,
-        covariance=found.file.calibration.covariance if found.file else np.full((6, 6), _UNKNOWN),
+        covariance=_covariance(found),
         camera=camera,
         metrics=Metrics(_UNKNOWN, _UNKNOWN, _UNKNOWN, 0),
         pairs=(),
@@ -207,6 +210,12 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
         radar_errors=found.file.calibration.radar_errors if found.file else RadarErrors(),
         systematic_errors=found.file.calibration.systematic_errors if found.file else (),
     )
+
+
+def _covariance(found: ImportedCalibration) -> Matrix66:
+    if found.file is not None:
+        return found.file.calibration.covariance
+    return np.full((6, 6), _UNKNOWN) if found.covariance is None else found.covariance
 
 
 def _imported_warning(found: ImportedCalibration, source: str) -> DataWarning:

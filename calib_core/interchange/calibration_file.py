@@ -143,6 +143,8 @@ class CalibrationFile:
         unknown: results written by a later version and unknown to this one; kept when the file is rewritten.
         verdict: how far to trust it, as it was judged when it was solved; None in files of older versions and other tools.
         evidence: what the pose rests on, as the file states it; None in files of older versions.
+        made_from_sha256: the SHA-256 of the calibration-1 file that this was made from, if something was changed on the way to
+            another format, such as the camera of rectified pictures; "" if nothing was.
     """
 
     calibration: Calibration
@@ -152,6 +154,7 @@ class CalibrationFile:
     unknown: tuple[UnknownResult, ...] = ()
     verdict: Verdict | None = None
     evidence: Evidence | None = None
+    made_from_sha256: str = ""
 
     @property
     def rests_on(self) -> Evidence:

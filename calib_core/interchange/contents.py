@@ -8,6 +8,7 @@ import numpy as np
 
 from calib_core.interchange.exporting import Export
 from calib_core.interchange.syntax.mat_file import load_mat
+from calib_core.interchange.syntax.mcap_file import MCAP_MAGIC, McapFile, load_mcap
 from calib_core.interchange.syntax.zip_archives import unpack
 
 __all__ = ["contents_text"]
@@ -23,6 +24,8 @@ def contents_text(written: Export) -> str:
     if content.startswith(b"PK"):
         members = unpack(content, source=written.file_name)
         return "\n".join(_member(name, data) for name, data in members.items())
+    if content.startswith(MCAP_MAGIC):
+        return _mcap_text(load_mcap(content, source=written.file_name) or McapFile((), {}))
     if content.startswith(b"MATLAB"):
         comment = content[:_MAT_TEXT_BYTES].decode("ascii", errors="replace").rstrip("\0 ")
         return "\n".join([comment, "", *_variables(load_mat(content, source=written.file_name))]) + "\n"
@@ -30,10 +33,19 @@ def contents_text(written: Export) -> str:
 
 
 def _member(name: str, data: bytes) -> str:
+    if name.endswith(".npz"):
+        inside = unpack(data, source=name)
+        return f"[{name}]\n" + "\n".join(_member(inner, array) for inner, array in inside.items())
     if not name.endswith(".npy"):
         return f"[{name}]\n{data.decode('utf-8', errors='replace')}"
     array = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
     return "\n".join(_variables({name.removesuffix(".npy"): array})) + "\n"
+
+
+def _mcap_text(file: McapFile) -> str:
+    messages = [f"[{one.topic}] {one.schema_name}\n{one.data.decode()}" for one in file.messages]
+    kept = [f"[metadata {name}]\n" + "\n".join(texts.values()) + "\n" for name, texts in file.metadata.items()]
+    return "\n".join([*messages, *kept])
 
 
 def _variables(values: Mapping[str, Any], owner: str = "") -> Iterator[str]:
@@ -43,10 +55,15 @@ def _variables(values: Mapping[str, Any], owner: str = "") -> Iterator[str]:
             continue
         array = np.asarray(value)
         if array.dtype.kind in "US":
-            yield f"{owner}{key} = {str(value)!r}"
+            lines = [line for text in array.ravel().tolist() for line in str(text).splitlines()]
+            yield from [f"{owner}{key} = {lines[0]!r}"] if len(lines) == 1 else [f"{owner}{key}", *_indented(lines)]
             continue
         yield f"{owner}{key}  {array.dtype}  {' x '.join(map(str, array.shape)) or 'scalar'}"
         yield from (f"    {row}" for row in _rows(array))
+
+
+def _indented(lines: list[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
 
 
 def _rows(array: np.ndarray) -> list[str]:

@@ -8,13 +8,37 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.format import Format
 from calib_core.interchange.formats.registry import format_named, written_formats
+from calib_core.interchange.origin import missing_map
+from calib_core.interchange.own.calibration_json import calibration_sha256
+from calib_core.interchange.rectification import maps_npz, rectified_camera, rectified_file
+from calib_core.interchange.syntax.zip_archives import pack
 
-__all__ = ["Export", "export"]
+__all__ = ["Export", "ExtraFile", "NotExported", "export", "export_all"]
 
-_RECTIFIED_NOTE = (
+_MAPS_NAME = "rectification.npz"
+_SAME_MATRIX_NOTE = (
     "written for rectified pictures: undistorted with this same camera matrix, no distortion left; "
     "wrong for pictures as the camera took them"
 )
+_NEW_MATRIX_NOTE = (
+    f"written for rectified pictures with a camera matrix of their own (fx {{:.6g}}, fy {{:.6g}}, cx {{:.6g}}, cy {{:.6g}} px); "
+    f"make them with the maps in {_MAPS_NAME} beside this file: cv2.remap(picture, map_x, map_y, cv2.INTER_LINEAR); "
+    "if your pictures are already undistorted with the camera matrix that they were taken with, say so with --rectified "
+    "(on the page, tick the box)"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ExtraFile:
+    """A file that belongs beside an exported one.
+
+    Attributes:
+        file_name: its name.
+        data: its bytes.
+    """
+
+    file_name: str
+    data: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,19 +48,71 @@ class Export:
     Attributes:
         file_name: the default name.
         content: text, or bytes if the format is binary.
-        notes: what a user of the file must know.
-        extra_files: further files that belong to it, each a name and its bytes.
+        notes: what a user of the file must know; the missing angle map first.
+        extra_files: what belongs beside it.
     """
 
     file_name: str
     content: str | bytes
     notes: tuple[str, ...] = ()
-    extra_files: tuple[tuple[str, bytes], ...] = ()
+    extra_files: tuple[ExtraFile, ...] = ()
 
     @property
     def data(self) -> bytes:
         """The file's bytes."""
         return self.content.encode() if isinstance(self.content, str) else self.content
+
+    @property
+    def download(self) -> ExtraFile:
+        """Everything as one file: the file itself, or a zip archive of it and what belongs beside it."""
+        if not self.extra_files:
+            return ExtraFile(self.file_name, self.data)
+        files = {self.file_name: self.data, **{extra.file_name: extra.data for extra in self.extra_files}}
+        return ExtraFile(f"{self.file_name.partition('.')[0]}_and_maps.zip", pack(files))
+
+
+@dataclass(frozen=True, slots=True)
+class NotExported:
+    """A format that cannot represent a calibration.
+
+    Attributes:
+        name: of the format.
+        reason: why, and what to use instead.
+    """
+
+    name: str
+    reason: str
+
+
+def export_all(
+    file: CalibrationFile, *, parent_from_radar: RigidTransform | None = None, rectified: bool = False
+) -> tuple[dict[str, Export], tuple[NotExported, ...]]:
+    """Export a calibration to every format that can represent it.
+
+    Args:
+        file: what to export.
+        parent_from_radar: as for `export`; used by the formats that have a third frame.
+        rectified: as for `export`; used by the formats that cannot store distortion.
+
+    Returns:
+        The files by the name of their format, and the formats that cannot represent it.
+    """
+    written: dict[str, Export] = {}
+    refused = []
+    for known in written_formats():
+        parent = parent_from_radar if known.write_in_parent else None
+        try:
+            made = export(file, known.name, parent_from_radar=parent, rectified=rectified and known.is_for_rectified)
+        except InputError as error:
+            refused.append(NotExported(known.name, str(error)))
+            continue
+        if made.file_name in {other.file_name for other in written.values()}:
+            refused.append(
+                NotExported(known.name, f"its file {made.file_name} is that of another format; export it alone")
+            )
+        else:
+            written[known.name] = made
+    return written, tuple(refused)
 
 
 def export(
@@ -53,42 +129,65 @@ def export(
         file: what to export.
         name: of a format that can be written.
         parent_from_radar: the radar's pose in the third frame of "autoware" (kit), "driveworks" (rig) or "nuscenes" (ego).
-        rectified: the file is for pictures undistorted with this same camera matrix, no distortion left; required for
-            a distorted lens by "kitti" and "nuscenes", which cannot store distortion.
+        rectified: the file is for pictures undistorted with this same camera matrix, no distortion left. Without it, "kitti"
+            and "nuscenes", which cannot store distortion, get the camera matrix of pictures rectified with maps of ours.
         frames: the frame names to write; None for the calibration's own.
 
     Raises:
         InputError: no such format, or it cannot represent this calibration; the message says why and what to use instead.
     """
     chosen = format_named(name)
-    if frames is not None:
-        file = replace(file, frames=frames)
+    if frames is not None and frames != file.frames:
+        file = replace(file, frames=frames, made_from_sha256=calibration_sha256(file))
     if chosen.write is None:
         raise InputError(
             f"the format {name} can only be read; cocalib export --to list shows those that can be written"
         )
-    camera = file.calibration.camera
-    _check_lens(chosen, camera, rectified=rectified)
+    _refuse_rectified(chosen, rectified=rectified)
+    prepared = _prepared(file, chosen, rectified=rectified)
     if parent_from_radar is None:
-        content = chosen.write(file)
+        content = chosen.write(prepared.file)
     elif chosen.write_in_parent is None:
         able = ", ".join(known.name for known in written_formats() if known.write_in_parent)
         raise InputError(f"the format {name} has no third frame to place the radar in; formats that have one: {able}")
     else:
-        content = chosen.write_in_parent(file, parent_from_radar)
-    notes = (*chosen.notes, _RECTIFIED_NOTE) if chosen.is_for_rectified and camera.is_distorted else chosen.notes
-    return Export(chosen.file_name, content, notes)
+        content = chosen.write_in_parent(prepared.file, parent_from_radar)
+    lost = () if chosen.holds_angle_map else missing_map(file.calibration)
+    notes_on = chosen.notes_on(file) if chosen.notes_on else ()
+    notes = (*lost, *chosen.notes, *notes_on, *prepared.notes)
+    return Export(chosen.file_name, content, notes, prepared.extra_files)
 
 
-def _check_lens(chosen: Format, camera: Camera, *, rectified: bool) -> None:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Prepared:
+    """What a format is given to write."""
+
+    file: CalibrationFile
+    notes: tuple[str, ...] = ()
+    extra_files: tuple[ExtraFile, ...] = ()
+
+
+def _prepared(file: CalibrationFile, chosen: Format, *, rectified: bool) -> _Prepared:
+    """Return the calibration as the format can hold it: that of rectified pictures if it stores no distortion.
+
+    Raises:
+        InputError: no rectified picture can be cut from this lens.
+    """
+    camera = file.calibration.camera
+    if not (chosen.is_for_rectified and camera.is_distorted):
+        return _Prepared(file)
+    if rectified:
+        same = Camera("pinhole", camera.width_px, camera.height_px, camera.matrix_px)
+        return _Prepared(rectified_file(file, same), (_SAME_MATRIX_NOTE,))
+    new = rectified_camera(camera)
+    k = new.matrix_px
+    note = _NEW_MATRIX_NOTE.format(k[0, 0], k[1, 1], k[0, 2], k[1, 2])
+    return _Prepared(rectified_file(file, new), (note,), (ExtraFile(_MAPS_NAME, maps_npz(camera, new)),))
+
+
+def _refuse_rectified(chosen: Format, *, rectified: bool) -> None:
     if rectified and not chosen.is_for_rectified:
         asking = ", ".join(known.name for known in written_formats() if known.is_for_rectified)
         raise InputError(
             f"rectified applies only to formats that cannot store distortion ({asking}), not to {chosen.name}; omit it"
-        )
-    if chosen.is_for_rectified and camera.is_distorted and not rectified:
-        raise InputError(
-            f"the format {chosen.name} stores a camera matrix but not the distortion of this {camera.model} lens, so it would "
-            "be wrong for pictures as taken; use a format that stores it, such as opencv or numpy, or, if your pictures are "
-            "undistorted with this same camera matrix, say so with --rectified (on the page, tick the box)"
         )

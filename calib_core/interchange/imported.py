@@ -2,12 +2,12 @@
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
-from calib_core.arrays import Matrix33, Vector2, Vector3, frozen_array
+from calib_core.arrays import Matrix33, Matrix66, Values, Vector2, Vector3, frozen_array
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz
@@ -148,9 +148,13 @@ class ImportedCalibration:
         notes: what reading it did with the numbers, one sentence each.
         faults: the contradictions in the file, one sentence each.
         file: everything else, if it is a calibration-1 file.
-        matrix_px: (3, 3) K of undistorted pictures whose size the file does not state; None if it has none.
+        matrix_px: (3, 3) K of pictures whose size the file does not state; None if it has none, or states the size.
+        lens_model: the lens model that belongs to matrix_px.
+        distortion: its coefficients.
         evidence: what the pose rests on, as the file states it; None if it states nothing.
         calibration_sha256: of the calibration-1 file that it says it was exported from; None if it states none.
+        covariance: (6, 6) of camera_from_radar, in the order of calibration-1; None if it states none. That of a
+            calibration-1 file is in `file`.
     """
 
     format: str
@@ -163,8 +167,11 @@ class ImportedCalibration:
     faults: tuple[str, ...] = ()
     file: CalibrationFile | None = None
     matrix_px: Matrix33 | None = None
+    lens_model: str = "pinhole"
+    distortion: Values = field(default_factory=lambda: np.zeros(0))
     evidence: Evidence | None = None
     calibration_sha256: str | None = None
+    covariance: Matrix66 | None = None
 
     def camera_for(self, image_size_px: tuple[int, int]) -> Camera | None:
         """Return the camera; one whose size the file does not state gets that of the pictures. None if there is none.
@@ -174,7 +181,7 @@ class ImportedCalibration:
         """
         if self.camera is not None or self.matrix_px is None:
             return self.camera
-        return Camera("pinhole", *image_size_px, self.matrix_px)
+        return Camera(self.lens_model, *image_size_px, self.matrix_px, self.distortion)
 
     @property
     def camera_from_radar(self) -> RigidTransform:

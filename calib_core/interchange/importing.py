@@ -1,5 +1,6 @@
 """Read a calibration in any known format."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,13 +11,15 @@ from calib_core.interchange.imported import ImportedCalibration
 from calib_core.interchange.origin import stated_origin
 from calib_core.interchange.syntax.content import Content, readings
 
-__all__ = ["calibration_bytes", "read_any", "read_any_file"]
+__all__ = ["calibration_bytes", "files_beside", "read_any", "read_any_file"]
 
 _MAX_BYTES = 256 * 1024 * 1024
+_MAX_BESIDE_BYTES = 1024 * 1024
 _KNOWN = (
     "known: calibration-1, static_transform_publisher in a command or launch file, URDF, Autoware, Apollo and "
-    "stamped transforms, Kalibr with T_cam_radar, OpenCV with R and T, KITTI, nuScenes, DriveWorks, Foxglove, "
-    "COLMAP, mat, npz, matrix"
+    "stamped transforms, tf_echo, Kalibr with T_cam_radar, OpenCV with R and T, KITTI, nuScenes, DriveWorks, Foxglove, "
+    "PJLab, direct_visual_lidar_calibration, easy_handeye, OpenLABEL, Scale, Segments.ai, Autoware.AI, TUM, COLMAP, mat, "
+    "npz, matrix"
 )
 
 
@@ -26,7 +29,21 @@ def read_any_file(path: str | Path) -> ImportedCalibration:
     Raises:
         InputError: the file cannot be read, or contains no pose.
     """
-    return read_any(calibration_bytes(path), str(Path(path)))
+    return read_any(calibration_bytes(path), str(Path(path)), beside=files_beside(path))
+
+
+def files_beside(path: str | Path) -> Mapping[str, bytes]:
+    """Return the files in the same folder that may complete a calibration, by name; those that cannot be read are left out."""
+    found = {}
+    for name in dict.fromkeys(name for reader in readers() for name in reader.beside):
+        file = Path(path).parent / name
+        if file.name == Path(path).name or not file.is_file():
+            continue
+        try:
+            found[name] = read_input(file, max_bytes=_MAX_BESIDE_BYTES, is_what="a calibration")
+        except (OSError, InputError):
+            continue
+    return found
 
 
 def calibration_bytes(path: str | Path) -> bytes:
@@ -42,23 +59,31 @@ def calibration_bytes(path: str | Path) -> bytes:
         raise InputError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
 
 
-def read_any(content: str | bytes, source: str = "calibration") -> ImportedCalibration:
+def read_any(
+    content: str | bytes, source: str = "calibration", *, beside: Mapping[str, bytes] | None = None
+) -> ImportedCalibration:
     """Read a calibration from the content of a file of any format in the registry; the content determines the format.
+
+    Args:
+        content: of the file.
+        source: its name, for error messages.
+        beside: files in the same folder that may complete it, from `files_beside`.
 
     Raises:
         InputError: it contains no pose in a known format; the message says what was looked for.
     """
     try:
-        return _read(content, source)
+        return _read(content, source, beside or {})
     except InputError as error:
         if str(error).startswith(f"{source}: "):
             raise
         raise InputError(f"{source}: {error}") from None  # FrameNames refuses a name without knowing the file
 
 
-def _read(content: str | bytes, source: str) -> ImportedCalibration:
+def _read(content: str | bytes, source: str, beside: Mapping[str, bytes]) -> ImportedCalibration:
     seen = []
-    for reading in readings(content, source=source):
+    for syntax in readings(content, source=source):
+        reading = replace(syntax, beside=beside)
         for reader in readers():
             if reader.recognizes(reading):
                 return _with_origin(reader.read(reading, source), reading)
@@ -80,6 +105,9 @@ def _refusal(content: Content, source: str) -> InputError:
         return InputError(f"{source}: neither text nor an archive; {_KNOWN}")
     if content.syntax == "xml" and content.value is None:
         return InputError(f"{source}: XML with <{content.root.tag}>; expected OpenCV's <opencv_storage>")
+    if content.syntax == "mcap":
+        names = ", ".join(message.schema_name for message in content.mcap.messages[:12])
+        return InputError(f"{source}: MCAP without foxglove.FrameTransforms (found {names or 'no message'}); {_KNOWN}")
     value = content.value
     found = ", ".join(map(str, list(value)[:12])) if isinstance(value, dict) else type(value).__name__
     return InputError(f"{source}: no pose of a camera and a radar in it (found {found or 'nothing'}); {_KNOWN}")

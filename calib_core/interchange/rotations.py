@@ -1,4 +1,4 @@
-"""Rotations as other formats write them: fixed-axis roll, pitch, yaw, both quaternion orders, optical and body axes."""
+"""Rotations and 4x4 matrices as other formats write them: fixed-axis roll, pitch, yaw, quaternions, optical and body axes."""
 
 import numpy as np
 
@@ -13,10 +13,13 @@ __all__ = [
     "nearest_rotation",
     "quaternion_xyzw_from_matrix",
     "rpy_from_matrix",
+    "upper_rows",
 ]
 
 LINK_FROM_OPTICAL = RigidTransform(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]), np.zeros(3))
 """From optical axes (x right, y down, z forward) to body axes (x forward, y left, z up), REP-103."""
+
+_LAST_ROW_TOLERANCE = 1e-9
 
 OPTICAL_RPY_RAD = (-np.pi / 2, 0.0, -np.pi / 2)
 """The same rotation as URDF's roll, pitch, yaw."""
@@ -58,6 +61,24 @@ def rpy_from_matrix(rotation: Matrix33) -> Vector3:
 def quaternion_xyzw_from_matrix(rotation: Matrix33) -> np.ndarray:
     """Return the unit quaternion in the order x, y, z, w, with w >= 0."""
     return np.roll(quaternion_wxyz_from_matrix(rotation), -1)
+
+
+def upper_rows(matrix: np.ndarray) -> np.ndarray:
+    """Return the upper three rows of a 3x4 or 4x4 transform.
+
+    Raises:
+        ValueError: it has another shape, or its last row is not 0 0 0 1.
+    """
+    rows = np.asarray(matrix, dtype=np.float64)
+    if rows.shape not in ((3, 4), (4, 4)):
+        raise ValueError(f"the matrix is {' x '.join(map(str, rows.shape))}, not 4 x 4 or 3 x 4")
+    last = np.array([0.0, 0.0, 0.0, 1.0])
+    if len(rows) == 4 and not np.abs(rows[3] - last).max() <= _LAST_ROW_TOLERANCE:
+        found = " ".join(f"{value:.6g}" for value in rows[3])
+        if np.abs(rows[:, 3] - last).max() <= _LAST_ROW_TOLERANCE:
+            raise ValueError(f"the matrix is transposed: its last row is {found} and its last column 0 0 0 1")
+        raise ValueError(f"the last row of the matrix is {found}, not 0 0 0 1; is it scaled, or another matrix?")
+    return rows[:3]
 
 
 def nearest_rotation(matrix: Matrix33, *, tolerance: float) -> Matrix33:

@@ -177,6 +177,20 @@ class Recording:
         return radar.other_azimuths if isinstance(radar, MergedStream) else ()
 
     @property
+    def has_plain_clouds(self) -> bool:
+        """Whether all radar messages are PointCloud2 with x, y, z in metres in the radar's axes, as any viewer draws them."""
+        parts = self._assembly.radar.parts if self._assembly.radar else ()
+        return bool(parts) and all(
+            part.topic.type.replace("/msg/", "/") == "sensor_msgs/PointCloud2" and part.layout.plan.is_plain_xyz
+            for part in parts
+        )
+
+    @property
+    def radar_delay_ns(self) -> int:
+        """The median time from a scan's stamp to its arrival [ns]; 0 by receive time or without a radar."""
+        return self._assembly.radar.parts[0].delay_ns if self._assembly.radar else 0
+
+    @property
     def radar_sensors(self) -> tuple[RadarSensor, ...]:
         """The radars that were compared, the one in use first, with their figures; reads a sample if there is only one."""
         radar = self._assembly.radar

@@ -29,6 +29,7 @@ _FLAGS = {"radar": "--radar-topic", "image": "--image-topic", "camera-info": "--
 _RADAR_WORDS = ("radar", "mmwave", "ars4", "ars5", "srr", "umrr", "esr", "oculii")
 _OBJECT_WORDS = ("object", "track")
 _MOST_RADARS = 12  # that are compared
+_ADDED_BY_EXPORT = "/cocalib/"
 _NOT_PICTURES = ("depth", "disparity", "mask", "infra", "debug")
 
 
@@ -96,8 +97,9 @@ class Inventory:
         return max(len(topic), self.counts.get(topic.name, 0))
 
     def of_kind(self, kind: TopicKind) -> list[Topic]:
-        """Return the readable topics of a kind."""
-        return [t for t in self.topics if self.usages[t.name].kind == kind and self.usages[t.name].problem is None]
+        """Return the readable topics of a kind; those that an export added repeat others, and are used only if named."""
+        usable = [t for t in self.topics if self.usages[t.name].kind == kind and self.usages[t.name].problem is None]
+        return [t for t in usable if not t.name.startswith(_ADDED_BY_EXPORT)]
 
     def list_topics(self) -> str:
         """List all topics with their types, for a message."""

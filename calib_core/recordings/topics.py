@@ -224,6 +224,11 @@ def join_topics(
 
 
 def _join(name: str, parts: tuple[tuple[Source, Channel], ...]) -> Topic:
+    if len(parts) == 1:  # of one file: in order already, and without copies, for there may be millions
+        source, channel = parts[0]
+        index = source.index(channel.id)
+        part = np.zeros(len(index), dtype=np.int64)
+        return Topic(name, parts, part, index.receive_ns, index.chunk, index.offset)
     columns: list[np.ndarray] = []
     seen: dict[int, np.ndarray] = {}
     repeated = 0

@@ -55,10 +55,12 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_wheel_contains_the_page_and_the_sample(wheel: Path) -> None:
+def test_the_wheel_contains_the_page_the_sample_and_the_code_of_the_pack(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {"app/static/index.html", "app/sample_data/rooftop/radar.bag", "app/sample_data/rooftop/camera.bag"} <= names
     assert "calib_core/interchange/published/calibration-1.schema.json" in names
+    delivered = "calib_core/interchange/formats/pack/delivered"
+    assert {f"{delivered}/{name}" for name in ("selftest.cpp", "selftest.py", "radar_correction.hpp")} <= names
     assert {"app/py.typed", "calib_core/py.typed"} <= names
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {
         "app",
@@ -134,7 +136,7 @@ def test_the_installed_command_serves_its_page(installed: Path, tmp_path: Path) 
         server.communicate()
 
 
-def test_the_installed_command_solves_its_sample(installed: Path, tmp_path: Path) -> None:
+def test_the_installed_command_solves_its_sample_and_packs_it(installed: Path, tmp_path: Path) -> None:
     code = "from app import resources; print(resources.sample_folder() / 'rooftop')"
     sample = Path(
         subprocess.run(
@@ -159,3 +161,6 @@ def test_the_installed_command_solves_its_sample(installed: Path, tmp_path: Path
     )
     assert done.returncode == 0, done.stderr
     assert json.loads(out.read_text())["schema"] == "cocalib/calibration-1"
+    command = [installed / "bin" / "cocalib", "export", out, "--to", "pack", "--out", tmp_path / "pack"]
+    assert subprocess.run(command, cwd=tmp_path, capture_output=True).returncode == 0
+    assert subprocess.run([sys.executable, "-I", "-S", tmp_path / "pack" / "selftest.py"]).returncode == 0

@@ -2,6 +2,7 @@
 
 import json
 import re
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,7 @@ def test_the_text_shown_is_the_file_that_is_saved_and_it_is_the_calibration(solv
         assert check(read_any_file(path), against=reference).ok, form.name
         shown = solved.value(f"document.querySelector('{DIALOG} .text').textContent")
         data = path.read_bytes()
-        if data.startswith((b"PK", b"MATLAB")):
+        if data.startswith((b"PK", b"MATLAB", b"\x89MCAP")):
             assert "binary" in solved.text(f"{DIALOG} .what")
             assert "camera" in shown
         else:
@@ -223,7 +224,7 @@ def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_with_a_re
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("x: 3.5")
 
 
-def test_a_format_that_cannot_store_distortion_is_refused_until_the_pictures_are_declared_rectified(
+def test_a_format_that_cannot_store_distortion_comes_with_maps_until_the_pictures_are_declared_rectified(
     solved: Driver, tmp_path: Path
 ) -> None:
     page = solved.page
@@ -232,10 +233,11 @@ def test_a_format_that_cannot_store_distortion_is_refused_until_the_pictures_are
     expect(page.locator(RECTIFIED)).to_be_hidden()
     for name in ("kitti", "nuscenes"):
         page.click(f'{DIALOG} [data-export="{name}"]')
-        expect(page.locator(f"{DIALOG} .reason")).to_contain_text(f"The format {name} stores a camera matrix")
-        expect(page.locator(f"{DIALOG} .reason")).to_contain_text("opencv or numpy")
-        expect(page.locator(f"{DIALOG} .first")).to_be_disabled()
+        expect(page.locator(f"{DIALOG} .notes")).to_contain_text("the maps in rectification.npz")
+        solved.until(f"document.querySelector('{DIALOG} .name input').value.endsWith('_and_maps.zip')")
         expect(page.locator(RECTIFIED)).not_to_be_checked()
+        with zipfile.ZipFile(saved(solved, tmp_path)) as archive:
+            assert archive.namelist() == [format_named(name).file_name, "rectification.npz"]
 
     for _ in range(4):
         page.keyboard.press("Tab")
@@ -256,8 +258,7 @@ def test_a_format_that_cannot_store_distortion_is_refused_until_the_pictures_are
     page.click(f'{DIALOG} [data-export="kitti"]')
     expect(page.locator(RECTIFIED)).to_be_checked()
     page.uncheck(RECTIFIED)
-    expect(page.locator(f"{DIALOG} .reason")).to_contain_text("not the distortion of this")
-    expect(page.locator(f"{DIALOG} .first")).to_be_disabled()
+    expect(page.locator(f"{DIALOG} .notes")).to_contain_text("the maps in rectification.npz")
 
 
 def test_a_keyboard_is_enough_and_stays_in_the_panel(solved: Driver) -> None:

@@ -17,7 +17,11 @@ from app.cli import demo
 from app.cli.serving_flags import ServingFlags
 from app.opening import Choice, Serving
 from calib_core.geometry import rotation_angle_rad
+from calib_core.interchange import read_calibration
 from tests.cli.conftest import Made
+from tests.corpus_calibrations.data_sets import DATA_SETS
+from tests.corpus_calibrations.tools import TOOLS
+from tests.corpus_calibrations.truth import CAMERA_FROM_RADAR, SIZE
 
 Cocalib = Callable[..., Any]
 
@@ -217,6 +221,43 @@ def test_import_converts_another_tools_file_to_a_calibration(
     assert "0 deg apart" in checked.out
 
 
+def test_import_takes_the_image_size_for_a_lens_without_one_and_the_file_beside_a_kitti_calibration(
+    cocalib: Cocalib, tmp_path: Path
+) -> None:
+    files = {file.name: file for file in (*TOOLS, *DATA_SETS)}
+    for name in ("koide3", "Scale frame", "Segments.ai", "KITTI odometry", "KITTI raw"):
+        folder, file = tmp_path / name, files[name]
+        folder.mkdir()
+        for path, content in {**file.beside, file.file_name: file.content}.items():
+            (folder / path).write_text(str(content), encoding="utf-8")
+        out = folder / "calibration.json"
+        has_size = "size" in file.holds_camera
+        if not has_size:
+            refused = cocalib("import", folder / file.file_name, "--out", out)
+            assert "give it with --image-size WIDTH HEIGHT" in refused.err
+        size = [] if has_size else ["--image-size", *map(str, SIZE)]
+        assert cocalib("import", folder / file.file_name, "--out", out, *size).code == 0
+        written = read_calibration(out.read_text(encoding="utf-8")).calibration
+        np.testing.assert_allclose(written.camera_from_radar.as_matrix(), CAMERA_FROM_RADAR, atol=1e-6)
+        assert (written.camera.width_px, written.camera.height_px) == SIZE
+        assert len(written.camera.distortion) == (5 if "lens" in file.holds_camera else 0)
+
+
+def test_camera_info_is_exported_and_read_by_the_camera_option(
+    cocalib: Cocalib, calibration: Path, tmp_path: Path
+) -> None:
+    info, back = tmp_path / "camera_info.yaml", tmp_path / "back.json"
+    written = cocalib("export", calibration, "--to", "camera-info", "--out", info)
+    assert written.code == 0
+    assert "contains the camera only, without the pose" in written.err
+    assert "no pose of a camera and a radar in it" in cocalib("check", info).err
+    tf2 = tmp_path / "tf.sh"
+    assert cocalib("export", calibration, "--to", "tf2", "--out", tf2).code == 0
+    assert cocalib("import", tf2, "--camera", info, "--out", back).code == 0
+    cameras = [read_calibration(path.read_text()).calibration.camera for path in (calibration, back)]
+    assert np.array_equal(cameras[0].matrix_px, cameras[1].matrix_px)
+
+
 def test_import_takes_the_camera_matrix_of_a_kitti_calibration(
     cocalib: Cocalib, calibration: Path, tmp_path: Path
 ) -> None:
@@ -239,17 +280,23 @@ def test_import_takes_the_camera_matrix_of_a_kitti_calibration(
     np.testing.assert_allclose(np.ravel(cameras[0]["matrix_px"])[[0, 2]], [float(written[0]), float(written[2])])
 
 
-def test_a_format_without_a_place_for_distortion_requires_rectified_pictures(
+def test_a_format_without_a_place_for_distortion_is_written_for_rectified_pictures_with_the_maps_beside_it(
     cocalib: Cocalib, calibration: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "calib.txt"
-    refused = cocalib("export", calibration, "--to", "kitti", "--out", out)
+    refused = cocalib("export", calibration, "--to", "kitti")
     assert refused.code == 2
-    assert "kitti stores a camera matrix but not the distortion of this plumb_bob lens" in refused.err
-    assert "opencv or numpy" in refused.err
-    assert "--rectified" in refused.err
-    assert len(refused.err.splitlines()) == 1
-    assert not out.exists()
+    assert "kitti comes with rectification.npz and needs a file or folder: --out calib.txt" in refused.err
+    written = cocalib("export", calibration, "--to", "kitti", "--out", out)
+    assert written.code == 0
+    assert f"written to {tmp_path / 'rectification.npz'}" in written.out
+    assert "make them with the maps in rectification.npz" in written.err
+    assert "say so with --rectified" in written.err
+    assert cocalib("check", out, "--against", calibration).code == 0
+    with np.load(tmp_path / "rectification.npz") as maps:
+        matrix_px = maps["K_new"]
+        assert maps["map_x"].shape == tuple(maps["image_size_px"][::-1])
+    assert f"P2: {float(matrix_px[0, 0])!r} " in out.read_text()
 
     written = cocalib("export", calibration, "--to", "kitti", "--rectified", "--out", out)
     assert written.code == 0

@@ -12,6 +12,7 @@ from app.view import view
 from app.web.messages.incoming import CursorMoved, FrameWanted, Hello, ImportWanted, ViewpointWanted, parse
 from app.web.port import guard
 from app.web.port.admissions import Admissions
+from calib_core.deployment.recorded_frames import read_frames
 from calib_core.errors import CalibrationError
 from calib_core.interchange import (
     FORMATS,
@@ -24,8 +25,9 @@ from calib_core.interchange import (
     read_pairs,
 )
 from calib_core.measurements import TimeNs
-from calib_core.recordings import describe, first_picture, inspect_recording
+from calib_core.recordings import Recording, describe, first_picture, inspect_recording
 from calib_core.recordings.column_map import parse_column_map
+from calib_core.recordings.containers.copying import Losses, copied_file
 from calib_core.recordings.messages.decoding import decode
 from calib_core.recordings.messages.definitions import parse_definition
 from calib_core.recordings.radar.axes import parse_radar_axes
@@ -54,6 +56,18 @@ def _read_everything(path: Path) -> None:
         for index in range(len(recording.image_times)):
             _swallow(lambda index=index: recording.image_bytes(index))
         describe(recording)
+        _swallow(lambda: _copy(recording))
+
+
+def _copy(recording: Recording) -> None:
+    """Read a recording as an export into it does."""
+    read_frames(recording)
+    for source in recording.sources:
+        file = copied_file(source)
+        if file is not None:
+            rows = {channel.id: source.index(channel.id) for channel in source.channels}
+            for _ in file.messages(rows, Losses()):
+                pass
 
 
 def _swallow(call: Callable[[], object]) -> None:

@@ -1,4 +1,6 @@
-"""Our files in the hands of readers that are not ours: xacro, pytransform3d, pyquaternion, PyYAML, SciPy, OpenCV, COLMAP."""
+"""Our files in the hands of readers that are not ours.
+
+xacro, pytransform3d, pyquaternion, PyYAML, SciPy, OpenCV, COLMAP, MCAP, Foxglove."""
 
 import io
 import json
@@ -7,10 +9,14 @@ import zipfile
 from pathlib import Path
 
 import cv2
+import jsonschema
 import numpy as np
 import pytest
 import xacro
 import yaml
+from foxglove.messages import CameraCalibration, FrameTransform, FrameTransforms, Timestamp, Vector3
+from foxglove.messages import Quaternion as FoxgloveQuaternion
+from mcap.reader import make_reader
 from pyquaternion import Quaternion
 from pytransform3d.rotations import check_matrix, matrix_from_quaternion
 from pytransform3d.transformations import transform_from
@@ -120,7 +126,8 @@ def test_xacro_takes_the_urdf_into_a_vehicle_and_pytransform3d_reads_what_comes_
 def test_nuscenes_records_carry_a_radar_point_into_the_image_as_the_devkit_does(file, expected_m):
     """The devkit's documented steps: rotate and translate into the ego frame by the radar's record, undo the camera's."""
     ego_from_radar = parent_pose([3.4, 0.0, 0.5, 0.0, 0.0, np.sin(0.1), np.cos(0.1)])
-    radar, camera = json.loads(export(file, "nuscenes", parent_from_radar=ego_from_radar, rectified=True).data)
+    written = export(file, "nuscenes", parent_from_radar=ego_from_radar, rectified=True).data
+    radar, camera = json.loads(zipfile.ZipFile(io.BytesIO(written)).read("calibrated_sensor.json"))
     point = Quaternion(radar["rotation"]).rotation_matrix @ POINT_RADAR_M + np.array(radar["translation"])
     point = Quaternion(camera["rotation"]).rotation_matrix.T @ (point - np.array(camera["translation"]))
     np.testing.assert_allclose(point, expected_m, **CLOSE)
@@ -132,8 +139,45 @@ def test_nuscenes_records_carry_a_radar_point_into_the_image_as_the_devkit_does(
     np.testing.assert_allclose(pixel[:2] / pixel[2], undistorted.ravel(), **CLOSE)
 
 
+def published_by(data: bytes) -> dict[str, dict]:
+    """Return the messages of an MCAP file by their type, each valid against its own schema, as MCAP's reader gives them."""
+    found = {}
+    for schema, channel, message in make_reader(io.BytesIO(data), validate_crcs=True).iter_messages():
+        assert schema is not None
+        assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+        found[schema.name] = json.loads(message.data)
+        jsonschema.validate(found[schema.name], json.loads(schema.data))
+    return found
+
+
+def test_foxglove_s_own_types_take_every_field_of_the_messages(file):
+    found = published_by(export(file, "foxglove").data)
+    (transform,), camera = found["foxglove.FrameTransforms"]["transforms"], found["foxglove.CameraCalibration"]
+    time, turn, shift = (transform.pop(key) for key in ("timestamp", "rotation", "translation"))
+    at = Timestamp(**time)
+    FrameTransforms(
+        transforms=[
+            FrameTransform(timestamp=at, rotation=FoxgloveQuaternion(**turn), translation=Vector3(**shift), **transform)
+        ]
+    ).encode()
+    CameraCalibration(**{**camera, "timestamp": at}).encode()
+
+
+def test_mcap_s_reader_finds_the_statement_and_agrees_with_the_summary(file):
+    reader = make_reader(io.BytesIO(export(file, "foxglove").data), validate_crcs=True)
+    (metadata,) = reader.iter_metadata()
+    summary = reader.get_summary()
+    assert metadata.name == "cocalib"
+    assert "p_camera = R p_radar + t" in metadata.metadata["statement"]
+    assert summary is not None
+    assert summary.statistics is not None
+    assert {channel.topic for channel in summary.channels.values()} == {"/tf_static", "/camera_calibration"}
+    assert (summary.statistics.message_count, summary.statistics.metadata_count) == (2, 1)
+    assert sum(1 for _ in reader.iter_messages(topics="/tf_static")) == 1  # by the chunk's index
+
+
 def test_foxglove_s_transform_is_the_pose_of_the_child_with_the_quaternion_s_parts_named(file, expected_m):
-    message = json.loads(text_of(file, "foxglove"))["FrameTransform"]
+    (message,) = published_by(export(file, "foxglove").data)["foxglove.FrameTransforms"]["transforms"]
     rotation = Quaternion(**message["rotation"]).rotation_matrix
     pose = transform_from(rotation, [message["translation"][axis] for axis in "xyz"])
     np.testing.assert_allclose(into_camera(pose), expected_m, **CLOSE)
@@ -190,7 +234,10 @@ def test_a_rig_is_read_as_its_other_readers_do(file, expected_m):
     ("change", "words"),
     [
         (lambda rig: rig["rig"]["sensors"].pop(), "1 radars and 0 cameras"),
-        (lambda rig: rig["rig"]["sensors"][1].update(correction_rig_T=[0, 0, 0.3]), "correction_rig_T is not zero"),
+        (
+            lambda rig: rig["rig"]["sensors"][1].update(correction_sensor_T=[0, 0, 0.3]),
+            "correction_sensor_T is not zero",
+        ),
         (lambda rig: rig["rig"]["sensors"][1].pop("nominalSensor2Rig_FLU"), "no nominalSensor2Rig_FLU"),
     ],
 )

@@ -112,7 +112,7 @@ def test_a_pose_reads_back_from_every_format(name, pose, camera, frames):
     np.testing.assert_allclose(again.camera_from_radar.as_matrix(), pose.as_matrix(), rtol=0, atol=1e-9)
     known = next(known for known in FORMATS if known.name == name)
     if known.comment != "none":
-        assert again.frames == frames
+        assert again.frames == (None if known.comment == "numbers" else frames)
         assert check(again, camera=camera).ok
     if again.camera is not None:
         point = np.array([[0.2, -0.1, 3.0]])

@@ -28,6 +28,7 @@ from calib_core.interchange import (
 )
 from calib_core.interchange.calibration_file import choose_check_point
 from calib_core.interchange.check.slips import undone_slips
+from calib_core.interchange.syntax.mcap_file import MCAP_MAGIC, load_mcap, mcap_bytes
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration, Metrics
@@ -107,11 +108,25 @@ def with_check_point_of(right: bytes, wrong: bytes) -> bytes:
     """Return the wrong file with the check point that the right one states."""
     if right.startswith(b"PK"):
         members = unpack(right, source="right")
+        if "SHA256SUMS" in members:  # a pack states its check point in calibration.json, as json does
+            return wrong
         return pack(
             {name: with_check_point_of(members[name], data) for name, data in unpack(wrong, source="wrong").items()}
         )
-    stated = re.search(rb"check point: .* px", right)
-    return re.sub(rb"check point: .* px", stated[0].replace(b"\\", b"\\\\"), wrong) if stated else wrong
+    if right.startswith(b"MATLAB"):
+        return wrong  # whose keys have the point and the pixel of the right one
+    if right.startswith(MCAP_MAGIC):
+        stated, changed = (load_mcap(data, source="mcap") for data in (right, wrong))
+        assert stated is not None
+        assert changed is not None
+        return mcap_bytes(dataclasses.replace(changed, metadata=stated.metadata))
+    if b"camera_intrinsic" in right:
+        (_, stated_camera), (radar, camera) = json.loads(right), json.loads(wrong)
+        return json.dumps([radar, {**camera, "cocalib": stated_camera["cocalib"]}]).encode()
+    if found := re.search(rb"cocalib_check_point: .*\n", right):
+        return re.sub(rb"cocalib_check_point: .*\n", b"", wrong) + found[0]
+    found = re.search(rb"check point: .* px", right)
+    return re.sub(rb"check point: .* px", found[0].replace(b"\\", b"\\\\"), wrong) if found else wrong
 
 
 def planted(file: CalibrationFile, name: str, slip: Callable[[np.ndarray, WrittenPose], np.ndarray]) -> bytes:

@@ -23,7 +23,6 @@ from calib_core.interchange import (
     read_any,
 )
 from calib_core.interchange.evidence import Evidence
-from calib_core.interchange.syntax.zip_archives import pack
 from calib_core.results import DataWarning
 
 __all__ = ["ExportPreview", "FormatRow", "NoPreview", "export_preview", "exported", "format_rows"]
@@ -47,7 +46,7 @@ class ExportPreview:
         size_bytes: of the file.
         numbers: what the file's numbers mean.
         notes: what a user of the file must know.
-        is_for_rectified: it is written only because the user stated that the pictures are rectified.
+        is_for_rectified: it is for rectified pictures: those that the user declared rectified, or those that its maps make.
         pose: the pose in the file, as read back: its direction, its frames and its numbers; None if it holds none.
         our_pose: camera_from_radar of the calibration.
         check_point: what a reader of the file must get; None if the calibration has none, or the file no pose.
@@ -96,13 +95,13 @@ class NoPreview:
 
 
 def exported(file: CalibrationFile, key: str, query: str) -> Export:
-    """Write a calibration in a format, with what the user filled in, from a URL's query; a zip if it is several files.
+    """Write a calibration in a format, with what the user filled in, from a URL's query.
 
     Raises:
         FieldError: a field cannot be used, or the format needs it.
         InputError: the format cannot hold this calibration, or has no third frame.
     """
-    return _as_one_file(_exported(file, key, fields_in(query, file.frames)))
+    return _exported(file, key, fields_in(query, file.frames))
 
 
 def export_preview(file: CalibrationFile, key: str, query: str, recording_name: str) -> ExportPreview:
@@ -123,13 +122,13 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
     named = replace(file, frames=fields.frames)
     whole = imported(named)
     report = check(read_any(written.data, written.file_name) if form.reads else whole, against=whole)
-    saved = _as_one_file(written)
+    saved = written.download
     lost = () if form.holds_angle_map else missing_map(file.calibration)
     return ExportPreview(
         key=key,
         file_name=f"{_slug(recording_name)}_{saved.file_name}",
         text=contents_text(written),
-        is_binary=isinstance(written.content, bytes),
+        is_binary=isinstance(written.content, bytes) or bool(written.extra_files),
         size_bytes=len(saved.data),
         numbers=sentence(form.numbers),
         notes=tuple(sentence(note) for note in written.notes if note not in lost),
@@ -164,14 +163,6 @@ def _exported(file: CalibrationFile, key: str, fields: Fields) -> Export:
         if form.is_for_rectified and file.calibration.camera.is_distorted and not fields.rectified:
             raise FieldError("rectified", str(error)) from None
         raise
-
-
-def _as_one_file(written: Export) -> Export:
-    """Pack a file and those that belong to it into one zip; return a file alone as it is."""
-    if not written.extra_files:
-        return written
-    members = {written.file_name: written.data, **dict(written.extra_files)}
-    return replace(written, file_name=f"{Path(written.file_name).stem}.zip", content=pack(members), extra_files=())
 
 
 def _evidence(file: CalibrationFile) -> str:

@@ -110,12 +110,14 @@ class SessionOffer:
         clicks: how many it has.
         recording: what its recording was called.
         continues: whether it can be continued: it has the frames of this recording.
+        plan: what is chosen unless the user chooses otherwise.
     """
 
     folder: str = ""
     clicks: int = 0
     recording: str = ""
     continues: bool = False
+    plan: SessionPlan = "continue"
 
 
 @dataclass(frozen=True, slots=True)

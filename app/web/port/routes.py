@@ -187,7 +187,7 @@ class _Downloads:
 
     def _export(self, name: str, query: str) -> Reply:
         def make(text: str) -> Reply:
-            written = exported(_file_of(text), name, query)
+            written = exported(_file_of(text), name, query).download
             return _download(written.data, written.file_name)
 
         return self._of_calibration(make)

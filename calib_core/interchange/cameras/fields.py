@@ -15,7 +15,7 @@ from calib_core.interchange.syntax.strict_json import checked
 from calib_core.lens_models.naming import lenses_named, opencv_lens
 from calib_core.lens_models.registry import LENS_MODELS
 
-__all__ = ["FoundCamera", "find_cameras", "floats"]
+__all__ = ["FoundCamera", "find_cameras", "floats", "lens_model_named"]
 
 _MATRIX_KEYS = {  # key of the camera matrix -> keys of the distortion
     "camera_matrix": ("distortion_coefficients", "dist_coeffs", "distortion_coeffs", "dist_coeff"),
@@ -59,11 +59,19 @@ class FoundCamera:
             raise InputError(
                 f"{source}: {self.name}: the image size is missing; add image_width and image_height to the file"
             )
-        model, distortion = _lens(self.model, self.distortion, source=source, name=self.name)
+        model, distortion = self.lens(source=source)
         try:
             return Camera(model, *size, np.reshape(self.matrix_px, (3, 3)), np.array(distortion))
         except ValueError as error:
             raise InputError(f"{source}: {self.name}: {error}; correct it or calibrate the camera again") from None
+
+    def lens(self, *, source: str) -> tuple[str, tuple[float, ...]]:
+        """Return the lens model and its coefficients.
+
+        Raises:
+            InputError: the model does not take that number of coefficients.
+        """
+        return _lens(self.model, self.distortion, source=source, name=self.name)
 
 
 def find_cameras(content: Mapping[str, Any], *, source: str) -> tuple[FoundCamera, ...]:
@@ -117,7 +125,7 @@ def _flat_camera(
     _refuse_crop(content, source=source)
     return FoundCamera(
         name=matrix_key,
-        model=_model(model, source=source),
+        model=lens_model_named(model, source=source),
         matrix_px=_matrix(content[matrix_key], source=source, place=matrix_key),
         distortion=floats(distortion, source=source, place=distortion_keys[0]),
         size_px=_size(content, source=source),
@@ -139,7 +147,7 @@ def _kalibr_camera(key: str, block: Mapping[str, Any], *, source: str) -> FoundC
         )
     return FoundCamera(
         name=key,
-        model=_model(str(block.get("distortion_model", "")), source=source),
+        model=lens_model_named(str(block.get("distortion_model", "")), source=source),
         matrix_px=(fu, 0.0, pu, 0.0, fv, pv, 0.0, 0.0, 1.0),
         distortion=floats(block.get("distortion_coeffs", ()), source=source, place=f"{key}.distortion_coeffs"),
         size_px=(int(size[0]), int(size[1])) if size else None,
@@ -156,7 +164,12 @@ def _refuse_crop(content: Mapping[str, Any], *, source: str) -> None:
         )
 
 
-def _model(name: str, *, source: str) -> str:
+def lens_model_named(name: str, *, source: str) -> str:
+    """Return our name for a lens model as a file names it; "" if the file does not.
+
+    Raises:
+        InputError: it is not supported.
+    """
     if not name:
         return ""
     models = {known: lens.name for lens in LENS_MODELS.values() for known in lens.names_in_files}

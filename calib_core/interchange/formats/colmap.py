@@ -8,7 +8,7 @@ from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
+from calib_core.interchange.formats.statement import hash_comment, statement, with_statement
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.content import Content
@@ -74,13 +74,12 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         raise InputError(f"{source}: images.txt: contains {count} images; keep only the intended one")
     image, camera = _first_line(text), _first_line(members["cameras.txt"].decode("utf-8", errors="replace"))
     numbers = floats(image[1:8], source=source, place="images.txt", length=7)
-    return ImportedCalibration(
+    found = ImportedCalibration(
         "colmap",
         WrittenPose("quaternion_wxyz", np.array(numbers[:4]), np.array(numbers[4:]), "camera_from_radar"),
         camera=_camera(camera, source=source),
-        frames=stated_frames(text),
-        check_point=stated_check_point(text),
-    ).checked(source)
+    )
+    return with_statement(found, text).checked(source)
 
 
 def _first_line(text: str) -> list[str]:

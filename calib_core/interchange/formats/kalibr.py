@@ -11,12 +11,16 @@ from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.own.camera_document import refuse_skew
+from calib_core.interchange.rotations import upper_rows
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
-from calib_core.lens_models.naming import written_lens
+from calib_core.lens_models.naming import WrittenLens, written_lens
 
 __all__ = ["KALIBR"]
 
+_NO_DISTORTION = "none"
+_NO_DISTORTION_AS_LOADED = WrittenLens("radtan", (0.0, 0.0, 0.0, 0.0))
+"""Kalibr names the model "none", but its reader makes no pinhole camera of it."""
 _NOTES = ("T_cam_radar is our own key; Kalibr has none for radars",)
 
 
@@ -30,6 +34,8 @@ def _write(file: CalibrationFile) -> str:
     camera = calibration.camera
     refuse_skew(camera, "Kalibr's pinhole model has")
     lens = written_lens(camera.lens, camera.distortion, "kalibr")
+    if lens.name == _NO_DISTORTION:
+        lens = _NO_DISTORTION_AS_LOADED
     k = camera.matrix_px
     rows = "".join(f"  - [{numbers_text(row)}]\n" for row in calibration.camera_from_radar.as_matrix())
     meaning = (
@@ -63,11 +69,14 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             f"{source}: T_cam_radar appears in {key}, {', '.join(map(str, others))}; keep only the intended camera"
         )
     matrix = floats(chain[key]["T_cam_radar"], source=source, place=f"{key}.T_cam_radar", length=16)
-    rows = np.reshape(matrix, (4, 4))
+    try:
+        rows = upper_rows(np.reshape(matrix, (4, 4)))
+    except ValueError as error:
+        raise InputError(f"{source}: {key}.T_cam_radar: {error}; correct it") from None
     cameras = find_cameras({key: chain[key]}, source=source) if "intrinsics" in chain[key] else ()
     return ImportedCalibration(
         "kalibr",
-        WrittenPose("matrix", rows[:3, :3], rows[:3, 3], "camera_from_radar"),
+        WrittenPose("matrix", rows[:, :3], rows[:, 3], "camera_from_radar"),
         camera=cameras[0].camera(image_size_px=None, source=source) if cameras else None,
         frames=stated_frames(content.text),
         check_point=stated_check_point(content.text),

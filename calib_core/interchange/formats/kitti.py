@@ -5,8 +5,10 @@ import numpy as np
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.evidence import EVIDENCE_LEVELS, Evidence
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.imported import ImportedCalibration, WrittenPose
+from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
+from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
@@ -14,14 +16,17 @@ __all__ = ["KITTI"]
 
 _NOTES = (
     "Tr_velo_to_cam maps radar points to the camera frame: p_camera = R p_radar + t (as in View-of-Delft)",
-    "a comment would break KITTI readers, so the check point is only in calibration.json",
+    "a comment would break KITTI readers, so the check point, the evidence and the calibration's hash are numbers in "
+    "lines of their own after KITTI's seven, explained in docs/formats.md",
 )
+_SHA256_BYTES, _BYTE_DIGITS = 32, 3
 _ASSUMPTION = "the format names no frames and assumes undistorted images"
+_CHECK_POINT, _EVIDENCE, _SHA256 = "cocalib_check_point", "cocalib_evidence", "cocalib_calibration_sha256"
 _POSE_KEYS = ("Tr_velo_to_cam", "Tr_radar_to_cam", "Tr_velo_cam")
 
 
 def _write(file: CalibrationFile) -> str:
-    """Write the seven lines of KITTI's object calibration, in the order that some readers rely on."""
+    """Write the seven lines of KITTI's object calibration, in the order that some readers rely on, then our own."""
     calibration = file.calibration
     projection = numbers_text(np.hstack([calibration.camera.matrix_px, np.zeros((3, 1))]).ravel(), " ")
     identity = numbers_text(np.eye(3, 4).ravel(), " ")
@@ -30,7 +35,21 @@ def _write(file: CalibrationFile) -> str:
         "".join(f"P{index}: {projection}\n" for index in range(4))
         + f"R0_rect: {numbers_text(np.eye(3).ravel(), ' ')}\n"
         + f"Tr_velo_to_cam: {pose}\nTr_imu_to_velo: {identity}\n"
+        + "".join(f"{key}: {numbers}\n" for key, numbers in _stated_numbers(file).items())
     )
+
+
+def _stated_numbers(file: CalibrationFile) -> dict[str, str]:
+    """Return what the file states as numbers, because readers convert the values of every key: p_radar, p_camera and the
+    rectified pixel of the check point; the number of the evidence level; the bytes of the calibration's SHA-256."""
+    stated = {}
+    check = file.check_point
+    if check is not None:
+        point_camera_m = (file.calibration.camera_from_radar @ check.radar_m[None])[0]
+        stated[_CHECK_POINT] = numbers_text((*check.radar_m, *point_camera_m, *check.pixel_px), " ")
+    stated[_EVIDENCE] = str(EVIDENCE_LEVELS.index(file.rests_on))
+    stated[_SHA256] = " ".join(map(str, bytes.fromhex(calibration_sha256(file))))
+    return stated
 
 
 def _recognizes(content: Content) -> bool:
@@ -43,10 +62,12 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     Raises:
         InputError: a line is missing or has too few or too many numbers.
     """
-    lines = dict(line.split(":", 1) for line in content.text.splitlines() if ":" in line and not line.startswith("#"))
-    key = next((key for key in _POSE_KEYS if key in lines), None)
-    if key is None:
+    lines = _values_by_key(content, source=source)
+    key, *others = [key for key in _POSE_KEYS if key in lines] or [""]
+    if not key:
         raise InputError(f"{source}: no Tr_velo_to_cam in it; add that line")
+    if others:
+        raise InputError(f"{source}: both {key} and {others[0]} are in it; keep only the radar's")
     pose = np.reshape(floats(lines[key].split(), source=source, place=key, length=12), (3, 4))
     notes = []
     rectified = "R0_rect" in lines
@@ -63,9 +84,53 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             pose = pose + np.column_stack([np.zeros((3, 3)), _offset_m(projection, source=source)])
             notes.append("the offset in P2 was applied; the camera is the one of image_2")
     written = WrittenPose("matrix", pose[:, :3], pose[:, 3], "camera_from_radar")
+    check_point = _check_point(lines, source=source)
     return ImportedCalibration(
-        "kitti", written, assumptions=(_ASSUMPTION,), notes=tuple(notes), matrix_px=matrix_px
+        "kitti",
+        written,
+        assumptions=() if check_point else (_ASSUMPTION,),
+        notes=tuple(notes),
+        matrix_px=matrix_px,
+        check_point=check_point,
+        evidence=_evidence(lines.get(_EVIDENCE, "")),
+        calibration_sha256=_sha256(lines.get(_SHA256, "")),
     ).checked(source)
+
+
+def _check_point(lines: dict[str, str], *, source: str) -> StatedCheckPoint | None:
+    if _CHECK_POINT not in lines:
+        return None
+    numbers = np.array(floats(lines[_CHECK_POINT].split(), source=source, place=_CHECK_POINT, length=8))
+    return StatedCheckPoint(numbers[:3], numbers[3:6])  # the pixel is one of the rectified picture
+
+
+def _evidence(value: str) -> Evidence | None:
+    return next((level for number, level in enumerate(EVIDENCE_LEVELS) if value.strip() == str(number)), None)
+
+
+def _sha256(value: str) -> str | None:
+    words = value.split()
+    numbers = [int(word) for word in words if word.isascii() and word.isdigit() and len(word) <= _BYTE_DIGITS]
+    if len(words) != _SHA256_BYTES or len(numbers) != _SHA256_BYTES or max(numbers) > 255:
+        return None
+    return bytes(numbers).hex()
+
+
+def _values_by_key(content: Content, *, source: str) -> dict[str, str]:
+    """Return what follows each key.
+
+    Raises:
+        InputError: a key appears twice, so that readers disagree on which line counts.
+    """
+    values: dict[str, str] = {}
+    for line in content.text.splitlines():
+        key, colon, value = line.partition(":")
+        if not colon or line.startswith("#"):
+            continue
+        if key in values:
+            raise InputError(f"{source}: {key} appears twice; keep only the intended line")
+        values[key] = value
+    return values
 
 
 def _offset_m(projection: np.ndarray, *, source: str) -> np.ndarray:
@@ -89,7 +154,7 @@ KITTI = Format(
     numbers="Tr_velo_to_cam carries radar points into the camera; images undistorted",
     file_name="calib.txt",
     camera="matrix",
-    comment="none",
+    comment="numbers",
     notes=_NOTES,
     write=_write,
     reads=Reads(_recognizes, _read),

@@ -1,4 +1,4 @@
-"""nuScenes' calibrated_sensor.json: each sensor's pose in the ego frame, for rectified images."""
+"""nuScenes' sensor.json and calibrated_sensor.json: each sensor's pose in the ego frame, for rectified images."""
 
 import hashlib
 from collections.abc import Mapping
@@ -12,40 +12,57 @@ from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_lines, statement, with_statement
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
-from calib_core.interchange.syntax.content import Content
+from calib_core.interchange.syntax.content import Content, decoded
 from calib_core.interchange.syntax.json_text import json_text
+from calib_core.interchange.syntax.strict_json import json_value
+from calib_core.interchange.syntax.zip_archives import pack
 
 __all__ = ["NUSCENES"]
 
 _NOTES = (
     "translation and rotation (w x y z) are the sensor's pose in the ego frame, camera optical; "
     "the ego frame is the radar frame unless parent_from_radar places the radar elsewhere",
-    "tokens are derived from the frame names; replace them with yours; JSON has no comments, so the check point is only in "
-    "calibration.json",
+    "unpack it into the folder of the tables; tokens are derived from the frame names: replace them with yours",
 )
+_SENSORS, _CALIBRATED = "sensor.json", "calibrated_sensor.json"
 
 
-def _write(file: CalibrationFile) -> str:
-    """Write calibrated_sensor.json with the radar frame as the ego frame."""
+def _write(file: CalibrationFile) -> bytes:
+    """Write the two tables with the radar frame as the ego frame."""
     return _write_in_ego(file, RigidTransform.identity())
 
 
-def _write_in_ego(file: CalibrationFile, ego_from_radar: RigidTransform) -> str:
-    """Write calibrated_sensor.json: one record for the radar and one for the camera, each posed in the ego frame."""
-    calibration = file.calibration
+def _write_in_ego(file: CalibrationFile, ego_from_radar: RigidTransform) -> bytes:
+    """Write the two tables, zipped: what each sensor is, and its pose in the ego frame."""
+    calibration, frames = file.calibration, file.frames
     ego_from_camera = ego_from_radar @ calibration.camera_from_radar.inverse()
-    records = [
-        _record(file.frames.radar, ego_from_radar, None),
-        _record(file.frames.camera, ego_from_camera, calibration.camera),
-    ]
-    return json_text(records)
+    meaning = (
+        "translation and rotation (w x y z) are the sensor's pose in the ego frame; "
+        "camera_intrinsic is for rectified pictures"
+    )
+    camera = _record(frames.camera, ego_from_camera, calibration.camera)
+    camera[STATEMENT_KEY] = list(statement(file, meaning, rectified=True))
+    tables = {
+        _SENSORS: [_sensor(frames.radar, "radar"), _sensor(frames.camera, "camera")],
+        _CALIBRATED: [_record(frames.radar, ego_from_radar, None), camera],
+    }
+    return pack({name: json_text(records).encode() for name, records in tables.items()})
+
+
+def _sensor(name: str, modality: str) -> dict[str, str]:
+    return {"token": _sensor_token(name), "channel": name, "modality": modality}
+
+
+def _sensor_token(name: str) -> str:
+    return hashlib.sha256(f"sensor {name}".encode()).hexdigest()[:32]
 
 
 def _record(name: str, ego_from_sensor: RigidTransform, camera: Camera | None) -> dict[str, Any]:
     return {
         "token": hashlib.sha256(f"calibrated_sensor {name}".encode()).hexdigest()[:32],
-        "sensor_token": hashlib.sha256(f"sensor {name}".encode()).hexdigest()[:32],
+        "sensor_token": _sensor_token(name),
         "translation": (ego_from_sensor.translation_m + 0.0).tolist(),
         "rotation": (quaternion_wxyz_from_matrix(ego_from_sensor.rotation) + 0.0).tolist(),
         "camera_intrinsic": [] if camera is None else camera.matrix_px.tolist(),
@@ -54,6 +71,8 @@ def _record(name: str, ego_from_sensor: RigidTransform, camera: Camera | None) -
 
 def _recognizes(content: Content) -> bool:
     one = content.json_mapping
+    if content.members:
+        return _member(content) is not None
     return (content.syntax == "json" and isinstance(content.value, list)) or (
         "rotation" in one and "camera_intrinsic" in one
     )
@@ -65,7 +84,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     Raises:
         InputError: not exactly one record with camera_intrinsic, or more than one without.
     """
-    records = content.value if isinstance(content.value, list) else [content.value]
+    value = _value(content, source=source)
+    records = value if isinstance(value, list) else [value]
     posed = [record for record in records if isinstance(record, Mapping) and "rotation" in record]
     cameras = [record for record in posed if record.get("camera_intrinsic")]
     radars = [record for record in posed if not record.get("camera_intrinsic")]
@@ -73,15 +93,14 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         raise InputError(
             f"{source}: {len(cameras)} records with camera_intrinsic and {len(radars)} without; keep one camera and one radar"
         )
-    camera_pose = _posed(cameras[0], source=source)
+    camera_pose, text = _posed(cameras[0], source=source), stated_lines(cameras[0].get(STATEMENT_KEY))
     matrix = floats(cameras[0]["camera_intrinsic"], source=source, place="camera_intrinsic", length=9)
     matrix_px = np.reshape(matrix, (3, 3))
     assumptions = ["the format names no frames and assumes undistorted images"]
     if not radars:
         assumptions.append("no radar record; assumed that the ego frame is the radar frame")
-        return ImportedCalibration(
-            "nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px
-        ).checked(source)
+        found = ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px)
+        return with_statement(found, text).checked(source)
     ego_from_radar = _posed(radars[0], source=source).as_written()
     if np.abs(ego_from_radar.as_matrix() - np.eye(4)).max() > 0:
         ego_from_camera = camera_pose.as_written()
@@ -89,9 +108,18 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         camera_pose = WrittenPose(
             "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"
         )
-    return ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px).checked(
-        source
-    )
+    found = ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px)
+    return with_statement(found, text).checked(source)
+
+
+def _member(content: Content) -> bytes | None:
+    """Return the table with the poses in a zip archive, in whichever folder it is."""
+    return next((data for name, data in content.members.items() if name.rsplit("/", 1)[-1] == _CALIBRATED), None)
+
+
+def _value(content: Content, *, source: str) -> Any:
+    member = _member(content)
+    return content.value if member is None else json_value(decoded(member, source=source), source=source)
 
 
 def _posed(record: Mapping[str, Any], *, source: str) -> WrittenPose:
@@ -104,13 +132,13 @@ def _posed(record: Mapping[str, Any], *, source: str) -> WrittenPose:
 
 NUSCENES = Format(
     name="nuscenes",
-    title="nuScenes calibrated_sensor",
+    title="nuScenes sensor and calibrated_sensor",
     used_in="Data sets and viewers",
     also="dataset devkit MMDetection3D",
     numbers="pose of each sensor in the ego frame, quaternion w x y z; images undistorted",
-    file_name="calibrated_sensor.json",
+    file_name="nuscenes.zip",
     camera="matrix",
-    comment="none",
+    comment="keys",
     notes=_NOTES,
     write=_write,
     write_in_parent=_write_in_ego,

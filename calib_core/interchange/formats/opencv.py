@@ -30,7 +30,11 @@ def _write(file: CalibrationFile) -> str:
     camera, pose = calibration.camera, calibration.camera_from_radar
     refuse_skew(camera, "OpenCV's camera models have")
     lens = written_lens(camera.lens, camera.distortion, "opencv")
-    meaning = "R and T carry radar points into the camera (as projectPoints and stereoCalibrate use them); rvec is R's"
+    function = f"cv::{(camera.lens.opencv or 'projectPoints').replace('.', '::')}"
+    meaning = (
+        f"R and T carry radar points into the camera, as {function} and stereoCalibrate use them; rvec is R's; "
+        f"the distortion coefficients are for {function}"
+    )
     check = file.check_point
     matrices = [
         ("camera_matrix", camera.matrix_px),
@@ -47,7 +51,7 @@ def _write(file: CalibrationFile) -> str:
         + f"equation: {quoted(EQUATION)}\n"
         + f"radar_frame: {quoted(file.frames.radar)}\ncamera_frame: {quoted(file.frames.camera)}\n"
         + f"image_width: {camera.width_px}\nimage_height: {camera.height_px}\n"
-        + f"distortion_model: {quoted(lens.name)}\n"
+        + f"distortion_model: {quoted(lens.name)}\nprojection_function: {quoted(function)}\n"
         + "".join(_matrix(key, matrix) for key, matrix in matrices)
     )
 

@@ -53,7 +53,11 @@ def _guarded(plugin: Plugin[Format]) -> Format:
         write=guard(added.write, (str, bytes)),
         write_in_parent=guard(added.write_in_parent, (str, bytes)),
         reads=reads
-        and Reads(_GuardedRecognizer(plugin.distribution, reads.recognizes), guard(reads.read, ImportedCalibration)),
+        and Reads(
+            _GuardedRecognizer(plugin.distribution, reads.recognizes),
+            guard(reads.read, ImportedCalibration),
+            reads.beside,
+        ),
     )
 
 

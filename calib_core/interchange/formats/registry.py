@@ -12,22 +12,40 @@ from calib_core.interchange.formats.arrays.text_matrix import MATRIX
 from calib_core.interchange.formats.autoware import AUTOWARE
 from calib_core.interchange.formats.colmap import COLMAP
 from calib_core.interchange.formats.driveworks import DRIVEWORKS
+from calib_core.interchange.formats.foreign.autoware_ai import AUTOWARE_AI
+from calib_core.interchange.formats.foreign.easy_handeye import EASY_HANDEYE
+from calib_core.interchange.formats.foreign.kitti_raw import KITTI_ODOMETRY, KITTI_RAW
+from calib_core.interchange.formats.foreign.koide3 import KOIDE3
+from calib_core.interchange.formats.foreign.labelling import SCALE, SEGMENTS
+from calib_core.interchange.formats.foreign.not_between_both import (
+    K_RADAR_CAMERA,
+    K_RADAR_OFFSET,
+    KALIBR_CHAIN,
+    KITTI_CAMERAS,
+)
+from calib_core.interchange.formats.foreign.openlabel import OPENLABEL
+from calib_core.interchange.formats.foreign.pjlab import PJLAB
+from calib_core.interchange.formats.foreign.tf_echo import TF_ECHO
+from calib_core.interchange.formats.foreign.tum_pose import TUM_POSE
 from calib_core.interchange.formats.foxglove import FOXGLOVE
 from calib_core.interchange.formats.kalibr import KALIBR
 from calib_core.interchange.formats.kitti import KITTI
 from calib_core.interchange.formats.nuscenes import NUSCENES
 from calib_core.interchange.formats.opencv import OPENCV
+from calib_core.interchange.formats.pack.deployment_pack import PACK
 from calib_core.interchange.formats.plugins import plugin_formats
+from calib_core.interchange.formats.ros.camera_info import CAMERA_INFO
 from calib_core.interchange.formats.ros.launch_files import TF1_LAUNCH, TF2_LAUNCH_PY, TF2_LAUNCH_XML
 from calib_core.interchange.formats.ros.tf2_command import TF2
 from calib_core.interchange.formats.ros.urdf import URDF
 from calib_core.interchange.own.calibration_format import CALIBRATION_1
 from calib_core.interchange.own.truth_json import TRUTH
 
-__all__ = ["FORMATS", "format_named", "readers", "written_formats"]
+__all__ = ["CAMERA_ONLY", "FORMATS", "format_named", "readers", "written_formats"]
 
 FORMATS: tuple[Format, ...] = (
     CALIBRATION_1,
+    PACK,
     TF2,
     TF2_LAUNCH_PY,
     TF2_LAUNCH_XML,
@@ -41,22 +59,35 @@ FORMATS: tuple[Format, ...] = (
     NUSCENES,
     DRIVEWORKS,
     FOXGLOVE,
+    PJLAB,
+    KOIDE3,
+    OPENLABEL,
     COLMAP,
     MATLAB,
     NUMPY,
     MATRIX,
 )
-"""Our formats that can be written, in display order."""
+"""Our formats that can be written and read, in display order."""
+
+CAMERA_ONLY: tuple[Format, ...] = (CAMERA_INFO,)
+"""Formats of the camera without the pose: written after FORMATS, and not read as a calibration."""
 
 # Content is read as the first format that recognizes it. Most content fits only one, and the formats are tried in the
 # order above; where two could fit, the more specific one is tried first.
 _TRIED_FIRST = (
-    *(CALIBRATION_1, TRUTH, DRIVEWORKS, FOXGLOVE, NUSCENES),  # JSON only; the next four may be JSON, too
-    *(OPENCV, APOLLO, KALIBR, AUTOWARE),
+    *(CALIBRATION_1, TRUTH, PJLAB, KOIDE3, OPENLABEL, DRIVEWORKS, FOXGLOVE),  # JSON only
+    NUSCENES,  # takes any JSON list
+    *(OPENCV, APOLLO, KALIBR, AUTOWARE),  # YAML, JSON or FileStorage
     TF2_LAUNCH_PY,  # mentions the publisher, as TF2 does
 )
+# Formats that are only read; each is recognized by keys or lines that no other tool writes.
+_ONLY_READ = (
+    *(SCALE, SEGMENTS, EASY_HANDEYE, AUTOWARE_AI),
+    *(KITTI_RAW, KITTI_ODOMETRY, TF_ECHO, TUM_POSE),
+    *(KALIBR_CHAIN, KITTI_CAMERAS, K_RADAR_CAMERA, K_RADAR_OFFSET),  # refused in words
+)
 _TRIED_LAST = (MATLAB, NUMPY)  # accept any mat file and any archive, to report what is wrong with it
-_RESERVED = frozenset({"list", TRUTH.name, *(known.name for known in FORMATS)})
+_RESERVED = frozenset({"list", "all", TRUTH.name, *(known.name for known in (*FORMATS, *CAMERA_ONLY))})
 
 
 def written_formats() -> tuple[Format, ...]:
@@ -67,6 +98,7 @@ def written_formats() -> tuple[Format, ...]:
 def readers() -> Iterator[Reads]:
     """Yield the reader of each format in the order in which they are tried; packages come after most of ours."""
     ours = [known for known in FORMATS if known not in (*_TRIED_FIRST, *_TRIED_LAST)]
+    yield from _ONLY_READ
     yield from _reads(*_TRIED_FIRST, *ours)
     yield from _reads(*plugin_formats(_RESERVED), *_TRIED_LAST)
 
@@ -91,6 +123,7 @@ def format_named(name: str) -> Format:
 
 def _written() -> Iterator[Format]:
     yield from FORMATS
+    yield from CAMERA_ONLY
     yield from (added for added in plugin_formats(_RESERVED) if added.write is not None)
 
 

@@ -1,35 +1,51 @@
-"""The comment in every file that allows comments: both frames, the equation, the order, the check point, the origin."""
+"""What every file states, in comments or in keys: both frames, the equation, the order, the check point, the origin."""
 
 import json
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
-from calib_core.interchange.imported import StatedCheckPoint
-from calib_core.interchange.origin import origin_lines
+from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint
+from calib_core.interchange.origin import origin_lines, stated_origin
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.radar import RadarErrors
 
-__all__ = ["POSE_ONLY", "hash_comment", "stated_check_point", "stated_frames", "statement", "xml_comment"]
+__all__ = [
+    "POSE_ONLY",
+    "STATEMENT_KEY",
+    "hash_comment",
+    "stated_check_point",
+    "stated_frames",
+    "stated_lines",
+    "statement",
+    "with_statement",
+    "xml_comment",
+]
 
 POSE_ONLY = "contains the pose only: keep your camera_info, or also export opencv, which contains the camera"
 """A note for every format that stores nothing of the camera."""
 
+STATEMENT_KEY = "cocalib"
+"""The key of the statement in formats that have keys but no comments, and whose readers ignore unknown keys."""
+
+_OF_RECTIFIED = " of the rectified picture"
 _STRING = r'"(?:[^"\\]|\\.)*"'
 _FRAMES = re.compile(rf"radar frame ({_STRING}) \(.*?\), camera frame ({_STRING}) \(")
 _CHECK_POINT = re.compile(
-    r"check point: p_radar \[([^\]]*)\] m -> p_camera \[([^\]]*)\] m(?: -> pixel \[([^\]]*)\] px)?"
+    r"check point: p_radar \[([^\]]*)\] m -> p_camera \[([^\]]*)\] m"
+    rf"(?: -> pixel \[([^\]]*)\] px(?!{_OF_RECTIFIED}))?"
 )
 
 
-def statement(file: CalibrationFile, meaning: str) -> tuple[str, ...]:
-    """Return the lines of the comment at the top of a file.
+def statement(file: CalibrationFile, meaning: str, *, rectified: bool = False) -> tuple[str, ...]:
+    """Return what a file states about itself: the comment at its top, or the value of a key, one line each.
 
     Args:
         file: what is exported.
         meaning: what the numbers of this format mean, with the order of the quaternion or the angles.
+        rectified: the format is for rectified pictures, so the check point's pixel is one of theirs.
     """
     frames = file.frames
     lines = [
@@ -42,7 +58,7 @@ def statement(file: CalibrationFile, meaning: str) -> tuple[str, ...]:
         point_camera_m = file.calibration.camera_from_radar @ check.radar_m[None]
         lines.append(
             f"check point: p_radar [{numbers_text(check.radar_m)}] m -> p_camera [{numbers_text(point_camera_m[0])}] m"
-            f" -> pixel [{numbers_text(check.pixel_px)}] px"
+            f" -> pixel [{numbers_text(check.pixel_px)}] px{_OF_RECTIFIED if rectified else ''}"
         )
     errors = file.calibration.radar_errors
     if errors != RadarErrors():
@@ -66,6 +82,27 @@ def xml_comment(lines: tuple[str, ...]) -> str:
     """Return lines as one XML comment, which must not contain two adjacent hyphens; JSON decodes the second one in the names."""
     body = "\n     ".join(lines).replace("--", "-\\u002d")
     return f"<!-- {body} -->\n"
+
+
+def stated_lines(value: object) -> str:
+    """Return the statement in a key: a text, or a list or an array of lines; "" if it is something else."""
+    if isinstance(value, str):
+        return value
+    lines = value.ravel().tolist() if isinstance(value, np.ndarray) else value
+    return "\n".join(line for line in lines if isinstance(line, str)) if isinstance(lines, list) else ""
+
+
+def with_statement(found: ImportedCalibration, text: str) -> ImportedCalibration:
+    """Add what a file states in a key; where it names the frames, nothing about them had to be assumed."""
+    frames, origin = stated_frames(text), stated_origin(text)
+    return replace(
+        found,
+        frames=found.frames or frames,
+        check_point=found.check_point or stated_check_point(text),
+        assumptions=() if frames else found.assumptions,
+        evidence=origin.evidence,
+        calibration_sha256=origin.calibration_sha256,
+    )
 
 
 def stated_frames(text: str) -> FrameNames | None:

@@ -2,19 +2,16 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from calib_core.errors import InputError
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.imported import ImportedCalibration, imported
 from calib_core.interchange.own.calibration_json import (
-    AGREEMENT,
     calibration_file_of,
     kept_results,
-    transform_of,
     write_calibration,
 )
 from calib_core.interchange.own.documents import CalibrationDocument, TransformDocument
+from calib_core.interchange.own.transform_document import are_inverse, transform_of
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.strict_json import parse_document
 
@@ -38,8 +35,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         faults.append("camera_from_radar.quaternion_wxyz and camera_from_radar.rotation are different rotations")
     if document.radar_from_camera is not None:
         try:
-            inverse = transform_of(document.radar_from_camera, source=source, place="radar_from_camera").inverse()
-            if np.abs(inverse.as_matrix() - pose.as_matrix()).max() > AGREEMENT:
+            if not are_inverse(stated, document.radar_from_camera, source=source, place="radar_from_camera"):
                 faults.append("radar_from_camera is not the inverse of camera_from_radar")
         except InputError:
             faults.append("radar_from_camera has contradictory rotations, or an invalid one")

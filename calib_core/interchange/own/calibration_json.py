@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from calib_core.errors import InputError
-from calib_core.geometry import RigidTransform, matrix_from_quaternion_wxyz, quaternion_wxyz_from_matrix
+from calib_core.geometry import RigidTransform
 from calib_core.input_files import encodable
 from calib_core.interchange.calibration_file import (
     EQUATION,
@@ -31,6 +31,7 @@ from calib_core.interchange.own.radar_errors_document import (
     systematic_error_document,
     systematic_error_of,
 )
+from calib_core.interchange.own.transform_document import are_inverse, transform_document, transform_of
 from calib_core.interchange.own.unknown_results import unknown_results, with_unknown
 from calib_core.interchange.syntax.content import decoded
 from calib_core.interchange.syntax.json_text import json_text
@@ -41,7 +42,6 @@ from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
 from calib_core.verdict import Verdict, verdict_on
 
 __all__ = [
-    "AGREEMENT",
     "COVARIANCE_CONVENTION",
     "calibration_file",
     "calibration_file_of",
@@ -49,7 +49,6 @@ __all__ = [
     "calibration_text",
     "kept_results",
     "read_calibration",
-    "transform_of",
     "write_calibration",
 ]
 
@@ -57,8 +56,6 @@ COVARIANCE_CONVENTION = (
     "6x6, row-major, order (x, y, z, rotX, rotY, rotZ) [m, rad], of the error (dt, dtheta) of camera_from_radar "
     "in camera axes: t = t_hat + dt, R = Exp(dtheta) R_hat"
 )
-AGREEMENT = 1e-5
-"""The largest difference allowed between two statements of one transform, in any matrix entry."""
 
 
 def calibration_text(
@@ -106,7 +103,7 @@ def calibration_file(
 
 def calibration_sha256(file: CalibrationFile) -> str:
     """Return the SHA-256 of a calibration's file, in hexadecimal: what exports name as their origin."""
-    return hashlib.sha256(write_calibration(file).encode()).hexdigest()
+    return file.made_from_sha256 or hashlib.sha256(write_calibration(file).encode()).hexdigest()
 
 
 def write_calibration(file: CalibrationFile) -> str:
@@ -116,8 +113,8 @@ def write_calibration(file: CalibrationFile) -> str:
     check = file.check_point
     document = documents.CalibrationDocument(
         schema=documents.CALIBRATION_SCHEMA,
-        camera_from_radar=_transform_document(calibration.camera_from_radar),
-        radar_from_camera=_transform_document(calibration.camera_from_radar.inverse()),
+        camera_from_radar=transform_document(calibration.camera_from_radar),
+        radar_from_camera=transform_document(calibration.camera_from_radar.inverse()),
         frames=documents.FramesDocument(file.frames.radar, file.frames.camera),
         equation=EQUATION,
         covariance=nested(calibration.covariance),
@@ -183,13 +180,14 @@ def read_calibration(content: str | bytes, source: str = "calibration") -> Calib
     text = decoded(content, source=source)
     document = parse_document(text, documents.CalibrationDocument, source=source)
     camera_from_radar = transform_of(document.camera_from_radar, source=source, place="camera_from_radar")
-    if document.radar_from_camera is not None:
-        inverse = transform_of(document.radar_from_camera, source=source, place="radar_from_camera").inverse()
-        if np.abs(inverse.as_matrix() - camera_from_radar.as_matrix()).max() > AGREEMENT:
-            raise InputError(
-                f"{source}: radar_from_camera: is not the inverse of camera_from_radar; "
-                "cocalib check finds which is wrong; correct it or remove radar_from_camera"
-            )
+    inverse = document.radar_from_camera
+    if inverse is not None and not are_inverse(
+        document.camera_from_radar, inverse, source=source, place="radar_from_camera"
+    ):
+        raise InputError(
+            f"{source}: radar_from_camera: is not the inverse of camera_from_radar; "
+            "cocalib check finds which is wrong; correct it or remove radar_from_camera"
+        )
     file = calibration_file_of(document, camera_from_radar, source=source)
     return dataclasses.replace(file, unknown=kept_results(text, source=source))
 
@@ -238,39 +236,6 @@ def calibration_file_of(
         provenance=provenance_of(document.provenance),
         verdict=_verdict_of(document.verdict),
         evidence=document.evidence,
-    )
-
-
-def transform_of(document: documents.TransformDocument, *, source: str, place: str) -> RigidTransform:
-    """Return the transform in a document.
-
-    Raises:
-        InputError: the rotation is invalid (mirrored, or not orthonormal), or the quaternion is a different rotation.
-    """
-    try:
-        transform = RigidTransform(np.array(document.rotation), np.array(document.translation_m))
-    except ValueError as error:
-        raise InputError(f"{source}: {place}.rotation: {error}; give a proper rotation") from None
-    if document.quaternion_wxyz is not None and not _same_rotation(document.quaternion_wxyz, transform):
-        raise InputError(
-            f"{source}: {place}.quaternion_wxyz: is a different rotation from {place}.rotation; "
-            "the order is w, x, y, z; correct one of the two"
-        )
-    return transform
-
-
-def _same_rotation(quaternion_wxyz: tuple[float, ...], transform: RigidTransform) -> bool:
-    quaternion = np.array(quaternion_wxyz)
-    if not quaternion.any():
-        return False
-    return bool(np.abs(matrix_from_quaternion_wxyz(quaternion) - transform.rotation).max() <= AGREEMENT)
-
-
-def _transform_document(transform: RigidTransform) -> documents.TransformDocument:
-    return documents.TransformDocument(
-        rotation=nested(transform.rotation + 0.0),
-        translation_m=nested(transform.translation_m + 0.0),
-        quaternion_wxyz=nested(quaternion_wxyz_from_matrix(transform.rotation) + 0.0),
     )
 
 

@@ -1,1 +1,1 @@
-"""The syntaxes that the formats use: strict JSON, YAML, XML, zip and mat files. No semantics, no geometry."""
+"""The syntaxes that the formats use: strict JSON, YAML, XML, zip, mat and MCAP files. No semantics, no geometry."""

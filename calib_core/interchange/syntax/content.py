@@ -1,5 +1,6 @@
 """The content of a file, its syntax parsed once; every format reads this instead of bytes."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -7,6 +8,7 @@ from xml.etree.ElementTree import Element
 
 from calib_core.errors import InputError
 from calib_core.interchange.syntax.mat_file import load_mat
+from calib_core.interchange.syntax.mcap_file import MCAP_MAGIC, McapFile, load_mcap
 from calib_core.interchange.syntax.opencv_xml import is_file_storage, opencv_values, parse_xml
 from calib_core.interchange.syntax.strict_json import json_value
 from calib_core.interchange.syntax.yaml_text import load_yaml
@@ -14,10 +16,12 @@ from calib_core.interchange.syntax.zip_archives import unpack
 
 __all__ = ["Content", "Syntax", "decoded", "readings"]
 
-Syntax = Literal["archive", "mat", "bytes", "json", "xml", "lines", "yaml"]
-"""zip archive, MATLAB's mat, bytes that are not text, JSON, XML, text by its lines, text as YAML."""
+Syntax = Literal["archive", "mat", "mcap", "bytes", "json", "xml", "lines", "yaml"]
+"""zip archive, MATLAB's mat, a small MCAP of JSON messages, other bytes, JSON, XML, text by its lines, text as YAML."""
 
 _NO_XML = Element("")
+_NO_MCAP = McapFile((), {})
+_LOGGED = re.compile(r"\s*\[(DEBUG|INFO|WARN|ERROR|FATAL)\]")  # a line of ROS's log, as tf2_echo prints first
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,9 +34,11 @@ class Content:
         data: all bytes, if the syntax is "bytes".
         members: of an archive, by name.
         variables: of a mat file, by name: arrays, str, and dicts of them.
+        mcap: the messages and metadata of an MCAP file.
         value: of JSON, of YAML, or of OpenCV's FileStorage XML.
         root: of XML.
         lines: of text, without comments (#) and empty lines.
+        beside: files in the same folder that complete it, by name.
     """
 
     syntax: Syntax
@@ -40,9 +46,11 @@ class Content:
     data: bytes = b""
     members: Mapping[str, bytes] = field(default_factory=dict)
     variables: Mapping[str, Any] = field(default_factory=dict)
+    mcap: McapFile = _NO_MCAP
     value: Any = None
     root: Element = _NO_XML
     lines: tuple[str, ...] = ()
+    beside: Mapping[str, bytes] = field(default_factory=dict)
 
     @property
     def mapping(self) -> Mapping[str, Any]:
@@ -69,6 +77,9 @@ def readings(content: str | bytes, *, source: str) -> Iterator[Content]:
         yield Content("archive", members=unpack(content, source=source))
     elif isinstance(content, bytes) and content.startswith(b"MATLAB"):
         yield Content("mat", variables=load_mat(content, source=source))
+    elif isinstance(content, bytes) and content.startswith(MCAP_MAGIC):
+        found = load_mcap(content, source=source)
+        yield Content("bytes", data=content) if found is None else Content("mcap", mcap=found)
     else:
         try:
             text = decoded(content, source=source)
@@ -94,7 +105,7 @@ def decoded(content: str | bytes, *, source: str) -> str:
 
 def _text_readings(text: str, *, source: str) -> Iterator[Content]:
     start = text.lstrip()[:1]
-    if start in ("{", "["):
+    if start in ("{", "[") and not _LOGGED.match(text):
         yield Content("json", text=text, value=json_value(text, source=source))
     elif start == "<":
         root = parse_xml(text, source=source)

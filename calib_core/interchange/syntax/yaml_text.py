@@ -15,8 +15,10 @@ _OPENCV_TAG = "tag:yaml.org,2002:opencv-matrix"
 def load_yaml(text: str, *, source: str) -> Any:
     """Parse YAML of plain values; OpenCV's header and matrices (as mappings with rows, cols, data) are supported.
 
+    `topic echo` ends each message with "---": an empty document is left out, and messages of transforms become one.
+
     Raises:
-        InputError: it is not YAML, or too large to be a calibration.
+        InputError: it is not YAML, too large to be a calibration, or several documents.
     """
     if len(text) > _MAX_CHARACTERS:
         raise InputError(f"{source}: {len(text):,} characters is too large for a calibration; is it the right file?")
@@ -33,11 +35,22 @@ def load_yaml(text: str, *, source: str) -> Any:
     # OpenCV before 5 writes "%YAML:1.0", which is not a YAML directive, and may omit the "---" after it.
     plain = re.sub(r"\A\ufeff?%YAML[: ][\d.]+[^\n]*\n(---[^\n]*\n)?", "", text)
     try:
-        return loader.load(plain)
+        documents = [document for document in loader.load_all(plain) if document is not None]
     except (YAMLError, ValueError, TypeError, LookupError, AttributeError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         where = f"line {mark.line + 1 + text.count(chr(10)) - plain.count(chr(10))}: " if mark else ""
         raise InputError(f"{source}: {where}not YAML ({_problem(error)}); correct it there") from None
+    return _joined(documents, source=source)
+
+
+def _joined(documents: list[Any], *, source: str) -> Any:
+    """Return the only document, or several messages of transforms as one."""
+    if len(documents) < 2:
+        return documents[0] if documents else None
+    listed = [document.get("transforms") if isinstance(document, dict) else None for document in documents]
+    if not all(isinstance(transforms, list) for transforms in listed):
+        raise InputError(f"{source}: contains {len(documents)} YAML documents; keep only the intended one")
+    return {"transforms": [transform for transforms in listed for transform in transforms or ()]}
 
 
 def _problem(error: Exception) -> str:

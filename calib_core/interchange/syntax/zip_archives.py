@@ -6,9 +6,11 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 
+import numpy as np
+
 from calib_core.errors import InputError
 
-__all__ = ["pack", "unpack"]
+__all__ = ["pack", "pack_arrays", "unpack"]
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _MAX_BYTES = 8 * 1024 * 1024
@@ -22,6 +24,16 @@ def pack(members: Mapping[str, bytes]) -> bytes:
         for name, data in members.items():
             archive.writestr(zipfile.ZipInfo(name, _EPOCH), data)
     return buffer.getvalue()
+
+
+def pack_arrays(arrays: Mapping[str, np.ndarray]) -> bytes:
+    """Return NumPy's archive (npz) of plain arrays; numpy.load reads it with allow_pickle=False."""
+    members = {}
+    for name, array in arrays.items():
+        buffer = io.BytesIO()
+        np.lib.format.write_array(buffer, np.asarray(array), allow_pickle=False)
+        members[f"{name}.npy"] = buffer.getvalue()
+    return pack(members)
 
 
 def unpack(data: bytes, *, source: str) -> dict[str, bytes]:

@@ -1,10 +1,11 @@
-"""Build and serialise ROS messages from values, with rosbags. For simulated recordings and for tests."""
+"""Build and serialise ROS messages from values, with rosbags: for simulated recordings, exports and tests."""
 
 import dataclasses
 from typing import Any, Literal
 
 import numpy as np
 
+from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.lens_models.naming import written_lens
 from calib_core.measurements import time_parts
 from calib_core.radar import cartesian_from_polar
@@ -15,8 +16,10 @@ from calib_core.recordings.containers.recorded_messages import (
     ImageMessage,
     MessageBody,
     RadarReturnMessage,
+    TransformMessage,
     VendorScanMessage,
 )
+from calib_core.recordings.containers.stored_channels import ChannelNotes, StoredChannel
 
 __all__ = ["MESSAGE_TYPES", "RADAR_SCAN_DEFINITION", "RADAR_SCAN_TYPE", "MessageBuilder"]
 
@@ -53,6 +56,8 @@ float32 f_pos_x            # [m] forward
 float32 f_pos_y            # [m] left
 float32 f_pos_z            # [m] up
 """
+TRANSFORMS_TYPE = "tf2_msgs/msg/TFMessage"
+TRANSFORMS_DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
 
 
 _DEFINITIONS = {
@@ -66,6 +71,7 @@ MESSAGE_TYPES: dict[type, str] = {
     CameraInfoMessage: "sensor_msgs/msg/CameraInfo",
     CloudMessage: "sensor_msgs/msg/PointCloud2",
     RadarReturnMessage: RADAR_SCAN_TYPE,
+    TransformMessage: TRANSFORMS_TYPE,
     VendorScanMessage: VENDOR_SCAN_TYPE,
 }
 
@@ -81,7 +87,29 @@ class MessageBuilder:
         for kind, definition in _DEFINITIONS.items():
             spelt = definition if generation == 1 else definition.replace("Header header", "std_msgs/Header header", 1)
             self.typestore.register(get_types_from_msg(spelt, kind))
+        if TRANSFORMS_TYPE not in self.typestore.types:  # as in the store of ROS 1
+            self.typestore.register(get_types_from_msg(TRANSFORMS_DEFINITION, TRANSFORMS_TYPE))
         self.sequence: dict[type, int] = {}
+
+    def serialised(self, body: MessageBody) -> bytes:
+        """Serialise for this generation."""
+        return self.ros1(body) if self.generation == 1 else self.cdr(body)
+
+    def channel(self, topic: str, kind: type, notes: ChannelNotes = ()) -> StoredChannel:
+        """Return the channel of a topic, with the definition of its messages.
+
+        Args:
+            topic: its name.
+            kind: the class of the values.
+            notes: the recorder's notes.
+        """
+        name, language = MESSAGE_TYPES[kind], f"ros{self.generation}msg"
+        definition, md5sum = self.typestore.generate_msgdef(name, ros_version=self.generation)
+        if self.generation == 1:
+            name, notes = name.replace("/msg/", "/"), (("md5sum", md5sum), *notes)
+        return StoredChannel(
+            topic, "ros1" if self.generation == 1 else "cdr", name, language, definition.encode(), notes
+        )
 
     def ros1(self, body: MessageBody) -> bytes:
         """Serialise for ROS 1."""
@@ -103,6 +131,8 @@ class MessageBuilder:
             return self._camera_info(body)
         if isinstance(body, ImageMessage):
             return self._image(body)
+        if isinstance(body, TransformMessage):
+            return self._transform(body)
         data = np.frombuffer(body.data, dtype=np.uint8)
         return self._new(body, header=self._header(body), format=body.format, data=data)
 
@@ -118,6 +148,19 @@ class MessageBuilder:
         sequence = self.sequence.get(type(body), 0)
         self.sequence[type(body)] = sequence + 1
         return header(seq=sequence, stamp=stamp, frame_id=body.frame_id)
+
+    def _transform(self, body: TransformMessage) -> Any:
+        w, *xyz = quaternion_wxyz_from_matrix(body.parent_from_child.rotation).tolist()
+        types = self.typestore.types
+        vector = types["geometry_msgs/msg/Vector3"](*body.parent_from_child.translation_m.tolist())
+        pose = types["geometry_msgs/msg/Transform"](
+            translation=vector, rotation=types["geometry_msgs/msg/Quaternion"](*xyz, w)
+        )
+        stamped = types["geometry_msgs/msg/TransformStamped"]
+        return self._new(
+            body,
+            transforms=[stamped(header=self._header(body), child_frame_id=body.child_frame_id, transform=pose)],
+        )
 
     def _radar_return(self, body: RadarReturnMessage) -> Any:
         return self._new(

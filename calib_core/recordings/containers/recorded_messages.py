@@ -7,6 +7,7 @@ import numpy as np
 
 from calib_core.arrays import frozen_array
 from calib_core.camera import Camera
+from calib_core.geometry import RigidTransform
 from calib_core.measurements import TimeNs
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "MessageBody",
     "RadarReturnMessage",
     "RecordedMessage",
+    "TransformMessage",
     "VendorScanMessage",
 ]
 
@@ -121,8 +123,31 @@ class VendorScanMessage:
             object.__setattr__(self, name, frozen_array(getattr(self, name), (count,)))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TransformMessage:
+    """A tf2_msgs/TFMessage of one transform.
+
+    Attributes:
+        stamp: of the transform.
+        frame_id: of the parent.
+        child_frame_id: of the child.
+        parent_from_child: the pose of the child in the parent.
+    """
+
+    stamp: TimeNs
+    frame_id: str
+    child_frame_id: str
+    parent_from_child: RigidTransform
+
+
 MessageBody: TypeAlias = (
-    CompressedImageMessage | ImageMessage | CameraInfoMessage | CloudMessage | RadarReturnMessage | VendorScanMessage
+    CompressedImageMessage
+    | ImageMessage
+    | CameraInfoMessage
+    | CloudMessage
+    | RadarReturnMessage
+    | TransformMessage
+    | VendorScanMessage
 )
 
 

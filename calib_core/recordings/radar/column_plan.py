@@ -11,6 +11,7 @@ from calib_core.recordings.radar.axes import RadarAxes
 __all__ = ["ColumnAssumption", "ColumnPlan", "ColumnReading", "plain_name"]
 
 _NO_SCALES = (1.0, 1.0, 1.0)
+_DIRECTIONS = ("forward", "left", "up")
 _ANGLES = ("azimuth", "elevation")
 
 
@@ -128,7 +129,7 @@ class ColumnPlan:
     sigma_scales: tuple[float, float, float] = _NO_SCALES
     claimed_scales: tuple[float, float, float] = _NO_SCALES
     doppler_scale: float = 1.0
-    directions: tuple[str, str, str] = ("forward", "left", "up")
+    directions: tuple[str, str, str] = _DIRECTIONS
     described: bool = False
     mapped: tuple[str, ...] = ()
     other_azimuths: tuple[str, ...] = ()
@@ -136,6 +137,17 @@ class ColumnPlan:
     readings: tuple[ColumnReading, ...] = ()
     assumptions: tuple[ColumnAssumption, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def is_plain_xyz(self) -> bool:
+        """Return whether the position is that of columns x, y and z, in metres, forward, left and up."""
+        unchanged = (self.axes, self.azimuth_from, self.scales, self.directions) == (
+            None,
+            None,
+            _NO_SCALES,
+            _DIRECTIONS,
+        )
+        return unchanged and not self.polar and self.position == ("x", "y", "z")
 
     @property
     def looks_like_radar(self) -> bool:

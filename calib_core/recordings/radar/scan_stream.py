@@ -71,6 +71,12 @@ class RadarStream(ScanBlocks):
         return frame, point
 
     @property
+    def delay_ns(self) -> int:
+        """The median time from a scan's stamp to the arrival of its first message [ns]."""
+        delays = self.topic.receive_ns[self._first] - self.times_ns
+        return int(np.median(delays)) if len(delays) else 0
+
+    @property
     def parts(self) -> tuple["RadarStream", ...]:
         """The streams of single topics that it is made of: itself."""
         return (self,)

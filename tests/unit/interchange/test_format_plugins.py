@@ -12,6 +12,7 @@ from app.cli import run
 from app.web.channel.export_preview import export_preview, format_rows
 from calib_core.errors import InputError
 from calib_core.interchange import (
+    CAMERA_ONLY,
     FORMATS,
     CalibrationFile,
     check,
@@ -125,7 +126,10 @@ def test_it_is_listed_after_ours_by_the_command_and_on_the_page(
 ) -> None:
     installed()
 
-    assert [known.name for known in written_formats()] == [*(known.name for known in FORMATS), "acme-params"]
+    assert [known.name for known in written_formats()] == [
+        *(known.name for known in (*FORMATS, *CAMERA_ONLY)),
+        "acme-params",
+    ]
     assert (format_rows()[-1].key, format_rows()[-1].label) == ("acme-params", "ROS 2 parameters")
     assert export_preview(file, "acme-params", "", "drive").check_is_good
     assert run(["export", "--to", "list"]) == 0
@@ -182,7 +186,7 @@ def test_a_broken_package_is_skipped_with_one_line_that_names_it(
 ) -> None:
     installed(module=module, value=value)
 
-    assert written_formats() == FORMATS
+    assert written_formats() == (*FORMATS, *CAMERA_ONLY)
     assert read_any(export(file, "tf2").data).format == "tf2"
     assert only_line(caplog).startswith("cocalib: skipped a plug-in of the package acme-params 1.2: ")
     assert words in only_line(caplog)
@@ -242,7 +246,7 @@ def test_a_package_in_the_current_folder_is_ignored(
     monkeypatch.chdir(tmp_path / "site-packages")
     monkeypatch.syspath_prepend("")
 
-    assert written_formats() == FORMATS
+    assert written_formats() == (*FORMATS, *CAMERA_ONLY)
 
 
 def test_a_module_in_the_current_folder_does_not_take_the_place_of_the_package_s(
@@ -253,7 +257,7 @@ def test_a_module_in_the_current_folder_does_not_take_the_place_of_the_package_s
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend("")
 
-    assert written_formats() == FORMATS
+    assert written_formats() == (*FORMATS, *CAMERA_ONLY)
     assert (
         "acme_params is in the current folder, from which nothing is loaded; start the program in a different"
         in only_line(caplog)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from calib_core.interchange import (
+    CAMERA_ONLY,
     FORMATS,
     Content,
     export,
@@ -37,7 +38,8 @@ def test_the_page_lists_every_format_with_its_file_name_its_camera_content_and_i
     rows = re.findall(r"^\| `([\w-]+)` \| [^|]* \| `([^`]+)` \| ([^|]*) \| (.*) \|$", page, flags=re.MULTILINE)
 
     camera = {"none": "none", "matrix": "K only", "lens": "lens"}
-    assert rows == [(known.name, known.file_name, camera[known.camera], known.numbers) for known in FORMATS]
+    written = (*FORMATS, *CAMERA_ONLY)
+    assert rows == [(known.name, known.file_name, camera[known.camera], known.numbers) for known in written]
 
 
 def test_the_examples_on_the_page_are_read(project_root: Path):

@@ -1,10 +1,11 @@
 """The table of formats: every writer has a reader, and the readers are tried in one order."""
 
+import dataclasses
 from pathlib import Path
 
 import pytest
 
-from calib_core.interchange import FORMATS, CalibrationFile, Format, export, read_any, read_calibration
+from calib_core.interchange import FORMATS, CalibrationFile, Format, FrameNames, export, read_any, read_calibration
 from calib_core.interchange.formats.registry import readers
 from calib_core.interchange.syntax.content import Content, readings
 from calib_core.interchange.syntax.zip_archives import pack
@@ -73,3 +74,15 @@ def test_content_that_fits_two_formats_is_read_as_the_more_specific_one(content:
         content = content.replace("arguments", "static_transform_publisher(arguments") + ")"
 
     assert read_any(content).format == name
+
+
+@pytest.mark.parametrize("name", ["tf2", "tf2-launch-py", "tf2-launch-xml", "tf1-launch", "urdf"])
+def test_a_frame_that_a_driver_publishes_gets_a_note_on_its_second_parent(file: CalibrationFile, name: str) -> None:
+    def notes(camera: str) -> list[str]:
+        written = export(dataclasses.replace(file, frames=FrameNames("radar", camera)), name)
+        return [note for note in written.notes if "two parents" in note]
+
+    assert notes("camera_optical") == []
+    (note,) = notes("camera_color_optical_frame")
+    assert "publishes camera_color_optical_frame under its camera_link already" in note
+    assert "--tree" in note

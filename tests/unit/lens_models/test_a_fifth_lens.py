@@ -1,5 +1,6 @@
 """A lens model that the program does not have, added as a contributor would add it: one value, put into the registry."""
 
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -137,5 +138,12 @@ def test_a_format_without_a_name_for_it_refuses_it_with_a_clear_error(file: Cali
             InputError, match=f"{title} has no name for the lens model division; json, matlab and numpy"
         ):
             export(file, name)
-    with pytest.raises(InputError, match="not the distortion of this division lens"):
-        export(file, "kitti")
+
+
+def test_its_pictures_are_rectified_with_maps(file: CalibrationFile) -> None:
+    camera = file.calibration.camera
+    (maps,) = export(file, "kitti").extra_files
+    arrays = np.load(io.BytesIO(maps.data), allow_pickle=False)
+    corner = np.linalg.inv(arrays["K_new"]) @ [10.0, 20.0, 1.0]
+    found_px = arrays["map_x"][20, 10], arrays["map_y"][20, 10]
+    np.testing.assert_allclose(found_px, camera.project(corner[None])[0], rtol=0, atol=1e-3)

@@ -8,14 +8,17 @@ import numpy as np
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.arrays.named_arrays import from_arrays
+from calib_core.interchange.formats.statement import STATEMENT_KEY, statement
 from calib_core.interchange.imported import ImportedCalibration
+from calib_core.interchange.own.calibration_json import COVARIANCE_CONVENTION
 from calib_core.interchange.syntax.content import Content
 
 __all__ = ["MATLAB"]
 
 _NOTES = (
-    "in MATLAB: load radar_camera.mat; tform = rigidtform3d(camera_from_radar.A); "
-    "camera.PrincipalPoint counts pixels from 1 as MATLAB does, camera.K from 0 as OpenCV does",
+    "in MATLAB: load radar_camera.mat; tform = rigidtform3d(camera_from_radar.A); intrinsics = "
+    "cameraIntrinsicsFromOpenCV(camera.K, camera.Distortion, camera.ImageSize), which counts pixels from 0 as camera.K does; "
+    "camera.PrincipalPoint counts from 1 as cameraIntrinsics does; neither function is for the equidistant model",
 )
 _MAT_TEXT_BYTES = 116
 _ONE_BASED = 1.0
@@ -47,9 +50,11 @@ def _write(file: CalibrationFile) -> bytes:
         "equation": EQUATION,
     }
     if np.isfinite(calibration.covariance).all():
-        content["covariance"] = calibration.covariance
+        content |= {"covariance": calibration.covariance, "covariance_convention": COVARIANCE_CONVENTION}
     if check is not None:
         content["check_point"] = {"radar_m": check.radar_m[None, :], "pixel_px": check.pixel_px[None, :]}
+    meaning = "camera_from_radar.A carries radar points into the camera; camera.PrincipalPoint counts pixels from 1"
+    content[STATEMENT_KEY] = "\n".join(statement(file, meaning))
     buffer = io.BytesIO()
     savemat(buffer, content, long_field_names=True, oned_as="row")  # type: ignore[arg-type]
     title = f"MATLAB 5.0 MAT-file, cocalib, {EQUATION}".ljust(_MAT_TEXT_BYTES).encode()
@@ -79,6 +84,9 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     if isinstance(camera, dict) and {"K", "Distortion", "ImageSize", "Model"} <= set(camera):
         arrays |= {"K": camera["K"], "D": np.ravel(camera["Distortion"]), "camera_model": camera["Model"]}
         arrays["image_size_px"] = np.ravel(camera["ImageSize"])[::-1]
+    arrays |= {
+        key: variables[key] for key in ("covariance", "covariance_convention", STATEMENT_KEY) if key in variables
+    }
     return from_arrays(arrays, "matlab", source=source)
 
 

@@ -5,10 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from calib_core.arrays import Matrix66
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import FrameNames
+from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_lines, with_statement
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
+from calib_core.interchange.own.calibration_json import COVARIANCE_CONVENTION
+from calib_core.interchange.rotations import upper_rows
 
 __all__ = ["from_arrays"]
 
@@ -26,8 +30,8 @@ def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> Importe
     """
     try:
         if "camera_from_radar" in arrays:
-            rows = np.asarray(arrays["camera_from_radar"], dtype=np.float64).reshape(-1, 4)
-            rotation, translation_m = rows[:3, :3], rows[:3, 3]
+            rows = upper_rows(arrays["camera_from_radar"])
+            rotation, translation_m = rows[:, :3], rows[:, 3]
         else:
             rotation = np.asarray(arrays["R"], dtype=np.float64)
             translation_m = np.asarray(arrays["t"], dtype=np.float64).ravel()
@@ -38,16 +42,28 @@ def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> Importe
             check = StatedCheckPoint(
                 np.ravel(arrays["check_point_radar_m"]), pixel_px=np.ravel(arrays["check_point_pixel_px"])
             )
-        return ImportedCalibration(
+        found = ImportedCalibration(
             name,
             pose,
             camera=_camera(arrays),
             frames=FrameNames(str(arrays["radar_frame"]), str(arrays["camera_frame"])) if named else None,
             check_point=check,
             assumptions=() if named else ("the file does not name its frames; assumed p_camera = R p_radar + t",),
+            covariance=_covariance(arrays),
         ).checked(source)
+        return with_statement(found, stated_lines(arrays.get(STATEMENT_KEY)))
     except (KeyError, ValueError, TypeError, IndexError) as error:
         raise InputError(f"{source}: needs camera_from_radar (4x4), or R and t ({error}); export it again") from None
+
+
+def _covariance(arrays: Mapping[str, Any]) -> Matrix66 | None:
+    """Return the covariance if the file says that it has our order and meaning, and it is one."""
+    if str(arrays.get("covariance_convention")) != COVARIANCE_CONVENTION or "covariance" not in arrays:
+        return None
+    covariance = np.asarray(arrays["covariance"], dtype=np.float64)
+    if covariance.shape != (6, 6) or not np.isfinite(covariance).all() or (np.diag(covariance) < 0).any():
+        raise ValueError("covariance is not a finite 6 x 6 matrix with a positive diagonal")
+    return covariance
 
 
 def _camera(arrays: Mapping[str, Any]) -> Camera | None:

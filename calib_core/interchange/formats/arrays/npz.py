@@ -9,9 +9,11 @@ from calib_core.errors import InputError
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.arrays.named_arrays import from_arrays
+from calib_core.interchange.formats.statement import STATEMENT_KEY, statement
 from calib_core.interchange.imported import ImportedCalibration
+from calib_core.interchange.own.calibration_json import COVARIANCE_CONVENTION
 from calib_core.interchange.syntax.content import Content
-from calib_core.interchange.syntax.zip_archives import pack
+from calib_core.interchange.syntax.zip_archives import pack_arrays
 
 __all__ = ["NUMPY"]
 
@@ -33,15 +35,12 @@ def _write(file: CalibrationFile) -> bytes:
         "equation": np.array(EQUATION),
     }
     if np.isfinite(calibration.covariance).all():
-        arrays["covariance"] = calibration.covariance
+        arrays |= {"covariance": calibration.covariance, "covariance_convention": np.array(COVARIANCE_CONVENTION)}
     if check is not None:
         arrays |= {"check_point_radar_m": check.radar_m, "check_point_pixel_px": check.pixel_px}
-    members = {}
-    for name, array in arrays.items():
-        buffer = io.BytesIO()
-        np.lib.format.write_array(buffer, np.asarray(array), allow_pickle=False)
-        members[f"{name}.npy"] = buffer.getvalue()
-    return pack(members)
+    meaning = "camera_from_radar, R and t carry radar points into the camera; K and D are the camera's"
+    arrays[STATEMENT_KEY] = np.array(statement(file, meaning))
+    return pack_arrays(arrays)
 
 
 def _recognizes(content: Content) -> bool:

@@ -13,6 +13,7 @@ from calib_core.interchange.formats.statement import (
     statement,
 )
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
+from calib_core.interchange.rotations import upper_rows
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text
 
@@ -52,13 +53,14 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         raise InputError(f"{source}: not a matrix ({error}); give 3 or 4 rows of 4 numbers") from None
     if len(numbers) not in (12, 16) or not (np.abs(numbers) <= _LARGEST).all():
         raise InputError(f"{source}: expected 12 or 16 finite numbers, found {len(numbers)}; give 3 or 4 rows of 4")
-    if len(numbers) == 16 and np.abs(numbers[12:] - [0, 0, 0, 1]).max() > 0:
-        raise InputError(f"{source}: the last row must be 0 0 0 1; is the matrix transposed?")
+    try:
+        rows = upper_rows(numbers.reshape(-1, 4))
+    except ValueError as error:
+        raise InputError(f"{source}: {error}; give the rows of camera_from_radar") from None
     frames = stated_frames(content.text)
-    rows = numbers.reshape(-1, 4)
     return ImportedCalibration(
         "matrix",
-        WrittenPose("matrix", rows[:3, :3], rows[:3, 3], "camera_from_radar"),
+        WrittenPose("matrix", rows[:, :3], rows[:, 3], "camera_from_radar"),
         frames=frames,
         check_point=stated_check_point(content.text),
         assumptions=() if frames else ("the file does not say what the matrix is; assumed p_camera = R p_radar + t",),

@@ -14,6 +14,7 @@ from calib_core.interchange.formats.ros.static_transform import (
     from_publishers,
     meaning,
     pose_numbers,
+    second_parent_notes,
 )
 from calib_core.interchange.formats.statement import POSE_ONLY, hash_comment, statement, xml_comment
 from calib_core.interchange.imported import ImportedCalibration
@@ -122,6 +123,7 @@ TF2_LAUNCH_PY = Format(
     camera="none",
     comment="#",
     notes=(POSE_ONLY,),
+    notes_on=second_parent_notes,
     write=_write_python,
     reads=Reads(_recognizes_python, _read_python),
 )
@@ -136,6 +138,7 @@ TF2_LAUNCH_XML = Format(
     camera="none",
     comment="<!-- -->",
     notes=(POSE_ONLY,),
+    notes_on=second_parent_notes,
     write=_write_ros2_xml,
     reads=_READS_XML,
 )
@@ -150,6 +153,7 @@ TF1_LAUNCH = Format(
     camera="none",
     comment="<!-- -->",
     notes=(POSE_ONLY,),
+    notes_on=second_parent_notes,
     write=_write_ros1_xml,
     reads=_READS_XML,
 )

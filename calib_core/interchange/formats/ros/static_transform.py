@@ -14,9 +14,10 @@ from calib_core.interchange.imported import Form, ImportedCalibration, WrittenPo
 from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.yaml_text import number_text
 
-__all__ = ["LABELS", "NUMBERS", "PUBLISHER", "from_publishers", "meaning", "pose_numbers"]
+__all__ = ["LABELS", "NUMBERS", "PUBLISHER", "from_publishers", "meaning", "pose_numbers", "second_parent_notes"]
 
 PUBLISHER = "static_transform_publisher"
+_DRIVERS_ENDING = "_optical_frame"
 LABELS = ("--x", "--y", "--z", "--qx", "--qy", "--qz", "--qw")
 NUMBERS = "pose of the child (camera, optical) in the parent (radar); quaternion x y z w"
 
@@ -25,6 +26,17 @@ def meaning(file: CalibrationFile) -> str:
     """Return what the numbers mean, for the comment at the top of a file."""
     parent, child = file.frames.radar, file.frames.camera
     return f"the numbers are the pose of the child {child} in the parent {parent}; quaternion order x y z w"
+
+
+def second_parent_notes(file: CalibrationFile) -> tuple[str, ...]:
+    """Return a note if the camera frame is called as drivers call it, who publish that frame themselves."""
+    camera = file.frames.camera
+    if not camera.endswith(_DRIVERS_ENDING):
+        return ()
+    return (
+        f"a camera's driver usually publishes {camera} under its camera_link already, and a frame cannot have two parents: with "
+        "--tree the transform is written to camera_link instead",
+    )
 
 
 def pose_numbers(file: CalibrationFile) -> list[str]:

@@ -12,6 +12,7 @@ from calib_core.interchange.formats.ros.static_transform import (
     from_publishers,
     meaning,
     pose_numbers,
+    second_parent_notes,
 )
 from calib_core.interchange.formats.statement import POSE_ONLY, hash_comment, statement
 from calib_core.interchange.imported import ImportedCalibration
@@ -62,6 +63,7 @@ TF2 = Format(
     camera="none",
     comment="#",
     notes=(POSE_ONLY,),
+    notes_on=second_parent_notes,
     write=_write,
     reads=Reads(_recognizes, _read),
 )

@@ -11,6 +11,7 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, Reads
+from calib_core.interchange.formats.ros.static_transform import second_parent_notes
 from calib_core.interchange.formats.statement import (
     POSE_ONLY,
     stated_check_point,
@@ -152,6 +153,7 @@ URDF = Format(
     camera="none",
     comment="<!-- -->",
     notes=(POSE_ONLY,),
+    notes_on=second_parent_notes,
     write=_write,
     reads=Reads(_recognizes, _read),
 )

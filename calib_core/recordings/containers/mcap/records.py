@@ -6,8 +6,11 @@ from dataclasses import dataclass
 
 from calib_core.recordings.containers.positioned_reads import Stretch
 from calib_core.recordings.containers.sources import Channel
+from calib_core.recordings.containers.stored_channels import ChannelNotes, StoredChannel
 
 __all__ = [
+    "ATTACHMENT",
+    "ATTACHMENT_INDEX",
     "BETWEEN_CHUNKS",
     "CHANNEL",
     "CHUNK",
@@ -16,16 +19,20 @@ __all__ = [
     "DATA_END",
     "DATA_KINDS",
     "FOOTER",
+    "HEADER",
     "MAGIC",
     "MAX_RECORD_BYTES",
     "MESSAGE",
     "MESSAGE_HEAD",
     "MESSAGE_INDEX",
+    "METADATA",
+    "METADATA_INDEX",
     "PRIVATE",
     "RECORD",
     "SCHEMA",
     "STATISTICS",
     "SUMMARY_KINDS",
+    "SUMMARY_OFFSET",
     "ChunkHead",
     "ChunkInfo",
     "Declarations",
@@ -40,12 +47,12 @@ __all__ = [
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 2, 3, 4, 5, 6, 7, 8
 STATISTICS, DATA_END = 11, 15
-_HEADER, _ATTACHMENT, _ATTACHMENT_INDEX, _METADATA, _METADATA_INDEX, _SUMMARY_OFFSET = 1, 9, 10, 12, 13, 14
+HEADER, ATTACHMENT, ATTACHMENT_INDEX, METADATA, METADATA_INDEX, SUMMARY_OFFSET = 1, 9, 10, 12, 13, 14
 CHUNK_KINDS = frozenset({SCHEMA, CHANNEL, MESSAGE})
-BETWEEN_CHUNKS = frozenset({_HEADER, SCHEMA, CHANNEL, _ATTACHMENT, _METADATA, DATA_END})
+BETWEEN_CHUNKS = frozenset({HEADER, SCHEMA, CHANNEL, ATTACHMENT, METADATA, DATA_END})
 DATA_KINDS = BETWEEN_CHUNKS - {DATA_END} | {MESSAGE, MESSAGE_INDEX}
 SUMMARY_KINDS = frozenset(
-    {SCHEMA, CHANNEL, STATISTICS, CHUNK_INDEX, _ATTACHMENT_INDEX, _METADATA_INDEX, _SUMMARY_OFFSET, FOOTER}
+    {SCHEMA, CHANNEL, STATISTICS, CHUNK_INDEX, ATTACHMENT_INDEX, METADATA_INDEX, SUMMARY_OFFSET, FOOTER}
 )
 PRIVATE = 0x80
 """Kinds from here on belong to other programs."""
@@ -61,8 +68,16 @@ _FORMATS = {"ros1msg": "msg", "ros2msg": "msg", "ros2idl": "idl", "omgidl": "idl
 @dataclass(frozen=True, slots=True)
 class _Schema:
     name: str
-    format: str
-    text: str
+    encoding: str
+    data: bytes
+
+    @property
+    def text(self) -> str:
+        """The definition as text."""
+        return self.data.decode("utf-8", "replace")
+
+
+_NO_SCHEMA = _Schema("", "", b"")
 
 
 class Declarations:
@@ -70,7 +85,7 @@ class Declarations:
 
     def __init__(self) -> None:
         self._schemas: dict[int, _Schema] = {}
-        self._channels: dict[int, tuple[int, str, str]] = {}
+        self._channels: dict[int, tuple[int, str, str, bytes]] = {}
 
     def note(self, kind: int, body: bytes) -> bool:
         """Record a schema or a channel; other records are ignored.
@@ -83,13 +98,13 @@ class Declarations:
                 number = int.from_bytes(body[:2], "little")
                 name, place = string_at(body, 2)
                 encoding, place = string_at(body, place)
-                text, _ = string_at(body, place)
-                self._schemas.setdefault(number, _Schema(name, _FORMATS.get(encoding, ""), text))
+                data, _ = _bytes_at(body, place)
+                self._schemas.setdefault(number, _Schema(name, encoding, data))
             elif kind == CHANNEL:
                 number, schema = struct.unpack_from("<HH", body)
                 topic, place = string_at(body, 4)
-                encoding, _ = string_at(body, place)
-                self._channels.setdefault(number, (schema, topic, encoding))
+                encoding, place = string_at(body, place)
+                self._channels.setdefault(number, (schema, topic, encoding, body[place:]))
         except struct.error:
             return False
         return True
@@ -102,10 +117,19 @@ class Declarations:
         """The channels, each with its schema if there is one."""
         return tuple(self._channel(number, *entry) for number, entry in self._channels.items())
 
-    def _channel(self, number: int, schema_number: int, topic: str, encoding: str) -> Channel:
-        schema = self._schemas.get(schema_number, _Schema("", "", ""))
-        form = schema.format if schema.text.strip() else ""
+    @property
+    def stored(self) -> Mapping[int, StoredChannel]:
+        """The channels exactly as they are stored, by number."""
+        return {number: self._stored(*entry) for number, entry in self._channels.items()}
+
+    def _channel(self, number: int, schema_number: int, topic: str, encoding: str, _: bytes) -> Channel:
+        schema = self._schemas.get(schema_number, _NO_SCHEMA)
+        form = _FORMATS.get(schema.encoding, "") if schema.text.strip() else ""
         return Channel(number, topic, schema.name, encoding, schema.text, form)
+
+    def _stored(self, schema_number: int, topic: str, encoding: str, notes: bytes) -> StoredChannel:
+        schema = self._schemas.get(schema_number, _NO_SCHEMA)
+        return StoredChannel(topic, encoding, schema.name, schema.encoding, schema.data, _mapping(notes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +240,26 @@ def walk(stretch: Stretch, place: int = 0) -> Iterator[tuple[int, int, int]]:
 
 def string_at(data: bytes, place: int) -> tuple[str, int]:
     """Read a length-prefixed string; return it and the offset after it."""
+    found, place = _bytes_at(data, place)
+    return found.decode("utf-8", "replace"), place
+
+
+def _bytes_at(data: bytes, place: int) -> tuple[bytes, int]:
     length = struct.unpack_from("<I", data, place)[0]
     if place + 4 + length > len(data):
         raise struct.error("string extends past its record")
-    return data[place + 4 : place + 4 + length].decode("utf-8", "replace"), place + 4 + length
+    return data[place + 4 : place + 4 + length], place + 4 + length
+
+
+def _mapping(data: bytes) -> ChannelNotes:
+    """Read a map of strings; what is damaged is left out."""
+    entries = []
+    try:
+        data, place = _bytes_at(data, 0)[0], 0
+        while place < len(data):
+            key, place = string_at(data, place)
+            value, place = string_at(data, place)
+            entries.append((key, value))
+    except struct.error:
+        pass
+    return tuple(entries)

@@ -10,7 +10,7 @@ from calib_core.recordings.containers.positioned_reads import FileBytes, FileStr
 from calib_core.recordings.containers.rosbag1.records import fields_of
 from calib_core.recordings.containers.sources import Channel
 
-__all__ = ["CONNECTION", "ChunkInfo", "channel_of", "counts_of", "damaged", "first_chunks", "read_tail"]
+__all__ = ["CONNECTION", "ChunkInfo", "channel_of", "counts_of", "damaged", "first_chunks", "read_tail", "record_head"]
 
 _CHUNK_INFO, CONNECTION = 6, 7
 _U32 = struct.Struct("<I")
@@ -61,7 +61,7 @@ def read_tail(
     tail = _Tail({}, [])
     place = 0
     while place < stretch.size:
-        header, size = _head(stretch, place, file, position)
+        header, size = record_head(stretch, place, file, position)
         data = place + 8 + len(header)
         if data + size > stretch.size or not tail.note(header, stretch.up_to(data, size)):
             raise damaged(file, position + place)
@@ -107,7 +107,7 @@ class _Tail:
         return fields is not None
 
 
-def _head(stretch: Stretch, place: int, file: FileBytes, origin: int) -> tuple[bytes, int]:
+def record_head(stretch: Stretch, place: int, file: FileBytes, origin: int) -> tuple[bytes, int]:
     """Return a record's header and the size of its data."""
     head = stretch.up_to(place, _HEAD_BYTES)
     length = _U32.unpack_from(head)[0] if len(head) >= 4 else _MAX_HEADER_BYTES

@@ -25,6 +25,7 @@ from calib_core.recordings.containers.sqlite.recovery import (
     first_rows,
     scan_rows,
 )
+from calib_core.recordings.containers.stored_channels import StoredChannel
 from calib_core.results import DataWarning
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ __all__ = ["MAGIC", "SqliteSource"]
 
 MAGIC = b"SQLite format 3\0"
 _FORMATS = {"ros2msg": "msg", "ros2idl": "idl"}
+_QUALITY = "offered_qos_profiles"
 _SMALL_BYTES = 4096
 _QUERY_ROWS = 20_000
 
@@ -136,6 +138,19 @@ class SqliteSource:
             )
             self.warnings = (*self.warnings, warning)
         return {}
+
+    def stored_channels(self) -> Mapping[int, StoredChannel]:
+        """Return the topics as stored, by number, with the quality of service that their publishers offered."""
+        have = {row[1] for row in self._rows("PRAGMA table_info(topics)")}
+        quality = dict(self._rows("SELECT id, offered_qos_profiles FROM topics")) if _QUALITY in have else {}
+        languages = {form: language for language, form in _FORMATS.items()}
+        found = {}
+        for one in self.channels:
+            notes = ((_QUALITY, str(quality[one.id])),) if quality.get(one.id) else ()
+            language = languages.get(one.definition_format, "")
+            definition = one.definition.encode() if language else b""
+            found[one.id] = StoredChannel(one.topic, one.encoding, one.type, language, definition, notes)
+        return found
 
     def index(self, channel_id: int) -> MessageIndex:
         """Return the locations of a channel's messages; SQLite scans the heads of all rows once, for all channels."""

@@ -110,6 +110,30 @@ def test_while_the_page_asks_because_of_an_error_a_signal_ends_the_command_with_
         assert server.stop()[0] == 2
 
 
+def test_what_cannot_be_used_is_left_out_of_the_next_answer(without_intrinsics: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.cocalib-session"
+    other.mkdir()
+    (other / "journal.jsonl").write_text("not a session\n", encoding="utf-8")
+    bad_clicks = tmp_path / "bad_clicks.json"
+    bad_clicks.write_text("{", encoding="utf-8")
+    before = sorted(path.name for path in without_intrinsics.iterdir())
+    small = tmp_path / "small.yaml"
+    small.write_bytes((without_intrinsics / "camera.yaml").read_bytes().replace(b"128", b"64"))
+    with served_process(without_intrinsics / "recording_csv", "--camera", small, "--clicks", bad_clicks, "--session", other,
+                        "--on-problem", "ask", state=tmp_path) as server:  # fmt: skip
+        cookie = come_in(server)
+        with channel(server, cookie) as socket:
+            for problem in ("bad_clicks.json", "64 x 80 px", "other.cocalib-session"):
+                question = wanted(socket, "opening_choices")
+                assert problem in question["problem"]
+                assert sorted(path.name for path in without_intrinsics.iterdir()) == before  # no session was begun
+                answer = {"type": "open_with", "question": question["question"], "answer": problem}
+                assert asked(socket, **answer, session=question["session"]["plan"])["type"] == "done"
+            assert opened(socket)["intrinsics"] == ""
+        assert server.stop()[0] == 0
+    assert (other / "journal.jsonl").read_text(encoding="utf-8") == "not a session\n"
+
+
 def test_a_script_gets_the_error_and_its_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a.bag").write_bytes(b"GIF89a")
     assert run(["open", str(tmp_path / "a.bag"), "--no-browser", "--port", "0"]) == 2

@@ -9,7 +9,7 @@ import pytest
 
 from app.web.channel import export_preview as panel
 from app.web.exports.format_list import format_rows
-from calib_core.interchange import FORMATS, CalibrationFile, Export, read_calibration
+from calib_core.interchange import CAMERA_ONLY, FORMATS, CalibrationFile, read_calibration
 from calib_core.radar import AngleMap
 
 
@@ -20,7 +20,7 @@ def file(project_root) -> CalibrationFile:
 
 def test_each_format_stands_once_under_the_heading_of_where_it_is_used():
     rows = format_rows()
-    assert sorted(row.key for row in rows) == sorted(form.name for form in FORMATS)
+    assert sorted(row.key for row in rows) == sorted(form.name for form in (*FORMATS, *CAMERA_ONLY))
     groups = [row.group for row in rows]
     assert groups == sorted(groups, key=groups.index)
     assert "Other tools" not in groups
@@ -49,16 +49,11 @@ def test_a_format_without_the_angle_map_says_so_with_both_figures(file):
     assert panel.export_preview(file, "opencv", "", "drive").missing == ""
 
 
-def test_a_file_with_others_that_belong_to_it_is_saved_as_one_zip(file, monkeypatch):
-    alone = panel.exported(file, "opencv", "")
-    assert alone.file_name == "radar_camera.yml"
-    more = (("map_x.npy", b"xx"), ("map_y.npy", b"yy"))
-    monkeypatch.setattr(panel, "export", lambda *_, **__: Export("radar_camera.yml", alone.content, (), more))
-    written = panel.exported(file, "opencv", "")
-    assert written.file_name == "radar_camera.zip"
-    members = zipfile.ZipFile(io.BytesIO(written.data))
-    assert members.namelist() == ["radar_camera.yml", "map_x.npy", "map_y.npy"]
-    assert members.read("radar_camera.yml") == alone.data
-    preview = panel.export_preview(file, "opencv", "", "drive")
-    assert preview.file_name == "drive_radar_camera.zip"
-    assert preview.text == alone.content
+def test_a_file_with_others_that_belong_to_it_is_saved_as_one_zip(file):
+    camera = replace(file.calibration.camera, model="plumb_bob", distortion=[-0.3, 0.1, 0, 0, 0])
+    distorted = replace(file, calibration=replace(file.calibration, camera=camera))
+    written = panel.exported(distorted, "kitti", "").download
+    assert zipfile.ZipFile(io.BytesIO(written.data)).namelist() == ["calib.txt", "rectification.npz"]
+    preview = panel.export_preview(distorted, "kitti", "", "drive")
+    assert preview.file_name == f"drive_{written.file_name}"
+    assert preview.size_bytes == len(written.data)

@@ -7,6 +7,7 @@ import pytest
 from app.web.channel.export_preview import export_preview, exported
 from app.web.exports.query import FieldError, fields_in
 from calib_core.interchange import CalibrationFile, FrameNames, export, read_any, read_calibration
+from calib_core.interchange.own.calibration_json import calibration_sha256
 
 
 @pytest.fixture
@@ -19,6 +20,8 @@ def test_the_names_of_the_query_are_those_in_the_file(file, key):
     written = exported(file, key, "radar_frame=front_radar&camera_frame=%2Ffront%2Fcamera_optical")
     assert read_any(written.data).frames == FrameNames("front_radar", "front/camera_optical")
     assert written.data == export(file, key, frames=FrameNames("front_radar", "front/camera_optical")).data
+    if key != "json":
+        assert read_any(written.data).calibration_sha256 == calibration_sha256(file), "its origin keeps its own names"
     made = export_preview(file, key, "radar_frame=front_radar", "drive")
     assert made.check_is_good
     assert "front_radar" in made.pose.words
@@ -43,10 +46,10 @@ def test_what_cannot_be_used_is_refused_with_the_name_of_its_field(query, field,
     assert refused.value.field == field
 
 
-def test_a_format_that_needs_rectified_pictures_asks_for_that_field(file):
-    camera = replace(file.calibration.camera, model="plumb_bob", distortion=[-0.3, 0.1, 0, 0, 0])
+def test_a_lens_that_no_maps_can_rectify_asks_whether_the_pictures_are_rectified(file):
+    camera = replace(file.calibration.camera, model="plumb_bob", distortion=[-5000.0, 0, 0, 0, 0])
     distorted = replace(file, calibration=replace(file.calibration, camera=camera))
-    with pytest.raises(FieldError, match="tick the box") as refused:
+    with pytest.raises(FieldError, match="no rectified picture") as refused:
         exported(distorted, "kitti", "")
     assert refused.value.field == "rectified"
 

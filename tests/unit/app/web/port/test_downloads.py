@@ -80,6 +80,15 @@ def test_a_preview_reads_its_own_text_back(file, ask, name):
     assert preview["size_bytes"] > 0
 
 
+def test_a_format_without_a_pose_is_previewed_without_reading_it_back(file, ask):
+    solved = Session(CLICKS, outcome=file.calibration, outcome_revision=0)
+    preview = json.loads(ask(solved, "/api/preview/camera-info").body)
+    assert preview["check"] == "Not read back: this format has no pose to read."
+    assert preview["file_name"] == "drive_7_camera_info.yaml"
+    assert any("without the pose" in note for note in preview["notes"])
+    assert b"camera_matrix:" in ask(solved, "/api/export/camera-info").body
+
+
 def test_the_address_may_pose_the_radar_in_the_kit(file, ask):
     solved = Session(CLICKS, outcome=file.calibration, outcome_revision=0)
     posed = ask(solved, "/api/export/autoware?parent_from_radar=1.5,0,0.25,0,0,0,1")

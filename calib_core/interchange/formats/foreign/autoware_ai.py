@@ -1,0 +1,69 @@
+"""Calibrations of Autoware.AI's camera-lidar calibrators: CameraExtrinsicMat and CameraMat in OpenCV's FileStorage."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from calib_core.errors import InputError
+from calib_core.interchange.cameras.fields import FoundCamera, floats, lens_model_named
+from calib_core.interchange.format import Reads
+from calib_core.interchange.formats.foreign.found_lens import with_camera
+from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing, rigid_matrix
+from calib_core.interchange.imported import ImportedCalibration, WrittenPose
+from calib_core.interchange.syntax.content import Content
+
+__all__ = ["AUTOWARE_AI"]
+
+_KEY = "CameraExtrinsicMat"
+_ASSUMPTION = (
+    f"the file does not say which way {_KEY} goes; read as Autoware.AI publishes it, the camera's pose (optical axes) "
+    "in the lidar, with the radar in the lidar's place"
+)
+
+
+def _recognizes(content: Content) -> bool:
+    return _KEY in content.mapping
+
+
+def _read(content: Content, source: str) -> ImportedCalibration:
+    """Read the camera's pose and the camera.
+
+    Raises:
+        InputError: it contains intrinsics only, or goes the other way by where the camera would look.
+    """
+    values = content.mapping
+    matrix = rigid_matrix(values[_KEY], source=source, place=_KEY)
+    if np.abs(matrix - np.eye(4)).max() == 0:
+        raise InputError(
+            f"{source}: {_KEY} is the identity, as the tool writes for intrinsics alone; give the file of the extrinsic "
+            "calibration (as intrinsics: --camera FILE)"
+        )
+    if direction_by_facing(matrix[:3, :3]) == "camera_from_radar":
+        raise InputError(
+            f"{source}: {_KEY}: as the camera's pose in the radar the camera looks away from it, and would not if the matrix "
+            "were inverted; invert it, or write it to a text file as camera_from_radar"
+        )
+    found = ImportedCalibration(
+        "autoware-ai",
+        WrittenPose("matrix", matrix[:3, :3], matrix[:3, 3], "radar_from_camera"),
+        assumptions=(_ASSUMPTION,),
+    ).checked(source)
+    return with_camera(found, _camera(values, source=source), source=source)
+
+
+def _camera(values: Mapping[str, Any], *, source: str) -> FoundCamera | None:
+    if "CameraMat" not in values:
+        return None
+    size = values.get("ImageSize") or ()
+    size = floats(size.split() if isinstance(size, str) else size, source=source, place="ImageSize")
+    return FoundCamera(
+        name="CameraMat",
+        model=lens_model_named(str(values.get("DistModel") or ""), source=source),
+        matrix_px=floats(values["CameraMat"], source=source, place="CameraMat", length=9),
+        distortion=floats(values.get("DistCoeff") or (), source=source, place="DistCoeff"),
+        size_px=(int(size[0]), int(size[1])) if len(size) == 2 and all(size) else None,
+    )
+
+
+AUTOWARE_AI = Reads(_recognizes, _read)

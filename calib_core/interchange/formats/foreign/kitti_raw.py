@@ -1,0 +1,124 @@
+"""KITTI's raw data (calib_velo_to_cam.txt with calib_cam_to_cam.txt beside it) and odometry (calib.txt with Tr)."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
+from calib_core.interchange.cameras.fields import FoundCamera, floats
+from calib_core.interchange.format import Reads
+from calib_core.interchange.formats.foreign.found_lens import with_camera
+from calib_core.interchange.formats.foreign.pose_parts import rigid
+from calib_core.interchange.imported import ImportedCalibration, WrittenPose
+from calib_core.interchange.syntax.content import Content
+
+__all__ = ["KITTI_ODOMETRY", "KITTI_RAW"]
+
+_CAMERAS = "calib_cam_to_cam.txt"
+_AS_RADAR = "the Velodyne's frame is taken to be the radar's; KITTI has no radar"
+_UNDISTORTED = "assumed that the pictures are undistorted, those of image_02"
+_ROUNDING = 1e-3
+
+
+def _keyed(text: str, *, source: str) -> dict[str, str]:
+    """Return the numbers of each line by its key.
+
+    Raises:
+        InputError: a key appears twice.
+    """
+    lines: dict[str, str] = {}
+    for line in text.splitlines():
+        key, colon, numbers = line.partition(":")
+        if not colon or line.lstrip().startswith("#"):
+            continue
+        if key.strip() in lines:
+            raise InputError(f"{source}: {key.strip()} appears twice; keep one")
+        lines[key.strip()] = numbers
+    return lines
+
+
+def _numbers(lines: Mapping[str, str], key: str, length: int, *, source: str) -> np.ndarray:
+    if key not in lines:
+        raise InputError(f"{source}: no {key} in it; add that line")
+    return np.array(floats(lines[key].split(), source=source, place=key, length=length))
+
+
+def _recognizes_raw(content: Content) -> bool:
+    keys = {line.partition(":")[0] for line in content.lines}
+    return content.syntax == "lines" and {"R", "T"} <= keys and bool(keys & {"calib_time", "delta_f", "delta_c"})
+
+
+def _read_raw(content: Content, source: str) -> ImportedCalibration:
+    """Read the Velodyne's pose, in the rectified camera 2 if the cameras' file is beside it.
+
+    Raises:
+        InputError: a line is missing or has the wrong number of values.
+    """
+    lines = _keyed(content.text, source=source)
+    rotation = _numbers(lines, "R", 9, source=source)
+    translation_m = _numbers(lines, "T", 3, source=source)
+    camera0_from_radar = rigid("matrix", rotation.reshape(3, 3), translation_m, source=source)
+    if _CAMERAS not in content.beside:
+        return _found(
+            camera0_from_radar,
+            f"no {_CAMERAS} beside the file: the camera is camera 0 before rectification",
+            source=source,
+        )
+    beside = _keyed(content.beside[_CAMERAS].decode("utf-8", errors="replace"), source=_CAMERAS)
+    rectifying = _numbers(beside, "R_rect_00", 9, source=_CAMERAS).reshape(3, 3)
+    rectified_from_camera0 = rigid("matrix", rectifying, np.zeros(3), source=_CAMERAS)
+    projection = _numbers(beside, "P_rect_02", 12, source=_CAMERAS).reshape(3, 4)
+    size = _numbers(beside, "S_rect_02", 2, source=_CAMERAS)
+    return _projected(
+        rectified_from_camera0 @ camera0_from_radar, projection, (int(size[0]), int(size[1])), source=source
+    )
+
+
+def _recognizes_odometry(content: Content) -> bool:
+    keys = {line.partition(":")[0].strip() for line in content.lines if ":" in line}
+    return (
+        content.syntax == "lines" and "Tr" in keys and not any("velo" in key or "radar" in key for key in keys - {"Tr"})
+    )
+
+
+def _read_odometry(content: Content, source: str) -> ImportedCalibration:
+    """Read Tr, the Velodyne's pose in the rectified camera 0, and the projection of camera 2.
+
+    Raises:
+        InputError: a line is missing or has the wrong number of values.
+    """
+    lines = _keyed(content.text, source=source)
+    matrix = _numbers(lines, "Tr", 12, source=source).reshape(3, 4)
+    camera0_from_radar = rigid("matrix", matrix[:, :3], matrix[:, 3], source=source)
+    if "P2" not in lines:
+        return _found(camera0_from_radar, "no P2 in the file: the camera is the rectified camera 0", source=source)
+    projection = _numbers(lines, "P2", 12, source=source).reshape(3, 4)
+    return _projected(camera0_from_radar, projection, None, source=source)
+
+
+def _projected(
+    camera0_from_radar: RigidTransform, projection: np.ndarray, size_px: tuple[int, int] | None, *, source: str
+) -> ImportedCalibration:
+    """Return the pose in camera 2, whose projection of the rectified camera 0 is K [I | t].
+
+    Raises:
+        InputError: the projection is not a camera's.
+    """
+    matrix = projection[:, :3]
+    if np.abs(matrix[2] - [0, 0, 1]).max() > _ROUNDING or not (np.diag(matrix) > 0).all():
+        raise InputError(f"{source}: the projection of camera 2 has no camera matrix in it; correct it")
+    offset_m = np.linalg.solve(matrix, projection[:, 3])
+    camera2_from_camera0 = RigidTransform(np.eye(3), offset_m)
+    found = _found(camera2_from_camera0 @ camera0_from_radar, _UNDISTORTED, source=source)
+    camera = FoundCamera("P2", "", tuple(matrix.ravel().tolist()), (), size_px)
+    return with_camera(found, camera, source=source)
+
+
+def _found(camera_from_radar: RigidTransform, assumption: str, *, source: str) -> ImportedCalibration:
+    pose = WrittenPose("matrix", camera_from_radar.rotation, camera_from_radar.translation_m, "camera_from_radar")
+    return ImportedCalibration("kitti-raw", pose, assumptions=(_AS_RADAR, assumption)).checked(source)
+
+
+KITTI_RAW = Reads(_recognizes_raw, _read_raw, beside=(_CAMERAS,))
+KITTI_ODOMETRY = Reads(_recognizes_odometry, _read_odometry)

@@ -1,0 +1,114 @@
+"""What files of other tools have in common: numbers by name, 4x4 matrices, roles by frame name, a direction by facing."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from calib_core.arrays import Matrix33
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
+from calib_core.interchange.cameras.fields import floats
+from calib_core.interchange.imported import (
+    Direction,
+    Form,
+    ImportedCalibration,
+    WrittenPose,
+    looks_like_camera,
+    looks_like_radar,
+    posed_between,
+)
+
+__all__ = ["AXES_ASSUMED", "between_named_frames", "direction_by_facing", "named_numbers", "rigid", "rigid_matrix"]
+
+AXES_ASSUMED = "assumed a radar frame with x forward, y left, z up, and a camera frame with optical axes (z forward)"
+"""For formats that name both sensors but say nothing of their axes."""
+
+_LAST_ROW_ROUNDING = 1e-6
+_FACING = 0.5  # cosine of 60 degrees
+
+
+def named_numbers(block: Any, keys: Sequence[str], *, source: str, place: str) -> tuple[float, ...]:
+    """Return the numbers under some keys of a mapping, in the order of the keys.
+
+    Raises:
+        InputError: it is no mapping, or a number is missing.
+    """
+    if not isinstance(block, Mapping):
+        raise InputError(f"{source}: {place}: missing; add it, with {', '.join(keys)}")
+    return tuple(floats(block.get(key), source=source, place=f"{place}.{key}", length=1)[0] for key in keys)
+
+
+def rigid(form: Form, rotation: ArrayLike, translation_m: ArrayLike, *, source: str) -> RigidTransform:
+    """Return the transform of a rotation as it is written and a translation [m].
+
+    Raises:
+        InputError: the rotation is invalid.
+    """
+    pose = WrittenPose(form, np.asarray(rotation), np.asarray(translation_m), "radar_from_camera")
+    try:
+        return pose.as_written()
+    except ValueError as error:
+        raise InputError(f"{source}: {error}; give a proper rotation") from None
+
+
+def rigid_matrix(value: Any, *, source: str, place: str) -> np.ndarray:
+    """Return a 4x4 matrix whose last row is 0 0 0 1; its rotation is checked by who takes it.
+
+    Raises:
+        InputError: there are not 16 numbers, or the last row is another.
+    """
+    matrix = np.reshape(floats(value, source=source, place=place, length=16), (4, 4))
+    if np.abs(matrix[3] - [0, 0, 0, 1]).max() > _LAST_ROW_ROUNDING:
+        raise InputError(f"{source}: {place}: the last row must be 0 0 0 1; is the matrix transposed?")
+    return matrix
+
+
+def between_named_frames(
+    name: str, written: WrittenPose, parent: str, child: str, *, source: str, notes: tuple[str, ...] = ()
+) -> ImportedCalibration:
+    """Read "the pose of child in parent" where one of the two must be a radar and the other a camera by name.
+
+    Args:
+        name: of the format.
+        written: the numbers; the direction and axes in it are replaced by those that the names give.
+        parent: name of the frame the pose is given in.
+        child: name of the other.
+        source: the name of the file in error messages.
+        notes: what reading did with the numbers.
+
+    Raises:
+        InputError: the names are not a radar's and a camera's, or the rotation is invalid.
+    """
+    parent, child = parent.strip().lstrip("/"), child.strip().lstrip("/")
+    is_pair = any(
+        looks_like_radar(radar) and looks_like_camera(camera) for radar, camera in ((parent, child), (child, parent))
+    )
+    if not is_pair:
+        raise InputError(
+            f"{source}: is the pose of {child!r} in {parent!r}, which by name are not a radar and a camera; rename the "
+            "frames if they are, or give the transform between the two"
+        )
+    roles = posed_between(parent, child, None, written)
+    return ImportedCalibration(
+        name, roles.pose, frames=roles.frames, assumptions=roles.assumptions, notes=notes
+    ).checked(source)
+
+
+def direction_by_facing(rotation: Matrix33) -> Direction | None:
+    """Return which way a transform between a radar and an optical camera frame goes, judged by where the camera looks.
+
+    Args:
+        rotation: of the transform as written.
+
+    Returns:
+        The direction under which the camera looks within 60 degrees of the radar's x axis, with its top up; None if both
+        directions do that, or neither.
+    """
+    looks: dict[Direction, tuple[float, float]] = {
+        "radar_from_camera": (rotation[0, 2], -rotation[2, 1]),
+        "camera_from_radar": (rotation[2, 0], -rotation[1, 2]),
+    }
+    fitting = [direction for direction, cosines in looks.items() if min(cosines) > _FACING]
+    return fitting[0] if len(fitting) == 1 else None

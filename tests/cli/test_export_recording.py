@@ -1,0 +1,180 @@
+"""`cocalib export --to mcap`: the new recording, what is refused, and that nothing half-written stays."""
+
+import errno
+import io
+import json
+import shutil
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+import app.cli.export_recording as command
+
+
+@pytest.fixture(scope="module")
+def calibration(project_root, tmp_path_factory):
+    """Return the calibration of the sample's own clicks."""
+    from app.cli import run
+
+    path = tmp_path_factory.mktemp("calibration") / "calibration.json"
+    sample = project_root / "sample_data" / "rooftop"
+    assert run(["solve", *map(str, files(sample)), "--clicks", str(sample / "clicks.json"), "--out", str(path)]) == 0
+    return path
+
+
+@pytest.fixture
+def sample(project_root):
+    return project_root / "sample_data" / "rooftop"
+
+
+@pytest.fixture(scope="module")
+def exported(project_root, calibration, tmp_path_factory):
+    """Return the new recording."""
+    from app.cli import run
+
+    out = tmp_path_factory.mktemp("exported") / "new.mcap"
+    sample = project_root / "sample_data" / "rooftop"
+    assert (
+        run(["export", str(calibration), "--to", "mcap", "--recording", *map(str, files(sample)), "--out", str(out)])
+        == 0
+    )
+    return out
+
+
+def files(sample):
+    return sample / "camera.bag", sample / "radar.bag"
+
+
+def test_the_new_recording_gives_the_same_calibration_from_the_same_clicks(
+    cocalib, sample, calibration, exported, tmp_path
+):
+    again = tmp_path / "again.json"
+    assert cocalib("solve", exported, "--clicks", sample / "clicks.json", "--out", again).code == 0
+    first, second = (json.loads(path.read_text()) for path in (calibration, again))
+    for document in (first, second):
+        document["provenance"].pop("inputs")
+    assert first == second
+    assert '"imageMode"' in exported.with_name("new.foxglove-layout.json").read_text()
+    assert sorted(path.name for path in exported.parent.iterdir()) == ["new.foxglove-layout.json", "new.mcap"]
+    with exported.open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        times = [message.log_time for _, _, message in reader.iter_messages(log_time_order=False)]
+        assert reader.get_header().profile == "ros1"
+    assert all(before <= after for before, after in pairwise(times))
+
+
+@pytest.mark.parametrize("link", ["itself", "symlink", "hardlink"])
+def test_the_recording_itself_is_never_written_over(link, cocalib, calibration, exported, tmp_path):
+    first = Path(shutil.copy(exported, tmp_path / "first.mcap"))
+    before = first.read_bytes()
+    out = first if link == "itself" else tmp_path / "other.mcap"
+    if link == "symlink":
+        out.symlink_to(first)
+    elif link == "hardlink":
+        out.hardlink_to(first)
+    done = cocalib("export", calibration, "--to", "mcap", "--recording", first, "--out", out, "--force")
+    assert (done.code, first.read_bytes() == before) == (2, True)
+    assert "is the recording itself, which is never changed" in done.err
+
+
+def test_a_file_that_exists_is_overwritten_only_with_force(cocalib, sample, calibration, tmp_path):
+    command_line = (
+        "export",
+        calibration,
+        "--to",
+        "mcap",
+        "--recording",
+        *files(sample),
+        "--out",
+        tmp_path / "new.mcap",
+    )
+    for name in ("new.mcap", "new.foxglove-layout.json"):
+        (tmp_path / name).write_text("mine")
+        done = cocalib(*command_line)
+        assert done.code == 2
+        assert f"{name}: already exists" in done.err
+        assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
+        (tmp_path / name).unlink()
+    (tmp_path / "new.mcap").write_text("mine")
+    done = cocalib(*command_line, "--force")
+    assert done.code == 0
+    assert "messages of the recording, unchanged; added: " in done.out
+    assert (tmp_path / "new.mcap").read_bytes()[1:5] == b"MCAP"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (("--to", "mcap"), "--recording RECORDING... --out NEW.mcap"),
+        (("--to", "tf2", "--force"), "are for --to mcap"),
+        (("--to", "mcap", "--recording", "{sample}", "--out", "new.bag"), "name it NAME.mcap"),
+        (("--to", "mcap", "--recording", "{sample}", "--out", "new.mcap", "--rectified"), "do not apply to --to mcap"),
+        (("--to", "mcap", "--recording", "nothing.bag", "--out", "new.mcap"), "no such file"),
+        (("--to", "mcap", "--recording", "{sample}", "--out", "no/folder/new.mcap"), "does not exist; create it"),
+    ],
+)
+def test_what_is_missing_or_does_not_belong_is_said(
+    changes, words, cocalib, sample, calibration, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    done = cocalib("export", calibration, *(one.format(sample=sample / "camera.bag") for one in changes))
+    assert (done.code, list(tmp_path.iterdir())) == (2, [])
+    assert words in done.err
+
+
+def test_folders_of_pictures_are_no_recording_to_write_again(cocalib, sample, calibration, tmp_path, jpeg_folder):
+    done = cocalib("export", calibration, "--to", "mcap", "--recording", jpeg_folder, "--out", tmp_path / "new.mcap")
+    assert done.code == 2
+    assert "is no ROS recording" in done.err
+    assert not (tmp_path / "new.mcap").exists()
+
+
+@pytest.fixture
+def jpeg_folder(cocalib, tmp_path):
+    import cv2
+    import numpy as np
+
+    folder = tmp_path / "pictures"
+    folder.mkdir()
+    for number in range(3):
+        cv2.imwrite(str(folder / f"17000000{number:02d}.000000.jpg"), np.full((720, 1280, 3), 90, dtype=np.uint8))
+    return folder
+
+
+class Full(io.RawIOBase):
+    """A disk with room for some bytes."""
+
+    def __init__(self, stream, room, error):
+        self.stream, self.room, self.error = stream, room, error
+
+    def write(self, data):
+        self.room -= len(data)
+        if self.room < 0:
+            raise self.error
+        return self.stream.write(data)
+
+
+@pytest.mark.parametrize(
+    "stop", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()], ids=["full", "ctrl-c"]
+)
+def test_nothing_half_written_stays(stop, cocalib, sample, calibration, tmp_path, monkeypatch):
+    writing = command.writing_whole
+
+    @contextmanager
+    def small(path):
+        with writing(path) as stream:
+            yield Full(stream, 1_000_000, stop)
+
+    monkeypatch.setattr(command, "writing_whole", small)
+    done = cocalib("export", calibration, "--to", "mcap", "--recording", *files(sample), "--out", tmp_path / "new.mcap")
+    assert done.code != 0
+    assert list(tmp_path.iterdir()) == []
+    if isinstance(stop, OSError):
+        assert "the disk is full: the new recording needs about" in done.err
+
+
+def test_list_names_it(cocalib):
+    assert "\nmcap " in cocalib("export").out

@@ -1,0 +1,89 @@
+"""Calibrations in the shape that other programs write: read right, or refused in words, and never read wrong."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib_core.errors import InputError
+from calib_core.interchange import read_any, read_any_file
+from tests.corpus_calibrations.data_sets import DATA_SETS
+from tests.corpus_calibrations.reading import Reading, read
+from tests.corpus_calibrations.ros import ROS
+from tests.corpus_calibrations.tools import TOOLS
+
+CALIBRATIONS = {calibration.name: calibration for calibration in (*ROS, *TOOLS, *DATA_SETS)}
+
+
+def refusal(data: bytes) -> str:
+    """Return the message with which a file is refused; empty if it is read."""
+    try:
+        read_any(data, "file")
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+@pytest.fixture(scope="module")
+def readings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Reading]:
+    folders = {name: tmp_path_factory.mktemp("foreign") for name in CALIBRATIONS}
+    return {name: read(calibration, folders[name]) for name, calibration in CALIBRATIONS.items()}
+
+
+def test_no_file_is_read_wrong_and_every_pose_between_a_radar_and_a_camera_is_read(
+    readings: dict[str, Reading],
+) -> None:
+    print("\n".join(f"{name:32} {reading.outcome:8} {reading.why}" for name, reading in readings.items()))
+    outcomes = [reading.outcome for reading in readings.values()]
+    print({outcome: outcomes.count(outcome) for outcome in ("right", "refused", "wrong")})
+    due = [name for name, calibration in CALIBRATIONS.items() if not (calibration.refused or calibration.waits)]
+
+    assert len(readings) >= 38
+    assert outcomes.count("wrong") == 0
+    assert [name for name in due if readings[name].outcome != "right"] == []
+    assert outcomes.count("right") >= 32
+
+
+@pytest.mark.parametrize("name", CALIBRATIONS)
+def test_a_file_is_read_right_or_refused_with_what_to_do(readings: dict[str, Reading], name: str) -> None:
+    calibration, reading = CALIBRATIONS[name], readings[name]
+
+    if calibration.refused:
+        assert reading.outcome == "refused"
+        assert re.search(calibration.refused, reading.why)
+    elif reading.outcome == "refused":
+        assert calibration.waits, reading.why
+        assert "; " in reading.why
+    else:
+        assert reading.outcome == "right", reading.why
+
+
+def test_a_sensor_that_the_file_does_not_call_a_radar_is_an_assumption(readings: dict[str, Reading]) -> None:
+    for name in ("koide3", "KITTI raw", "KITTI odometry", "Scale frame", "Segments.ai", "Autoware.AI", "OpenLABEL"):
+        assert readings[name].assumed, name
+    for name in ("tf2_echo without names", "TUM pose", "PJLab", "DriveWorks rig, corrected"):
+        assert readings[name].assumed, name
+
+
+def test_the_folder_of_a_file_is_looked_at_for_what_completes_it(tmp_path: Path) -> None:
+    calibration = CALIBRATIONS["KITTI raw"]
+    together = read(calibration, tmp_path)
+    (tmp_path / "calib_cam_to_cam.txt").write_text("R_rect_00: 1 0 0\n", encoding="utf-8")
+
+    assert together.outcome == "right"
+    with pytest.raises(InputError, match="R_rect_00: expected 9 numbers, found 3"):
+        read_any_file(tmp_path / calibration.file_name)
+
+
+@pytest.mark.parametrize("name", CALIBRATIONS)
+def test_a_damaged_file_is_read_or_refused(name: str) -> None:
+    content = CALIBRATIONS[name].content
+    data = content.encode() if isinstance(content, str) else content
+    rng = np.random.default_rng(len(data))
+    for _ in range(8):
+        at, cut = int(rng.integers(len(data))), int(rng.integers(1, 40))
+        junk = rng.choice([b"", b"-", b"0", b"nan", b"[", b"{}", b": ", b"\n", b"\xff", b'"'])
+        refused = refusal(data[:at] + bytes(junk) + data[at + cut :])
+        assert not refused or refused.startswith("file: ")
+        assert "\n" not in refused

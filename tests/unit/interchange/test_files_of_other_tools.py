@@ -1,0 +1,232 @@
+"""Readers of other tools' files: variants of each shape, what they refuse, and what they take for granted."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calib_core.camera import Camera
+from calib_core.errors import InputError
+from calib_core.interchange import CalibrationFile, export, read_any, read_calibration
+from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing
+
+FORWARD = [0.1, -0.2, 0.3, -0.5, 0.5, -0.5, 0.5]  # a camera that looks along the radar's x axis, x y z qx qy qz qw
+POSITION, TURN = FORWARD[:3], FORWARD[3:]
+MATRIX = [[0, 0, 1, 0.1], [-1, 0, 0, -0.2], [0, -1, 0, 0.3], [0, 0, 0, 1]]
+ECHO = "At time 0.0\n- Translation: [{}]\n- Rotation: in Quaternion [{}]\n"
+
+
+@pytest.fixture(scope="module")
+def file(project_root: Path) -> CalibrationFile:
+    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+
+
+def refusal(content: str | dict[str, Any]) -> str:
+    with pytest.raises(InputError) as refused:
+        read_any(content if isinstance(content, str) else json.dumps(content), "file")
+    assert str(refused.value).startswith("file: ")
+    return str(refused.value)
+
+
+def echo(position: list[float], turn: list[float], more: str = "") -> str:
+    return ECHO.format(", ".join(map(str, position)), ", ".join(map(str, turn))) + more
+
+
+def labelled(systems: dict[str, Any], streams: dict[str, Any] | None = None) -> dict[str, Any]:
+    return {"openlabel": {"coordinate_systems": systems, "streams": streams or {}}}
+
+
+def placed(parent: str, matrix: Any = None) -> dict[str, Any]:
+    return {"type": "sensor_cs", "parent": parent, "pose_wrt_parent": {"matrix4x4": np.ravel(matrix).tolist()}}
+
+
+def extrinsic(sensor: str, target: str, matrix: Any = MATRIX) -> dict[str, Any]:
+    return {"sensor_name": sensor, "target_sensor_name": target, "param": {"sensor_calib": {"data": matrix}}}
+
+
+@pytest.mark.parametrize("name", ["pjlab", "koide3", "openlabel"])
+def test_without_our_statement_a_file_is_read_the_same_and_its_meaning_is_assumed(file, name):
+    def stripped(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: stripped(inner) for key, inner in value.items() if key != "cocalib"}
+        return value
+
+    ours = export(file, name).data.decode()
+    bare = read_any(json.dumps(stripped(json.loads(ours))))
+    whole = read_any(ours)
+
+    np.testing.assert_array_equal(bare.camera_from_radar.as_matrix(), whole.camera_from_radar.as_matrix())
+    assert (whole.assumptions, whole.evidence, bare.evidence) == ((), "clicked", None)
+    assert bare.assumptions
+    assert bare.check_point is None
+
+
+def test_a_lens_without_an_image_size_is_completed_with_it(file):
+    content = json.loads(export(file, "koide3").data)
+    del content["camera"]["image_size"]
+    found = read_any(json.dumps(content))
+    assert found.camera is None
+    camera = found.camera_for((640, 480))
+    assert camera is not None
+    point = np.array([[0.4, -0.2, 5.0]])
+    np.testing.assert_allclose(camera.project(point), file.calibration.camera.project(point), rtol=0, atol=1e-9)
+
+
+def test_a_lens_of_another_kind_is_left_out_with_a_note(file):
+    content = json.loads(export(file, "koide3").data)
+    content["camera"]["camera_model"] = "omnidir"
+    found = read_any(json.dumps(content))
+    assert (found.camera, found.matrix_px) == (None, None)
+    assert any("omnidir" in note for note in found.notes)
+
+
+def test_openlabel_has_no_fisheye_and_says_so(file):
+    fisheye = Camera("equidistant", 640, 480, file.calibration.camera.matrix_px, np.zeros(4))
+    with pytest.raises(InputError, match="has no equidistant model, which this camera uses; export with --to"):
+        export(replace(file, calibration=replace(file.calibration, camera=fisheye)), "openlabel")
+
+
+def test_of_several_extrinsics_the_one_of_the_radar_is_taken():
+    content = {"a": extrinsic("lidar", "front_camera"), "b": extrinsic("front_camera", "front_radar")}
+    found = read_any(json.dumps(content))
+    assert (found.pose.direction, found.frames and found.frames.radar) == ("radar_from_camera", "front_radar")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"a": extrinsic("radar", "camera", np.transpose(MATRIX).tolist())}, "last row must be 0 0 0 1; is the matrix"),
+        ({"a": extrinsic("radar", "camera", [[1, 0], [0, 1]])}, "expected 16 numbers, found 4"),
+        ({"a": extrinsic("radar", "camera", np.diag([1, 1, -1, 1]).tolist())}, "mirrored"),
+        (
+            {"a": extrinsic("radar", "camera_1"), "b": extrinsic("radar", "camera_2")},
+            "2 of them between a radar and a camera",
+        ),
+        ({"results": {"T_lidar_camera": [1, 2, 3]}}, "expected 7 numbers, found 3"),
+        ({"results": {"T_lidar_camera": [0, 0, 0, 1, 1, 1, 1]}}, "has length 2, not 1"),
+        (labelled({"radar": placed("a", np.eye(4)), "camera": placed("b", MATRIX)}), "no common parent"),
+        (labelled({"radar": placed("camera", np.eye(4)), "camera": placed("radar", MATRIX)}), "form a circle"),
+        (
+            labelled({"radar": placed("", np.eye(4)), "cam1": placed("", MATRIX), "cam2": placed("", MATRIX)}),
+            "2 cameras",
+        ),
+        (labelled({"camera": placed("", np.eye(4))}), "0 radars"),
+        (
+            labelled({"radar": placed("", np.eye(4)), "camera": {"pose_wrt_parent": {"euler_angles": [0, 0, 0]}}}),
+            "neither",
+        ),
+        (
+            labelled(
+                {"radar": placed("", np.eye(4)), "camera": placed("radar", MATRIX)},
+                {"camera": {"stream_properties": {"intrinsics_pinhole": {"camera_matrix_3x4": [1.0] * 12}}}},
+            ),
+            "a projection with a pose in it",
+        ),
+        ({"images": [{"position": dict(x=0, y=0, z=0), "heading": dict(w=1, x=0, y=0, z=0)}]}, "no device_heading"),
+        ({"images": [{"position": {}, "heading": {}}] * 2, "device_heading": {}}, "2 cameras with a pose"),
+        ({"position": [0, 0, 0], "heading": [1, 0, 0]}, "heading: expected 4 numbers, found 3"),
+        (
+            {
+                "extrinsics": {
+                    "translation": dict(x=0, y=0, z=0),
+                    "rotation": dict(zip(("qx", "qy", "qz", "qw"), TURN, strict=True)),
+                },
+                "camera_convention": "Unity",
+            },
+            "'Unity' is neither OpenGL nor OpenCV",
+        ),
+        ({"extrinsics": {"translation": dict(x=0, y=0, z=0)}}, "extrinsics.rotation: missing"),
+        (
+            {"transforms": [{"parent_frame_id": "base", "child_frame_id": name} for name in ("camera", "radar")]},
+            "contains 2 transforms",
+        ),
+    ],
+)
+def test_json_of_another_tool_that_cannot_be_read_is_refused_in_words(content, words):
+    assert words in refusal(content)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (echo(POSITION, TURN) + echo([0.2, -0.2, 0.3], TURN), "changes from one print to the next"),
+        (echo(POSITION, TURN, "- Rotation: in RPY (degree) [1, 2, 3]\n"), "disagree"),
+        (echo(POSITION, [0, 0, 0, 1]), "names no frames"),
+        ("$ tf2_echo base_link camera\n" + echo(POSITION, TURN), "not a radar and a camera"),
+        ("$ tf2_echo base_link radar\n" + echo(POSITION, TURN), "not a radar and a camera"),
+        (echo([0.1, 0.2], TURN), "Translation: expected 3 numbers, found 2"),
+        ("12.5 0.1 -0.2 0.3 0 0 0 1\n", "does not tell which way it goes"),
+        ("calib_time: 1\nR: 1 0 0 0 1 0 0 0 1\nR: 1 0 0 0 1 0 0 0 1\nT: 0 0 0\n", "R appears twice"),
+        ("calib_time: 1\nR: 1 0 0 0 1 0 0 0 1\nT: 0 0\n", "T: expected 3 numbers, found 2"),
+        ("P2: 0 0 0 0 0 0 0 0 0 0 0 0\nTr: 1 0 0 0 0 1 0 0 0 0 1 0\n", "no camera matrix"),
+        ("transformation: {x: 0}\nparameters: {tracking_base_frame: camera}\n", "has no name; name both"),
+        ("a: 1\n---\nb: 2\n", "contains 2 YAML documents"),
+        ("CameraExtrinsicMat: [1, 2]\n", "expected 16 numbers, found 2"),
+    ],
+)
+def test_text_of_another_tool_that_cannot_be_read_is_refused_in_words(content, words):
+    assert words in refusal(content)
+
+
+def test_the_command_above_an_echo_tells_which_way_it_goes():
+    text = echo(POSITION, TURN)
+    forth = read_any(f"$ ros2 run tf2_ros tf2_echo radar camera_optical_frame\n{text}")
+    back = read_any(f"$ ros2 run tf2_ros tf2_echo camera_optical_frame radar\n{text}")
+    np.testing.assert_allclose(
+        forth.camera_from_radar.as_matrix() @ back.camera_from_radar.as_matrix(), np.eye(4), atol=1e-12
+    )
+    assert forth.assumptions == back.assumptions == ()
+
+
+def test_the_oldest_hand_eye_file_has_its_parameters_at_the_top():
+    numbers = dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), FORWARD, strict=True))
+    text = "eye_on_hand: true\nrobot_effector_frame: radar\ntracking_base_frame: camera_optical\ntransformation:\n"
+    found = read_any(text + "".join(f"  {key}: {value}\n" for key, value in numbers.items()))
+    assert found.format == "easy_handeye"
+    np.testing.assert_allclose(found.pose.translation_m, POSITION)
+
+
+def test_scale_s_lens_is_read_if_it_is_one_of_ours():
+    frame = {"position": POSITION, "heading": [TURN[3], *TURN[:3]], "fx": 500.0, "fy": 501.0, "cx": 320.0, "cy": 240.0}
+    lenses = [
+        ({}, ("pinhole", 0)),
+        ({"k1": 0.1}, ("plumb_bob", 5)),
+        ({"k1": 0.1, "camera_model": "fisheye"}, ("equidistant", 4)),
+    ]
+    for more, (model, count) in lenses:
+        found = read_any(json.dumps({**frame, **more}))
+        assert (found.lens_model, len(found.distortion)) == (model, count)
+        assert found.matrix_px is not None
+    for more in ({"camera_model": "omnidirectional"}, {"k1": 0.1, "k5": 0.2}, {"k4": 0.1}):
+        assert read_any(json.dumps({**frame, **more})).matrix_px is None
+
+
+def test_where_a_camera_looks_tells_the_direction_only_if_one_direction_fits():
+    radar_from_camera = np.array(MATRIX, dtype=float)[:3, :3]
+    sideways = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    assert direction_by_facing(radar_from_camera) == "radar_from_camera"
+    assert direction_by_facing(radar_from_camera.T) == "camera_from_radar"
+    assert direction_by_facing(sideways @ radar_from_camera) is None
+    assert direction_by_facing(np.eye(3)) is None
+
+
+def test_a_corrected_rig_keeps_unknown_corrections_out():
+    sensors = [
+        {"name": "r", "protocol": "radar", "nominalSensor2Rig_FLU": {"roll-pitch-yaw": [0, 0, 0], "t": [0, 0, 0]}},
+        {"name": "c", "protocol": "camera", "nominalSensor2Rig_FLU": {"roll-pitch-yaw": [0, 0, 0], "t": [0, 0, 1]}},
+    ]
+    sensors[1]["correction_rig_T"] = [0, 0, 0.5]  # type: ignore[assignment]
+    found = read_any(json.dumps({"rig": {"sensors": sensors}}))
+    np.testing.assert_allclose(found.pose.translation_m, [0, 0, 1.5])
+    assert "corrections" in found.assumptions[0]
+    sensors[1]["correction_other_R"] = [0, 0, 0.5]  # type: ignore[assignment]
+    assert "correction_other_R is not zero" in refusal({"rig": {"sensors": sensors}})
+
+
+def test_a_log_line_before_the_text_is_not_taken_for_json():
+    text = "[INFO] [1.5] [tf2_echo]: Waiting for transform radar ->  camera_optical: no\n" + echo(POSITION, TURN)
+    assert read_any(text).format == "tf-echo"
+    assert "not JSON" in refusal("[1, 2")
