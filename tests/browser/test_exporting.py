@@ -239,7 +239,7 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_the_picture
         with zipfile.ZipFile(saved(solved, tmp_path)) as archive:
             assert archive.namelist() == [format_named(name).file_name, "rectification.npz"]
 
-    for _ in range(4):
+    for _ in range(8):
         page.keyboard.press("Tab")
         if page.locator(RECTIFIED).evaluate("box => box === document.activeElement"):
             break
