@@ -1,7 +1,14 @@
 // @ts-check
-/** Parts of the export panel: the text with its comments dimmed, the pose in numbers, the warnings. */
+/** Parts of the export panel: the text with its comments dimmed, the file's numbers, its check point, what it rests on. */
 
+import { shape } from "./frames.js";
 import { icon, make } from "./notices.js";
+
+/** FileNumbers of app/web/exports/file_numbers.py. @typedef {{title: string, rows: {name: string, values: string[], unit: string}[]}} Numbers */
+/** CheckPointRow of app/web/exports/check_point.py. @typedef {{words: string, u_px: number, v_px: number, width_px: number, height_px: number, pair: string}} CheckPoint */
+/** How much of the picture's width the inset shows, and its shape. */
+const INSET = 0.36;
+const INSET_ASPECT = 0.34;
 
 /** The text with its comments dimmed. @param {string} content */
 export function lines(content) {
@@ -14,28 +21,63 @@ export function lines(content) {
   });
 }
 
-/** The pose in numbers, the order of the quaternion in its name. @param {Record<string, any>} preview */
+/** The file's own numbers, with the calibration's folded below. @param {Record<string, any>} preview */
 export function numbers(preview) {
-  const [x, y, z] = preview.translation_m.map((/** @type {number} */ value) => value.toFixed(4));
-  const row = (/** @type {string} */ name, /** @type {string[]} */ values) =>
-    make("tr", "", [make("th", "", name), ...values.map((value) => make("td", "", value))]);
-  const table = make("table", "pose-numbers", [
-    make("caption", "", "camera_from_radar"),
-    row("translation_m", [x, y, z, ""]),
-    row(...quaternion(preview)),
-  ]);
-  table.dataset.hint = "Rounded here; the file has full precision.";
-  return table;
+  const own = table(preview.pose.numbers);
+  own.dataset.hint = "Read back from the file: its own numbers in its own order and units. Matrices are rounded to 9 decimals here; the file has all digits.";
+  const ours = make("details", "ours", [make("summary", "", preview.our_pose.title), table(preview.our_pose)]);
+  return [own, ours];
 }
 
-/** The quaternion in the order of the file: x y z w where the file says so, else as in our own. @param {Record<string, any>} preview @returns {[string, string[]]} */
-function quaternion(preview) {
-  const xyzw = preview.quaternion_xyzw.map((/** @type {number} */ value) => value.toFixed(4));
-  return /x,? y,? z,? w/.test(preview.numbers) ? ["quaternion_xyzw", xyzw] : ["quaternion_wxyz", [xyzw[3], ...xyzw.slice(0, 3)]];
+/** @param {Numbers} given */
+function table({ title, rows }) {
+  const most = Math.max(...rows.map((row) => row.values.length));
+  const lines = rows.map(({ name, values, unit }) => {
+    const cells = values.map((value) => make("td", "", value));
+    if (cells.length === 1) cells[0].colSpan = most;
+    return make("tr", "", [make("th", "", unit ? `${name} [${unit}]` : name), ...cells]);
+  });
+  return make("table", "pose-numbers", [make("caption", "", title), ...lines]);
+}
+
+/** The check point: in a cut-out of the picture, and in one sentence. @param {CheckPoint|null} point */
+export function checkPoint(point) {
+  if (!point) return [];
+  const figure = make("figure", "check-point", [make("figcaption", "", [make("b", "", "Check point. "), point.words])]);
+  if (point.pair) figure.append(inset(point, () => figure.querySelector("svg")?.remove()));
+  return [figure];
+}
+
+/** A cut-out of the picture around the check point, with a mark on it. @param {CheckPoint} point @param {() => void} failed */
+function inset({ u_px, v_px, width_px, height_px, pair }, failed) {
+  const width = Math.max(INSET * width_px, 160);
+  const height = width * INSET_ASPECT;
+  const [u, v] = [u_px + 0.5, v_px + 0.5]; // pixel (0, 0) is the centre of the first one
+  const left = Math.max(0, Math.min(width_px - width, u - width / 2));
+  const top = Math.max(0, Math.min(height_px - height, v - height / 2));
+  const svg = shape("svg", { viewBox: `${left} ${top} ${width} ${height}`, class: "inset", role: "img", "aria-label": "The check point in the picture" });
+  const image = shape("image", { href: `api/check_point_picture?${encodeURIComponent(pair)}`, width: width_px, height: height_px });
+  image.addEventListener("error", failed);
+  const radius = 0.035 * width;
+  const arm = (/** @type {number} */ from, /** @type {number} */ to) => `M${u + from} ${v}H${u + to}M${u} ${v + from}V${v + to}`;
+  const path = `${arm(-1.7 * radius, -0.35 * radius)}${arm(0.35 * radius, 1.7 * radius)}`;
+  svg.append(image);
+  for (const name of ["rim", "mark"]) {
+    const mark = shape("g", { class: name });
+    mark.append(shape("circle", { cx: u, cy: v, r: radius }), shape("path", { d: path }));
+    svg.append(mark);
+  }
+  return svg;
+}
+
+/** What is to be known before saving: what the pose rests on, what the file cannot hold, the warnings. @param {Record<string, any>} preview */
+export function beforeSaving(preview) {
+  const missing = preview.missing ? [make("div", "missing", [icon("warning"), make("strong", "", preview.missing)])] : [];
+  return [make("div", "evidence", preview.evidence), ...missing, ...warningBox(preview.warnings)];
 }
 
 /** The warnings of the calibration. @param {import("./messages.js").WarningRow[]} rows */
-export function warningBox(rows) {
+function warningBox(rows) {
   if (!rows.length) return [];
   const title = rows.length === 1 ? "This calibration has one warning" : `This calibration has ${rows.length} warnings`;
   const items = rows.map((row) => {
@@ -43,30 +85,7 @@ export function warningBox(rows) {
     item.dataset.hint = row.hint;
     return item;
   });
-  return [make("div", "with-warnings", [make("strong", "", [icon("warning"), title]), make("ul", "", items)])];
-}
-
-const RECTIFIED = "cocalib-rectified";
-
-/** The user's statement that the pictures are rectified already, asked by formats that cannot hold distortion. It is kept for this
- * browser session only: the pictures of the next recording may differ. @param {() => void} changed */
-export function rectifiedBox(changed) {
-  const box = make("input", "", []);
-  box.type = "checkbox";
-  try {
-    box.checked = sessionStorage.getItem(RECTIFIED) === "1";
-  } catch {
-    // Without storage, the choice is just not remembered.
-  }
-  box.addEventListener("change", () => {
-    try {
-      sessionStorage.setItem(RECTIFIED, box.checked ? "1" : "0");
-    } catch {
-      // As above.
-    }
-    changed();
-  });
-  const label = make("label", "", [box, "My pictures are rectified (undistorted with this K)"]);
-  label.dataset.hint = "The pictures were undistorted with this camera matrix and have no distortion left. This format cannot hold distortion coefficients.";
-  return { box, row: make("div", "rectified", [label]) };
+  const box = make("details", "with-warnings", [make("summary", "", [icon("warning"), title]), make("ul", "", items)]);
+  box.open = true;
+  return [box];
 }

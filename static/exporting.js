@@ -2,19 +2,18 @@
 /** The export panel: a preview of every format, the direction of its transform, and the clicks. */
 
 import { ask, BROKE_OFF, content } from "./asking.js";
-import { warningBox, lines, numbers, rectifiedBox } from "./export_parts.js";
+import { IDENTITY, nameFields, parentFields, rectifiedBox } from "./export_fields.js";
+import { drawFormats, focusFormats, formatColumn } from "./export_list.js";
+import { beforeSaving, checkPoint, lines, numbers } from "./export_parts.js";
 import { frameDrawing } from "./frames.js";
 import { importer } from "./importing.js";
 import { icon, make } from "./notices.js";
 import { on, state } from "./state.js";
 
-/** @typedef {{key: string, label: string, takes_parent: boolean, takes_rectified: boolean}} Format */
+/** @typedef {import("./export_list.js").Format} Format */
 /** The server's preview of a format: ExportPreview in app/web/channel/export_preview.py. @typedef {Record<string, any>} Preview */
 const KEPT = "cocalib-export";
 const CLICKS = "clicks";
-const PARENT = ["x", "y", "z", "qx", "qy", "qz", "qw"];
-const IDENTITY = ["0", "0", "0", "0", "0", "0", "1"];
-const TYPING_MS = 250;
 const ASKING = "Asking the server for the file…";
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("export-dialog"));
 const button = /** @type {HTMLButtonElement} */ (document.getElementById("export"));
@@ -23,19 +22,19 @@ let formats = [];
 /** @type {{format: string, parent: string[]}} */
 let kept = { format: "json", parent: [...IDENTITY] };
 let asked = 0;
-let parentTimer = 0;
 
-const list = make("div", "formats", []);
 const head = make("div", "what", []);
-const parent = make("div", "parent", []);
+const names = nameFields(() => load());
 const rectified = rectifiedBox(() => load());
+/** @type {ReturnType<typeof parentFields>} */
+let parent;
+const before = make("div", "before", []);
 const text = make("pre", "text", "");
 const notes = make("ul", "notes", []);
 const side = make("aside", "", []);
 const fileName = make("input", "", []);
 const copy = make("button", "second", "Copy");
 const save = make("button", "first", "Download");
-const separator = make("hr", "", []);
 const retry = make("button", "second", "Try again");
 
 export function startExporting() {
@@ -54,7 +53,10 @@ export function startExporting() {
     button.classList.toggle("ready", state.view?.has_calibration ?? false);
     if (dialog.open) load();
   });
-  on(["recording"], loadFormats);
+  on(["recording"], () => {
+    names.typed.clear();
+    loadFormats();
+  });
   on(["connection"], () => {
     if (dialog.open) load(); // the server is back, or gone
   });
@@ -75,8 +77,7 @@ export function openExport() {
   drawList();
   drawReason(ASKING);
   dialog.showModal();
-  /** @type {HTMLElement|null} */ (list.querySelector('[aria-selected="true"]'))?.focus();
-  list.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" });
+  focusFormats();
   load();
 }
 
@@ -86,10 +87,6 @@ function build() {
   close.onclick = () => dialog.close();
   const title = make("h2", "", "Export");
   title.id = "export-title";
-  separator.setAttribute("role", "presentation");
-  list.setAttribute("role", "listbox");
-  list.setAttribute("aria-label", "Format");
-  list.addEventListener("keydown", walk);
   text.tabIndex = 0;
   text.setAttribute("aria-label", "File content");
   fileName.type = "text";
@@ -100,60 +97,28 @@ function build() {
   });
   copy.onclick = copyText;
   save.onclick = download;
-  parent.append(...parentFields());
+  parent = parentFields(kept.parent, (values) => {
+    keep({ parent: values });
+    load();
+  });
+  const list = formatColumn((key) => {
+    keep({ format: key });
+    load();
+  });
   const foot = make("div", "foot", [importer(), make("span", "gap", ""), make("label", "name", ["File name", fileName]), copy, save]);
-  dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, rectified.row, parent, text, notes]), side, foot);
+  dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, names.element, rectified.row, parent.element, before, text, notes]), side, foot);
 }
 
+/** The formats, and the clicks as one of them. */
 function drawList() {
-  list.replaceChildren(
-    ...formats.map((format) => option(format.key, format.label)),
-    separator,
-    option(CLICKS, "Clicks, to continue elsewhere"),
-  );
-}
-
-/** @param {string} key @param {string} label */
-function option(key, label) {
-  const item = make("button", "", [make("span", "", label), make("code", "", key)]);
-  item.type = "button";
-  item.setAttribute("role", "option");
-  item.dataset.export = key;
-  const chosen = key === kept.format;
-  item.setAttribute("aria-selected", String(chosen));
-  item.tabIndex = chosen ? 0 : -1;
-  item.onclick = () => choose(key);
-  return item;
-}
-
-/** @param {string} key */
-function choose(key) {
-  keep({ format: key });
-  for (const item of /** @type {NodeListOf<HTMLElement>} */ (list.querySelectorAll("[data-export]"))) {
-    const chosen = item.dataset.export === key;
-    item.setAttribute("aria-selected", String(chosen));
-    item.tabIndex = chosen ? 0 : -1;
-    if (chosen) item.focus();
-  }
-  load();
-}
-
-/** The up and down keys move through the list and select. @param {KeyboardEvent} event */
-function walk(event) {
-  const items = /** @type {HTMLElement[]} */ ([...list.querySelectorAll("[data-export]")]);
-  const at = items.findIndex((item) => item.dataset.export === kept.format);
-  const to = /** @type {Record<string, number>} */ ({ ArrowDown: at + 1, ArrowUp: at - 1, Home: 0, End: items.length - 1 })[event.key];
-  if (to === undefined) return;
-  event.preventDefault();
-  const next = items[Math.max(0, Math.min(items.length - 1, to))];
-  choose(next.dataset.export ?? "json");
-  next.scrollIntoView({ block: "nearest" });
+  const clicks = { key: CLICKS, label: "Clicks, to continue elsewhere", group: "Go on", also: "clicks.json session", takes_parent: false, takes_rectified: false };
+  drawFormats([...formats, clicks], kept.format);
 }
 
 /** Keep Tab inside the panel. @param {KeyboardEvent} event */
 function trap(event) {
   if (event.key !== "Tab") return;
-  const stops = /** @type {HTMLElement[]} */ ([...dialog.querySelectorAll("button, input:not([type=file]), label[tabindex], pre")]).filter(
+  const stops = /** @type {HTMLElement[]} */ ([...dialog.querySelectorAll("button, input:not([type=file]), label[tabindex], summary, pre")]).filter(
     (stop) => stop.tabIndex >= 0 && !stop.hasAttribute("disabled") && stop.offsetParent !== null,
   );
   const [first, last] = [stops[0], stops[stops.length - 1]];
@@ -172,7 +137,7 @@ async function load() {
   const said = answer && (await content(key === CLICKS ? answer.text() : answer.json()));
   if (mine !== asked) return;
   if (said === null) drawReason(reason || BROKE_OFF, isLost || !reason);
-  else if (said.reason) drawReason(said.reason);
+  else if (said.reason) drawReason(said.reason, false, said.field);
   else if (key === CLICKS) drawClicks(said);
   else drawPreview(said);
 }
@@ -182,6 +147,7 @@ function address(kind) {
   const query = new URLSearchParams();
   if (takesParent() && kept.parent.join() !== IDENTITY.join()) query.set("parent_from_radar", kept.parent.join());
   if (takesRectified() && rectified.box.checked) query.set("rectified", "1");
+  for (const [name, value] of names.typed) query.set(name, value);
   return `api/${kind}/${encodeURIComponent(kept.format)}${query.size ? `?${query}` : ""}`;
 }
 
@@ -193,15 +159,15 @@ const takesRectified = () => form()?.takes_rectified ?? false;
 function drawPreview(preview) {
   const kind = preview.is_binary ? `binary, ${preview.size_bytes} bytes; contents shown below` : "";
   head.replaceChildren(make("span", "", preview.numbers), make("span", "kind", kind));
-  parent.hidden = !takesParent();
-  rectified.row.hidden = !preview.is_for_rectified;
+  names.draw(preview);
+  drawFields({ names: true, parent: takesParent(), rectified: preview.is_for_rectified });
+  before.replaceChildren(...beforeSaving(preview));
   show(preview.text, preview.file_name, preview.is_binary);
   notes.replaceChildren(...preview.notes.map((/** @type {string} */ note) => make("li", "", note)));
   side.replaceChildren(
-    frameDrawing(preview),
-    numbers(preview),
+    ...(preview.pose ? [frameDrawing(preview.pose), make("p", "direction", preview.pose.words), ...numbers(preview)] : []),
+    ...checkPoint(preview.check_point),
     make("div", `check ${preview.check_is_good ? "good" : "bad"}`, [make("b", "", preview.check_is_good ? "✓" : "!"), make("span", "", preview.check)]),
-    ...warningBox(preview.warnings),
   );
 }
 
@@ -209,24 +175,30 @@ function drawPreview(preview) {
 function drawClicks(content) {
   const count = state.view?.clicks.length ?? 0;
   head.replaceChildren(make("span", "", `${count} click${count === 1 ? "" : "s"} with the stamps of their frames, for cocalib solve or to load on another machine`));
-  parent.hidden = true;
-  rectified.row.hidden = true;
+  drawFields({});
   show(content, "clicks.json", false);
-  notes.replaceChildren();
-  side.replaceChildren();
+  for (const part of [before, notes, side]) part.replaceChildren();
 }
 
-/** Show why there is nothing to save yet. @param {string} reason @param {boolean} [canRetry] */
-function drawReason(reason, canRetry = false) {
+/** Show why there is nothing to save yet. @param {string} reason @param {boolean} [canRetry] @param {"frames"|"parent"|"rectified"|null} [field] that has to be filled in or corrected */
+function drawReason(reason, canRetry = false, field = null) {
   head.replaceChildren();
-  const inParent = takesParent() && reason.includes("parent");
-  parent.hidden = !inParent;
-  rectified.row.hidden = !(takesRectified() && reason.includes("rectified"));
-  text.replaceChildren(make("div", "reason", [...(reason === ASKING ? [] : [icon("warning")]), make("span", "", reason.trim()), ...(canRetry ? [retry] : [])]));
-  notes.replaceChildren();
-  side.replaceChildren();
+  drawFields({ names: field === "frames", parent: field === "parent", rectified: field === "rectified" });
+  names.refuse(field === "frames" ? reason : "");
+  parent.refuse(field === "parent" ? reason : "");
+  const words = field === "frames" || field === "parent" ? "There is no file until the field above is corrected." : reason.trim();
+  text.replaceChildren(make("div", "reason", [...(reason === ASKING ? [] : [icon("warning")]), make("span", "", words), ...(canRetry ? [retry] : [])]));
+  for (const part of [before, notes, side]) part.replaceChildren();
   fileName.value = "";
   for (const control of [fileName, copy, save]) control.disabled = true;
+}
+
+/** Show these fields, with nothing wrong in them. @param {{names?: boolean, parent?: boolean, rectified?: boolean}} shown */
+function drawFields(shown) {
+  names.element.hidden = !shown.names;
+  parent.element.hidden = !shown.parent;
+  rectified.row.hidden = !shown.rectified;
+  for (const fields of [names, parent]) fields.refuse("");
 }
 
 /** @param {string} content @param {string} name @param {boolean} isBinary */
@@ -237,26 +209,6 @@ function show(content, name, isBinary) {
   text.scrollTop = 0;
   for (const control of [fileName, save]) control.disabled = false;
   copy.disabled = isBinary;
-}
-
-function parentFields() {
-  const label = make("span", "", "Radar pose in the kit, rig or ego frame");
-  label.dataset.hint = "parent_from_radar: position in metres, rotation as a quaternion in the order x y z w. By default the radar is the origin.";
-  const fields = PARENT.map((name, index) => {
-    const field = make("input", "", []);
-    field.type = "text";
-    field.inputMode = "decimal";
-    field.value = kept.parent[index] ?? IDENTITY[index];
-    field.setAttribute("aria-label", `${name} of the radar in the parent frame`);
-    field.addEventListener("input", () => {
-      const values = /** @type {HTMLInputElement[]} */ ([...parent.querySelectorAll("input")]).map((input) => input.value.trim());
-      keep({ parent: values.map((value, at) => value || IDENTITY[at]) });
-      clearTimeout(parentTimer);
-      parentTimer = window.setTimeout(load, TYPING_MS);
-    });
-    return make("label", "", [name, field]);
-  });
-  return [label, make("div", "", fields)];
 }
 
 async function copyText() {

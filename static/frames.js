@@ -1,12 +1,14 @@
 // @ts-check
-/** A small drawing of the radar's and the camera's axes, with an arrow for the direction of the transform. */
+/** A small drawing of the radar's and the camera's axes, with a bold arrow for the direction of the file's transform. */
 
 const NS = "http://www.w3.org/2000/svg";
 const WIDTH = 280;
-const HEIGHT = 212;
-const RADAR = [72, 78];
-const CAMERA = [206, 78];
-const LENGTH = 44;
+const HEIGHT = 168;
+const RADAR = [72, 72];
+const CAMERA = [206, 72];
+const LENGTH = 42;
+/** A longer frame name is cut in the middle. */
+const LONGEST = 20;
 /** Directions of the radar's x (forward), y (left) and z (up) in the drawing: seen from behind, from the left and from above. */
 const PAPER = [
   [0.64, -0.4],
@@ -16,24 +18,25 @@ const PAPER = [
 const COLOURS = ["var(--axis-x)", "var(--axis-y)", "var(--axis-z)"];
 
 /**
- * Draw both frames. The directions of the axes are the solved ones; the positions are not to scale.
- * @param {Record<string, any>} preview ExportPreview of app/web/channel/export_preview.py
+ * Draw both frames, with a bold arrow the way that the file's numbers carry points. The directions of the axes are the solved
+ * ones; the positions are not to scale.
+ * @param {Record<string, any>} pose PoseInFile of app/web/exports/file_numbers.py
  */
-export function frameDrawing(preview) {
+export function frameDrawing(pose) {
   const svg = shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "frames", role: "img" });
-  const body = preview.axes === "link";
-  const inFile = preview.carries === "radar_from_camera" ? `The file gives the pose of the camera${body ? "'s body frame" : ""} in the radar frame.` : "";
-  svg.append(titled(`Transforms points from ${preview.radar_frame} to ${preview.camera_frame}: p_camera = R p_radar + t. ${inFile}`));
-  svg.append(arrow(RADAR, CAMERA, 0, "carry"), label(136, 70, "R, t", "equation"), label(WIDTH / 2, 176, "p_camera = R p_radar + t", "equation"));
-  if (preview.carries === "radar_from_camera") {
-    svg.append(arrow(CAMERA, RADAR, 13, "stated"), label(WIDTH / 2, 196, `⇠ in this file: the pose of ${body ? "its body frame (x forward)" : "the camera"}`, "stated"));
-  } else svg.append(label(WIDTH / 2, 196, "in this file: the same R and t", "stated"));
+  svg.append(titled(pose.words));
+  const [from, to] = pose.carries === "camera_from_radar" ? [RADAR, CAMERA] : [CAMERA, RADAR];
+  svg.append(arrow(to, from, 34, 5, "inverse"), arrow(from, to, 16, 8, "carry"));
+  svg.append(label(139, 79, "R, t", "equation"), label(139, 119, "inverse", "inverse"), label(WIDTH / 2, 159, pose.equation, "equation"));
   const unit = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
   axes(svg, RADAR, unit);
-  axes(svg, CAMERA, preview.rotation);
-  svg.append(label(RADAR[0], 146, preview.radar_frame, "frame"), label(CAMERA[0], 146, preview.camera_frame, "frame"));
+  axes(svg, CAMERA, pose.camera_axes);
+  svg.append(label(RADAR[0], 139, short(pose.radar_frame), "frame"), label(CAMERA[0], 139, short(pose.camera_frame), "frame"));
   return svg;
 }
+
+/** @param {string} name */
+const short = (name) => (name.length > LONGEST ? `${name.slice(0, LONGEST / 2 - 1)}…${name.slice(-LONGEST / 2)}` : name);
 
 /** Three arrows with their letters; `directions` are the axes in the radar frame. @param {Element} svg @param {number[]} at @param {number[][]} directions */
 function axes(svg, at, directions) {
@@ -53,14 +56,14 @@ function axes(svg, at, directions) {
   svg.append(shape("circle", { cx: at[0], cy: at[1], r: 3, class: "origin" }));
 }
 
-/** An arrow from one frame to the other. @param {number[]} from @param {number[]} to @param {number} lower how far below the origins @param {string} name */
-function arrow(from, to, lower, name) {
+/** An arrow from one frame to the other. @param {number[]} from @param {number[]} to @param {number} lower how far below the origins @param {number} head its size @param {string} name */
+function arrow(from, to, lower, head, name) {
   const sign = Math.sign(to[0] - from[0]);
   const [start, end, y] = [from[0] + sign * 14, to[0] - sign * 14, from[1] + lower];
   const group = shape("g", { class: name });
   group.append(
     shape("path", { d: `M${start} ${y}H${end}`, fill: "none" }),
-    shape("path", { d: `M${end - sign * 7} ${y - 4}L${end} ${y}L${end - sign * 7} ${y + 4}`, fill: "none" }),
+    shape("path", { d: `M${end - sign * head} ${y - 0.7 * head}L${end} ${y}L${end - sign * head} ${y + 0.7 * head}`, fill: "none" }),
   );
   return group;
 }
@@ -80,7 +83,7 @@ function titled(words) {
 }
 
 /** @param {string} name @param {Record<string, string|number>} attributes */
-function shape(name, attributes) {
+export function shape(name, attributes) {
   const element = document.createElementNS(NS, name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
   return element;

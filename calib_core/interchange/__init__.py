@@ -30,6 +30,7 @@ from calib_core.interchange.importing import (
     read_together,
     tree_files,
 )
+from calib_core.interchange.origin import missing_map
 from calib_core.interchange.own.calibration_json import (
     calibration_sha256,
     calibration_text,
@@ -105,6 +106,7 @@ __all__ = [
     "format_named",
     "imported",
     "joined_tree",
+    "missing_map",
     "names_schema",
     "parent_pose",
     "patched",

@@ -1,14 +1,15 @@
 """Export a calibration to another format, or refuse with a clear error if the format cannot represent it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform
-from calib_core.interchange.calibration_file import CalibrationFile
+from calib_core.interchange.calibration_file import CalibrationFile, FrameNames
 from calib_core.interchange.format import Format
 from calib_core.interchange.formats.registry import format_named, written_formats
 from calib_core.interchange.origin import missing_map
+from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.rectification import maps_npz, rectified_camera, rectified_file
 from calib_core.interchange.syntax.zip_archives import pack
 
@@ -115,7 +116,12 @@ def export_all(
 
 
 def export(
-    file: CalibrationFile, name: str, *, parent_from_radar: RigidTransform | None = None, rectified: bool = False
+    file: CalibrationFile,
+    name: str,
+    *,
+    parent_from_radar: RigidTransform | None = None,
+    rectified: bool = False,
+    frames: FrameNames | None = None,
 ) -> Export:
     """Export a calibration to another format; the same calibration gives the same bytes.
 
@@ -125,11 +131,14 @@ def export(
         parent_from_radar: the radar's pose in the third frame of "autoware" (kit), "driveworks" (rig) or "nuscenes" (ego).
         rectified: the file is for pictures undistorted with this same camera matrix, no distortion left. Without it, "kitti"
             and "nuscenes", which cannot store distortion, get the camera matrix of pictures rectified with maps of ours.
+        frames: the frame names to write; None for the calibration's own.
 
     Raises:
         InputError: no such format, or it cannot represent this calibration; the message says why and what to use instead.
     """
     chosen = format_named(name)
+    if frames is not None and frames != file.frames:
+        file = replace(file, frames=frames, made_from_sha256=calibration_sha256(file))
     if chosen.write is None:
         raise InputError(
             f"the format {name} can only be read; cocalib export --to list shows those that can be written"

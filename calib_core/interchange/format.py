@@ -49,6 +49,8 @@ class Format:
         reads: how it is recognized and read; None if the format can only be written.
         notes: what a user of the file must know, one sentence each.
         write_in_parent: like write, with a given pose of the radar in a third frame (kit, ego); None if it has none.
+        used_in: where its files are used: the heading in lists.
+        also: other words that someone may search for.
         notes_on: returns more notes, which depend on the calibration; None if there are none.
         holds_angle_map: it stores the radar's angle map.
         is_unpacked: it is a zip archive whose files are meant to be unpacked: written into a folder, if one is given.
@@ -64,6 +66,8 @@ class Format:
     reads: Reads | None
     notes: tuple[str, ...] = ()
     write_in_parent: Callable[[CalibrationFile, RigidTransform], str | bytes] | None = None
+    used_in: str = "Other tools"
+    also: str = ""
     notes_on: Callable[[CalibrationFile], tuple[str, ...]] | None = None
     holds_angle_map: bool = False
     is_unpacked: bool = False

@@ -17,6 +17,7 @@ from calib_core.interchange.rotations import LINK_FROM_OPTICAL, looks_forward, m
 
 __all__ = [
     "TRUTH_FORMAT",
+    "AngleUnit",
     "Axes",
     "Direction",
     "Form",
@@ -33,6 +34,7 @@ __all__ = [
 Form = Literal["matrix", "quaternion_xyzw", "quaternion_wxyz", "rpy"]
 Direction = Literal["camera_from_radar", "radar_from_camera"]
 Axes = Literal["optical", "link"]
+AngleUnit = Literal["rad", "deg"]
 
 TRUTH_FORMAT = "truth"
 """The ground truth of a simulation: for comparison, never a calibration."""
@@ -58,6 +60,7 @@ class WrittenPose:
         translation_m: (3,).
         direction: which transform the numbers are, in p_target = R p_source + t.
         axes: of the camera frame: optical, or body axes as in camera_link (x forward).
+        angle_unit: in which the file states roll, pitch and yaw; the rotation above is in radians in any case.
     """
 
     form: Form
@@ -65,6 +68,7 @@ class WrittenPose:
     translation_m: Vector3
     direction: Direction
     axes: Axes = "optical"
+    angle_unit: AngleUnit = "rad"
 
     def __post_init__(self) -> None:
         shape = {"matrix": (3, 3), "rpy": (3,)}.get(self.form, (4,))

@@ -63,6 +63,10 @@ def test_axe_finds_nothing_in_any_state_of_the_page(page: Driver, truth: Any) ->
     user.keyboard.press("e")
     expect(user.locator("#export-dialog .text")).to_contain_text("camera_from_radar")
     look("export, dark")
+    user.fill("#export-dialog [data-field=radar_frame]", "")
+    user.locator("#export-dialog .names .error").wait_for()
+    user.fill("#export-dialog .find", "ros")
+    look("export with a refused frame name, some formats")
     user.keyboard.press("Escape")
     for width, height in ((1024, 700), (640, 700)):
         user.set_viewport_size({"width": width, "height": height})

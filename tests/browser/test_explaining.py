@@ -49,9 +49,9 @@ def test_explanations_show_on_hover_and_focus_beside_what_they_explain(page: Dri
     user.keyboard.press("e")
     expect(user.locator("#export-dialog .text")).to_contain_text("camera_from_radar")
     user.hover("#export-dialog .pose-numbers")
-    expect(tip).to_contain_text("full precision")
+    expect(tip).to_contain_text("all digits")
     assert user.locator("dialog[open] #tip").count() == 1, "it is above the dialog"
-    assert "quaternion_wxyz" in page.text("#export-dialog .pose-numbers")
+    assert "R row 1" in page.text("#export-dialog .pose-numbers")
     user.keyboard.press("Escape")
     hintless = page.value(
         "[...document.querySelectorAll('#bar button, #time button, .chip, .figure, #page-options .field')]"

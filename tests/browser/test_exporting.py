@@ -1,6 +1,7 @@
 """The export panel: what is shown is what is saved, and a keyboard is enough."""
 
 import json
+import re
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -71,15 +72,120 @@ def test_the_text_shown_is_the_file_that_is_saved_and_it_is_the_calibration(solv
             assert shown == data.decode()
 
 
-def test_the_drawing_says_which_way_the_numbers_of_the_file_go(solved: Driver) -> None:
-    solved.page.click("#export")
-    for name, stated in (("tf2", 1), ("kitti", 0), ("urdf", 1), ("opencv", 0)):
+def test_the_direction_of_the_file_is_bold_and_the_table_holds_its_own_numbers(solved: Driver) -> None:
+    page, shown = solved.page, {}
+    page.click("#export")
+    for name, rightwards, equation in (
+        ("tf2", False, "p_radar = R p_camera + t"),
+        ("opencv", True, "p_camera = R p_radar + t"),
+        ("urdf", False, "p_radar = R p_link + t"),
+        ("driveworks", False, "p_radar = R p_link + t"),
+    ):
         choose(solved, name)
-        expect(solved.page.locator(f"{DIALOG} .frames .equation").last).to_have_text("p_camera = R p_radar + t")
-        expect(solved.page.locator(f"{DIALOG} .frames g.stated")).to_have_count(stated)
-        said = solved.page.locator(f"{DIALOG} .frames text.stated")
-        expect(said).to_contain_text({"urdf": "its body frame", "tf2": "the camera"}.get(name, "the same R and t"))
-    assert "quaternion_wxyz" in solved.text(f"{DIALOG} .pose-numbers")
+        expect(page.locator(f"{DIALOG} .frames .equation").last).to_have_text(equation)
+        expect(page.locator(f"{DIALOG} .direction")).to_contain_text(equation)
+        bold, thin = (page.locator(f"{DIALOG} .frames g.{way} path").first for way in ("carry", "inverse"))
+        widths = [arrow.evaluate("path => parseFloat(getComputedStyle(path).strokeWidth)") for arrow in (bold, thin)]
+        assert widths[0] >= 3 * widths[1]
+        assert bold.evaluate("path => getComputedStyle(path).strokeDasharray") == "none"
+        start, end = map(float, re.findall(r"M(\S+) \S+H(\S+)", bold.get_attribute("d") or "")[0])
+        assert (end > start) is rightwards
+        rows = page.locator(f"{DIALOG} .pose-numbers").first.locator("tr")
+        shown[name] = dict(row.split("\t", 1) for row in rows.all_inner_texts())
+        if name in ("tf2", "urdf"):
+            text = page.locator(f"{DIALOG} .text").inner_text()
+            assert all(value.strip() in text for value in shown[name].values())
+    assert list(shown["tf2"]) == ["x [m]", "y [m]", "z [m]", "qx", "qy", "qz", "qw"]
+    assert list(shown["urdf"])[3:] == ["roll [rad]", "pitch [rad]", "yaw [rad]"]
+    assert list(shown["driveworks"])[3:] == ["roll [deg]", "pitch [deg]", "yaw [deg]"]
+    assert list(shown["opencv"]) == ["R row 1", "R row 2", "R row 3", "t [m]"]
+    expect(page.locator(f"{DIALOG} .ours td").first).to_be_hidden()
+    page.click(f"{DIALOG} .ours summary")
+    expect(page.locator(f"{DIALOG} .ours tr").last).to_contain_text("qz")
+
+
+def test_the_check_point_is_said_and_marked_on_the_picture_and_the_evidence_is_there_before_saving(
+    solved: Driver,
+) -> None:
+    page = solved.page
+    page.click("#export")
+    choose(solved, "opencv")
+    point = solved.value("fetch('api/preview/opencv').then((answer) => answer.json())")["check_point"]
+    said = page.locator(f"{DIALOG} .check-point figcaption")
+    expect(said).to_contain_text(f"must project to pixel ({point['u_px']:.2f}, {point['v_px']:.2f})")
+    assert solved.value(
+        "fetch(document.querySelector('#export-dialog .inset image').getAttribute('href'))"
+        ".then((answer) => answer.blob()).then(createImageBitmap).then((made) => [made.width, made.height])"
+    ) == [point["width_px"], point["height_px"]]
+    ring = page.locator(f"{DIALOG} .inset .mark circle")
+    assert float(ring.get_attribute("cx") or 0) == pytest.approx(point["u_px"] + 0.5)
+    assert float(ring.get_attribute("cy") or 0) == pytest.approx(point["v_px"] + 0.5)
+    inside, around = (page.locator(f"{DIALOG} {part}").bounding_box() for part in (".inset .mark circle", ".inset"))
+    assert inside is not None
+    assert around is not None
+    assert around["x"] < inside["x"] < inside["x"] + inside["width"] < around["x"] + around["width"]
+    expect(page.locator(f"{DIALOG} .evidence")).to_contain_text("Rests on clicks (")
+    expect(page.locator(f"{DIALOG} .evidence")).to_be_in_viewport()
+    choose(solved, "tf2")
+    expect(said).to_contain_text("This file holds no lens")
+
+
+def test_a_format_is_found_by_typing_and_chosen_by_keyboard(solved: Driver) -> None:
+    page = solved.page
+    page.keyboard.press("e")
+    expect(page.locator(f'{DIALOG} [data-export="json"]')).to_be_focused()
+    names = f"[...document.querySelectorAll('{DIALOG} [data-export]')].map((item) => item.dataset.export)"
+    everything = solved.value(names)
+    for words, first, others in (
+        ("nuscenes", "nuscenes", set()),
+        ("foxgl", "foxglove", set()),
+        ("ros 2", "tf2", {"urdf", "autoware"}),
+    ):
+        page.locator(f"{DIALOG} .find").fill(words)
+        found = solved.value(names)
+        assert found[0] == first
+        assert others <= set(found)
+        assert len(found) < len(everything) / 2
+    page.keyboard.press("Enter")
+    expect(page.locator(f'{DIALOG} [data-export="tf2"]')).to_be_focused()
+    expect(page.locator(f"{DIALOG} .text")).to_contain_text("static_transform_publisher")
+    page.keyboard.type("kalibr")  # a letter in the list goes on searching
+    expect(page.locator(f"{DIALOG} .find")).to_have_value("kalibr")
+    page.keyboard.press("ArrowDown")
+    expect(page.locator(f"{DIALOG} .find")).to_be_focused()
+    expect(page.locator(f"{DIALOG} .text")).to_contain_text("T_cam_radar")
+    page.keyboard.press("Control+a")
+    page.keyboard.type("qqqq")
+    expect(page.locator(f"{DIALOG} .formats [role=status]")).to_contain_text("No format fits")
+    page.keyboard.press("Control+a")
+    page.keyboard.press("Delete")
+    assert solved.value(names) == everything
+
+
+def test_frames_get_the_names_that_the_user_types_and_a_wrong_one_is_refused_at_its_field(
+    solved: Driver, tmp_path: Path
+) -> None:
+    page = solved.page
+    page.click("#export")
+    choose(solved, "tf2")
+    radar, camera = (page.locator(f'{DIALOG} [data-field="{name}_frame"]') for name in ("radar", "camera"))
+    text, error = page.locator(f"{DIALOG} .text"), page.locator(f"{DIALOG} .names .error")
+    usual = radar.input_value()
+    expect(text).to_contain_text(f"--frame-id {usual}")
+    radar.fill("front_radar")
+    camera.fill("front_camera_optical")
+    expect(text).to_contain_text("--frame-id front_radar --child-frame-id front_camera_optical")
+    expect(page.locator(f"{DIALOG} .direction")).to_contain_text("'front_camera_optical' (z forward) in 'front_radar'")
+    assert b"--frame-id front_radar" in saved(solved, tmp_path).read_bytes()
+    radar.fill("a$b")
+    expect(error).to_contain_text("The radar frame is called")
+    expect(page.locator(f"{DIALOG} .first")).to_be_disabled()
+    expect(radar).to_be_focused()
+    radar.fill("front_camera_optical")
+    expect(error).to_contain_text("different names")
+    radar.fill(usual)
+    expect(error).to_be_hidden()
+    expect(text).to_contain_text(f"--frame-id {usual} --child-frame-id front_camera_optical")
 
 
 def test_a_name_given_by_hand_is_the_name_of_the_file(solved: Driver, tmp_path: Path) -> None:
@@ -112,7 +218,8 @@ def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_with_a_re
         after.camera_from_radar.as_matrix(), before.camera_from_radar.as_matrix(), rtol=0, atol=1e-12
     )
     solved.page.fill('[aria-label="qw of the radar in the parent frame"]', "0.5")
-    expect(solved.page.locator(f"{DIALOG} .reason")).to_contain_text("length")
+    expect(solved.page.locator(f"{DIALOG} .parent .error")).to_contain_text("length")
+    expect(solved.page.locator(f"{DIALOG} .first")).to_be_disabled()
     solved.page.fill('[aria-label="qw of the radar in the parent frame"]', "1")
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("x: 3.5")
 
@@ -132,7 +239,7 @@ def test_a_format_that_cannot_store_distortion_comes_with_maps_until_the_picture
         with zipfile.ZipFile(saved(solved, tmp_path)) as archive:
             assert archive.namelist() == [format_named(name).file_name, "rectification.npz"]
 
-    for _ in range(4):
+    for _ in range(8):
         page.keyboard.press("Tab")
         if page.locator(RECTIFIED).evaluate("box => box === document.activeElement"):
             break
@@ -192,7 +299,7 @@ def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, tr
         expect(page.page.locator(f"{DIALOG} .with-warnings")).to_contain_text(row["message"])
 
 
-@pytest.mark.parametrize("size", [(1280, 720), (1440, 900)])
+@pytest.mark.parametrize("size", [(1280, 720), (1440, 900), (390, 844)])
 def test_the_panel_fits_the_screen(solved: Driver, size: tuple[int, int]) -> None:
     solved.page.set_viewport_size({"width": size[0], "height": size[1]})
     solved.page.click("#export")
@@ -205,14 +312,17 @@ def test_the_panel_fits_the_screen(solved: Driver, size: tuple[int, int]) -> Non
         choose(solved, name)
         solved.until(f"document.querySelector('{DIALOG} .frames')")
         solved.drawn()
-        parts = ", ".join(f"{DIALOG} {part}" for part in ("", "footer *", "aside *", ".rectified *"))
+        parts = ", ".join(
+            f"{DIALOG} {part}" for part in ("", ".foot *", "aside :not(image)", ".names *", ".rectified *")
+        )
         spilled = solved.value(
             f"[...document.querySelectorAll('{parts}')].filter((part) => {{ const box = part.getBoundingClientRect(); "
             "return box.width && (box.right > innerWidth || box.left < 0); }).length"
         )
         assert spilled == 0
         panel = solved.page.locator(f"{DIALOG} aside").bounding_box()
-        table = solved.page.locator(f"{DIALOG} .pose-numbers").bounding_box()
+        table = solved.page.locator(f"{DIALOG} .pose-numbers").first.bounding_box()
         assert panel is not None
         assert table is not None
         assert table["x"] + table["width"] <= panel["x"] + panel["width"]
+    expect(solved.page.locator(f"{DIALOG} .first")).to_be_in_viewport()

@@ -1,14 +1,15 @@
 """What the export panel shows of one format: the file's text, what its numbers mean, and the result of reading it back."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
-from urllib.parse import parse_qs
 
 from app.view import sentence, warning_in_sentences
+from app.web.exports.check_point import CheckPointRow, check_point_row
+from app.web.exports.file_numbers import FileNumbers, PoseInFile, our_numbers, pose_in_file
+from app.web.exports.format_list import FormatRow, format_rows
+from app.web.exports.query import Field, FieldError, Fields, fields_in
 from calib_core.errors import InputError
-from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange import (
     CalibrationFile,
     CheckReport,
@@ -18,42 +19,19 @@ from calib_core.interchange import (
     export,
     format_named,
     imported,
-    parent_pose,
+    missing_map,
     read_any,
-    written_formats,
 )
+from calib_core.interchange.evidence import Evidence
 from calib_core.results import DataWarning
 
-__all__ = [
-    "ExportPreview",
-    "FormatRow",
-    "NoPreview",
-    "export_preview",
-    "exported",
-    "format_rows",
-    "parent_in",
-    "rectified_in",
-]
+__all__ = ["ExportPreview", "FormatRow", "NoPreview", "export_preview", "exported", "format_rows"]
 
-_PARENT = "parent_from_radar"
-_RECTIFIED = "rectified"
-
-
-@dataclass(frozen=True, slots=True)
-class FormatRow:
-    """One line of the list of formats.
-
-    Attributes:
-        key: what `--to` takes.
-        label: one line for display.
-        takes_parent: the radar can be posed in a third frame.
-        takes_rectified: the user may state that the pictures are rectified already.
-    """
-
-    key: str
-    label: str
-    takes_parent: bool
-    takes_rectified: bool
+_EVIDENCE: dict[Evidence, str] = {
+    "clicked": "Rests on clicks",
+    "imported_proven": "Imported; a check point, pairs or another calibration proved what its numbers mean",
+    "imported_assumed": "Imported; what its numbers mean was assumed, nothing proves it",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,15 +47,16 @@ class ExportPreview:
         numbers: what the file's numbers mean.
         notes: what a user of the file must know.
         is_for_rectified: it is for rectified pictures: those that the user declared rectified, or those that its maps make.
-        carries: direction of the pose in the file, as read back.
-        axes: of the camera frame that the file uses: optical, or its body frame.
+        pose: the pose in the file, as read back: its direction, its frames and its numbers; None if it holds none.
+        our_pose: camera_from_radar of the calibration.
+        check_point: what a reader of the file must get; None if the calibration has none, or the file no pose.
         check: what `cocalib check` says about the file.
         check_is_good: whether it found no problem.
-        radar_frame: name of the radar's frame.
-        camera_frame: name of the camera's optical frame.
-        rotation: camera_from_radar, by rows.
-        translation_m: of camera_from_radar.
-        quaternion_xyzw: of camera_from_radar.
+        radar_frame: the calibration's name of the radar's frame.
+        camera_frame: its name of the camera's optical frame.
+        names_frames: the file holds frame names.
+        evidence: what the pose rests on.
+        missing: what the calibration has and this file cannot hold; "" if nothing.
         warnings: of the calibration.
     """
 
@@ -89,68 +68,40 @@ class ExportPreview:
     numbers: str
     notes: tuple[str, ...]
     is_for_rectified: bool
-    carries: Literal["camera_from_radar", "radar_from_camera"]
-    axes: Literal["optical", "link"]
+    pose: PoseInFile | None
+    our_pose: FileNumbers
+    check_point: CheckPointRow | None
     check: str
     check_is_good: bool
     radar_frame: str
     camera_frame: str
-    rotation: tuple[tuple[float, ...], ...]
-    translation_m: tuple[float, ...]
-    quaternion_xyzw: tuple[float, ...]
+    names_frames: bool
+    evidence: str
+    missing: str
     warnings: tuple[DataWarning, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class NoPreview:
-    """Why there is nothing to save yet, and what to do."""
+    """Why there is nothing to save yet, and what to do.
+
+    Attributes:
+        reason: in sentences.
+        field: the part of the panel that the user has to fill in or correct; "" if none.
+    """
 
     reason: str
-
-
-def format_rows() -> tuple[FormatRow, ...]:
-    """Return the list of formats."""
-    return tuple(
-        FormatRow(form.name, form.title, form.write_in_parent is not None, form.is_for_rectified)
-        for form in written_formats()
-    )
-
-
-def parent_in(query: str) -> RigidTransform | None:
-    """Return the radar's pose in a third frame from a URL's query, `parent_from_radar=x,y,z,qx,qy,qz,qw`; None without one.
-
-    Raises:
-        InputError: it is not seven numbers, or not a pose.
-    """
-    given = parse_qs(query).get(_PARENT)
-    if not given:
-        return None
-    try:
-        numbers = [float(word) for word in given[-1].split(",")]
-    except ValueError:
-        raise InputError(f"{_PARENT}: {given[-1]!r} is not seven numbers") from None
-    return parent_pose(numbers)
-
-
-def rectified_in(query: str) -> bool:
-    """Return whether a URL's query says that the pictures are rectified, `rectified=1`.
-
-    Raises:
-        InputError: the value is neither 0 nor 1.
-    """
-    given = parse_qs(query, keep_blank_values=True).get(_RECTIFIED, ["0"])[-1]
-    if given not in ("0", "1"):
-        raise InputError(f"{_RECTIFIED}: {given!r} is neither 0 nor 1; 1 means that the pictures are rectified")
-    return given == "1"
+    field: Field | None = None
 
 
 def exported(file: CalibrationFile, key: str, query: str) -> Export:
-    """Write a calibration in a format, with the parent's pose and the rectified flag of a URL's query.
+    """Write a calibration in a format, with what the user filled in, from a URL's query.
 
     Raises:
+        FieldError: a field cannot be used, or the format needs it.
         InputError: the format cannot hold this calibration, or has no third frame.
     """
-    return export(file, key, parent_from_radar=parent_in(query), rectified=rectified_in(query))
+    return _exported(file, key, fields_in(query, file.frames))
 
 
 def export_preview(file: CalibrationFile, key: str, query: str, recording_name: str) -> ExportPreview:
@@ -159,39 +110,67 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
     Args:
         file: the calibration.
         key: of the format.
-        query: of the URL; it may give the radar's pose in a third frame, and say that the pictures are rectified.
+        query: of the URL, with what the user filled in.
         recording_name: what the user calls the recording.
 
     Raises:
+        FieldError: a field cannot be used, or the format needs it.
         InputError: the format cannot hold this calibration, or has no third frame.
     """
-    written, form = exported(file, key, query), format_named(key)
-    download = written.download
-    whole = imported(file)
+    fields = fields_in(query, file.frames)
+    written, form = _exported(file, key, fields), format_named(key)
+    named = replace(file, frames=fields.frames)
+    whole = imported(named)
     report = check(read_any(written.data, written.file_name) if form.reads else whole, against=whole)
-    pose = file.calibration.camera_from_radar
-    wxyz = quaternion_wxyz_from_matrix(pose.rotation).tolist()
-    warnings = file.calibration.warnings
+    saved = written.download
+    lost = () if form.holds_angle_map else missing_map(file.calibration)
     return ExportPreview(
         key=key,
-        file_name=f"{_slug(recording_name)}_{download.file_name}",
+        file_name=f"{_slug(recording_name)}_{saved.file_name}",
         text=contents_text(written),
         is_binary=isinstance(written.content, bytes) or bool(written.extra_files),
-        size_bytes=len(download.data),
+        size_bytes=len(saved.data),
         numbers=sentence(form.numbers),
-        notes=tuple(sentence(note) for note in written.notes),
+        notes=tuple(sentence(note) for note in written.notes if note not in lost),
         is_for_rectified=form.is_for_rectified and file.calibration.camera.is_distorted,
-        carries=report.imported.pose.direction,
-        axes=report.imported.pose.axes,
+        pose=pose_in_file(report.imported.pose, fields.frames, in_third_frame=fields.parent_from_radar is not None)
+        if form.reads
+        else None,
+        our_pose=our_numbers(file.calibration.camera_from_radar),
+        check_point=check_point_row(named, form, report.imported) if form.reads else None,
         check=_read_back(report) if form.reads else "Not read back: this format has no pose to read.",
         check_is_good=report.ok,
         radar_frame=file.frames.radar,
         camera_frame=file.frames.camera,
-        rotation=tuple(tuple(row) for row in pose.rotation.tolist()),
-        translation_m=tuple(pose.translation_m.tolist()),
-        quaternion_xyzw=(*wxyz[1:], wxyz[0]),
-        warnings=tuple(map(warning_in_sentences, warnings)),
+        names_frames=report.imported.frames is not None,
+        evidence=_evidence(file),
+        missing=" ".join(map(sentence, lost)),
+        warnings=tuple(map(warning_in_sentences, file.calibration.warnings)),
     )
+
+
+def _exported(file: CalibrationFile, key: str, fields: Fields) -> Export:
+    form = format_named(key)
+    try:
+        return export(
+            file,
+            key,
+            parent_from_radar=fields.parent_from_radar,
+            rectified=fields.rectified,
+            frames=fields.frames,
+        )
+    except InputError as error:
+        if form.is_for_rectified and file.calibration.camera.is_distorted and not fields.rectified:
+            raise FieldError("rectified", str(error)) from None
+        raise
+
+
+def _evidence(file: CalibrationFile) -> str:
+    """Return what the pose rests on, with the verdict, in one or two sentences."""
+    pairs = sum(1 for pair in file.calibration.pairs if pair.inlier)
+    count = f" ({pairs} pairs)" if file.rests_on == "clicked" and pairs else ""
+    verdict = f" Verdict: {file.verdict.line}." if file.verdict is not None else ""
+    return f"{_EVIDENCE[file.rests_on]}{count}.{verdict}"
 
 
 def _read_back(report: CheckReport) -> str:

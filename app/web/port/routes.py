@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 import msgspec
+import numpy as np
 
 from app.session import Session
 from app.solving import calibration_text
@@ -18,6 +19,8 @@ from app.view import sentence
 from app.web.channel.export_preview import NoPreview, export_preview, exported, format_rows
 from app.web.channel.picture_changes import PictureChanges
 from app.web.channel.radar_survey import Survey
+from app.web.exports.check_point import picture_of
+from app.web.exports.query import FieldError
 from app.web.port.preloading import with_preloaded_modules
 from app.web.port.viser_hook import client_page
 from app.workspace import Workspace
@@ -36,6 +39,7 @@ _TYPES = {
     ".svg": "image/svg+xml",
     ".json": "application/json",
 }
+_PICTURE_TYPES = {"jpeg": "image/jpeg", "png": "image/png"}
 _ALWAYS = (
     ("X-Content-Type-Options", "nosniff"),
     ("X-Frame-Options", "SAMEORIGIN"),
@@ -173,6 +177,7 @@ class _Downloads:
             "/api/formats.json": _formats,
             "/api/activity.json": self._activity,
             "/api/picture_changes.json": self._picture_changes,
+            "/api/check_point_picture": self._check_point_picture,
             **{f"/api/export/{form.name}": partial(self._export, form.name) for form in formats},
             **{f"/api/preview/{form.name}": partial(self._preview, form.name) for form in formats},
         }
@@ -189,13 +194,29 @@ class _Downloads:
 
     def _preview(self, name: str, query: str) -> Reply:
         def make(text: str) -> Reply:
-            preview = export_preview(_file_of(text), name, query, self._workspace.facts.name)
+            try:
+                preview = export_preview(_file_of(text), name, query, self._workspace.facts.name)
+            except FieldError as error:
+                return _reply(msgspec.json.encode(NoPreview(sentence(str(error)), error.field)), _TYPES[".json"])
             return _reply(msgspec.json.encode(preview), _TYPES[".json"])
 
         reply = self._of_calibration(make)
         if reply.status != 409:
             return reply
         return _reply(msgspec.json.encode(NoPreview(reply.body.decode().strip())), _TYPES[".json"])
+
+    def _check_point_picture(self, _query: str) -> Reply:
+        """Return the frame in which the check point was clicked; the query only tells one calibration's from another's."""
+
+        def make(text: str) -> Reply:
+            stamp, times = picture_of(_file_of(text)), self._recording.image_times
+            index = -1 if stamp is None else int(np.searchsorted(times, stamp))
+            if not 0 <= index < len(times) or times[index] != stamp:
+                return refusal(404, "No picture shows the check point.")
+            picture = self._recording.image_bytes(index)
+            return _reply(picture.data, _PICTURE_TYPES[picture.format], more=(("Cache-Control", "no-store"),))
+
+        return self._of_calibration(make)
 
     def _of_calibration(self, make: Callable[[str], Reply]) -> Reply:
         """Make a reply from the current calibration-1 text, or say why there is none; never from an outdated calibration."""

@@ -88,6 +88,8 @@ def _ends(stamped: Mapping[str, Any]) -> Ends:
 APOLLO = Format(
     name="apollo",
     title="Apollo extrinsics",
+    used_in="Vehicle stacks",
+    also="Baidu Cyber RT vehicle",
     numbers="pose of the child (camera, optical) in the parent (radar); quaternion x y z w",
     file_name="radar_camera_extrinsics.yaml",
     camera="none",

@@ -117,6 +117,8 @@ def _is_kit(value: Any) -> bool:
 AUTOWARE = Format(
     name="autoware",
     title="Autoware sensor kit",
+    used_in="Vehicle stacks",
+    also="ROS 2 xacro vehicle kit",
     numbers="pose of each sensor in sensor_kit_base_link, roll pitch yaw about fixed axes; camera_link has body axes",
     file_name="sensor_kit_calibration.yaml",
     camera="none",

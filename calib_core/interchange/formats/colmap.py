@@ -111,6 +111,8 @@ def _camera(words: list[str], *, source: str) -> Camera:
 COLMAP = Format(
     name="colmap",
     title="COLMAP text model",
+    used_in="Calibration tools and arrays",
+    also="structure from motion photogrammetry",
     numbers="world (radar) into camera, quaternion w x y z; principal point half a pixel larger",
     file_name="colmap.zip",
     camera="lens",

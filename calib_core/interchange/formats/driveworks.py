@@ -104,7 +104,7 @@ def _posed(sensor: Mapping[str, Any], *, source: str) -> WrittenPose:
         raise InputError(f"{source}: {place}: no {_POSE}; add the sensor's pose in the rig")
     angles_deg = floats(pose.get("roll-pitch-yaw"), source=source, place=f"{place}.roll-pitch-yaw", length=3)
     position_m = floats(pose.get("t"), source=source, place=f"{place}.t", length=3)
-    nominal = WrittenPose("rpy", np.deg2rad(angles_deg), np.array(position_m), "radar_from_camera", "link")
+    nominal = WrittenPose("rpy", np.deg2rad(angles_deg), np.array(position_m), "radar_from_camera", "link", "deg")
     if not _is_corrected(sensor):
         return nominal
     turn_deg = _correction(sensor, _ROTATION_CORRECTION, source=source, place=place)
@@ -132,6 +132,8 @@ def _numbers(value: Any) -> list[Any]:
 DRIVEWORKS = Format(
     name="driveworks",
     title="NVIDIA DriveWorks rig",
+    used_in="Vehicle stacks",
+    also="NVIDIA DRIVE vehicle",
     numbers="pose of each sensor in the rig, roll pitch yaw in degrees about fixed axes; the camera with body axes",
     file_name="rig.json",
     camera="none",

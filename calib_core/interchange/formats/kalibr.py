@@ -86,6 +86,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
 KALIBR = Format(
     name="kalibr",
     title="Kalibr camera chain",
+    used_in="Calibration tools and arrays",
+    also="camchain intrinsics yaml",
     numbers="T_cam_radar carries radar points into the camera; our key, Kalibr has none for radars",
     file_name="camchain.yaml",
     camera="lens",

@@ -149,6 +149,8 @@ def _offset_m(projection: np.ndarray, *, source: str) -> np.ndarray:
 KITTI = Format(
     name="kitti",
     title="KITTI and View-of-Delft calibration",
+    used_in="Data sets and viewers",
+    also="VoD dataset OpenPCDet MMDetection3D",
     numbers="Tr_velo_to_cam carries radar points into the camera; images undistorted",
     file_name="calib.txt",
     camera="matrix",

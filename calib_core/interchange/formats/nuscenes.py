@@ -133,6 +133,8 @@ def _posed(record: Mapping[str, Any], *, source: str) -> WrittenPose:
 NUSCENES = Format(
     name="nuscenes",
     title="nuScenes sensor and calibrated_sensor",
+    used_in="Data sets and viewers",
+    also="dataset devkit MMDetection3D",
     numbers="pose of each sensor in the ego frame, quaternion w x y z; images undistorted",
     file_name="nuscenes.zip",
     camera="matrix",

@@ -103,6 +103,8 @@ def _check_point(values: Mapping[str, Any], source: str) -> StatedCheckPoint | N
 OPENCV = Format(
     name="opencv",
     title="OpenCV FileStorage",
+    used_in="Calibration tools and arrays",
+    also="cv2 C++ Python projectPoints rvec tvec",
     numbers="R, T, rvec carry radar points into the camera",
     file_name="radar_camera.yml",
     camera="lens",

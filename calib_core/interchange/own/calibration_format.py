@@ -50,6 +50,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
 CALIBRATION_1 = Format(
     name="json",
     title="cocalib's own calibration-1",
+    used_in="cocalib",
+    also="everything: pose, covariance, pairs, camera, angle map",
     numbers="camera_from_radar and its inverse, both as matrix, translation and quaternion w x y z",
     file_name="calibration.json",
     camera="lens",

@@ -93,6 +93,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
 MATLAB = Format(
     name="matlab",
     title="MATLAB mat file",
+    used_in="Calibration tools and arrays",
+    also="Octave cameraIntrinsics rigidtform3d",
     numbers="camera_from_radar.A carries radar points into the camera; camera.PrincipalPoint counts from 1",
     file_name="radar_camera.mat",
     camera="lens",

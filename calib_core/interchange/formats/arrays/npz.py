@@ -65,6 +65,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
 NUMPY = Format(
     name="numpy",
     title="NumPy arrays, no pickle",
+    used_in="Calibration tools and arrays",
+    also="Python npz",
     numbers="camera_from_radar (4x4), R and t carry radar points into the camera; K and D are the camera's",
     file_name="radar_camera.npz",
     camera="lens",

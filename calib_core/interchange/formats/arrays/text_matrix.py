@@ -70,6 +70,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
 MATRIX = Format(
     name="matrix",
     title="4x4 matrix as text",
+    used_in="Calibration tools and arrays",
+    also="plain text homogeneous",
     numbers="rows of the 4x4 matrix that carries radar points into the camera",
     file_name="camera_from_radar.txt",
     camera="none",

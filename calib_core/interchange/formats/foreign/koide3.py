@@ -125,6 +125,8 @@ def _camera(block: Any, *, source: str) -> tuple[FoundCamera | None, tuple[str, 
 KOIDE3 = Format(
     name="koide3",
     title="direct_visual_lidar_calibration",
+    used_in="Calibration tools and arrays",
+    also="ROS 2 lidar camera koide",
     numbers=_NUMBERS,
     file_name="calib.json",
     camera="lens",

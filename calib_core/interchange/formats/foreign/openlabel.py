@@ -204,6 +204,8 @@ def _camera(stream: Mapping[str, Any], *, source: str) -> FoundCamera | None:
 OPENLABEL = Format(
     name="openlabel",
     title="ASAM OpenLABEL",
+    used_in="Data sets and viewers",
+    also="annotation labels streams coordinate systems",
     numbers=_NUMBERS,
     file_name="openlabel.json",
     camera="lens",

@@ -112,6 +112,8 @@ def _direction(entry: Mapping[str, Any]) -> Direction | None:
 PJLAB = Format(
     name="pjlab",
     title="PJLab SensorsCalibration extrinsic",
+    used_in="Calibration tools and arrays",
+    also="OpenCalib lidar radar camera",
     numbers=_NUMBERS,
     file_name="radar-to-camera-extrinsic.json",
     camera="none",

@@ -26,6 +26,8 @@ def _write(file: CalibrationFile) -> str:
 CAMERA_INFO = Format(
     name="camera-info",
     title="ROS camera_info.yaml (camera only)",
+    used_in="ROS",
+    also="ROS 2 intrinsics sensor_msgs CameraInfo calibration_file",
     numbers=_NUMBERS,
     file_name="camera_info.yaml",
     camera="lens",

@@ -58,6 +58,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
 TF2 = Format(
     name="tf2",
     title="ROS 2 command",
+    used_in="ROS",
+    also="tf tf_static transform broadcaster rviz",
     numbers=NUMBERS,
     file_name="static_transform.sh",
     camera="none",

@@ -164,6 +164,8 @@ def _refuse_nonstandard_optical(joint: Element, *, source: str) -> None:
 URDF = Format(
     name="urdf",
     title="URDF: camera_link and optical frame",
+    used_in="ROS",
+    also="ROS 2 robot description xacro robot_state_publisher joint",
     numbers="pose of camera_link (body axes) in the radar, roll pitch yaw about fixed axes; then the optical joint",
     file_name="radar_camera.urdf",
     camera="none",

@@ -6,8 +6,9 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from app.session import Session
@@ -16,6 +17,7 @@ from calib_core.errors import InputError
 from calib_core.interchange import (
     FORMATS,
     CalibrationFile,
+    choose_check_point,
     contents_text,
     export,
     format_named,
@@ -23,6 +25,7 @@ from calib_core.interchange import (
     read_calibration,
 )
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
+from calib_core.results import Calibration
 from tests.picture_recording import PictureRecording, grey_pictures
 
 
@@ -100,6 +103,48 @@ def test_the_address_may_pose_the_radar_in_the_kit(file, ask):
         assert refused.status == 409
         assert words in refused.body
     assert ask(solved, "/api/export/tf2?parent_from_radar=0,0,0,0,0,0,1").status == 409
+
+
+def test_a_refused_field_is_named_and_a_name_in_the_address_is_written(file, ask):
+    solved = Session(CLICKS, outcome=file.calibration, outcome_revision=0)
+    assert b"--frame-id front " in ask(solved, "/api/export/tf2?radar_frame=front").body
+    assert ask(solved, "/api/export/tf2?radar_frame=").status == 409
+    refused = json.loads(ask(solved, "/api/preview/tf2?radar_frame=").body)
+    assert refused["field"] == "frames"
+    assert refused["reason"].startswith("The radar frame has no name")
+    assert json.loads(ask(Session(), "/api/preview/tf2").body)["field"] is None
+
+
+def test_the_picture_of_the_check_point_is_the_frame_in_which_it_was_clicked(file, project_root):
+    pictures = [np.full((60, 80, 3), shade, dtype=np.uint8) for shade in (10, 90, 200)]
+    recording = PictureRecording(pictures)
+    nearest = pair_of_check_point(file.calibration)
+
+    def ask_at(stamp: int) -> Reply:
+        pairs = tuple(
+            dataclasses.replace(pair, image_time=TimeNs(stamp) if pair.id == nearest else None)
+            for pair in file.calibration.pairs
+        )
+        session = Session(CLICKS, outcome=dataclasses.replace(file.calibration, pairs=pairs), outcome_revision=0)
+        workspace: Any = SimpleNamespace(session=session, facts=SimpleNamespace(name="drive 7.mcap"), camera_file=None)
+        routes, hub = Routes(project_root / "static"), SimpleNamespace(survey=None)
+        routes.admit(workspace, recording, cast(Any, hub))
+        return asyncio.run(routes.answer(f"/api/check_point_picture?{nearest}"))
+
+    for index, stamp in enumerate(recording.image_times.tolist()):
+        shown = ask_at(stamp)
+        assert shown.status == 200
+        assert dict(shown.headers)["Content-Type"] == "image/png"
+        assert shown.body == recording.image_bytes(index).data
+    assert ask_at(int(recording.image_times[-1]) + 1).status == 404
+    assert ask_at(int(recording.image_times[0]) + 1).status == 404
+
+
+def pair_of_check_point(calibration: Calibration) -> str:
+    check = choose_check_point(calibration)
+    assert check is not None
+    positions = calibration.radar_errors.corrected(np.array([pair.point_radar_m for pair in calibration.pairs]))
+    return calibration.pairs[int(np.linalg.norm(positions - check.radar_m, axis=1).argmin())].id
 
 
 def test_the_contents_of_binary_files_are_listed(file):

@@ -1,0 +1,59 @@
+"""What the export panel says before a file is saved: groups of formats, evidence, the missing angle map, several files as one."""
+
+import io
+import zipfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.web.channel import export_preview as panel
+from app.web.exports.format_list import format_rows
+from calib_core.interchange import CAMERA_ONLY, FORMATS, CalibrationFile, read_calibration
+from calib_core.radar import AngleMap
+
+
+@pytest.fixture
+def file(project_root) -> CalibrationFile:
+    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+
+
+def test_each_format_stands_once_under_the_heading_of_where_it_is_used():
+    rows = format_rows()
+    assert sorted(row.key for row in rows) == sorted(form.name for form in (*FORMATS, *CAMERA_ONLY))
+    groups = [row.group for row in rows]
+    assert groups == sorted(groups, key=groups.index)
+    assert "Other tools" not in groups
+    found = {row.key for row in rows if "ros 2" in f"{row.label} {row.also}".lower()}
+    assert {"tf2", "tf2-launch-py", "tf2-launch-xml", "urdf", "autoware"} <= found
+
+
+def test_the_evidence_is_said_with_the_verdict(file):
+    said = panel.export_preview(file, "tf2", "", "drive").evidence
+    inliers = sum(pair.inlier for pair in file.calibration.pairs)
+    assert said.startswith(f"Rests on clicks ({inliers} pairs).")
+    assumed = panel.export_preview(replace(file, evidence="imported_assumed"), "tf2", "", "drive").evidence
+    assert "nothing proves it" in assumed
+    proven = panel.export_preview(replace(file, evidence="imported_proven"), "tf2", "", "drive").evidence
+    assert "proved" in proven
+
+
+def test_a_format_without_the_angle_map_says_so_with_both_figures(file):
+    grid = AngleMap(np.array([-0.5, 0.5]), np.array([-0.2, 0.2]), np.zeros((2, 2, 2)), np.ones((2, 2, 2)), 22.9, 2.04)
+    mapped = replace(file, calibration=replace(file.calibration, angle_map=grid))
+    made = panel.export_preview(mapped, "opencv", "", "drive")
+    assert "22.9 px" in made.missing
+    assert "2.04 px" in made.missing
+    assert made.missing not in made.notes
+    assert panel.export_preview(mapped, "json", "", "drive").missing == ""
+    assert panel.export_preview(file, "opencv", "", "drive").missing == ""
+
+
+def test_a_file_with_others_that_belong_to_it_is_saved_as_one_zip(file):
+    camera = replace(file.calibration.camera, model="plumb_bob", distortion=[-0.3, 0.1, 0, 0, 0])
+    distorted = replace(file, calibration=replace(file.calibration, camera=camera))
+    written = panel.exported(distorted, "kitti", "").download
+    assert zipfile.ZipFile(io.BytesIO(written.data)).namelist() == ["calib.txt", "rectification.npz"]
+    preview = panel.export_preview(distorted, "kitti", "", "drive")
+    assert preview.file_name == f"drive_{written.file_name}"
+    assert preview.size_bytes == len(written.data)

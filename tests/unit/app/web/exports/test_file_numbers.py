@@ -1,0 +1,101 @@
+"""The numbers that the export panel shows are the file's own: direction, order, unit and value."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from app.web.channel.export_preview import export_preview
+from app.web.exports.file_numbers import our_numbers, pose_in_file
+from calib_core.interchange import FORMATS, CalibrationFile, FrameNames, WrittenPose, read_calibration
+
+NAMES = FrameNames("front_radar", "front_camera_optical")
+
+
+@pytest.fixture
+def file(project_root) -> CalibrationFile:
+    return read_calibration((project_root / "tests/golden/calibration-1.json").read_text(encoding="utf-8"))
+
+
+def preview(file, key, query=""):
+    form = next(form for form in FORMATS if form.name == key)
+    ticked = "rectified=1" if form.is_for_rectified else ""
+    return export_preview(file, key, "&".join(part for part in (query, ticked) if part), "drive")
+
+
+@pytest.mark.parametrize("key", ["tf2", "tf2-launch-py", "tf1-launch", "urdf", "autoware", "apollo", "foxglove"])
+def test_each_number_of_the_table_is_in_the_text_digit_by_digit(file, key):
+    made = preview(file, key)
+    rows = made.pose.numbers.rows
+    assert len(rows) in (6, 7)
+    for row in rows:
+        (value,) = row.values
+        assert re.search(rf"(?<![\d.]){re.escape(value)}(?![\d.])", made.text), row.name
+
+
+def test_angles_that_the_file_states_in_degrees_are_shown_in_degrees(file):
+    made = preview(file, "driveworks")
+    sensor = json.loads(made.text)["rig"]["sensors"][1]["nominalSensor2Rig_FLU"]
+    shown = {row.name: (float(row.values[0]), row.unit) for row in made.pose.numbers.rows}
+    for name, angle_deg in zip(("roll", "pitch", "yaw"), sensor["roll-pitch-yaw"], strict=True):
+        assert shown[name] == (pytest.approx(angle_deg, abs=1e-9), "deg")
+    assert preview(file, "urdf").pose.numbers.rows[-1].unit == "rad"
+
+
+@pytest.mark.parametrize("form", [form.name for form in FORMATS])
+def test_the_table_and_the_words_give_the_calibration_back(file, form):
+    made = preview(file, form)
+    pose, numbers = made.pose, {row.name: row.values for row in made.pose.numbers.rows}
+    turn = rotation_in(numbers, degrees=made.pose.numbers.rows[-1].unit == "deg")
+    shift = np.array(numbers["t"] if "t" in numbers else [numbers[name][0] for name in "xyz"], dtype=float)
+    point = np.array([7.0, -2.0, 0.5])
+    optical = file.calibration.camera_from_radar @ point[None]
+    link_from_optical = np.array([[0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+    seen = link_from_optical @ optical[0] if "p_link" in pose.equation else optical[0]
+    carried = turn @ point + shift if pose.carries == "camera_from_radar" else turn.T @ (point - shift)
+    np.testing.assert_allclose(carried, seen, rtol=0, atol=1e-7)
+    assert pose.equation in pose.words
+    assert ("carry points from" in pose.words) is (pose.carries == "camera_from_radar")
+    axes = np.array(pose.camera_axes)
+    np.testing.assert_allclose(axes, turn if pose.carries == "camera_from_radar" else turn.T, rtol=0, atol=1e-8)
+
+
+def rotation_in(numbers, degrees):
+    from scipy.spatial.transform import Rotation
+
+    if "R row 1" in numbers:
+        return np.array([numbers[f"R row {row}"] for row in (1, 2, 3)], dtype=float)
+    if "roll" in numbers:
+        angles = [float(numbers[name][0]) for name in ("roll", "pitch", "yaw")]
+        return Rotation.from_euler("xyz", angles, degrees=degrees).as_matrix()
+    return Rotation.from_quat([float(numbers[name][0]) for name in ("qx", "qy", "qz", "qw")]).as_matrix()
+
+
+def test_the_words_name_the_frames_of_the_file_and_the_axes_of_the_camera():
+    turn, shift = np.eye(3), np.array([0.1, 0.2, 0.3])
+    optical, link, forward = (
+        pose_in_file(WrittenPose("matrix", turn, shift, direction, axes), NAMES, in_third_frame=False)
+        for direction, axes in (
+            ("radar_from_camera", "optical"),
+            ("radar_from_camera", "link"),
+            ("camera_from_radar", "optical"),
+        )
+    )
+    assert "are the pose of 'front_camera_optical' (z forward) in 'front_radar'" in optical.words
+    assert "are the pose of 'front_camera_link' (x forward) in 'front_radar'" in link.words
+    assert "carry points from 'front_radar' to 'front_camera_optical'" in forward.words
+
+
+def test_two_poses_in_a_third_frame_are_said_to_be_combined(file):
+    made = preview(file, "autoware", "parent_from_radar=1,0,0,0,0,0.6,0.8")
+    assert "in the third frame" in made.pose.words
+    own = {row.name: row.values for row in preview(file, "json").pose.numbers.rows}
+    assert own["t"] != made.pose.numbers.rows[-1].values
+    assert "third frame" not in preview(file, "autoware").pose.words
+
+
+def test_the_calibration_s_own_pose_is_there_whatever_the_file_holds(file):
+    ours = our_numbers(file.calibration.camera_from_radar)
+    assert [row.name for row in ours.rows][-4:] == ["qw", "qx", "qy", "qz"]
+    assert preview(file, "tf2").our_pose == preview(file, "kitti").our_pose == ours
