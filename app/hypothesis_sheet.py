@@ -15,7 +15,17 @@ if TYPE_CHECKING:
     from calib_core.interchange.hypotheses.ranking import Hypothesis
     from calib_core.recordings import Recording
 
-__all__ = ["FrameWithReturns", "contact_sheet", "frame_with_returns", "jpeg", "png", "returns_in_picture", "tile"]
+__all__ = [
+    "FrameWithReturns",
+    "Offer",
+    "OpenMeaning",
+    "contact_sheet",
+    "frame_with_returns",
+    "jpeg",
+    "png",
+    "returns_in_picture",
+    "tile",
+]
 
 _TILE_WIDTH_PX = 560
 _CAPTION_PX, _LINE_PX = 58, 19
@@ -39,6 +49,34 @@ class FrameWithReturns:
 
     picture: np.ndarray
     points_radar_m: Points3
+    camera: "Camera"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Offer:
+    """One pose that the numbers in a file can mean.
+
+    Attributes:
+        place: of the numbers in the file.
+        hypothesis: what they mean.
+    """
+
+    place: str
+    hypothesis: "Hypothesis"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenMeaning:
+    """A calibration that is not shown until a person picks what its numbers mean.
+
+    Attributes:
+        name: of its file.
+        offers: what they can mean, the likeliest first.
+        camera: to draw with.
+    """
+
+    name: str
+    offers: tuple[Offer, ...]
     camera: "Camera"
 
 

@@ -914,6 +914,8 @@ export interface OpenWith {
   intrinsics?: "keep" | "recorded" | "near" | "file";
   file?: DroppedFile | null;
   session?: "continue" | "new" | "copy";
+  meaning?: string;
+  meaning_place?: string;
   request?: number;
 }
 

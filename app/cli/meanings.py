@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["MeaningFlags"]
 
-_LEAST_SHARE = 0.01
-_FEWEST, _MOST = 3, 9
 _CONTRADICTED = 0.05
 
 
@@ -38,9 +36,9 @@ class MeaningFlags:
     sheet: File = None
     """Draw each meaning over a frame of --recording and write the picture here (PNG)."""
     recording: Annotated[tuple[Path, ...], called("RECORDING")] = ()
-    """A recording of these sensors, for --sheet."""
+    """A recording of these sensors: --sheet draws over one of its frames."""
     at: Annotated[float | None, called("SECONDS")] = None
-    """Which frame for --sheet, in seconds after the first; by default the one in the middle."""
+    """Which frame to draw over, in seconds after the first; by default the one in the middle."""
     topics: Topics = field(default_factory=TopicFlags)
 
     def calibration(
@@ -65,7 +63,7 @@ class MeaningFlags:
             InputError: it contains no pose, no such pose, or no such meaning; or the pairs contradict what was picked.
         """
         from calib_core.interchange import read_any
-        from calib_core.interchange.hypotheses.ranking import clear_one, hypotheses_of
+        from calib_core.interchange.hypotheses.ranking import clear_one, hypotheses_of, likely_ones
         from calib_core.interchange.hypotheses.reading import as_imported, picked, read_unstated
 
         source = str(path)
@@ -77,7 +75,7 @@ class MeaningFlags:
         other = None if against is None else against.camera_from_radar
         hypotheses = hypotheses_of(pose, pairs=pairs, against=other)
         if self.sheet is not None:
-            self._write_sheet(self.sheet, file, _listed(hypotheses), camera)
+            self._write_sheet(self.sheet, file, likely_ones(hypotheses), camera)
         if self.as_ is not None:
             chosen = picked(hypotheses, self.as_, source)
             if pairs is not None or against is not None:
@@ -150,15 +148,11 @@ def _frame_at(recording: "Recording", seconds: float | None) -> int | None:
     return int(np.argmin(np.abs(after_s - seconds)))
 
 
-def _listed(hypotheses: "Sequence[Hypothesis]") -> "Sequence[Hypothesis]":
-    """Return those that are shown: the plausible ones, and a few more to compare with."""
-    likely = sum(one.share >= _LEAST_SHARE for one in hypotheses)
-    return hypotheses[: min(max(likely, _FEWEST), _MOST)]
-
-
 def _list(hypotheses: "Sequence[Hypothesis]", path: Path, place: str) -> None:
     """Print the hypotheses, how to choose one, and that nothing was written."""
-    shown = _listed(hypotheses)
+    from calib_core.interchange.hypotheses.ranking import likely_ones
+
+    shown = likely_ones(hypotheses)
     print(f"{path.name}: {place} does not state what its numbers mean; they may be:")
     for number, one in enumerate(shown, 1):
         print(f"{number:>3}  {one.key}  ({one.score})\n     {one.words}")

@@ -13,10 +13,12 @@ from calib_core.interchange.hypotheses.found_poses import FoundPose
 from calib_core.interchange.hypotheses.meanings import Meaning, meanings_of
 from calib_core.interchange.hypotheses.mounting import is_usual, mounting_weight, mounting_words
 
-__all__ = ["Hypothesis", "clear_one", "hypotheses_of"]
+__all__ = ["Hypothesis", "clear_one", "hypotheses_of", "likely_ones"]
 
 _SAME_RAD, _SAME_M = 1e-4, 1e-4
 _CLEAR = 0.95
+_LEAST_SHARE = 0.01
+_FEWEST, _MOST = 3, 9
 _LEAST_SIGMA_PX = 1.0
 _NEAR_PX = 0.03
 _ANGLE_RAD, _APART_M = math.radians(2.0), 0.05
@@ -100,6 +102,12 @@ def clear_one(hypotheses: Sequence[Hypothesis]) -> Hypothesis | None:
     """Return the only hypothesis that is plausible; None if several are, or none."""
     first = hypotheses[0]
     return first if first.fits and first.share >= _CLEAR else None
+
+
+def likely_ones(hypotheses: Sequence[Hypothesis]) -> Sequence[Hypothesis]:
+    """Return those to show to a person: all that are likely, and a few more to compare with."""
+    likely = sum(one.share >= _LEAST_SHARE for one in hypotheses)
+    return hypotheses[: min(max(likely, _FEWEST), _MOST)]
 
 
 def _merged(meanings: Iterable[Meaning]) -> list[Hypothesis]:
