@@ -16,6 +16,7 @@ from calib_core.errors import InputError
 if TYPE_CHECKING:
     from calib_core.camera import Camera
     from calib_core.interchange import CheckPairs, ImportedCalibration
+    from calib_core.interchange.hypotheses.found_poses import FoundPose
     from calib_core.interchange.hypotheses.ranking import Hypothesis
     from calib_core.interchange.hypotheses.reading import UnstatedFile
     from calib_core.recordings import Recording
@@ -81,9 +82,9 @@ class MeaningFlags:
             if pairs is not None or against is not None:
                 _refuse_contradicted(chosen, hypotheses[0], source)
             return as_imported(file, pose, chosen, by_hand=True)
-        clear = clear_one(hypotheses)
+        clear = clear_one(pose, hypotheses)
         if clear is None:
-            _list(hypotheses, path, pose.place)
+            _list(hypotheses, path, pose)
             return None
         _tell_of_others(hypotheses, tested=pairs is not None or against is not None)
         return as_imported(file, pose, clear, by_hand=False)
@@ -148,16 +149,18 @@ def _frame_at(recording: "Recording", seconds: float | None) -> int | None:
     return int(np.argmin(np.abs(after_s - seconds)))
 
 
-def _list(hypotheses: "Sequence[Hypothesis]", path: Path, place: str) -> None:
+def _list(hypotheses: "Sequence[Hypothesis]", path: Path, pose: "FoundPose") -> None:
     """Print the hypotheses, how to choose one, and that nothing was written."""
     from calib_core.interchange.hypotheses.ranking import likely_ones
 
     shown = likely_ones(hypotheses)
-    print(f"{path.name}: {place} does not state what its numbers mean; they may be:")
+    print(f"{path.name}: {pose.place} does not state what its numbers mean; they may be:")
     for number, one in enumerate(shown, 1):
         print(f"{number:>3}  {one.key}  ({one.score})\n     {one.words}")
     others = len(hypotheses) - len(shown)
     print(f"{others} other meanings are less plausible." if others else "There are no others.")
+    if pose.hints.other:
+        print(f"Its names mention {pose.hints.other!r} and no radar: is it the radar's pose?")
     print(
         f"Nothing was written: pick one, such as --as {shown[0].key}; or let them be tested with --pairs FILE or --against FILE. "
         "--sheet FILE.png --recording RECORDING draws each over a frame."

@@ -67,14 +67,15 @@ def reference_from(path: Path, camera: Camera | None, pick: MeaningPick) -> Refe
     file = read_unstated(data, source)
     if file is None:
         return Reference(name, adopted_calibration(read_any(data, source), source, camera=camera))
-    if pick.meaning or len(file.poses) == 1:
+    radars = [pose for pose in file.poses if pose.hints.names_radar]
+    if pick.meaning or len(file.poses) == 1 or len(radars) == 1:
         pose = file.pose_at(pick.place or None)
         hypotheses = hypotheses_of(pose)
-        chosen = picked(hypotheses, pick.meaning, source) if pick.meaning else clear_one(hypotheses)
+        chosen = picked(hypotheses, pick.meaning, source) if pick.meaning else clear_one(pose, hypotheses)
         if chosen is not None:
             found = as_imported(file, pose, chosen, by_hand=bool(pick.meaning))
             return Reference(name, adopted_calibration(found, source, camera=camera))
-    ranked = [(pose, hypotheses_of(pose)) for pose in file.poses[:_MOST_POSES]]
+    ranked = [(pose, hypotheses_of(pose)) for pose in (radars or file.poses)[:_MOST_POSES]]
     most = _MOST_OFFERS // len(ranked)
     offers = (Offer(pose.place, one) for pose, hypotheses in ranked for one in likely_ones(hypotheses)[:most])
     return OpenMeaning(name, tuple(offers), camera)

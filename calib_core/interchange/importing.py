@@ -19,6 +19,8 @@ _KNOWN = (
     "COLMAP, mat, npz, matrix"
 )
 
+_OTHERS = "; a pose that states nothing: cocalib import FILE lists what its numbers may mean"
+
 
 def read_any_file(path: str | Path) -> ImportedCalibration:
     """Read a calibration from a file of any format in the registry.
@@ -82,4 +84,6 @@ def _refusal(content: Content, source: str) -> InputError:
         return InputError(f"{source}: XML with <{content.root.tag}>; expected OpenCV's <opencv_storage>")
     value = content.value
     found = ", ".join(map(str, list(value)[:12])) if isinstance(value, dict) else type(value).__name__
-    return InputError(f"{source}: no pose of a camera and a radar in it (found {found or 'nothing'}); {_KNOWN}")
+    return InputError(
+        f"{source}: no pose of a camera and a radar in it (found {found or 'nothing'}); {_KNOWN}{_OTHERS}"
+    )

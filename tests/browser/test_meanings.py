@@ -51,7 +51,9 @@ def test_the_meaning_that_is_picked_is_shown_as_the_calibration(
     page.until(
         "[...document.querySelectorAll('#meanings-dialog img')].every((one) => one.complete && one.naturalWidth === 480)"
     )
-    meanings = page.value("[...document.querySelectorAll('#meanings-dialog .meaning')].map((one) => one.dataset.meaning)")
+    meanings = page.value(
+        "[...document.querySelectorAll('#meanings-dialog .meaning')].map((one) => one.dataset.meaning)"
+    )
     assert {RIGHT, "camera_from_radar,body,m"} <= set(meanings[:2])
     assert not page.view["reference"]
     with page.page.expect_navigation():

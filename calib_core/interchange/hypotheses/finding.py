@@ -25,6 +25,17 @@ _WHOLE = "the file"
 _MOST_POSES = 200
 _MOST_VALUES = 20_000
 _DEEPEST = 40
+_LONGEST_NAME = 80
+_MOST_TEXTS = 40
+_FRAME_KEYS = (  # target, source, and whether that is said of the points or of the sensors
+    ("parent", "child", "from"),
+    ("parent_frame", "child_frame", "from"),
+    ("frame_id", "child_frame_id", "from"),
+    ("to", "from", "to"),
+    ("target", "source", "to"),
+    ("to_frame", "from_frame", "to"),
+    ("target_frame", "source_frame", "to"),
+)
 _NOT_POSES = frozenset(
     {"intrinsic", "intrinsics", "projection", "rectification", "distortion", "coefficients", "covariance"}
     | {"homography", "fundamental", "essential", "information"}
@@ -110,10 +121,11 @@ def _in_rows(rows: list[np.ndarray], search: _Search) -> None:
 def _look(value: Any, keys: tuple[object, ...], texts: tuple[str, ...], search: _Search) -> None:
     if len(keys) > _DEEPEST or (isinstance(value, list | dict) and not search.is_new(value)):
         return
-    if _is_of_the_camera(keys[-1:]) or _as_numbers(value, keys, texts, search):
+    of_the_camera = _is_of_the_camera(keys[-1:]) and array_of(value) is not None
+    if of_the_camera or _as_numbers(value, keys, texts, search):
         return
     if isinstance(value, Mapping):
-        _in_mapping(value, keys, search)
+        _in_mapping(value, keys, texts, search)
     elif isinstance(value, list | tuple):
         for index, item in enumerate(value[:_MOST_VALUES]):
             if isinstance(item, list | tuple | Mapping):
@@ -147,13 +159,24 @@ def _as_numbers(value: Any, keys: tuple[object, ...], texts: tuple[str, ...], se
     return True
 
 
-def _in_mapping(value: Mapping[Any, Any], keys: tuple[object, ...], search: _Search) -> None:
+def _in_mapping(value: Mapping[Any, Any], keys: tuple[object, ...], texts: tuple[str, ...], search: _Search) -> None:
     """Look for a rotation and a translation next to each other, then into each value."""
-    texts = tuple(text for text in value.values() if isinstance(text, str) and len(text) < 80)
+    own = (text for text in value.values() if isinstance(text, str) and len(text) < _LONGEST_NAME)
+    texts = (*_between(value), *own, *texts)[:_MOST_TEXTS]
     taken = _pairs_in(value, keys, texts, search)
     for key, inner in value.items():
         if key not in taken:
             _look(inner, (*keys, key), texts, search)
+
+
+def _between(value: Mapping[Any, Any]) -> Iterator[str]:
+    """Yield which frames a mapping names, as words about the direction: a child's pose carries its points into the parent."""
+    named = {
+        str(key).lower(): text for key, text in value.items() if isinstance(text, str) and len(text) < _LONGEST_NAME
+    }
+    for target, source, word in _FRAME_KEYS:
+        if target in named and source in named:
+            yield f"{named[target]} from {named[source]}" if word == "from" else f"{named[source]} to {named[target]}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

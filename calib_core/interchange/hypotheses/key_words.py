@@ -61,6 +61,10 @@ _OF_AXES = {
     "frd": ("radar", "frd"),
     "rfu": ("radar", "rfu"),
 }
+_OTHERS = frozenset(
+    {"lidar", "velo", "velodyne", "livox", "ouster", "hesai", "imu", "gps", "gnss", "ego", "vehicle", "chassis"}
+    | {"base", "world", "map"}
+)
 _FROM, _TO = ("from", "wrt", "in"), ("to", "2")
 
 
@@ -73,12 +77,16 @@ class KeyHints:
         camera_axes: the camera's axes that a name mentions; "" if none does.
         radar_axes: the same for the radar.
         unit: of length that a name mentions; "" if none does.
+        names_radar: whether a name mentions a radar.
+        other: another sensor or frame that a name mentions although none mentions a radar, such as "lidar"; "" if none does.
     """
 
     carries_radar: float = 0.5
     camera_axes: str = ""
     radar_axes: str = ""
     unit: str = ""
+    names_radar: bool = False
+    other: str = ""
 
 
 def words_of(key: object) -> tuple[str, ...]:
@@ -115,10 +123,13 @@ def hints_of(keys: Sequence[object], texts: Sequence[str] = ()) -> KeyHints:
         for word in [*words, *(part for text in texts for part in words_of(text))]
         for whose, which in [_OF_AXES.get(word, ("", ""))]
     }
-    innermost = next((hint for key in reversed(keys) if (hint := _direction(words_of(key))) != 0.5), 0.5)
+    names = (*reversed(keys), *texts)
+    innermost = next((hint for name in names if (hint := _direction(words_of(name))) != 0.5), 0.5)
     units = [*(unit_in(key) for key in reversed(keys)), *(_UNITS.get(text.strip().lower(), "") for text in texts)]
     unit = next((unit for unit in units if unit in ("mm", "cm", "m")), "")
-    return KeyHints(innermost, axes.get("camera", ""), axes.get("radar", ""), unit)
+    names_radar = any(looks_like_radar(word) for one in (*keys, *texts) for word in words_of(one))
+    other = "" if names_radar else next((word for word in words if word in _OTHERS), "")
+    return KeyHints(innermost, axes.get("camera", ""), axes.get("radar", ""), unit, names_radar, other)
 
 
 def _direction(words: Sequence[str]) -> float:

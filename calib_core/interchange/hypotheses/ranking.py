@@ -98,10 +98,16 @@ def hypotheses_of(
     return tuple(sorted(shared, key=lambda one: (-one.share, one.key)))
 
 
-def clear_one(hypotheses: Sequence[Hypothesis]) -> Hypothesis | None:
-    """Return the only hypothesis that is plausible; None if several are, or none."""
+def clear_one(pose: FoundPose, hypotheses: Sequence[Hypothesis]) -> Hypothesis | None:
+    """Return the only hypothesis that is plausible; None if several are, or none, or if the pose seems to be another sensor's.
+
+    Args:
+        pose: the numbers.
+        hypotheses: what they can mean, the likeliest first.
+    """
     first = hypotheses[0]
-    return first if first.fits and first.share >= _CLEAR else None
+    tested = not (math.isnan(first.miss_px) and math.isnan(first.apart[0]))
+    return first if first.fits and first.share >= _CLEAR and (tested or not pose.hints.other) else None
 
 
 def likely_ones(hypotheses: Sequence[Hypothesis]) -> Sequence[Hypothesis]:

@@ -18,11 +18,12 @@ from calib_core.interchange.hypotheses.finding import find_poses
 from calib_core.interchange.hypotheses.found_poses import FoundPose, Unreadable
 from calib_core.interchange.hypotheses.key_words import hints_of
 from calib_core.interchange.hypotheses.plain_values import array_of, plain_values
-from calib_core.interchange.hypotheses.ranking import Hypothesis
+from calib_core.interchange.hypotheses.ranking import Hypothesis, clear_one, hypotheses_of
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
+from calib_core.interchange.importing import read_any
 from calib_core.interchange.syntax.content import Content, readings
 
-__all__ = ["BARE_POSE", "UnstatedFile", "as_imported", "picked", "read_unstated"]
+__all__ = ["BARE_POSE", "UnstatedFile", "as_imported", "picked", "read_clear", "read_unstated"]
 
 _BARE = tuple(known.reads for known in (MATRIX, NUMPY, MATLAB, OPENCV))
 _SHOWN = 8
@@ -48,15 +49,16 @@ class UnstatedFile:
     camera: FoundCamera | None = None
 
     def pose_at(self, place: str | None) -> FoundPose:
-        """Return the pose at a place; the only one if none is given.
+        """Return the pose at a place; if none is given, the only one, or the only one whose names mention a radar.
 
         Raises:
             InputError: there is none there, or there are several to choose from.
         """
         places = [pose.place for pose in self.poses]
         named = ", ".join(repr(one) for one in places[:_SHOWN]) + (", ..." if len(places) > _SHOWN else "")
-        if place is None and len(places) == 1:
-            return self.poses[0]
+        radars = [pose for pose in self.poses if pose.hints.names_radar]
+        if place is None and (len(places) == 1 or len(radars) == 1):
+            return radars[0] if len(radars) == 1 else self.poses[0]
         if place is None:
             raise InputError(f"{self.source}: contains {len(places)} poses; choose one with --pose PLACE: {named}")
         if place not in places:
@@ -160,8 +162,37 @@ def as_imported(file: UnstatedFile, pose: FoundPose, chosen: Hypothesis, *, by_h
         ),
         camera=camera,
         matrix_px=matrix_px,
+        notes=_notes(file, pose),
         assumptions=(f"the file does not state what its pose{where} means; {how}: {meaning.words} ({meaning.key})",),
     )
+
+
+def _notes(file: UnstatedFile, pose: FoundPose) -> tuple[str, ...]:
+    """Return what else is in the file."""
+    notes = [f"not read: {one.place}: {one.fault}" for one in file.unreadable[:_SHOWN]]
+    if len(file.poses) > 1:
+        notes.append(f"{pose.place} was read, one of {len(file.poses)} poses in the file")
+    return tuple(notes)
+
+
+def read_clear(content: str | bytes, source: str = "calibration") -> ImportedCalibration:
+    """Read a calibration of any known format, or one that states nothing if only one meaning of its numbers is plausible.
+
+    Raises:
+        InputError: it contains no pose, or several, or its numbers may mean several things.
+    """
+    file = read_unstated(content, source)
+    if file is None:
+        return read_any(content, source)
+    pose = file.pose_at(None)
+    hypotheses = hypotheses_of(pose)
+    clear = clear_one(pose, hypotheses)
+    if clear is None:
+        keys = " or ".join(one.key for one in hypotheses[:2])
+        raise InputError(
+            f"{source}: does not state what its numbers mean ({keys}, for example); pick it with cocalib import FILE --as MEANING"
+        )
+    return as_imported(file, pose, clear, by_hand=False)
 
 
 def _camera(file: UnstatedFile) -> tuple[Camera | None, np.ndarray | None]:

@@ -11,7 +11,7 @@ from scipy.io import savemat
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix, rotation_exp, rotation_log
 from calib_core.interchange.hypotheses.ranking import clear_one, hypotheses_of
-from calib_core.interchange.hypotheses.reading import as_imported, picked, read_unstated
+from calib_core.interchange.hypotheses.reading import as_imported, picked, read_clear, read_unstated
 
 POSE = RigidTransform(
     rotation_exp(np.array([0.03, -0.08, 0.02])) @ np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
@@ -116,7 +116,7 @@ def test_the_meaning_of_a_usual_mounting_is_clear(name: str) -> None:
     assert file is not None
     pose = file.pose_at(None)
     hypotheses = hypotheses_of(pose)
-    chosen = clear_one(hypotheses)
+    chosen = clear_one(pose, hypotheses)
     if name in NOT_CERTAIN:
         assert chosen is None or _is_pose(chosen.camera_from_radar)
         return
@@ -130,8 +130,9 @@ def test_the_meaning_of_a_usual_mounting_is_clear(name: str) -> None:
 def test_body_axes_in_both_frames_leave_the_direction_open() -> None:
     file = read_unstated(json.dumps({"T": {"x": 1.2, "y": 0.1, "z": 0.4, "qw": 1, "qx": 0, "qy": 0, "qz": 0}}))
     assert file is not None
-    hypotheses = hypotheses_of(file.pose_at(None))
-    assert clear_one(hypotheses) is None
+    pose = file.pose_at(None)
+    hypotheses = hypotheses_of(pose)
+    assert clear_one(pose, hypotheses) is None
     directions = [one.meanings[0].direction for one in hypotheses[:2]]
     assert sorted(directions) == ["camera_from_radar", "radar_from_camera"]
 
@@ -258,3 +259,60 @@ def test_the_camera_in_the_file_comes_along() -> None:
     found = as_imported(file, pose, hypotheses_of(pose)[0], by_hand=True)
     assert found.camera is not None
     assert (found.camera.width_px, found.camera.matrix_px[0, 0]) == (640, 500.0)
+
+
+@pytest.mark.parametrize(
+    ("names", "first"),
+    [
+        ({"parent": "radar_front", "child": "camera"}, "radar_from_camera"),
+        ({"parent_frame": "cam0", "child_frame": "radar"}, "camera_from_radar"),
+        ({"from": "radar", "to": "camera"}, "camera_from_radar"),
+        ({"source_frame": "camera", "target_frame": "radar"}, "radar_from_camera"),
+        ({"description": "extrinsics from the camera to the radar"}, "radar_from_camera"),
+    ],
+)
+def test_names_of_frames_beside_a_pose_rank_the_direction(names: dict[str, str], first: str) -> None:
+    matrix = RigidTransform(np.eye(3), [1.2, 0.1, 0.4]).as_matrix().tolist()
+    file = read_unstated(json.dumps(names | {"transform": {"matrix": matrix}}), "file.json")
+    assert file is not None
+    assert hypotheses_of(file.pose_at(None))[0].meanings[0].direction == first
+
+
+def test_the_pose_of_another_sensor_is_not_taken_for_the_radars() -> None:
+    file = read_unstated(json.dumps({"T_cam_lidar": MATRIX.tolist()}), "file.json")
+    assert file is not None
+    pose = file.pose_at(None)
+    assert clear_one(pose, hypotheses_of(pose)) is None
+    assert clear_one(pose, hypotheses_of(pose, against=POSE)) is not None
+    with pytest.raises(InputError, match="does not state what its numbers mean"):
+        read_clear(json.dumps({"T_cam_lidar": MATRIX.tolist()}), "file.json")
+
+
+def test_of_several_poses_the_only_one_that_names_a_radar_is_taken() -> None:
+    text = json.dumps({"T_cam_lidar": np.eye(4).tolist(), "T_cam_radar": MATRIX.tolist()})
+    found = read_clear(text, "rig.json")
+    assert _is_pose(found.camera_from_radar)
+    assert found.notes == ("T_cam_radar was read, one of 2 poses in the file",)
+
+
+def test_what_cannot_be_read_beside_a_pose_is_told() -> None:
+    mirrored = (MATRIX @ np.diag([1.0, -1, 1, 1])).tolist()
+    found = read_clear(json.dumps({"front": mirrored, "rear": MATRIX.tolist()}), "rig.json")
+    assert _is_pose(found.camera_from_radar)
+    assert found.notes[0].startswith("not read: front: the rotation is left-handed")
+
+
+def test_intrinsics_are_no_pose() -> None:
+    projection = [[500.0, 0, 320, 0], [0, 500, 240, 0], [0, 0, 1, 0]]
+    text = json.dumps(
+        {"projection_matrix": {"rows": 3, "cols": 4, "data": np.ravel(projection).tolist()}, "P2": projection}
+    )
+    assert read_unstated(text, "camera.json") is None
+
+
+def test_units_in_names_rank_first() -> None:
+    file = read_unstated(json.dumps({"R": POSE.rotation.tolist(), "t_mm": [120.0, -310.0, 70.0]}), "file.json")
+    assert file is not None
+    first = hypotheses_of(file.pose_at(None))[0]
+    assert first.meanings[0].unit == "mm"
+    assert _is_pose(first.camera_from_radar)
