@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["camera_in", "camera_of", "reference_from"]
 
+_NOTHING_PICKED = MeaningPick()
 _MOST_POSES, _MOST_OFFERS = 4, 12
 
 
@@ -50,7 +51,7 @@ def camera_in(path: Path, width_px: int, height_px: int) -> Camera | None:
     return camera if fits else None
 
 
-def reference_from(path: Path, camera: Camera | None, pick: MeaningPick) -> Reference | OpenMeaning:
+def reference_from(path: Path, camera: Camera | None, pick: MeaningPick = _NOTHING_PICKED) -> Reference | OpenMeaning:
     """Return the calibration in a file, to be shown with the recording's camera; or what it can mean, if it does not say.
 
     Args:
