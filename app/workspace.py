@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
+from app.hypothesis_sheet import OpenMeaning
 from app.session import (
     AssumedReading,
     ClicksImported,
@@ -93,11 +94,13 @@ class Workspace:
         camera: the intrinsics to solve with; None if there are none.
         camera_file: the file that they come from; None for the recording's own.
         intrinsics: where they come from, in words; "" if there are none.
+        open_meaning: a calibration that is not shown until a person picks what its numbers mean; None if there is none.
     """
 
     camera: Camera | None = None
     camera_file: CameraFile | None = None
     intrinsics: str = ""
+    open_meaning: OpenMeaning | None = None
 
     def __init__(
         self,

@@ -915,6 +915,8 @@ export interface OpenWith {
   intrinsics?: "keep" | "recorded" | "near" | "file";
   file?: DroppedFile | null;
   session?: "continue" | "new" | "copy";
+  meaning?: string;
+  meaning_place?: string;
   request?: number;
 }
 

@@ -168,6 +168,15 @@ async function choose() {
   toast(refused);
 }
 
+/** Open what is open again in another way, without asking. @param {{meaning: string, meaning_place: string}} changed */
+export async function openAgain(changed) {
+  if (!(await known()) || !choices) return;
+  const answer = crypto.getRandomValues(new Uint32Array(4)).join("-");
+  const { question, radar_topic, image_topic } = choices;
+  const refused = await send({ type: "open_with", question, answer, radar_topic, image_topic, intrinsics: "keep", session: "continue", ...changed });
+  if (refused !== null) toast(refused);
+}
+
 /** Use a file of intrinsics: in the dialog it is chosen, outside it is used at once. @param {File} file */
 async function give(file) {
   const refuse = (/** @type {string} */ words) => {

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.cli.flags import File, NewFile, Switch, called
+from app.cli.flags import File, Switch, called
+from app.cli.meanings import MeaningFlags
 from app.cli.output import write_whole
-from app.cli.tree_flags import FrameFlags, Frames
+from app.cli.tree_flags import FrameFlags, Frames, input_file
 from calib_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,10 +24,10 @@ __all__ = ["Import"]
 class Import:
     """Convert a calibration from any known format to cocalib/calibration-1 JSON."""
 
-    out: NewFile
-    """Output file (calibration-1 JSON)."""
     calibration: Annotated[tuple[Path, ...], tyro.conf.Positional, called("FILE...")] = ()
-    """A calibration in any format that `cocalib check` reads, from any program; or files, a folder or a recording with a tree."""
+    """A calibration in any format, or any file with a pose, from any program; or files, a folder or a recording with a tree."""
+    out: File = None
+    """Output file (calibration-1 JSON)."""
     camera: File = None
     """Intrinsics to use if the file has none: camera_info YAML, OpenCV YAML/XML, Kalibr, JSON."""
     image_size: Annotated[tuple[int, int] | None, called("WIDTH HEIGHT")] = None
@@ -38,12 +39,18 @@ class Import:
     replace_camera: Switch = False
     """Take --camera although the file states another camera."""
     frames: Frames = field(default_factory=FrameFlags)
+    meaning: Annotated[MeaningFlags, tyro.conf.arg(name="")] = field(default_factory=MeaningFlags)
 
     def run(self) -> int:
-        """Write the calibration; return the exit code: 3 if it was converted but looks wrong, and nothing proves it."""
+        """Write the calibration; return the exit code.
+
+        It is 3 if it was converted but looks wrong, and nothing proves it; or if its numbers may mean several things, and
+        nothing was written.
+        """
         from calib_core.interchange import (
             Provenance,
             adoption,
+            calibration_bytes,
             read_any_file,
             read_camera_file,
             read_check_pairs_file,
@@ -55,10 +62,20 @@ class Import:
                 "import takes a calibration, or the files of one: cocalib import FILE... --out calibration.json"
             )
         path, source = self.calibration[0], ", ".join(map(str, self.calibration))
-        found, inputs = self.frames.read(self.calibration)
-        camera = read_camera_file(self.camera) if self.camera else _sized_camera(found, path, self.image_size)
+        given = read_camera_file(self.camera) if self.camera else None
         against = read_any_file(self.against) if self.against else None
         pairs = read_check_pairs_file(self.pairs) if self.pairs else None
+        unstated = self.meaning.unstated(self.calibration)
+        if unstated is None:
+            found, inputs = self.frames.read(self.calibration)
+        else:
+            chosen = self.meaning.chosen(unstated, camera=given, pairs=pairs, against=against)
+            if chosen is None:
+                return 3
+            found, inputs = chosen, (input_file(path, calibration_bytes(path)),)
+        if self.out is None:
+            raise InputError(f"{source}: give the output file with --out FILE")
+        camera = given or _sized_camera(found, path, self.image_size)
         adopted = adoption(
             found,
             source,

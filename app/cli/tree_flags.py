@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from calib_core.interchange import CalibrationFile, Export, FrameTree, ImportedCalibration, WantedFrames
     from calib_core.results import InputFile
 
-__all__ = ["FrameFlags", "Frames", "TreeFlags", "Trees"]
+__all__ = ["FrameFlags", "Frames", "TreeFlags", "Trees", "input_file"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,17 +50,12 @@ class FrameFlags:
             InputError: a path cannot be read, or there is no pose between a radar and a camera.
         """
         from calib_core.interchange import calibration_in_tree, read_together, tree_files
-        from calib_core.results import InputFile
 
         if any(map(_holds_recording, paths)) and not _is_plain_mcap(paths):
             source = ", ".join(map(str, paths))
             return calibration_in_tree(tree_of(paths), self.wanted, source=source), ()
         files = tree_files(paths)
-        inputs = tuple(
-            InputFile(name_text(Path(file.source).name), len(file.data), hashlib.sha256(file.data).hexdigest())
-            for file in files
-        )
-        return read_together(files, self.wanted), inputs
+        return read_together(files, self.wanted), tuple(input_file(Path(file.source), file.data) for file in files)
 
     def renamed(self, file: "CalibrationFile") -> "CalibrationFile":
         """Return a calibration with its frames called as the user says; what is written names the calibration as it was.
@@ -138,6 +133,13 @@ class TreeFlags:
 
 
 Trees: TypeAlias = Annotated[TreeFlags, tyro.conf.arg(name="")]
+
+
+def input_file(path: Path, data: bytes) -> "InputFile":
+    """Return what the provenance says of a file."""
+    from calib_core.results import InputFile
+
+    return InputFile(name_text(path.name), len(data), hashlib.sha256(data).hexdigest())
 
 
 def tree_of(paths: Sequence[Path]) -> "FrameTree":

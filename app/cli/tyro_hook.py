@@ -160,7 +160,8 @@ def flags_of(kind: type[Any], prefix: str = "") -> Iterator[str]:
             unnamed = any(getattr(note, "name", None) == "" for note in notes)  # set by tyro.conf.arg(name="")
             yield from flags_of(typing.cast(type, value), prefix if unnamed else f"{prefix}{field.name}.")
         elif tyro.conf.Positional not in notes and not any(map(dataclasses.is_dataclass, typing.get_args(value))):
-            yield f"--{prefix}{field.name}".replace("_", "-")
+            given = next((name for note in notes if (name := getattr(note, "name", None))), field.name)
+            yield f"--{prefix}{given}".replace("_", "-")
 
 
 def _fault(event: Any) -> Fault | None:

@@ -13,7 +13,7 @@ from calib_core.interchange import CameraFile
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import RecordingOptions
 
-__all__ = ["Choice", "ChoicePart", "GivenClicks", "UnusablePartError", "part_of_choice"]
+__all__ = ["Choice", "ChoicePart", "GivenClicks", "MeaningPick", "UnusablePartError", "part_of_choice"]
 
 ChoicePart: TypeAlias = Literal["camera", "calibration", "clicks", "session"]
 """What is opened together with a recording, and can be left out."""
@@ -61,6 +61,19 @@ class GivenClicks:
 
 
 @dataclass(frozen=True, slots=True)
+class MeaningPick:
+    """What a person picked as the meaning of a calibration that does not state it.
+
+    Attributes:
+        meaning: the key of a hypothesis; "" if nothing was picked.
+        place: of the pose in the file; "" for the only one.
+    """
+
+    meaning: str = ""
+    place: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Choice:
     """A recording, and how to open it.
 
@@ -70,6 +83,7 @@ class Choice:
         topics: how to read it.
         camera_file: the intrinsics; None to use the recording's own.
         calibration_file: a calibration to show; None for none.
+        pick: what its numbers mean, if it does not say and a person picked it.
         clicks: to start a new session with.
         options: to set in the session; None to keep its own.
         session: its folder; None to find it.
@@ -86,6 +100,7 @@ class Choice:
     topics: RecordingOptions = field(default_factory=RecordingOptions)
     camera_file: CameraFile | None = None
     calibration_file: Path | None = None
+    pick: MeaningPick = MeaningPick()
     clicks: GivenClicks | None = None
     options: CalibrationOptions | None = None
     session: Path | None = None
@@ -134,6 +149,7 @@ class Choice:
             self,
             topics=replace(self.topics, radar_topic=radar, image_topic=image, camera_info_topic=info),
             camera_file=camera_file,
+            pick=MeaningPick(command.meaning, command.meaning_place) if command.meaning else self.pick,
             session_plan=command.session,
             copy_from=copy_from if command.session == "copy" else None,
         )

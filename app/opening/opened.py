@@ -10,6 +10,7 @@ from pathlib import Path
 from time import sleep
 
 import calib_core.recordings as recordings
+from app.hypothesis_sheet import OpenMeaning
 from app.opening.choice import Choice, ChoicePart, GivenClicks, UnusablePartError, part_of_choice
 from app.opening.reference import camera_in, reference_from
 from app.opening.sessions import FittingClicks, fitting_clicks, session_folder
@@ -17,7 +18,7 @@ from app.session import AssumptionsConfirmed, ClicksImported, ColumnsMapped, Opt
 from app.session.click_stamps import ClicksAtFrames, clicks_at_frames
 from app.session.file import FoundFolder, recording_session_folder, remembered_map
 from app.solving import camera_for
-from app.view import sentence
+from app.view import Reference, sentence
 from app.workspace import Workspace, open_workspace, recording_facts
 from calib_core.camera import Camera
 from calib_core.errors import InputError
@@ -132,7 +133,8 @@ def _workspace(choice: Choice, recording: Recording) -> Workspace:
     camera = _camera(choice, recording)
     calibration = choice.calibration_file
     with part_of_choice("calibration"):
-        reference = reference_from(calibration, camera) if calibration and camera else None
+        shown = reference_from(calibration, camera, choice.pick) if calibration and camera else None
+    reference = shown if isinstance(shown, Reference) else None
     facts = recording_facts(recording, choice.title)
     from_calibration = camera is not None and choice.camera_file is None and recording.camera() is None
     with part_of_choice("session"):
@@ -145,24 +147,37 @@ def _workspace(choice: Choice, recording: Recording) -> Workspace:
             name=choice.title,
             reference=reference,
             warnings=_warnings(
-                found, copied, calibration if reference is None and len(recording.image_times) else None
+                found, copied, calibration if shown is None and len(recording.image_times) else None, shown
             ),
             camera_file=choice.camera_file,
             intrinsics=name_text(calibration.name) if from_calibration and calibration else "",
         )
+    workspace.open_meaning = shown if isinstance(shown, OpenMeaning) else None
     if copied is not None and copied.clicks and workspace.restored.steps == 0:
         workspace.dispatch(ClicksImported(copied.clicks))
     return workspace
 
 
-def _warnings(found: FoundFolder, copied: FittingClicks | None, unshown: Path | None) -> tuple[DataWarning, ...]:
-    """Return what the user must know about the session, and about a calibration that cannot be shown without intrinsics."""
+def _warnings(
+    found: FoundFolder, copied: FittingClicks | None, unshown: Path | None, shown: Reference | OpenMeaning | None
+) -> tuple[DataWarning, ...]:
+    """Return what the user must know about the session, and about a calibration that is not shown.
+
+    Args:
+        found: the session's folder.
+        copied: clicks of another session, if any were copied.
+        unshown: a calibration that cannot be shown without intrinsics.
+        shown: the calibration, or what it can mean.
+    """
     about = [*found.warnings, *([] if copied is None else [copied.about])]
     if unshown is not None:
         message = f"{name_text(unshown.name)} is not shown, since there are no camera intrinsics"
         about.append(
             DataWarning("calibration-not-shown", message, "drop the camera file on the page, or give --camera FILE")
         )
+    if isinstance(shown, OpenMeaning):
+        message = f"{shown.name} is not shown, since it does not state what its numbers mean"
+        about.append(DataWarning("calibration-ambiguous", message, "pick a meaning; reload the page to see them again"))
     return tuple(about)
 
 

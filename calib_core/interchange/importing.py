@@ -34,6 +34,8 @@ _KNOWN = (
     "npz, matrix"
 )
 
+_OTHERS = "; a pose that states nothing: cocalib import FILE lists what its numbers may mean"
+
 
 def read_any_file(path: str | Path, frames: WantedFrames | None = None) -> ImportedCalibration:
     """Read a calibration from a file of any format in the registry, or from a folder with the files of one frame tree.
@@ -182,4 +184,6 @@ def _refusal(content: Content, source: str) -> InputError:
         return InputError(f"{source}: MCAP without foxglove.FrameTransforms (found {names or 'no message'}); {_KNOWN}")
     value = content.value
     found = ", ".join(map(str, list(value)[:12])) if isinstance(value, dict) else type(value).__name__
-    return InputError(f"{source}: no pose of a camera and a radar in it (found {found or 'nothing'}); {_KNOWN}")
+    return InputError(
+        f"{source}: no pose of a camera and a radar in it (found {found or 'nothing'}); {_KNOWN}{_OTHERS}"
+    )

@@ -1,5 +1,7 @@
 """What is fuzzed: everything that reads what a stranger may have written."""
 
+import io
+import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -24,6 +26,8 @@ from calib_core.interchange import (
     read_clicks,
     read_pairs,
 )
+from calib_core.interchange.hypotheses.ranking import hypotheses_of
+from calib_core.interchange.hypotheses.reading import as_imported, read_unstated
 from calib_core.measurements import TimeNs
 from calib_core.recordings import Recording, describe, first_picture, inspect_recording
 from calib_core.recordings.column_map import parse_column_map
@@ -176,6 +180,31 @@ def _exported(_folder: Path) -> list[bytes]:
     return [one if isinstance(one, bytes) else one.encode() for one in made]
 
 
+def _unstated(data: bytes) -> None:
+    """Read a file that states nothing, and what its first pose can mean."""
+    file = read_unstated(data, "input")
+    if file is not None:
+        pose = file.poses[0]
+        hypotheses = hypotheses_of(pose)
+        found = as_imported(file, pose, hypotheses[0], by_hand=True)
+        assert np.isfinite(found.camera_from_radar.as_matrix()).all()
+
+
+def _unstated_files(_folder: Path) -> list[bytes]:
+    matrix = np.array([[0.0, -1, 0, 0.1], [0, 0, -1, -0.3], [1, 0, 0, 0.05], [0, 0, 0, 1]])
+    npy = io.BytesIO()
+    np.save(npy, matrix)
+    rotation, rows = matrix[:3, :3].ravel().tolist(), matrix.tolist()
+    texts = (
+        json.dumps({"radar": {"T_cam_radar": rows, "K": [[500, 0, 320], [0, 500, 240], [0, 0, 1]]}}),
+        json.dumps({"rotation": [0.5, -0.5, 0.5, -0.5], "translation": {"x": 1, "y": 2, "z": 3}, "rvec": [1, 2, 1]}),
+        f"sensors:\n- rotation: {rotation}\n  translation: [1, 2, 3]\n- {{x: 1, y: 2, z: 3, roll: 0, pitch: 0, yaw: 90}}\n",
+        "0.1 0.2 0.3 0.5 -0.5 0.5 -0.5\n",
+        "<rig><pose rvec='1 2 1' t='1 2 3'/></rig>",
+    )
+    return [npy.getvalue(), *(text.encode() for text in texts)]
+
+
 def _own(data: bytes, _folder: Path) -> None:
     text = data.decode("utf-8", "surrogateescape")
     for read in (read_clicks, read_pairs, read_calibration, read_camera):
@@ -292,6 +321,7 @@ TARGETS: tuple[Target, ...] = (
     Target("definition", _definition, _fixed(_DEFINITION + b"\0" + bytes(64), b"float64 x\nfloat64 y\n\0")),
     Target("calibration", lambda data, _: _swallow(lambda: read_any(data, "input")), _exported, (b"NaN", b"xyzw", b"1e308")),
     Target("frame-tree", tree_reader(_swallow), _fixed(*SEEDS), (b"${", b"&x", b"xacro:", b"<origin", b"1e999", b"---\n")),
+    Target("unstated", lambda data, _: _swallow(lambda: _unstated(data)), _unstated_files, (b"NaN", b"rpy", b"rvec", b"1e308")),
     Target("own-files", _own, _own_files, (b'"pairs"', b'"clicks"', b'"cocalib/pairs-1"', b'"cocalib/clicks-1"')),
     Target("session", _session, _sessions, (b'"n"', b'"step"', b'"undo"', b"\n")),
     Target("messages", _messages, _fixed(*_MESSAGES), (b'"type"', b'"request"', b'"click_moved"', b'"import"')),

@@ -35,7 +35,8 @@ from app.web.messages.review_messages import (
 from app.workspace import Workspace
 from calib_core.camera import Camera
 from calib_core.errors import CalibrationError, InputError
-from calib_core.interchange import adopted_calibration, read_any
+from calib_core.interchange import adopted_calibration
+from calib_core.interchange.hypotheses.reading import read_clear
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
 from calib_core.results import Calibration
@@ -193,6 +194,6 @@ class ReviewDesk:
             data = base64.b64decode(request.file_base64, validate=True)
         except binascii.Error as error:
             raise InputError(f"{name}: was not sent as base64: {error}") from None
-        found = read_any(data, name)
+        found = read_clear(data, name)
         self._read = request, Solution(name, found, adopted_calibration(found, name, camera=self._camera))
         return self._read[1]

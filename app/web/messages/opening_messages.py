@@ -71,6 +71,8 @@ class OpenWith(OpeningCommand, frozen=True, tag="open_with"):
         intrinsics: those in use, the recording's own, those of the file next to it, or those of `file`.
         file: a file of intrinsics.
         session: continue the one with the same frames, start a new one, or start one with the clicks that fit.
+        meaning: what the numbers of the calibration to show mean, if it does not say: the key of a hypothesis; "" for as before.
+        meaning_place: of these numbers in its file.
     """
 
     question: Annotated[int, Meta(ge=0, le=2**53 - 1)]
@@ -82,6 +84,8 @@ class OpenWith(OpeningCommand, frozen=True, tag="open_with"):
     intrinsics: IntrinsicsChoice = "keep"
     file: DroppedFile | None = None
     session: SessionPlan = "continue"
+    meaning: Text = ""
+    meaning_place: Text = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from app.session import Session
 from app.solving import calibration_text
 from app.view import sentence
 from app.web.channel.export_preview import NoPreview, export_preview, exported, format_rows
+from app.web.channel.open_meaning import drawn_meaning, meaning_rows
 from app.web.channel.picture_changes import PictureChanges
 from app.web.channel.radar_survey import Survey
 from app.web.exports.check_point import picture_of
@@ -38,6 +39,7 @@ _TYPES = {
     ".css": "text/css; charset=utf-8",
     ".svg": "image/svg+xml",
     ".json": "application/json",
+    ".jpg": "image/jpeg",
 }
 _PICTURE_TYPES = {"jpeg": "image/jpeg", "png": "image/png"}
 _ALWAYS = (
@@ -178,6 +180,8 @@ class _Downloads:
             "/api/activity.json": self._activity,
             "/api/picture_changes.json": self._picture_changes,
             "/api/check_point_picture": self._check_point_picture,
+            "/api/meanings.json": self._meanings,
+            "/api/meaning.jpg": self._meaning,
             **{f"/api/export/{form.name}": partial(self._export, form.name) for form in formats},
             **{f"/api/preview/{form.name}": partial(self._preview, form.name) for form in formats},
         }
@@ -236,6 +240,16 @@ class _Downloads:
         if survey is None:
             return refusal(409, "The radar data are still being read.")
         return _reply(msgspec.json.encode(survey.activity), _TYPES[".json"])
+
+    def _meanings(self, _query: str) -> Reply:
+        return json_reply(msgspec.json.encode(meaning_rows(self._workspace.open_meaning)))
+
+    def _meaning(self, query: str) -> Reply:
+        try:
+            picture = drawn_meaning(self._workspace.open_meaning, self._recording, query)
+        except CalibrationError as error:
+            return refusal(409, sentence(str(error)))
+        return _reply(picture, _TYPES[".jpg"])
 
     def _picture_changes(self, _query: str) -> Reply:
         return _reply(msgspec.json.encode(self._hub.picture_changes), _TYPES[".json"])

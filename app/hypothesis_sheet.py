@@ -1,0 +1,175 @@
+"""Pictures of hypotheses: one frame with the radar's returns where each meaning of a file's numbers puts them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calib_core.arrays import Points3
+from calib_core.errors import InputError
+from calib_core.measurements import TimeNs
+
+if TYPE_CHECKING:
+    from calib_core.camera import Camera
+    from calib_core.interchange.hypotheses.ranking import Hypothesis
+    from calib_core.recordings import Recording
+
+__all__ = [
+    "FrameWithReturns",
+    "Offer",
+    "OpenMeaning",
+    "contact_sheet",
+    "frame_with_returns",
+    "jpeg",
+    "png",
+    "returns_in_picture",
+    "tile",
+]
+
+_TILE_WIDTH_PX = 560
+_CAPTION_PX, _LINE_PX = 58, 19
+_ACROSS = 3
+_WITHIN_S = 0.3
+_FONT_SCALE = 0.4
+_NEAR_M, _FAR_M = 2.0, 40.0
+_INK, _PAPER = (30, 30, 30), (245, 245, 245)
+_QUALITY = 85
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameWithReturns:
+    """A frame of a recording, and what the radar saw at that time.
+
+    Attributes:
+        picture: uint8 (h, w, 3), blue first.
+        points_radar_m: (n, 3) the returns of the nearest scan; none if no scan is near.
+        camera: the intrinsics of the picture.
+    """
+
+    picture: np.ndarray
+    points_radar_m: Points3
+    camera: "Camera"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Offer:
+    """One pose that the numbers in a file can mean.
+
+    Attributes:
+        place: of the numbers in the file.
+        hypothesis: what they mean.
+    """
+
+    place: str
+    hypothesis: "Hypothesis"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenMeaning:
+    """A calibration that is not shown until a person picks what its numbers mean.
+
+    Attributes:
+        name: of its file.
+        offers: what they can mean, the likeliest first.
+        camera: to draw with.
+    """
+
+    name: str
+    offers: tuple[Offer, ...]
+    camera: "Camera"
+
+
+def frame_with_returns(recording: "Recording", camera: "Camera", index: int | None = None) -> FrameWithReturns:
+    """Read a frame and the returns of the scan nearest to it.
+
+    Args:
+        recording: with pictures and a radar.
+        camera: the intrinsics of its pictures.
+        index: of the frame; None takes the one in the middle.
+
+    Raises:
+        InputError: the intrinsics are those of pictures of another size.
+        RecordingError: the frame cannot be read.
+    """
+    index = len(recording.image_times) // 2 if index is None else index
+    picture = recording.image(index)
+    if picture.shape[:2] != (camera.height_px, camera.width_px):
+        height_px, width_px = picture.shape[:2]
+        raise InputError(
+            f"{recording.name}: the pictures have {width_px} x {height_px} px, and the camera {camera.width_px} x "
+            f"{camera.height_px} px; give the intrinsics of these pictures with --camera FILE"
+        )
+    time = TimeNs(int(recording.image_times[index]))
+    scans = recording.radar_scans_around([time], _WITHIN_S)
+    points_radar_m = scans.scan(scans.nearest(time)).points_radar_m if len(scans) else np.zeros((0, 3))
+    return FrameWithReturns(picture, points_radar_m[np.isfinite(points_radar_m).all(axis=1)], camera)
+
+
+def tile(frame: FrameWithReturns, hypothesis: "Hypothesis", width_px: int = _TILE_WIDTH_PX) -> np.ndarray:
+    """Draw the returns of a frame where a hypothesis puts them, nearer ones larger and warmer; uint8 (h, w, 3)."""
+    import cv2
+
+    scale = width_px / frame.picture.shape[1]
+    height_px = max(1, round(frame.picture.shape[0] * scale))
+    drawn = cv2.resize(frame.picture, (width_px, height_px), interpolation=cv2.INTER_AREA)
+    for (u_px, v_px), range_m in _seen(frame, hypothesis):
+        nearness = float(np.clip(np.log(_FAR_M / range_m) / np.log(_FAR_M / _NEAR_M), 0.0, 1.0))
+        at = round((u_px + 0.5) * scale), round((v_px + 0.5) * scale)
+        radius = 3 + round(4 * nearness)
+        cv2.circle(drawn, at, radius + 1, (0, 0, 0), -1, cv2.LINE_AA)
+        colour = (round(255 * (1 - nearness)), 180, round(255 * nearness))
+        cv2.circle(drawn, at, radius, colour, -1, cv2.LINE_AA)
+    return np.asarray(drawn)
+
+
+def returns_in_picture(frame: FrameWithReturns, hypothesis: "Hypothesis") -> str:
+    """Return how many of the returns a hypothesis puts into the picture."""
+    return f"{len(_seen(frame, hypothesis))} of {len(frame.points_radar_m)} returns in the picture"
+
+
+def _seen(frame: FrameWithReturns, hypothesis: "Hypothesis") -> list[tuple[tuple[float, float], float]]:
+    """Return the pixel and the range of each return that is in the picture."""
+    if not len(frame.points_radar_m):
+        return []
+    points_camera_m = hypothesis.camera_from_radar @ frame.points_radar_m
+    seen = np.flatnonzero(frame.camera.sees(points_camera_m))
+    pixels_px = frame.camera.project(points_camera_m[seen])
+    ranges_m = np.linalg.norm(frame.points_radar_m[seen], axis=1)
+    return [
+        ((float(u), float(v)), max(float(range_m), 1e-3)) for (u, v), range_m in zip(pixels_px, ranges_m, strict=True)
+    ]
+
+
+def contact_sheet(frame: FrameWithReturns, hypotheses: Sequence["Hypothesis"]) -> np.ndarray:
+    """Draw each hypothesis over the frame, with its number, its score and what it means; uint8 (h, w, 3)."""
+    tiles = [np.vstack([_caption(frame, number, one), tile(frame, one)]) for number, one in enumerate(hypotheses, 1)]
+    blank = np.full_like(tiles[0], _PAPER[0])
+    tiles += [blank] * (-len(tiles) % min(_ACROSS, len(tiles)))
+    rows = [tiles[at : at + _ACROSS] for at in range(0, len(tiles), _ACROSS)]
+    return np.vstack([np.hstack(row) for row in rows])
+
+
+def _caption(frame: FrameWithReturns, number: int, one: "Hypothesis") -> np.ndarray:
+    import cv2
+
+    strip = np.full((_CAPTION_PX, _TILE_WIDTH_PX, 3), _PAPER, np.uint8)
+    lines = (f"{number}: {one.key}", f"{one.score}; {returns_in_picture(frame, one)}", one.mounting)
+    for row, line in enumerate(lines):
+        at = 6, 15 + row * _LINE_PX
+        cv2.putText(strip, line[:100], at, cv2.FONT_HERSHEY_SIMPLEX, _FONT_SCALE, _INK, 1, cv2.LINE_AA)
+    return strip
+
+
+def png(picture: np.ndarray) -> bytes:
+    """Return a picture as a PNG file."""
+    import cv2
+
+    return bytes(cv2.imencode(".png", picture)[1])
+
+
+def jpeg(picture: np.ndarray) -> bytes:
+    """Return a picture as a JPEG file."""
+    import cv2
+
+    return bytes(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1])

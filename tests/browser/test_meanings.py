@@ -1,0 +1,65 @@
+"""A calibration whose numbers do not say what they mean: each meaning is drawn over a frame, and a person picks one."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calib_core.geometry import RigidTransform
+from calib_core.interchange.rotations import LINK_FROM_OPTICAL
+from tests.browser.driving import Driver
+from tests.served_process import ServedProcess, served_process
+
+pytestmark = pytest.mark.browser
+
+DIALOG = "document.querySelector('#meanings-dialog[open]')"
+RIGHT = "radar_from_camera,body,m"
+
+
+@pytest.fixture
+def serve(tmp_path: Path) -> Iterator[Callable[..., ServedProcess]]:
+    """Start the command; it is ended with the test."""
+    with ExitStack() as stack:
+        yield lambda *arguments: stack.enter_context(
+            served_process(*arguments, "--token", "meanings-1", state=tmp_path)
+        )
+
+
+def test_the_meaning_that_is_picked_is_shown_as_the_calibration(
+    serve: Callable[..., ServedProcess],
+    open_page: Callable[..., Driver],
+    project_root: Path,
+    truth: Any,
+    tmp_path: Path,
+) -> None:
+    pose = truth["camera_from_radar"]
+    camera_from_radar = RigidTransform(np.array(pose["rotation"]), np.array(pose["translation_m"]))
+    body = (LINK_FROM_OPTICAL @ camera_from_radar).inverse()
+    (tmp_path / "extrinsic.json").write_text(json.dumps({"pose": body.as_matrix().tolist()}))
+    sample = project_root / "sample_data" / "rooftop"
+    server = serve(
+        *(sample / "radar.bag", sample / "camera.bag"),
+        *("--calibration", tmp_path / "extrinsic.json", "--session", tmp_path / "session"),
+    )
+    page = open_page(server.url)
+    page.until(DIALOG)
+    assert page.text("#meanings-title") == "What does extrinsic.json mean?"
+    page.until(
+        "[...document.querySelectorAll('#meanings-dialog img')].every((one) => one.complete && one.naturalWidth === 480)"
+    )
+    meanings = page.value(
+        "[...document.querySelectorAll('#meanings-dialog .meaning')].map((one) => one.dataset.meaning)"
+    )
+    assert {RIGHT, "camera_from_radar,body,m"} <= set(meanings[:2])
+    assert not page.view["reference"]
+    with page.page.expect_navigation():
+        page.page.click(f"#meanings-dialog [data-meaning='{RIGHT}']")
+    page.until("__cocalib.state.shown && __cocalib.state.view && __cocalib.state.view.reference === 'extrinsic.json'")
+    assert not page.value(f"Boolean({DIALOG})")
+    codes = page.value("__cocalib.state.recording.warnings.map((one) => one.code)")
+    assert "calibration-ambiguous" not in codes
+    page.forget_lost_connections()

@@ -1,0 +1,151 @@
+"""`cocalib import` of files that do not say what their numbers mean."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from calib_core.geometry import RigidTransform
+from calib_core.interchange import camera_info_text, read_calibration
+from calib_core.interchange.rotations import LINK_FROM_OPTICAL
+from tests.cli.conftest import Made, Typed
+
+Cocalib = Callable[..., Typed]
+POSE = Made().camera_from_radar
+BODY = (LINK_FROM_OPTICAL @ POSE).inverse()
+"""The pose of the camera's body frame in the radar: near the identity, so that its direction is open."""
+
+
+@pytest.fixture
+def camera_file(tmp_path: Path) -> Path:
+    path = tmp_path / "camera.yaml"
+    path.write_text(camera_info_text(Made().camera))
+    return path
+
+
+@pytest.fixture
+def ambiguous(tmp_path: Path) -> Path:
+    path = tmp_path / "extrinsic.json"
+    path.write_text(json.dumps({"calibration": {"radar": {"T": BODY.as_matrix().tolist()}}}))
+    return path
+
+
+def _is_pose(path: Path, tolerance: float = 1e-9) -> bool:
+    found = read_calibration(path.read_text()).calibration.camera_from_radar
+    return bool(np.abs(found.as_matrix() - POSE.as_matrix()).max() < tolerance)
+
+
+def test_import_lists_what_the_numbers_may_mean_and_writes_nothing(
+    cocalib: Cocalib, ambiguous: Path, camera_file: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out.json"
+    listed = cocalib("import", ambiguous, "--out", out, "--camera", camera_file)
+    assert listed.code == 3
+    assert not out.exists()
+    assert "calibration.radar.T does not state what its numbers mean" in listed.out
+    assert "  1  " in listed.out
+    assert "radar_from_camera,body,m  (" in listed.out
+    assert "camera_from_radar,body,m  (" in listed.out
+    assert "Nothing was written: pick one, such as --as " in listed.out
+
+
+def test_import_needs_no_output_file_to_list(cocalib: Cocalib, ambiguous: Path) -> None:
+    assert cocalib("import", ambiguous).code == 3
+
+
+def test_import_writes_what_was_picked_and_says_so(
+    cocalib: Cocalib, ambiguous: Path, camera_file: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out.json"
+    picked = cocalib("import", ambiguous, "--as", "radar_from_camera,body,m", "--out", out, "--camera", camera_file)
+    assert picked.code == 0
+    assert _is_pose(out)
+    file = read_calibration(out.read_text())
+    assert file.evidence == "imported_assumed"
+    assumed = [warning.message for warning in file.calibration.warnings if warning.code == "assumed"]
+    assert any("picked by hand" in message and "radar_from_camera,body,m" in message for message in assumed)
+
+
+def test_pairs_decide_what_the_numbers_mean(
+    cocalib: Cocalib, ambiguous: Path, camera_file: Path, pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    out, pairs = tmp_path / "out.json", pairs_file()
+    assert cocalib("import", ambiguous, "--pairs", pairs, "--out", out, "--camera", camera_file).code == 0
+    assert _is_pose(out)
+    assert read_calibration(out.read_text()).evidence == "imported_proven"
+    against = cocalib("import", ambiguous, "--against", out, "--out", tmp_path / "second.json", "--camera", camera_file)
+    assert against.code == 0
+    assert _is_pose(tmp_path / "second.json")
+
+
+def test_what_the_pairs_contradict_cannot_be_picked(
+    cocalib: Cocalib, ambiguous: Path, camera_file: Path, pairs_file: Callable[..., Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "out.json"
+    picking = ("--as", "camera_from_radar,body,m", "--pairs", pairs_file())
+    refused = cocalib("import", ambiguous, *picking, "--out", out, "--camera", camera_file)
+    assert refused.code == 2
+    assert "--as camera_from_radar,body,m is contradicted" in refused.err
+    assert "the test supports radar_from_camera,body,m" in refused.err
+    assert not out.exists()
+
+
+def test_a_clear_meaning_is_taken_and_told(cocalib: Cocalib, camera_file: Path, tmp_path: Path) -> None:
+    bare, out = tmp_path / "bare.txt", tmp_path / "out.json"
+    np.savetxt(bare, POSE.inverse().as_matrix())
+    taken = cocalib("import", bare, "--out", out, "--camera", camera_file)
+    assert taken.code == 0
+    assert "note: taken as radar_from_camera,optical,m (" in taken.err
+    assert _is_pose(out)
+    assert read_calibration(out.read_text()).evidence == "imported_assumed"
+
+
+def test_one_of_several_poses_is_chosen_by_its_place(cocalib: Cocalib, camera_file: Path, tmp_path: Path) -> None:
+    several, out = tmp_path / "rig.json", tmp_path / "out.json"
+    other = RigidTransform(POSE.rotation, [0.5, 0.5, 0.5]).as_matrix().tolist()
+    several.write_text(json.dumps({"front": POSE.as_matrix().tolist(), "rear": other}))
+    refused = cocalib("import", several, "--out", out, "--camera", camera_file)
+    assert refused.code == 2
+    assert "choose one with --pose PLACE: 'front', 'rear'" in refused.err
+    assert cocalib("import", several, "--pose", "front", "--out", out, "--camera", camera_file).code == 0
+    assert _is_pose(out)
+
+
+def test_a_sheet_draws_each_meaning_over_a_frame(
+    cocalib: Cocalib, ambiguous: Path, made: Callable[..., Path], tmp_path: Path
+) -> None:
+    sheet = tmp_path / "sheet.png"
+    drawn = cocalib("import", ambiguous, "--sheet", sheet, "--recording", made(), "--at", "10")
+    assert drawn.code == 3
+    assert "meanings drawn over a frame of made.mcap" in drawn.err
+    picture = cv2.imread(str(sheet))
+    assert picture is not None
+    assert picture.shape[1] % 3 == 0
+    spread = picture.reshape(-1, 3).astype(int)
+    assert ((spread.max(axis=1) - spread.min(axis=1)) > 60).sum() > 50  # the frames are grey, the returns are not
+
+
+def test_a_sheet_needs_a_recording_and_a_time_in_it(
+    cocalib: Cocalib, ambiguous: Path, made: Callable[..., Path], tmp_path: Path
+) -> None:
+    sheet = tmp_path / "sheet.png"
+    refused = cocalib("import", ambiguous, "--sheet", sheet)
+    assert refused.code == 2
+    assert "give it with --recording RECORDING" in refused.err
+    refused = cocalib("import", ambiguous, "--sheet", sheet, "--recording", made(), "--at", "1000")
+    assert refused.code == 2
+    assert "give a time in them" in refused.err
+
+
+def test_a_format_that_states_its_meaning_refuses_another(cocalib: Cocalib, camera_file: Path, tmp_path: Path) -> None:
+    out, other = tmp_path / "out.json", tmp_path / "tf.sh"
+    bare = tmp_path / "bare.txt"
+    np.savetxt(bare, POSE.as_matrix())
+    assert cocalib("import", bare, "--out", out, "--camera", camera_file).code == 0
+    assert cocalib("export", out, "--to", "tf2", "--out", other).code == 0
+    refused = cocalib("import", other, "--as", "camera_from_radar,optical,m", "--out", out, "--camera", camera_file)
+    assert refused.code == 2
+    assert "its format states what the numbers mean; omit --as" in refused.err

@@ -1,0 +1,82 @@
+"""What the page is offered when a calibration does not state what its numbers mean."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from app.hypothesis_sheet import OpenMeaning
+from app.opening.choice import MeaningPick
+from app.opening.reference import reference_from
+from app.view import Reference
+from app.web.channel.open_meaning import drawn_meaning, meaning_rows
+from calib_core.errors import InputError
+from calib_core.geometry import RigidTransform
+from calib_core.recordings import Recording, open_recording
+
+POSE = RigidTransform(np.eye(3), [0.4, 0.1, -0.2])
+"""Of a camera's body frame in the radar, or the other way round."""
+
+
+@pytest.fixture
+def sample(project_root: Path) -> Iterator[Recording]:
+    folder = project_root / "sample_data" / "rooftop"
+    with open_recording([folder / "radar.bag", folder / "camera.bag"]) as recording:
+        yield recording
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "extrinsic.json"
+    path.write_text(json.dumps({"front": {"T": POSE.as_matrix().tolist()}}))
+    return path
+
+
+def _open_meaning(file: Path, recording: Recording) -> OpenMeaning:
+    meaning = reference_from(file, recording.camera(), MeaningPick())
+    assert isinstance(meaning, OpenMeaning)
+    return meaning
+
+
+def test_the_rows_are_the_likely_meanings_with_their_place(file: Path, sample: Recording) -> None:
+    rows = meaning_rows(_open_meaning(file, sample))
+    assert rows.name == "extrinsic.json"
+    assert {row.meaning for row in rows.rows[:2]} == {"camera_from_radar,body,m", "radar_from_camera,body,m"}
+    assert {row.place for row in rows.rows} == {"front.T"}
+    assert all(row.score.endswith("%") and row.mounting.startswith("the camera looks") for row in rows.rows)
+
+
+def test_nothing_is_offered_without_such_a_calibration() -> None:
+    assert meaning_rows(None).rows == ()
+
+
+def test_each_row_is_drawn_differently_over_a_frame(file: Path, sample: Recording) -> None:
+    meaning = _open_meaning(file, sample)
+    first, second = (
+        cv2.imdecode(np.frombuffer(drawn_meaning(meaning, sample, f"number={number}&frame=40"), np.uint8), 1)
+        for number in (0, 1)
+    )
+    assert first is not None
+    assert second is not None
+    assert first.shape == second.shape
+    assert (np.abs(first.astype(int) - second.astype(int)).max(axis=2) > 60).sum() > 100
+
+
+@pytest.mark.parametrize(
+    "query", ["", "number=99&frame=1", "number=0&frame=999999", "number=-1&frame=0", "number=x&frame=²"]
+)
+def test_what_does_not_exist_is_refused(file: Path, sample: Recording, query: str) -> None:
+    with pytest.raises(InputError, match="no such meaning or frame"):
+        drawn_meaning(_open_meaning(file, sample), sample, query)
+
+
+def test_the_picked_meaning_is_the_calibration(file: Path, sample: Recording) -> None:
+    shown = reference_from(file, sample.camera(), MeaningPick("radar_from_camera,body,m", "front.T"))
+    assert isinstance(shown, Reference)
+    camera_radar_m = shown.calibration.camera_from_radar.inverse().translation_m
+    assert np.abs(camera_radar_m - POSE.translation_m).max() < 1e-9
+    assumed = [warning.message for warning in shown.calibration.warnings if warning.code == "assumed"]
+    assert any("picked by hand" in message for message in assumed)
