@@ -50,7 +50,6 @@ class Import:
         from calib_core.interchange import (
             Provenance,
             adoption,
-            calibration_bytes,
             read_any_file,
             read_camera_file,
             read_check_pairs_file,
@@ -65,14 +64,15 @@ class Import:
         given = read_camera_file(self.camera) if self.camera else None
         against = read_any_file(self.against) if self.against else None
         pairs = read_check_pairs_file(self.pairs) if self.pairs else None
-        unstated = self.meaning.unstated(self.calibration)
-        if unstated is None:
-            found, inputs = self.frames.read(self.calibration)
+        files = self.frames.files(self.calibration)
+        unstated = self.meaning.unstated(files, source)
+        if unstated is None or files is None:
+            found, inputs = self.frames.read(self.calibration, files)
         else:
             chosen = self.meaning.chosen(unstated, camera=given, pairs=pairs, against=against)
             if chosen is None:
                 return 3
-            found, inputs = chosen, (input_file(path, calibration_bytes(path)),)
+            found, inputs = chosen, (input_file(files[0]),)
         if self.out is None:
             raise InputError(f"{source}: give the output file with --out FILE")
         camera = given or _sized_camera(found, path, self.image_size)

@@ -15,7 +15,7 @@ from calib_core.errors import InputError
 
 if TYPE_CHECKING:
     from calib_core.camera import Camera
-    from calib_core.interchange import CheckPairs, ImportedCalibration
+    from calib_core.interchange import CheckPairs, ImportedCalibration, TreeFile
     from calib_core.interchange.hypotheses.found_poses import FoundPose
     from calib_core.interchange.hypotheses.ranking import Hypothesis
     from calib_core.interchange.hypotheses.reading import UnstatedFile
@@ -42,20 +42,22 @@ class MeaningFlags:
     """Which frame to draw over, in seconds after the first; by default the one in the middle."""
     topics: Topics = field(default_factory=TopicFlags)
 
-    def unstated(self, paths: Sequence[Path]) -> "UnstatedFile | None":
+    def unstated(self, files: "Sequence[TreeFile] | None", source: str) -> "UnstatedFile | None":
         """Return the poses in a file that does not say what they mean; None if it does, or if this is a tree of frames.
 
-        Raises:
-            InputError: it cannot be read, or flags were given that a file which states its meaning does not need.
-        """
-        from calib_core.interchange import calibration_bytes
-        from calib_core.interchange.hypotheses.reading import read_unstated
-        from calib_core.recordings import holds_recording
+        Args:
+            files: of the calibration; None if it is a recording.
+            source: the name of it all, for error messages.
 
-        alone = len(paths) == 1 and not paths[0].is_dir() and not holds_recording(paths[0])
-        file = read_unstated(calibration_bytes(paths[0]), str(paths[0])) if alone else None
+        Raises:
+            InputError: flags were given that a file which states its meaning does not need.
+        """
+        from calib_core.interchange.hypotheses.reading import read_unstated
+
+        alone = files[0] if files is not None and len(files) == 1 else None
+        file = None if alone is None else read_unstated(alone.data, alone.source)
         if file is None:
-            self._refuse_needless(", ".join(map(str, paths)))
+            self._refuse_needless(source)
         return file
 
     def chosen(

@@ -18,7 +18,7 @@ from calib_core.input_files import name_text
 
 if TYPE_CHECKING:
     from calib_core.geometry import RigidTransform
-    from calib_core.interchange import CalibrationFile, Export, FrameTree, ImportedCalibration, WantedFrames
+    from calib_core.interchange import CalibrationFile, Export, FrameTree, ImportedCalibration, TreeFile, WantedFrames
     from calib_core.results import InputFile
 
 __all__ = ["FrameFlags", "Frames", "TreeFlags", "Trees", "input_file"]
@@ -40,8 +40,26 @@ class FrameFlags:
 
         return WantedFrames(self.radar_frame, self.camera_frame)
 
-    def read(self, paths: Sequence[Path]) -> "tuple[ImportedCalibration, tuple[InputFile, ...]]":
+    def files(self, paths: Sequence[Path]) -> "tuple[TreeFile, ...] | None":
+        """Return the content of a calibration's files, each read once; None if they are a recording.
+
+        Raises:
+            InputError: one cannot be read, or a folder contains none.
+        """
+        from calib_core.interchange import tree_files
+
+        if any(map(_holds_recording, paths)) and not _is_plain_mcap(paths):
+            return None
+        return tree_files(paths)
+
+    def read(
+        self, paths: Sequence[Path], files: "tuple[TreeFile, ...] | None" = None
+    ) -> "tuple[ImportedCalibration, tuple[InputFile, ...]]":
         """Read a calibration from one file, or from files, a folder or a recording that make one frame tree.
+
+        Args:
+            paths: of them.
+            files: what `files` returned, if it was called.
 
         Returns:
             The calibration, and the files that it was read from; none for a recording.
@@ -49,13 +67,13 @@ class FrameFlags:
         Raises:
             InputError: a path cannot be read, or there is no pose between a radar and a camera.
         """
-        from calib_core.interchange import calibration_in_tree, read_together, tree_files
+        from calib_core.interchange import calibration_in_tree, read_together
 
-        if any(map(_holds_recording, paths)) and not _is_plain_mcap(paths):
+        found = self.files(paths) if files is None else files
+        if found is None:
             source = ", ".join(map(str, paths))
             return calibration_in_tree(tree_of(paths), self.wanted, source=source), ()
-        files = tree_files(paths)
-        return read_together(files, self.wanted), tuple(input_file(Path(file.source), file.data) for file in files)
+        return read_together(found, self.wanted), tuple(map(input_file, found))
 
     def renamed(self, file: "CalibrationFile") -> "CalibrationFile":
         """Return a calibration with its frames called as the user says; what is written names the calibration as it was.
@@ -135,11 +153,11 @@ class TreeFlags:
 Trees: TypeAlias = Annotated[TreeFlags, tyro.conf.arg(name="")]
 
 
-def input_file(path: Path, data: bytes) -> "InputFile":
+def input_file(file: "TreeFile") -> "InputFile":
     """Return what the provenance says of a file."""
     from calib_core.results import InputFile
 
-    return InputFile(name_text(path.name), len(data), hashlib.sha256(data).hexdigest())
+    return InputFile(name_text(Path(file.source).name), len(file.data), hashlib.sha256(file.data).hexdigest())
 
 
 def tree_of(paths: Sequence[Path]) -> "FrameTree":

@@ -48,7 +48,7 @@ from calib_core.interchange.trees.frame_tree import FrameTree
 from calib_core.interchange.trees.joint import Joint, Place
 from calib_core.interchange.trees.patching import Patch, patched
 from calib_core.interchange.trees.posed_in_tree import calibration_in_tree
-from calib_core.interchange.trees.reading import joined_tree
+from calib_core.interchange.trees.reading import TreeFile, joined_tree
 
 __all__ = [
     "CALIBRATION_SCHEMA",
@@ -81,6 +81,7 @@ __all__ = [
     "Provenance",
     "Reads",
     "StatedCheckPoint",
+    "TreeFile",
     "Verdict",
     "WantedFrames",
     "WrittenPose",

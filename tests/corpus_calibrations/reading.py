@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 
 from calib_core.errors import CalibrationError
-from calib_core.interchange import ImportedCalibration, read_any_file
+from calib_core.interchange import ImportedCalibration, WantedFrames, read_together, tree_files
+from calib_core.interchange.hypotheses.reading import read_clear, read_unstated
 from tests.corpus_calibrations.truth import CAMERA_FROM_RADAR, DISTORTION, SIZE, Calibration, K
 
 __all__ = ["Outcome", "Reading", "read"]
@@ -35,7 +36,7 @@ def read(calibration: Calibration, folder: Path) -> Reading:
     for name, content in {**calibration.beside, calibration.file_name: calibration.content}.items():
         (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
     try:
-        found = read_any_file(folder / calibration.file_name)
+        found = _found(calibration, folder)
     except CalibrationError as error:
         return Reading("refused", str(error).removeprefix(str(folder)))
     off = float(np.abs(found.camera_from_radar.as_matrix() - CAMERA_FROM_RADAR).max())
@@ -43,6 +44,18 @@ def read(calibration: Calibration, folder: Path) -> Reading:
     if off > calibration.close or camera:
         return Reading("wrong", f"off by {off:.2g} {camera}; assumed: {'; '.join(found.assumptions)}")
     return Reading("right", "; ".join(found.assumptions), bool(found.assumptions))
+
+
+def _found(calibration: Calibration, folder: Path) -> ImportedCalibration:
+    """Read as `cocalib import` does: what states nothing by its one plausible meaning, all else by its format or as a tree.
+
+    Raises:
+        InputError: there is no pose between a radar and a camera, or what it means is not clear.
+    """
+    files = tree_files([folder if calibration.folder else folder / calibration.file_name])
+    if len(files) == 1 and read_unstated(files[0].data, files[0].source) is not None:
+        return read_clear(files[0].data, files[0].source)
+    return read_together(files, WantedFrames(*(calibration.frames or (None, None))))
 
 
 def _camera_difference(calibration: Calibration, found: ImportedCalibration) -> str:

@@ -279,13 +279,12 @@ TOOLS = (
     Calibration("TUM trajectory", "trajectory.txt", f"1.0 {words(POSE_7)}\n2.0 {words(POSE_7)}\n", refused="2 poses"),
     Calibration("4x4 in text", "radar_to_camera.txt", "\n".join(words(row) for row in CAMERA_FROM_RADAR)),
     Calibration("npz with R and t", "calibration.npz", _npz()),
-    Calibration("4x4 in npy", "camera_from_radar.npy", _npy(CAMERA_FROM_RADAR), waits="loose"),
+    Calibration("4x4 in npy", "camera_from_radar.npy", _npy(CAMERA_FROM_RADAR)),
     Calibration(
         "named 4x4 in JSON",
         "extrinsics.json",
         json.dumps({"T_camera_radar": CAMERA_FROM_RADAR.tolist()}),
-        waits="loose",
     ),
-    Calibration("rvec and tvec in JSON", "pnp.json", _vectors(), waits="loose"),
-    Calibration("R and t in JSON", "extrinsics.json", _rotation_and_translation(), waits="loose"),
+    Calibration("rvec and tvec in JSON", "pnp.json", _vectors()),
+    Calibration("R and t in JSON", "extrinsics.json", _rotation_and_translation()),
 )

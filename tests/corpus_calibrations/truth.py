@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,7 +14,6 @@ __all__ = [
     "SIZE",
     "Calibration",
     "K",
-    "Waits",
     "inverse",
     "posed",
     "quaternion",
@@ -61,8 +59,6 @@ K = np.array([[912.4, 0, 644.2], [0, 909.7, 366.1], [0, 0, 1.0]])
 DISTORTION = (-0.17, 0.032, 0.0006, -0.0004, 0.011)
 SIZE = (1280, 720)
 
-Waits = Literal["", "tree", "loose"]
-
 
 @dataclass(frozen=True)
 class Calibration:
@@ -74,7 +70,8 @@ class Calibration:
         content: of the file.
         beside: other files in its folder.
         refused: words of the refusal, if there is no pose between a radar and a camera in it; "" if it must be read right.
-        waits: for the reader of trees or of unnamed layouts; until then it may be refused.
+        folder: whether the folder is read, with the files beside it.
+        frames: names of the radar and the camera that the user gives, if the file has several.
         close: how near to the truth the numbers as printed can come [m, and in the rotation].
         holds_camera: "lens" or "matrix" if the camera must be read with it, with "size" if the image size is in the file.
     """
@@ -84,6 +81,7 @@ class Calibration:
     content: str | bytes
     beside: Mapping[str, str | bytes] = field(default_factory=dict)
     refused: str = ""
-    waits: Waits = ""
+    folder: bool = False
+    frames: tuple[str, str] | None = None
     close: float = 1e-6
     holds_camera: str = ""

@@ -51,7 +51,7 @@ def _opencv_matrix(name: str, matrix: np.ndarray) -> str:
     return f'<{name} type_id="opencv-matrix"><rows>{rows}</rows><cols>{columns}</cols><dt>d</dt><data>{numbers}</data></{name}>'
 
 
-NOT_CERTAIN = {"pose.txt", "tum.txt", "rotation-then-translation.txt", "own.xml"}
+NOT_CERTAIN = {"pose.txt", "rotation-then-translation.txt", "own.xml"}
 """The order of a quaternion, rows or columns, angles or a rotation vector: more than one may be plausible."""
 
 CORPUS: dict[str, str | bytes] = {
@@ -85,7 +85,6 @@ CORPUS: dict[str, str | bytes] = {
     "rotation-then-translation.txt": _rows(np.vstack([POSE.rotation, POSE.translation_m])),
     "transposed.txt": _rows(MATRIX.T),
     "pose.txt": " ".join(map(str, [*TRANSLATION, *np.roll(QUATERNION, -1).tolist()])) + "\n",
-    "tum.txt": " ".join(map(str, [1700000000.25, *TRANSLATION, *np.roll(QUATERNION, -1).tolist()])) + "\n",
     "nested.yaml": "sensors:\n  radar:\n    T_cam_radar:\n"
     + "".join(f"    - [{', '.join(map(repr, row))}]\n" for row in MATRIX.tolist()),
     "keyed.txt": f"R: {' '.join(map(repr, POSE.rotation.ravel().tolist()))}\nt: {' '.join(map(repr, TRANSLATION))}\n",
