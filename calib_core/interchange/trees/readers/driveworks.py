@@ -28,8 +28,8 @@ def recognizes_driveworks(content: Content) -> bool:
 def has_one_of_each(content: Content) -> bool:
     """Return whether a rig has exactly one radar and one camera, which the format's own reader reads."""
     sensors = [one for one in content.mapping["rig"]["sensors"] if isinstance(one, Mapping)]
-    kinds = [str(one.get("protocol", "")).lower()[:5] for one in sensors]
-    return kinds.count("radar") == 1 and kinds.count("camer") == 1
+    protocols = [str(one.get("protocol", "")).lower() for one in sensors]
+    return all(sum(name.startswith(kind) for name in protocols) == 1 for kind in ("radar", "camera"))
 
 
 def read_driveworks(content: Content, source: str) -> TreePart:
