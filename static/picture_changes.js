@@ -19,7 +19,8 @@ export function startPictureChanges() {
 
 async function fetchChanges() {
   if (state.looking || changes.complete) return;
-  const answer = state.connected ? await fetch("api/picture_changes.json").catch(() => null) : null; // the banner says that the server is gone
+  const ready = state.connected && !state.opening; // the banner says that the server is gone, the status that it is still opening
+  const answer = ready ? await fetch("api/picture_changes.json").catch(() => null) : null;
   if (answer?.ok) Object.assign(changes, await answer.json());
   emit("cursor");
   if (!changes.complete && !state.following) timer = window.setTimeout(fetchChanges, EVERY);
