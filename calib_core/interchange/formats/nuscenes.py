@@ -101,14 +101,18 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         assumptions.append("no radar record; assumed that the ego frame is the radar frame")
         found = ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px)
         return with_statement(found, text).checked(source)
-    ego_from_radar = _posed(radars[0], source=source).as_written()
+    radar_pose, both = _posed(radars[0], source=source), None
+    ego_from_radar = radar_pose.as_written()
     if np.abs(ego_from_radar.as_matrix() - np.eye(4)).max() > 0:
+        both = radar_pose, camera_pose
         ego_from_camera = camera_pose.as_written()
         radar_from_camera = ego_from_radar.inverse() @ ego_from_camera
         camera_pose = WrittenPose(
             "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"
         )
-    found = ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px)
+    found = ImportedCalibration(
+        "nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px, in_third_frame=both
+    )
     return with_statement(found, text).checked(source)
 
 
