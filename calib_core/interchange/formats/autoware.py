@@ -31,7 +31,7 @@ from calib_core.interchange.syntax.yaml_text import number_text, quoted
 __all__ = ["AUTOWARE"]
 
 _NOTES = (
-    "poses are in sensor_kit_base_link; the radar is at the kit's origin unless parent_from_radar places it elsewhere",
+    "poses are in sensor_kit_base_link; the radar is at the kit's origin unless its pose is given (--parent-from-radar)",
     POSE_ONLY,
 )
 _KIT = "sensor_kit_base_link"

@@ -20,7 +20,7 @@ __all__ = ["DRIVEWORKS"]
 
 _NOTES = (
     "nominalSensor2Rig_FLU is the sensor's pose in the rig: metres, roll-pitch-yaw in degrees about fixed axes, the camera with "
-    "body axes (x forward, y left, z up); the radar is at the rig's origin unless parent_from_radar places it elsewhere",
+    "body axes (x forward, y left, z up); the radar is at the rig's origin unless its pose is given (--parent-from-radar)",
     "contains the pose only: copy the two poses into your own rig file; the check point, the evidence and the calibration's "
     "hash are in the camera's properties, as a text that DriveWorks does not read",
 )

@@ -23,7 +23,7 @@ __all__ = ["NUSCENES"]
 
 _NOTES = (
     "translation and rotation (w x y z) are the sensor's pose in the ego frame, camera optical; "
-    "the ego frame is the radar frame unless parent_from_radar places the radar elsewhere",
+    "the ego frame is the radar frame unless its pose is given (--parent-from-radar)",
     "unpack it into the folder of the tables; tokens are derived from the frame names: replace them with yours",
 )
 _SENSORS, _CALIBRATED = "sensor.json", "calibrated_sensor.json"
