@@ -67,17 +67,19 @@ class Offer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenMeaning:
-    """A calibration that is not shown until a person picks what its numbers mean.
+    """A calibration that does not state what its numbers mean: a person picks, now or again.
 
     Attributes:
         name: of its file.
         offers: what they can mean, the likeliest first.
         camera: to draw with.
+        shown: which of them the calibration is shown with; None if it is not shown until one is picked.
     """
 
     name: str
     offers: tuple[Offer, ...]
     camera: "Camera"
+    shown: int | None = None
 
 
 def frame_with_returns(recording: "Recording", camera: "Camera", index: int | None = None) -> FrameWithReturns:

@@ -94,7 +94,7 @@ class Workspace:
         camera: the intrinsics to solve with; None if there are none.
         camera_file: the file that they come from; None for the recording's own.
         intrinsics: where they come from, in words; "" if there are none.
-        open_meaning: a calibration that is not shown until a person picks what its numbers mean; None if there is none.
+        open_meaning: a calibration that does not state what its numbers mean, for a person to pick; None if there is none.
     """
 
     camera: Camera | None = None

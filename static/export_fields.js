@@ -95,7 +95,7 @@ export function parentFields(values, changed) {
     input.addEventListener("input", soon);
     inputs.push(input);
   }
-  return row("parent", [label, make("div", "", inputs.map((input, index) => make("label", "", [PARENT[index], input])))]);
+  return row("parent", [label, make("div", "", inputs.map((input, index) => make("label", "", [index < 3 ? `${PARENT[index]} [m]` : PARENT[index], input])))]);
 }
 
 /** The user's statement that the pictures are rectified already, asked by formats that cannot hold distortion. It is kept for this

@@ -21,12 +21,13 @@ export function lines(content) {
   });
 }
 
-/** The file's own numbers, with the calibration's folded below. @param {Record<string, any>} preview */
-export function numbers(preview) {
-  const own = table(preview.pose.numbers);
-  own.dataset.hint = "Read back from the file: its own numbers in its own order and units. Matrices are rounded to 9 decimals here; the file has all digits.";
-  const ours = make("details", "ours", [make("summary", "", preview.our_pose.title), table(preview.our_pose)]);
-  return [own, ours];
+/** The file's own numbers; folded below what follows from them, and the calibration's. @param {Record<string, any>} preview */
+export function numbers({ pose, our_pose }) {
+  const isChained = pose.in_third_frame.length > 0;
+  const own = (isChained ? pose.in_third_frame : [pose.numbers]).map(table);
+  for (const one of own) one.dataset.hint = "Read back from the file: its own numbers in its own order and units. Matrices are rounded to 9 decimals here; the file has all digits.";
+  const below = isChained ? [pose.numbers, our_pose] : [our_pose];
+  return [...own, ...below.map((one) => make("details", "ours", [make("summary", "", one.title), table(one)]))];
 }
 
 /** @param {Numbers} given */

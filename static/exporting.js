@@ -155,9 +155,12 @@ const form = () => formats.find((format) => format.key === kept.format);
 const takesParent = () => form()?.takes_parent ?? false;
 const takesRectified = () => form()?.takes_rectified ?? false;
 
+/** @param {number} bytes */
+const size = (bytes) => (bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
+
 /** @param {Preview} preview */
 function drawPreview(preview) {
-  const kind = preview.is_binary ? `binary, ${preview.size_bytes} bytes; contents shown below` : "";
+  const kind = preview.is_binary ? `binary, ${size(preview.size_bytes)}; contents shown below` : "";
   head.replaceChildren(make("span", "", preview.numbers), make("span", "kind", kind));
   names.draw(preview);
   drawFields({ names: true, parent: takesParent(), rectified: preview.is_for_rectified });

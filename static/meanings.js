@@ -4,11 +4,12 @@
  * that is picked is shown as the calibration.
  */
 
-import { make } from "./notices.js";
+import { ask, content } from "./asking.js";
+import { make, toast } from "./notices.js";
 import { openAgain } from "./opening.js";
 import { on, state } from "./state.js";
 
-/** @typedef {{meaning: string, place: string, score: string, words: string, mounting: string}} Row */
+/** @typedef {{meaning: string, place: string, score: string, words: string, mounting: string, is_shown: boolean}} Row */
 
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("meanings-dialog"));
 /** @type {{name: string, rows: Row[]}|null} */
@@ -20,15 +21,20 @@ export function startMeanings() {
   on(["recording"], look);
 }
 
-/** Ask for the meanings if the calibration needs a pick, and show them. */
-async function look() {
+/** Show the meanings once if the calibration needs a pick. */
+function look() {
   const waits = state.recording?.warnings.some((warning) => warning.code === "calibration-ambiguous");
-  if (!waits || known) return;
-  const answer = await fetch("/api/meanings.json").catch(() => null);
-  if (!answer?.ok) return;
-  known = await answer.json();
+  if (waits && !known) openMeanings();
+}
+
+/** Show the meanings to pick from, drawn over the frame on the screen. */
+export async function openMeanings() {
+  const { answer, reason } = await ask("api/meanings.json");
+  const given = answer && (await content(answer.json()));
+  if (!given?.rows.length) return toast(reason || "This calibration states what its numbers mean.");
+  known = given;
   draw();
-  if (known?.rows.length && !dialog.open) dialog.showModal();
+  if (!dialog.open) dialog.showModal();
 }
 
 function draw() {
@@ -41,7 +47,7 @@ function draw() {
   close.onclick = () => dialog.close();
   const why = make("p", "why", "The file does not state it. Pick the picture in which the radar returns lie on what they come from; other frames may tell more.");
   const rows = make("div", "meanings", known.rows.map(card));
-  dialog.replaceChildren(make("header", "", [title, close]), why, frames(), rows);
+  dialog.replaceChildren(make("div", "top", [title, close]), why, frames(), rows);
 }
 
 /** Go to another frame: some moments tell more than others. */
@@ -65,11 +71,13 @@ function card(row, number) {
   const picture = make("img", "", []);
   picture.src = address(number);
   picture.alt = `Returns under ${row.meaning}: ${row.mounting}`;
-  const parts = [picture, make("strong", "", `${row.score}: ${row.mounting}`), make("small", "", row.words)];
+  const shown = row.is_shown ? [make("em", "", "Shown now")] : [];
+  const parts = [picture, make("strong", "", `${row.score}: ${row.mounting}`), make("small", "", row.words), ...shown];
   if (known && new Set(known.rows.map((one) => one.place)).size > 1) parts.push(make("small", "", `at ${row.place}`));
   const button = make("button", "meaning", parts);
   button.dataset.meaning = row.meaning;
-  button.onclick = () => pick(row);
+  if (row.is_shown) button.setAttribute("aria-current", "true");
+  button.onclick = () => (row.is_shown ? dialog.close() : pick(row));
   return button;
 }
 

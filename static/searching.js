@@ -10,7 +10,7 @@ const OTHER_WORD = 0.55;
 /** How well a query fits: 0 if one of its words does not fit at all. @param {string} query @param {Searchable} entry */
 export function fitOf(query, entry) {
   const parts = wordsOf(query);
-  const [own, others] = [wordsOf(entry.words), wordsOf(entry.also ?? "")];
+  const [own, others] = [namesOf(entry.words), namesOf(entry.also ?? "")];
   let total = 0;
   for (const part of parts) {
     const fit = Math.max(best(part, own), OTHER_WORD * best(part, others));
@@ -22,7 +22,10 @@ export function fitOf(query, entry) {
 }
 
 /** @param {string} text */
-const wordsOf = (text) => text.toLowerCase().match(/[\p{L}\p{N}.%_]+/gu) ?? [];
+const wordsOf = (text) => text.toLowerCase().match(/[\p{L}\p{N}.%_+]+/gu) ?? [];
+
+/** The words, and each with the number after it: "ROS 2" is also found as "ros2". @param {string} text */
+const namesOf = (text) => wordsOf(text).flatMap((word, index, all) => (/^\d+$/.test(all[index + 1] ?? "") ? [word, word + all[index + 1]] : [word]));
 
 /** @param {string} part @param {string[]} words */
 const best = (part, words) => words.reduce((most, word) => Math.max(most, fitOfWord(part, word)), 0);

@@ -1,6 +1,7 @@
 // @ts-check
 /** The warnings: one line each, the gravest first; one unfolds to its whole message and what to do about it. */
 
+import { openMeanings } from "./meanings.js";
 import { icon, make, toast } from "./notices.js";
 import { send } from "./socket.js";
 
@@ -8,9 +9,11 @@ import { send } from "./socket.js";
 /** @typedef {import("./messages.js").AssumptionRow} AssumptionRow */
 const box = /** @type {HTMLElement} */ (document.getElementById("warnings"));
 /** What the user has unfolded stays so. @type {Set<string>} */
-const openCodes = new Set(["unsolvable", "no-camera", "assumed"]);
+const openCodes = new Set(["unsolvable", "no-camera", "assumed", "calibration-ambiguous"]);
 /** What is no warning of a calibration, but why there is none. */
 const NOT_TO_ACKNOWLEDGE = ["unsolvable", "no-camera"];
+/** What leaves open what a calibration means: a person picks. */
+const TO_PICK = ["calibration-ambiguous", "calibration-picked"];
 let drawn = "";
 
 /**
@@ -43,7 +46,13 @@ export function drawWarnings(ofPose, ofRecording, assumptions, acknowledged) {
 
 /** @param {WarningRow} warning @param {string} kind @param {boolean} read */
 function row(warning, kind, read) {
+  /** @type {HTMLElement[]} */
   const inside = [make("div", "hint", warning.hint)];
+  if (TO_PICK.includes(warning.code)) {
+    const pick = make("button", "pick", "Pick a meaning…");
+    pick.onclick = openMeanings;
+    inside.push(pick);
+  }
   if (!NOT_TO_ACKNOWLEDGE.includes(warning.code)) {
     const button = make("button", "acknowledge", read ? "Show again" : "Acknowledge");
     button.onclick = async () => {

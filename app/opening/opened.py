@@ -10,13 +10,12 @@ from pathlib import Path
 from time import sleep
 
 import calib_core.recordings as recordings
-from app.hypothesis_sheet import OpenMeaning
 from app.opening.choice import Choice, ChoicePart, GivenClicks, UnusablePartError, part_of_choice
-from app.opening.reference import camera_in, reference_from
-from app.opening.sessions import FittingClicks, fitting_clicks, session_folder
+from app.opening.reference import about_calibration, camera_in, meaning_of, reference_from
+from app.opening.sessions import fitting_clicks, session_folder
 from app.session import AssumptionsConfirmed, ClicksImported, ColumnsMapped, OptionsChanged
 from app.session.click_stamps import ClicksAtFrames, clicks_at_frames
-from app.session.file import FoundFolder, recording_session_folder, remembered_map
+from app.session.file import recording_session_folder, remembered_map
 from app.solving import camera_for
 from app.view import Reference, sentence
 from app.workspace import Workspace, open_workspace, recording_facts
@@ -26,7 +25,6 @@ from calib_core.input_files import name_text
 from calib_core.interchange import read_clicks
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, RecordingOptions
-from calib_core.results import DataWarning
 
 __all__ = ["Opened", "open_choice", "with_remembered"]
 
@@ -134,6 +132,7 @@ def _workspace(choice: Choice, recording: Recording) -> Workspace:
     calibration = choice.calibration_file
     with part_of_choice("calibration"):
         shown = reference_from(calibration, camera, choice.pick) if calibration and camera else None
+        meaning = meaning_of(calibration, camera, choice.pick) if calibration and camera else None
     reference = shown if isinstance(shown, Reference) else None
     facts = recording_facts(recording, choice.title)
     from_calibration = camera is not None and choice.camera_file is None and recording.camera() is None
@@ -146,39 +145,18 @@ def _workspace(choice: Choice, recording: Recording) -> Workspace:
             session_folder=found.path,
             name=choice.title,
             reference=reference,
-            warnings=_warnings(
-                found, copied, calibration if shown is None and len(recording.image_times) else None, shown
+            warnings=(
+                *found.warnings,
+                *([] if copied is None else [copied.about]),
+                *(about_calibration(calibration, shown, meaning) if len(recording.image_times) else ()),
             ),
             camera_file=choice.camera_file,
             intrinsics=name_text(calibration.name) if from_calibration and calibration else "",
         )
-    workspace.open_meaning = shown if isinstance(shown, OpenMeaning) else None
+    workspace.open_meaning = meaning
     if copied is not None and copied.clicks and workspace.restored.steps == 0:
         workspace.dispatch(ClicksImported(copied.clicks))
     return workspace
-
-
-def _warnings(
-    found: FoundFolder, copied: FittingClicks | None, unshown: Path | None, shown: Reference | OpenMeaning | None
-) -> tuple[DataWarning, ...]:
-    """Return what the user must know about the session, and about a calibration that is not shown.
-
-    Args:
-        found: the session's folder.
-        copied: clicks of another session, if any were copied.
-        unshown: a calibration that cannot be shown without intrinsics.
-        shown: the calibration, or what it can mean.
-    """
-    about = [*found.warnings, *([] if copied is None else [copied.about])]
-    if unshown is not None:
-        message = f"{name_text(unshown.name)} is not shown, since there are no camera intrinsics"
-        about.append(
-            DataWarning("calibration-not-shown", message, "drop the camera file on the page, or give --camera FILE")
-        )
-    if isinstance(shown, OpenMeaning):
-        message = f"{shown.name} is not shown, since it does not state what its numbers mean"
-        about.append(DataWarning("calibration-ambiguous", message, "pick a meaning; reload the page to see them again"))
-    return tuple(about)
 
 
 def _camera(choice: Choice, recording: Recording) -> Camera | None:

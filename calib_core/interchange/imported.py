@@ -155,6 +155,7 @@ class ImportedCalibration:
         calibration_sha256: of the calibration-1 file that it says it was exported from; None if it states none.
         covariance: (6, 6) of camera_from_radar, in the order of calibration-1; None if it states none. That of a
             calibration-1 file is in `file`.
+        in_third_frame: the poses of radar and camera as written, if both are in a third frame and the radar is not its origin.
     """
 
     format: str
@@ -172,6 +173,7 @@ class ImportedCalibration:
     evidence: Evidence | None = None
     calibration_sha256: str | None = None
     covariance: Matrix66 | None = None
+    in_third_frame: tuple[WrittenPose, WrittenPose] | None = None
 
     def camera_for(self, image_size_px: tuple[int, int]) -> Camera | None:
         """Return the camera; one whose size the file does not state gets that of the pictures. None if there is none.

@@ -140,6 +140,8 @@ def test_a_format_is_found_by_typing_and_chosen_by_keyboard(solved: Driver) -> N
         ("nuscenes", "nuscenes", set()),
         ("foxgl", "foxglove", set()),
         ("ros 2", "tf2", {"urdf", "autoware"}),
+        ("c++", "pack", set()),
+        ("ros2", "tf2", {"tf2-launch-py"}),
     ):
         page.locator(f"{DIALOG} .find").fill(words)
         found = solved.value(names)
@@ -213,6 +215,13 @@ def test_the_radar_can_be_posed_in_the_kit_and_a_wrong_pose_is_refused_with_a_re
     before = read_any(saved(solved, tmp_path).read_bytes())
     solved.page.fill('[aria-label="x of the radar in the parent frame"]', "3.5")
     expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text("x: 3.5")
+    tables = solved.page.locator(f"{DIALOG} .pose-numbers:visible")
+    expect(tables.locator("caption")).to_have_text(
+        [f"Pose of {name} in sensor_kit_base_link" for name in ("ti_mmwave_0", "camera_link")]
+    )
+    text = solved.text(f"{DIALOG} .text")
+    for row in tables.locator("tr").all_inner_texts():
+        assert row.split("\t", 1)[1].strip() in text
     after = read_any(saved(solved, tmp_path).read_bytes())
     np.testing.assert_allclose(
         after.camera_from_radar.as_matrix(), before.camera_from_radar.as_matrix(), rtol=0, atol=1e-12
@@ -303,11 +312,16 @@ def test_warnings_of_the_calibration_are_shown_next_to_the_text(page: Driver, tr
 def test_the_panel_fits_the_screen(solved: Driver, size: tuple[int, int]) -> None:
     solved.page.set_viewport_size({"width": size[0], "height": size[1]})
     solved.page.click("#export")
-    solved.page.click(f'{DIALOG} [data-export="nuscenes"]')
-    expect(solved.page.locator(f"{DIALOG} .reason")).to_be_visible()
+    choose(solved, "tf2")
+    radar = solved.page.locator(f'{DIALOG} [data-field="radar_frame"]')
+    usual = radar.input_value()
+    radar.fill("a$b")
+    expect(solved.page.locator(f"{DIALOG} .reason")).to_contain_text("until the field above is corrected")
     assert solved.value(
         f"document.querySelector('{DIALOG} .text').scrollHeight <= document.querySelector('{DIALOG} .text').clientHeight"
     )
+    radar.fill(usual)
+    expect(solved.page.locator(f"{DIALOG} .text")).to_contain_text(f"--frame-id {usual}")
     for name in ("autoware", "numpy", "nuscenes", "kitti"):
         choose(solved, name)
         solved.until(f"document.querySelector('{DIALOG} .frames')")

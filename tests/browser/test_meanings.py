@@ -11,6 +11,7 @@ import pytest
 
 from calib_core.geometry import RigidTransform
 from calib_core.interchange.rotations import LINK_FROM_OPTICAL
+from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
 from tests.served_process import ServedProcess, served_process
 
@@ -29,21 +30,28 @@ def serve(tmp_path: Path) -> Iterator[Callable[..., ServedProcess]]:
         )
 
 
+@pytest.fixture
+def extrinsic(truth: Any, tmp_path: Path) -> Path:
+    """A 4x4 matrix without a word: the pose of the camera in the radar, both with body axes."""
+    pose = truth["camera_from_radar"]
+    camera_from_radar = RigidTransform(np.array(pose["rotation"]), np.array(pose["translation_m"]))
+    body = (LINK_FROM_OPTICAL @ camera_from_radar).inverse()
+    file = tmp_path / "extrinsic.json"
+    file.write_text(json.dumps({"pose": body.as_matrix().tolist()}))
+    return file
+
+
 def test_the_meaning_that_is_picked_is_shown_as_the_calibration(
     serve: Callable[..., ServedProcess],
     open_page: Callable[..., Driver],
     project_root: Path,
-    truth: Any,
+    extrinsic: Path,
     tmp_path: Path,
 ) -> None:
-    pose = truth["camera_from_radar"]
-    camera_from_radar = RigidTransform(np.array(pose["rotation"]), np.array(pose["translation_m"]))
-    body = (LINK_FROM_OPTICAL @ camera_from_radar).inverse()
-    (tmp_path / "extrinsic.json").write_text(json.dumps({"pose": body.as_matrix().tolist()}))
     sample = project_root / "sample_data" / "rooftop"
     server = serve(
         *(sample / "radar.bag", sample / "camera.bag"),
-        *("--calibration", tmp_path / "extrinsic.json", "--session", tmp_path / "session"),
+        *("--calibration", extrinsic, "--session", tmp_path / "session"),
     )
     page = open_page(server.url)
     page.until(DIALOG)
@@ -62,4 +70,41 @@ def test_the_meaning_that_is_picked_is_shown_as_the_calibration(
     assert not page.value(f"Boolean({DIALOG})")
     codes = page.value("__cocalib.state.recording.warnings.map((one) => one.code)")
     assert "calibration-ambiguous" not in codes
+    page.forget_lost_connections()
+
+
+def test_a_pick_is_named_as_such_and_can_be_changed(
+    serve: Callable[..., ServedProcess],
+    open_page: Callable[..., Driver],
+    project_root: Path,
+    extrinsic: Path,
+    tmp_path: Path,
+) -> None:
+    sample = project_root / "sample_data" / "rooftop"
+    server = serve(
+        *(sample / "radar.bag", sample / "camera.bag"),
+        *("--calibration", extrinsic, "--session", tmp_path / "session"),
+    )
+    page = open_page(server.url)
+    page.until(DIALOG)
+    assert violations(page) == []
+    page.page.keyboard.press("Escape")
+    page.until(f"!{DIALOG}")
+    for picked in ("camera_from_radar,body,m", RIGHT):
+        row = page.page.locator("#warnings [data-code^='calibration-']")
+        if not row.evaluate("row => row.open"):
+            row.locator("summary").click()
+        row.locator(".pick").click()
+        page.until(DIALOG)
+        with page.page.expect_navigation():
+            page.page.click(f"#meanings-dialog [data-meaning='{picked}']")
+        page.until("__cocalib.state.shown && __cocalib.state.view && __cocalib.state.view.reference")
+        warnings = page.value("__cocalib.state.recording.warnings")
+        assert [row["code"] for row in warnings] == ["calibration-picked"]
+        assert "does not state what its numbers mean" in warnings[0]["message"]
+        shown = page.value(
+            "fetch('api/meanings.json').then((answer) => answer.json()).then((said) => "
+            "said.rows.filter((row) => row.is_shown).map((row) => row.meaning))"
+        )
+        assert shown == [picked]
     page.forget_lost_connections()

@@ -133,9 +133,7 @@ def export_preview(file: CalibrationFile, key: str, query: str, recording_name: 
         numbers=sentence(form.numbers),
         notes=tuple(sentence(note) for note in written.notes if note not in lost),
         is_for_rectified=form.is_for_rectified and file.calibration.camera.is_distorted,
-        pose=pose_in_file(report.imported.pose, fields.frames, in_third_frame=fields.parent_from_radar is not None)
-        if form.reads
-        else None,
+        pose=pose_in_file(report.imported, fields.frames) if form.reads else None,
         our_pose=our_numbers(file.calibration.camera_from_radar),
         check_point=check_point_row(named, form, report.imported) if form.reads else None,
         check=_read_back(report) if form.reads else "Not read back: this format has no pose to read.",

@@ -22,6 +22,7 @@ class MeaningRow:
         score: its share among all, in words.
         words: what the numbers mean.
         mounting: where the camera is, and where it looks.
+        is_shown: the calibration is shown with it.
     """
 
     meaning: str
@@ -29,6 +30,7 @@ class MeaningRow:
     score: str
     words: str
     mounting: str
+    is_shown: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +38,7 @@ class MeaningRows:
     """The meanings of a calibration.
 
     Attributes:
-        name: of its file; "" if no calibration waits for a pick.
+        name: of its file; "" if there is no calibration that leaves it open.
         rows: the likeliest first.
     """
 
@@ -55,8 +57,9 @@ def meaning_rows(meaning: OpenMeaning | None) -> MeaningRows:
             offer.hypothesis.score,
             offer.hypothesis.meanings[0].words,
             offer.hypothesis.mounting,
+            is_shown=number == meaning.shown,
         )
-        for offer in meaning.offers
+        for number, offer in enumerate(meaning.offers)
     )
     return MeaningRows(meaning.name, tuple(rows))
 

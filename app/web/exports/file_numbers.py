@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
-from calib_core.interchange import FrameNames, WrittenPose
+from calib_core.interchange import FrameNames, ImportedCalibration, WrittenPose
 
 __all__ = ["FileNumbers", "NumberRow", "PoseInFile", "our_numbers", "pose_in_file"]
 
@@ -15,6 +15,7 @@ _ORDERS = {
     "quaternion_wxyz": ("qw", "qx", "qy", "qz"),
     "rpy": ("roll", "pitch", "yaw"),
 }
+_THIRD_FRAMES = {"autoware": "sensor_kit_base_link", "driveworks": "the rig", "nuscenes": "the ego frame"}
 _CAMERA_WORDS = {"optical": "z forward", "link": "x forward"}
 
 
@@ -57,7 +58,8 @@ class PoseInFile:
         radar_frame: the name of the radar's frame.
         camera_frame: the name of the camera's frame that the numbers are about: optical, or its body frame.
         camera_axes: of that frame: directions of its x, y and z in the radar frame, by rows.
-        numbers: as the file holds them.
+        numbers: of the pose, as the file holds them.
+        in_third_frame: instead, if the file poses both sensors in a third frame: the numbers of the radar and of the camera.
     """
 
     carries: Literal["camera_from_radar", "radar_from_camera"]
@@ -67,16 +69,17 @@ class PoseInFile:
     camera_frame: str
     camera_axes: tuple[tuple[float, ...], ...]
     numbers: FileNumbers
+    in_third_frame: tuple[FileNumbers, ...] = ()
 
 
-def pose_in_file(pose: WrittenPose, frames: FrameNames, *, in_third_frame: bool) -> PoseInFile:
+def pose_in_file(found: ImportedCalibration, frames: FrameNames) -> PoseInFile:
     """Describe the pose that was read back from a file.
 
     Args:
-        pose: as written.
+        found: what was read.
         frames: the names that the file was written with.
-        in_third_frame: the file poses both sensors in a third frame, not at the radar.
     """
+    pose = found.pose
     camera = frames.camera if pose.axes == "optical" else frames.camera_link
     point = "p_camera" if pose.axes == "optical" else "p_link"
     written = pose.as_written()
@@ -88,8 +91,17 @@ def pose_in_file(pose: WrittenPose, frames: FrameNames, *, in_third_frame: bool)
         equation = f"p_radar = R {point} + t"
         title, camera_axes = f"Pose of {camera} in {frames.radar}", written.rotation.T
     words = f"The numbers of this file {what}: {equation}."
-    if in_third_frame:
-        words += " The file poses each sensor in the third frame; this is the one pose that follows from the two."
+    both: tuple[FileNumbers, ...] = ()
+    if found.in_third_frame is not None:
+        third = _THIRD_FRAMES.get(found.format, "the third frame")
+        both = tuple(
+            FileNumbers(f"Pose of {name} in {third}", _rows(one))
+            for name, one in zip((frames.radar, camera), found.in_third_frame, strict=True)
+        )
+        words = (
+            f"The numbers of this file are the poses of {frames.radar!r} and of {camera!r} ({_CAMERA_WORDS[pose.axes]}) in "
+            f"{third}. From both follows the pose of {camera!r} in {frames.radar!r}: {equation}."
+        )
     return PoseInFile(
         carries=pose.direction,
         words=words,
@@ -98,6 +110,7 @@ def pose_in_file(pose: WrittenPose, frames: FrameNames, *, in_third_frame: bool)
         camera_frame=camera,
         camera_axes=tuple(tuple(row) for row in camera_axes.tolist()),
         numbers=FileNumbers(title, _rows(pose)),
+        in_third_frame=both,
     )
 
 

@@ -31,7 +31,7 @@ from calib_core.interchange.syntax.yaml_text import number_text, quoted
 __all__ = ["AUTOWARE"]
 
 _NOTES = (
-    "poses are in sensor_kit_base_link; the radar is at the kit's origin unless parent_from_radar places it elsewhere",
+    "poses are in sensor_kit_base_link; the radar is at the kit's origin unless its pose is given (--parent-from-radar)",
     POSE_ONLY,
 )
 _KIT = "sensor_kit_base_link"
@@ -88,12 +88,13 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     kit_from_radar, kit_from_camera = (
         _posed(kit[name], source=source, place=f"{kit_name}.{name}") for name in (radar, camera)
     )
-    numbers = kit_from_camera
+    numbers, both = kit_from_camera, None
     if np.any(kit_from_radar.as_written().as_matrix() != np.eye(4)):
         radar_from_camera = kit_from_radar.as_written().inverse() @ kit_from_camera.as_written()
         numbers = WrittenPose(
             "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"
         )
+        both = kit_from_radar, kit_from_camera
     roles = posed_between(radar, camera, stated, numbers)
     return ImportedCalibration(
         "autoware",
@@ -101,6 +102,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         frames=roles.frames,
         check_point=stated_check_point(content.text),
         assumptions=roles.assumptions,
+        in_third_frame=both,
     ).checked(source)
 
 

@@ -20,7 +20,7 @@ __all__ = ["DRIVEWORKS"]
 
 _NOTES = (
     "nominalSensor2Rig_FLU is the sensor's pose in the rig: metres, roll-pitch-yaw in degrees about fixed axes, the camera with "
-    "body axes (x forward, y left, z up); the radar is at the rig's origin unless parent_from_radar places it elsewhere",
+    "body axes (x forward, y left, z up); the radar is at the rig's origin unless its pose is given (--parent-from-radar)",
     "contains the pose only: copy the two poses into your own rig file; the check point, the evidence and the calibration's "
     "hash are in the camera's properties, as a text that DriveWorks does not read",
 )
@@ -80,16 +80,17 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             f"{source}: rig.sensors: {len(radars)} radars and {len(cameras)} cameras by protocol; keep one of each"
         )
     rig_from_radar, rig_from_link = (_posed(sensor, source=source) for sensor in (radars[0], cameras[0]))
-    pose, note = rig_from_link, "the format defines the camera axes as body axes (x forward, y left, z up)"
+    pose, both, note = rig_from_link, None, "the format defines the camera axes as body axes (x forward, y left, z up)"
     if np.abs(rig_from_radar.as_written().as_matrix() - np.eye(4)).max() > 0:
         radar_from_link = rig_from_radar.as_written().inverse() @ rig_from_link.as_written()
         pose = WrittenPose(
             "matrix", radar_from_link.rotation, radar_from_link.translation_m, "radar_from_camera", "link"
         )
+        both = rig_from_radar, rig_from_link
     assumptions = (_CORRECTED,) if any(_is_corrected(sensor) for sensor in (radars[0], cameras[0])) else ()
     properties = cameras[0].get("properties")
     text = stated_lines(properties.get(STATEMENT_KEY)) if isinstance(properties, Mapping) else ""
-    found = ImportedCalibration("driveworks", pose, notes=(note,), assumptions=assumptions)
+    found = ImportedCalibration("driveworks", pose, notes=(note,), assumptions=assumptions, in_third_frame=both)
     return with_statement(found, text).checked(source)
 
 
@@ -133,7 +134,7 @@ DRIVEWORKS = Format(
     name="driveworks",
     title="NVIDIA DriveWorks rig",
     used_in="Vehicle stacks",
-    also="NVIDIA DRIVE vehicle",
+    also="NVIDIA DRIVE Isaac vehicle",
     numbers="pose of each sensor in the rig, roll pitch yaw in degrees about fixed axes; the camera with body axes",
     file_name="rig.json",
     camera="none",

@@ -23,7 +23,7 @@ __all__ = ["NUSCENES"]
 
 _NOTES = (
     "translation and rotation (w x y z) are the sensor's pose in the ego frame, camera optical; "
-    "the ego frame is the radar frame unless parent_from_radar places the radar elsewhere",
+    "the ego frame is the radar frame unless its pose is given (--parent-from-radar)",
     "unpack it into the folder of the tables; tokens are derived from the frame names: replace them with yours",
 )
 _SENSORS, _CALIBRATED = "sensor.json", "calibrated_sensor.json"
@@ -101,14 +101,18 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         assumptions.append("no radar record; assumed that the ego frame is the radar frame")
         found = ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px)
         return with_statement(found, text).checked(source)
-    ego_from_radar = _posed(radars[0], source=source).as_written()
+    radar_pose, both = _posed(radars[0], source=source), None
+    ego_from_radar = radar_pose.as_written()
     if np.abs(ego_from_radar.as_matrix() - np.eye(4)).max() > 0:
+        both = radar_pose, camera_pose
         ego_from_camera = camera_pose.as_written()
         radar_from_camera = ego_from_radar.inverse() @ ego_from_camera
         camera_pose = WrittenPose(
             "matrix", radar_from_camera.rotation, radar_from_camera.translation_m, "radar_from_camera"
         )
-    found = ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px)
+    found = ImportedCalibration(
+        "nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px, in_third_frame=both
+    )
     return with_statement(found, text).checked(source)
 
 

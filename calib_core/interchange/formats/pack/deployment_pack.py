@@ -101,7 +101,7 @@ def _files(members: Mapping[str, bytes]) -> dict[str, bytes]:
 
 PACK = Format(
     name="pack",
-    title="deployment pack: pose, camera_info, tf, angle map, self-test",
+    title="Deployment pack: pose, camera_info, tf, angle map, self-test",
     used_in="cocalib",
     also="deploy zip robot self-test C++ Python",
     numbers="calibration.json: camera_from_radar and its inverse; tf/: pose of the child (camera, optical) in the parent (radar)",

@@ -79,7 +79,7 @@ def second_parent_notes(file: CalibrationFile) -> tuple[str, ...]:
         return ()
     return (
         f"a camera's driver usually publishes {camera} under its camera_link already, and a frame cannot have two parents: with "
-        "--tree the transform is written to camera_link instead",
+        "`cocalib export --tree FILE` the transform is written to camera_link instead",
     )
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from app.hypothesis_sheet import OpenMeaning
 from app.opening.choice import MeaningPick
-from app.opening.reference import reference_from
+from app.opening.reference import about_calibration, meaning_of, reference_from
 from app.view import Reference
 from app.web.channel.open_meaning import drawn_meaning, meaning_rows
 from calib_core.errors import InputError
@@ -80,3 +80,25 @@ def test_the_picked_meaning_is_the_calibration(file: Path, sample: Recording) ->
     assert np.abs(camera_radar_m - POSE.translation_m).max() < 1e-9
     assumed = [warning.message for warning in shown.calibration.warnings if warning.code == "assumed"]
     assert any("picked by hand" in message for message in assumed)
+
+
+def test_what_is_shown_with_an_assumption_says_so_and_can_be_picked_again(file: Path, sample: Recording) -> None:
+    camera = sample.camera()
+    assert camera is not None
+    pick = MeaningPick("radar_from_camera,body,rfu,m", "front.T")
+    meaning = meaning_of(file, camera, pick)
+    assert [row.meaning for row in meaning_rows(meaning).rows if row.is_shown] == [pick.meaning]
+    (warning,) = about_calibration(file, reference_from(file, camera, pick), meaning)
+    assert warning.code == "calibration-picked"
+    assert "extrinsic.json does not state what its numbers mean; it is shown as if it carries" in warning.message
+
+
+def test_a_format_that_leaves_something_open_is_shown_with_what_was_assumed(tmp_path: Path, sample: Recording) -> None:
+    camera, path = sample.camera(), tmp_path / "calib.txt"
+    assert camera is not None
+    rows = " ".join(map(str, np.array([[0, -1, 0, 0], [0, 0, -1, 0.1], [1, 0, 0, 0]], float).ravel()))
+    path.write_text("P2: 700 0 320 0 0 700 240 0 0 0 1 0\nR0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: " + rows + "\n")
+    assert meaning_of(path, camera) is None
+    (warning,) = about_calibration(path, reference_from(path, camera), None)
+    assert warning.code == "calibration-assumed"
+    assert "calib.txt is shown with an assumption" in warning.message

@@ -8,7 +8,14 @@ import pytest
 
 from app.web.channel.export_preview import export_preview
 from app.web.exports.file_numbers import our_numbers, pose_in_file
-from calib_core.interchange import FORMATS, CalibrationFile, FrameNames, WrittenPose, read_calibration
+from calib_core.interchange import (
+    FORMATS,
+    CalibrationFile,
+    FrameNames,
+    ImportedCalibration,
+    WrittenPose,
+    read_calibration,
+)
 
 NAMES = FrameNames("front_radar", "front_camera_optical")
 
@@ -75,7 +82,7 @@ def rotation_in(numbers, degrees):
 def test_the_words_name_the_frames_of_the_file_and_the_axes_of_the_camera():
     turn, shift = np.eye(3), np.array([0.1, 0.2, 0.3])
     optical, link, forward = (
-        pose_in_file(WrittenPose("matrix", turn, shift, direction, axes), NAMES, in_third_frame=False)
+        pose_in_file(ImportedCalibration("other", WrittenPose("matrix", turn, shift, direction, axes)), NAMES)
         for direction, axes in (
             ("radar_from_camera", "optical"),
             ("radar_from_camera", "link"),
@@ -87,12 +94,22 @@ def test_the_words_name_the_frames_of_the_file_and_the_axes_of_the_camera():
     assert "carry points from 'front_radar' to 'front_camera_optical'" in forward.words
 
 
-def test_two_poses_in_a_third_frame_are_said_to_be_combined(file):
-    made = preview(file, "autoware", "parent_from_radar=1,0,0,0,0,0.6,0.8")
-    assert "in the third frame" in made.pose.words
-    own = {row.name: row.values for row in preview(file, "json").pose.numbers.rows}
-    assert own["t"] != made.pose.numbers.rows[-1].values
-    assert "third frame" not in preview(file, "autoware").pose.words
+@pytest.mark.parametrize(
+    ("key", "third"), [("autoware", "sensor_kit_base_link"), ("driveworks", "the rig"), ("nuscenes", "the ego frame")]
+)
+def test_of_two_poses_in_a_third_frame_the_file_s_own_numbers_are_shown(file, key, third):
+    made = preview(file, key, "parent_from_radar=1.25,-0.5,0.75,0,0,0.6,0.8")
+    assert f"are the poses of 'radar' and of {made.pose.camera_frame!r}" in made.pose.words
+    assert [table.title for table in made.pose.in_third_frame] == [
+        f"Pose of {name} in {third}" for name in ("radar", made.pose.camera_frame)
+    ]
+    radar, camera = ({row.name: row for row in table.rows} for table in made.pose.in_third_frame)
+    assert [float(radar[name].values[0]) for name in "xyz"] == [1.25, -0.5, 0.75]
+    assert all(camera[name].values[0] in made.text for name in "xyz")
+    turns = [row for row in (*radar.values(), *camera.values()) if row.name not in "xyz"]
+    assert all(row.values[0] in made.text or row.unit == "deg" for row in turns)
+    assert made.pose.numbers.title == f"Pose of {made.pose.camera_frame} in radar"
+    assert preview(file, key).pose.in_third_frame == ()
 
 
 def test_the_calibration_s_own_pose_is_there_whatever_the_file_holds(file):
