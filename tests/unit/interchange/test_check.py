@@ -222,6 +222,22 @@ def test_a_bare_matrix_that_looks_sideways_is_a_warning_with_a_guess(file):
     assert "the direction is swapped" in result.hint
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n",
+        '<robot name="car"><link name="radar"/><link name="camera_link"/><joint name="j" type="fixed"><parent link="radar"/>'
+        '<child link="camera_link"/><origin xyz="0 0 0" rpy="0 0 0"/></joint></robot>',
+    ],
+    ids=["matrix", "urdf"],
+)
+def test_the_identity_of_a_template_is_doubtful(text):
+    report = check(read_any(text, "file"))
+
+    assert "placeholder" in [result.code for result in report.results if result.level == "warning"]
+    assert report.verdict == "doubtful"
+
+
 def test_a_check_point_in_pixels_without_a_camera_is_reported_as_unused(file):
     text = text_of(file, "opencv").replace("image_width: 640\n", "")
     text = without_comments(text)
