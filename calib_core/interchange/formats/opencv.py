@@ -19,6 +19,8 @@ from calib_core.lens_models.naming import written_lens
 
 __all__ = ["OPENCV"]
 
+_OF_SECOND_CAMERA = ("M2", "K2", "cameraMatrix2", "camera_matrix_2", "R2", "P2")
+
 
 def _write(file: CalibrationFile) -> str:
     """Write a file that cv::FileStorage of OpenCV 3, 4 and 5 reads.
@@ -73,6 +75,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         InputError: a number is missing.
     """
     values = content.mapping
+    _refuse_stereo(values, source=source)
     rotation = floats(values["R"], source=source, place="R", length=9)
     translation_m = floats(values["T"], source=source, place="T", length=3)
     cameras = find_cameras(values, source=source)
@@ -89,6 +92,19 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         check_point=_check_point(values, source) or stated_check_point(content.text),
         assumptions=assumptions,
     ).checked(source)
+
+
+def _refuse_stereo(values: Mapping[str, Any], *, source: str) -> None:
+    """Refuse what stereoCalibrate wrote: its R and T are between two cameras.
+
+    Raises:
+        InputError: the file has a second camera.
+    """
+    second = next((key for key in _OF_SECOND_CAMERA if key in values), None)
+    if second is not None:
+        raise InputError(
+            f"{source}: a stereo pair ({second}): its R and T are between two cameras; give those between radar and camera"
+        )
 
 
 def _check_point(values: Mapping[str, Any], source: str) -> StatedCheckPoint | None:

@@ -141,7 +141,7 @@ def test_of_several_extrinsics_the_one_of_the_radar_is_taken():
         ({"extrinsics": {"translation": dict(x=0, y=0, z=0)}}, "extrinsics.rotation: missing"),
         (
             {"transforms": [{"parent_frame_id": "base", "child_frame_id": name} for name in ("camera", "radar")]},
-            "contains 2 transforms",
+            "transforms[0].translation: missing",
         ),
     ],
 )
@@ -230,3 +230,25 @@ def test_a_log_line_before_the_text_is_not_taken_for_json():
     text = "[INFO] [1.5] [tf2_echo]: Waiting for transform radar ->  camera_optical: no\n" + echo(POSITION, TURN)
     assert read_any(text).format == "tf-echo"
     assert "not JSON" in refusal("[1, 2")
+
+
+def test_a_stereo_pair_is_not_taken_for_radar_and_camera():
+    matrices = "".join(
+        f"{key}: !!opencv-matrix\n   rows: 3\n   cols: {len(values) // 3}\n   dt: d\n   data: {values}\n"
+        for key, values in {
+            "M1": [5.0] * 9,
+            "M2": [5.0] * 9,
+            "R": [1, 0, 0, 0, 1, 0, 0, 0, 1],
+            "T": [-0.1, 0, 0],
+        }.items()
+    )
+    assert "a stereo pair (M2): its R and T are between two cameras" in refusal("%YAML:1.0\n---\n" + matrices)
+
+
+def test_openlabels_radar_of_another_stream_type_is_found_by_its_name():
+    systems = {
+        name: {"type": "sensor_cs", "parent": "car", "pose_wrt_parent": {"matrix4x4": np.ravel(matrix).tolist()}}
+        for name, matrix in (("RADAR_FRONT", np.eye(4)), ("CAM_FRONT", MATRIX))
+    }
+    label = labelled(systems, {"RADAR_FRONT": {"type": "other"}, "CAM_FRONT": {"type": "camera"}})
+    np.testing.assert_allclose(read_any(json.dumps(label)).pose.as_written().as_matrix(), MATRIX)
