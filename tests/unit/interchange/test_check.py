@@ -292,7 +292,7 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("", "no pose of a camera and a radar in it"),
+        ("", "the file is empty"),
         ("hello: world", "no pose of a camera and a radar in it .found hello"),
         ("{}", "no pose of a camera and a radar in it"),
         ("[]", "0 records with camera_intrinsic"),

@@ -1,6 +1,8 @@
 """Readers of other tools' files: variants of each shape, what they refuse, and what they take for granted."""
 
+import io
 import json
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,7 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import CalibrationFile, export, read_any, read_calibration
+from calib_core.interchange import CalibrationFile, export, read_any, read_any_file, read_calibration
 from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing
 
 FORWARD = [0.1, -0.2, 0.3, -0.5, 0.5, -0.5, 0.5]  # a camera that looks along the radar's x axis, x y z qx qy qz qw
@@ -252,3 +254,43 @@ def test_openlabels_radar_of_another_stream_type_is_found_by_its_name():
     }
     label = labelled(systems, {"RADAR_FRONT": {"type": "other"}, "CAM_FRONT": {"type": "camera"}})
     np.testing.assert_allclose(read_any(json.dumps(label)).pose.as_written().as_matrix(), MATRIX)
+
+
+def test_a_folder_of_colmaps_text_files_is_read_as_its_archive(tmp_path, file):
+    unpacked = zipfile.ZipFile(io.BytesIO(export(file, "colmap").data))
+    unpacked.extractall(tmp_path)
+
+    found = read_any_file(tmp_path)
+
+    assert found.camera is not None
+    np.testing.assert_allclose(found.camera.matrix_px, file.calibration.camera.matrix_px, rtol=1e-12)
+    assert found.evidence == file.rests_on
+    assert found.assumptions == ()
+    np.testing.assert_allclose(
+        found.camera_from_radar.as_matrix(), file.calibration.camera_from_radar.as_matrix(), rtol=0, atol=1e-12
+    )
+    images = tmp_path / "images.txt"
+    images.write_text("".join(line for line in images.read_text().splitlines(keepends=True) if line[0] != "#"))
+    assert "what its world frame is" in read_any_file(images).assumptions[0]
+    images.write_text(images.read_text() * 2)
+    with pytest.raises(InputError, match="contains 2 images"):
+        read_any_file(images)
+
+
+def test_kittis_folder_is_read_and_its_imu_refused(tmp_path):
+    numbers = "calib_time: 1\nR: 0 -1 0 0 0 -1 1 0 0\nT: 0.1 0.2 0.3\n"
+    (tmp_path / "calib_imu_to_velo.txt").write_text(numbers)
+    (tmp_path / "calib_velo_to_cam.txt").write_text(numbers)
+
+    np.testing.assert_array_equal(read_any_file(tmp_path).pose.translation_m, [0.1, 0.2, 0.3])
+    with pytest.raises(InputError, match=r"between IMU and Velodyne.*give calib_velo_to_cam.txt"):
+        read_any_file(tmp_path / "calib_imu_to_velo.txt")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [("", "the file is empty"), ("no pose at all", "found text"), ("Größe: 1".encode("latin-1"), "save it as UTF-8")],
+)
+def test_a_file_without_a_calibration_is_named_in_words(content, words):
+    with pytest.raises(InputError, match=words):
+        read_any(content, "file")
