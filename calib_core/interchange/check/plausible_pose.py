@@ -14,6 +14,7 @@ _SIDEWAYS_RAD = np.radians(60.0)
 _FORWARD_RAD = np.radians(35.0)
 _NAMED = 3
 _PARALLEL = 1e-9
+_SEEN = 0.5
 
 
 def by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
@@ -37,7 +38,18 @@ def by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
         results.append(
             CheckResult("warning", "looks-elsewhere", message, hint if likely else "is it mounted like that?")
         )
+    lean = _lean(camera_from_radar)
+    if off <= _SIDEWAYS_RAD and lean > _SIDEWAYS_RAD and not verified:
+        message = f"the picture leans {np.degrees(lean):.0f} deg to one side"
+        hint = "if the camera is not mounted like that, perhaps its frame has other axes: optical (z forward) or body (x forward)"
+        results.append(CheckResult("warning", "on-its-side", message, hint))
     return results
+
+
+def _lean(camera_from_radar: RigidTransform) -> float:
+    """Return how far the radar's up axis leans to one side in the picture [rad]; 0 where it is seen from its end."""
+    right, down = camera_from_radar.rotation[0, 2], camera_from_radar.rotation[1, 2]
+    return abs(float(np.arctan2(right, -down))) if np.hypot(right, down) > _SEEN else 0.0
 
 
 def _is_placeholder(camera_from_radar: RigidTransform) -> bool:
