@@ -78,7 +78,7 @@ class CheckReport:
         frames = self.imported.frames
         named = f", radar {frames.radar!r}, camera {frames.camera!r}" if frames else ", frames not named"
         rows = [f"read as {self.imported.format}{named}"]
-        rows += [f"assumed: {assumption}" for assumption in self.imported.assumptions]
+        rows += [f"assumed: {assumption.removeprefix('assumed ')}" for assumption in self.imported.assumptions]
         rows += [f"note: {note}" for note in self.imported.notes]
         for result in self.results:
             rows.append(f"{_label(result)}: {result.message}" + (f"; {result.hint}" if result.hint else ""))
