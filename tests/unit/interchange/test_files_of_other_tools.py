@@ -12,7 +12,7 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import CalibrationFile, export, read_any, read_any_file, read_calibration
+from calib_core.interchange import CalibrationFile, WantedFrames, export, read_any, read_any_file, read_calibration
 from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing
 
 FORWARD = [0.1, -0.2, 0.3, -0.5, 0.5, -0.5, 0.5]  # a camera that looks along the radar's x axis, x y z qx qy qz qw
@@ -294,3 +294,34 @@ def test_kittis_folder_is_read_and_its_imu_refused(tmp_path):
 def test_a_file_without_a_calibration_is_named_in_words(content, words):
     with pytest.raises(InputError, match=words):
         read_any(content, "file")
+
+
+def _published(parent: str, child: str, position: list[float]) -> str:
+    numbers = " ".join(map(str, position + TURN))
+    return f"ros2 run tf2_ros static_transform_publisher {numbers} {parent} {child}\n"
+
+
+@pytest.mark.parametrize("other", ["base_link", "velodyne", "imu_link", "novatel"])
+def test_the_camera_in_the_vehicle_or_another_sensor_is_not_taken_for_the_radars(other):
+    text = _published(other, "camera_optical", POSITION)
+    assert (
+        f"{other!r} is no radar by its name; if it is the radar's frame, say so with --radar-frame {other}"
+        in refusal(text)
+    )
+    named = read_any(text, "file", WantedFrames(other))
+    np.testing.assert_allclose(named.pose.as_written().translation_m, POSITION)
+    transform = {
+        "parent_frame_id": other,
+        "child_frame_id": "camera_optical",
+        "translation": dict(zip("xyz", POSITION, strict=True)),
+        "rotation": dict(zip("xyzw", TURN, strict=True)),
+    }
+    assert "is no radar by its name" in refusal(transform)
+    assert read_any(json.dumps(transform), "file", WantedFrames(other)).frames.radar == other
+
+
+def test_the_frame_that_is_a_camera_by_name_is_never_the_radars():
+    found = read_any(_published("camera_optical", "front_sensor", POSITION))
+    assert (found.frames.radar, found.frames.camera) == ("front_sensor", "camera_optical")
+    assert found.pose.direction == "camera_from_radar"
+    assert "assumed 'front_sensor'" in found.assumptions[0]

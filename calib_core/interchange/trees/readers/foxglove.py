@@ -44,7 +44,7 @@ def _listed(content: Content) -> list[Mapping[str, Any]]:
     messages = content.json_mapping
     named = messages.get("FrameTransforms")
     transforms = (named if isinstance(named, Mapping) else messages).get("transforms")
-    listed = transforms if isinstance(transforms, list) else []
+    listed = transforms if isinstance(transforms, list) else [messages.get("FrameTransform", messages)]
     return [one for one in listed if isinstance(one, Mapping) and "parent_frame_id" in one]
 
 
