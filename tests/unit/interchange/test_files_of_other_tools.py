@@ -325,3 +325,14 @@ def test_the_frame_that_is_a_camera_by_name_is_never_the_radars():
     assert (found.frames.radar, found.frames.camera) == ("front_sensor", "camera_optical")
     assert found.pose.direction == "camera_from_radar"
     assert "assumed 'front_sensor'" in found.assumptions[0]
+
+
+def test_an_echo_with_too_few_decimals_is_refused_with_how_to_print_more():
+    assert "too few decimals; print more with -p 9" in refusal(echo(POSITION, [0.6, -0.4, 0.4, -0.5]))
+
+
+def test_nuscenes_says_which_of_two_unnamed_sensors_is_taken_for_the_radar():
+    pose = {"translation": [0, 0, 1], "rotation": [0.5, -0.5, 0.5, -0.5]}
+    camera = pose | {"camera_intrinsic": [[500, 0, 320], [0, 500, 240], [0, 0, 1]]}
+    found = read_any(json.dumps([camera, {"translation": [0, 0, 0], "rotation": [1, 0, 0, 0], "camera_intrinsic": []}]))
+    assert "the sensor without camera_intrinsic is taken to be the radar" in found.assumptions
