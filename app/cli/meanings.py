@@ -161,7 +161,7 @@ def _frame_at(recording: "Recording", seconds: float | None) -> int | None:
 
 def _list(hypotheses: "Sequence[Hypothesis]", path: Path, pose: "FoundPose") -> None:
     """Print the hypotheses, how to choose one, and that nothing was written."""
-    from calib_core.interchange.hypotheses.ranking import likely_ones
+    from calib_core.interchange.hypotheses.ranking import contradicts_names, likely_ones
 
     shown = likely_ones(hypotheses)
     print(f"{path.name}: {pose.place} does not state what its numbers mean; they may be:")
@@ -170,7 +170,12 @@ def _list(hypotheses: "Sequence[Hypothesis]", path: Path, pose: "FoundPose") -> 
     others = len(hypotheses) - len(shown)
     print(f"{others} other meanings are less plausible." if others else "There are no others.")
     if pose.hints.other:
-        print(f"Its names mention {pose.hints.other!r} and no radar: is it the radar's pose?")
+        missing = "camera" if pose.hints.names_radar else "radar"
+        print(f"Its names mention {pose.hints.other!r} and no {missing}: is it the pose between radar and camera?")
+    if contradicts_names(pose, shown[0]):
+        print(
+            f"Its names say {pose.hints.named_direction}, its numbers look like the other direction: find out which is right."
+        )
     print(
         f"Nothing was written: pick one, such as --as {shown[0].key}; or let them be tested with --pairs FILE or --against FILE. "
         "--sheet FILE.png --recording RECORDING draws each over a frame."

@@ -2,7 +2,7 @@
 
 from typing import Literal, TypeAlias, get_args
 
-__all__ = ["EVIDENCE_LEVELS", "Evidence", "evidence_named"]
+__all__ = ["EVIDENCE_LEVELS", "Evidence", "stated_evidence"]
 
 Evidence: TypeAlias = Literal["clicked", "imported_proven", "imported_assumed"]
 """Solved from clicks; read from another tool's file whose meaning a check point, pairs or another calibration proved; read from
@@ -12,6 +12,6 @@ EVIDENCE_LEVELS: tuple[Evidence, ...] = get_args(Evidence)
 """From the strongest to the weakest."""
 
 
-def evidence_named(text: str) -> Evidence | None:
-    """Return the level of that name; None if there is none."""
-    return next((level for level in EVIDENCE_LEVELS if level == text), None)
+def stated_evidence(text: str) -> Evidence:
+    """Return the level that a file states; the weakest if it is none of ours, such as one of a later version."""
+    return next((level for level in EVIDENCE_LEVELS if level == text), EVIDENCE_LEVELS[-1])

@@ -42,6 +42,10 @@ TRUTH_FORMAT = "truth"
 _ROUNDING = 2e-3
 _LARGEST = 1e12
 _RADAR_NAME = re.compile(r"radar|rdr|mmwave|umrr|ars\d|srr|mrr|lrr", re.IGNORECASE)
+_OTHER_NAME = re.compile(
+    r"base|lidar|laser|velo|livox|ouster|hesai|imu|gps|gnss|novatel|vehicle|chassis|robot|world|\bego|\bmap\b|odom|gripper|tool\d",
+    re.IGNORECASE,
+)
 _CAMERA_NAME = re.compile(r"cam|optical|image|rgb", re.IGNORECASE)
 
 
@@ -244,15 +248,18 @@ def posed_between(parent: str, child: str, stated: FrameNames | None, numbers: W
         numbers: as written; the direction and axes in it are not looked at.
 
     Raises:
-        InputError: a frame has no name.
+        InputError: a frame has no name, or by its name the other frame is not the radar's but the vehicle's or another sensor's.
     """
     assumptions: list[str] = []
     if stated is not None and stated.radar in (parent, child):
         radar, camera = stated.radar, child if parent == stated.radar else parent
     else:
-        radar_first = not (looks_like_radar(child) and not looks_like_radar(parent))
+        child_is_radar = looks_like_radar(child) and not looks_like_radar(parent)
+        parent_is_camera = looks_like_camera(parent) and not looks_like_camera(child)
+        radar_first = not (child_is_radar or (parent_is_camera and not looks_like_radar(parent)))
         radar, camera = (parent, child) if radar_first else (child, parent)
         if not (looks_like_radar(radar) and not looks_like_radar(camera)):
+            _refuse_another_sensor(radar)
             assumptions.append(f"the file does not say which frame is the radar's; assumed {radar!r}")
     pose = replace(numbers, direction="radar_from_camera" if parent == radar else "camera_from_radar", axes="optical")
     axes: Axes = "optical"
@@ -265,6 +272,19 @@ def posed_between(parent: str, child: str, stated: FrameNames | None, numbers: W
         assumptions.append(_ASSUMED_AXES[axes].format(camera))
         frames = FrameNames(radar, camera if axes == "optical" else _optical_name(camera))
     return Roles(replace(pose, axes=axes), frames, tuple(assumptions))
+
+
+def _refuse_another_sensor(frame: str) -> None:
+    """Refuse to take a frame for the radar's that is named like the vehicle's or another sensor's.
+
+    Raises:
+        InputError: it is.
+    """
+    if _OTHER_NAME.search(frame):
+        raise InputError(
+            f"{frame!r} is no radar by its name; if it is the radar's frame, say so with --radar-frame {frame}, or rename it; "
+            "else give the pose of the radar as well"
+        )
 
 
 _ASSUMED_AXES = {

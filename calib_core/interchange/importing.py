@@ -34,6 +34,7 @@ _KNOWN = (
     "npz, matrix"
 )
 
+_OF_FOLDERS = ("calib_velo_to_cam.txt", "images.txt")  # of KITTI and COLMAP, read with the file beside it
 _OTHERS = "; a pose that states nothing: cocalib import FILE lists what its numbers may mean"
 
 
@@ -85,8 +86,19 @@ def tree_files(paths: Sequence[Path]) -> tuple[TreeFile, ...]:
     Raises:
         InputError: one cannot be read, or a folder contains none.
     """
-    files = (file for path in paths for file in files_of_trees(path))
+    files = (file for path in paths for file in _files_at(path))
     return tuple(TreeFile(calibration_bytes(file), str(file)) for file in files)
+
+
+def _files_at(path: Path) -> tuple[Path, ...]:
+    """Return the files of a folder to read, or the file itself.
+
+    Raises:
+        InputError: the folder contains none, or very many.
+    """
+    whole = (path / name for name in _OF_FOLDERS if path.is_dir())
+    first = next((file for file in whole if file.is_file()), None)
+    return files_of_trees(path) if first is None else (first,)
 
 
 def files_beside(path: str | Path) -> Mapping[str, bytes]:
@@ -176,14 +188,17 @@ def _with_origin(found: ImportedCalibration, content: Content) -> ImportedCalibr
 def _refusal(content: Content, source: str) -> InputError:
     """Return the error for a file that no format recognizes, with what is in it."""
     if content.syntax == "bytes":
-        return InputError(f"{source}: neither text nor an archive; {_KNOWN}")
+        return InputError(f"{source}: neither text nor an archive; if it is text, save it as UTF-8; if not, {_KNOWN}")
     if content.syntax == "xml" and content.value is None:
         return InputError(f"{source}: XML with <{content.root.tag}>; expected OpenCV's <opencv_storage>")
     if content.syntax == "mcap":
         names = ", ".join(message.schema_name for message in content.mcap.messages[:12])
         return InputError(f"{source}: MCAP without foxglove.FrameTransforms (found {names or 'no message'}); {_KNOWN}")
+    if not content.text.strip():
+        return InputError(f"{source}: the file is empty; {_KNOWN}")
     value = content.value
-    found = ", ".join(map(str, list(value)[:12])) if isinstance(value, dict) else type(value).__name__
+    kind = "a list" if isinstance(value, list) else "text" if isinstance(value, str) else "one value"
+    found = ", ".join(map(str, list(value)[:12])) if isinstance(value, dict) else kind
     return InputError(
         f"{source}: no pose of a camera and a radar in it (found {found or 'nothing'}); {_KNOWN}{_OTHERS}"
     )

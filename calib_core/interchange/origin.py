@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.interchange.calibration_file import CalibrationFile
-from calib_core.interchange.evidence import Evidence, evidence_named
+from calib_core.interchange.evidence import Evidence, stated_evidence
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.results import Calibration
 
 __all__ = ["Origin", "missing_map", "origin_lines", "stated_origin"]
 
-_ORIGIN = re.compile(r"evidence: (\w+); from the calibration with sha256 ([0-9a-f]{64})")
+_ORIGIN = re.compile(r"evidence: ([^;\s]+); from the calibration with sha256 ([0-9a-f]{64})")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ def missing_map(calibration: Calibration) -> tuple[str, ...]:
 def stated_origin(text: str) -> Origin:
     """Find the evidence and the calibration's hash in a file's text."""
     match = _ORIGIN.search(text)
-    return Origin(evidence_named(match[1]), match[2]) if match else Origin()
+    return Origin(stated_evidence(match[1]), match[2]) if match else Origin()
 
 
 def _figures(calibration: Calibration) -> str:

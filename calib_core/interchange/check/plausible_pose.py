@@ -13,6 +13,8 @@ _FAR_M = 20.0
 _SIDEWAYS_RAD = np.radians(60.0)
 _FORWARD_RAD = np.radians(35.0)
 _NAMED = 3
+_PARALLEL = 1e-9
+_SEEN = 0.5
 
 
 def by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
@@ -23,6 +25,9 @@ def by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
     if distance_m > _FAR_M:
         message = f"the sensors are {distance_m:.4g} m apart"
         results.append(CheckResult("warning", "far-apart", message, "is the translation in millimetres?"))
+    if not verified and _is_placeholder(camera_from_radar):
+        message = "the camera is exactly at the radar's place, turned by exact right angles"
+        results.append(CheckResult("warning", "placeholder", message, "is this the placeholder of a template?"))
     off = _off_forward(camera_from_radar)
     if off > _SIDEWAYS_RAD and not verified:
         likely = [s for s in undone_slips(pose) if len(s.slips) == 1 and _is_forward(s.pose)]
@@ -33,7 +38,25 @@ def by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
         results.append(
             CheckResult("warning", "looks-elsewhere", message, hint if likely else "is it mounted like that?")
         )
+    lean = _lean(camera_from_radar)
+    if off <= _SIDEWAYS_RAD and lean > _SIDEWAYS_RAD and not verified:
+        message = f"the picture leans {np.degrees(lean):.0f} deg to one side"
+        hint = "if the camera is not mounted like that, perhaps its frame has other axes: optical (z forward) or body (x forward)"
+        results.append(CheckResult("warning", "on-its-side", message, hint))
     return results
+
+
+def _lean(camera_from_radar: RigidTransform) -> float:
+    """Return how far the radar's up axis leans to one side in the picture [rad]; 0 where it is seen from its end."""
+    right, down = camera_from_radar.rotation[0, 2], camera_from_radar.rotation[1, 2]
+    return abs(float(np.arctan2(right, -down))) if np.hypot(right, down) > _SEEN else 0.0
+
+
+def _is_placeholder(camera_from_radar: RigidTransform) -> bool:
+    """Return whether a pose is what templates contain: no distance, and axes that are parallel to the last digit."""
+    rotation = camera_from_radar.rotation
+    parallel = np.abs(np.abs(rotation) - np.abs(rotation).round()).max() <= _PARALLEL
+    return bool(parallel and not camera_from_radar.translation_m.any())
 
 
 def _off_forward(camera_from_radar: RigidTransform) -> float:

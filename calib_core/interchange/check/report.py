@@ -31,7 +31,7 @@ _ASSUMED = "what this pose rests on was assumed when it was imported, and its ow
 _OWN_WORD = frozenset({"check-point", "pairs"})
 """Results of what a file says of itself: no proof of a pose whose meaning was assumed."""
 _DIFFERENCES = frozenset({"disagrees"})
-_IMPLAUSIBLE = frozenset({"far-apart", "looks-elsewhere"})
+_IMPLAUSIBLE = frozenset({"far-apart", "looks-elsewhere", "on-its-side", "placeholder"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,5 +1,7 @@
 """A COLMAP text model of one image, with the radar frame as world frame."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from calib_core.camera import Camera
@@ -8,7 +10,7 @@ from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.statement import hash_comment, statement, with_statement
+from calib_core.interchange.formats.statement import hash_comment, stated_frames, statement, with_statement
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.content import Content
@@ -23,6 +25,7 @@ _NOTES = (
     "COLMAP puts the centre of the top-left pixel at (0.5, 0.5), so the principal point is half a pixel larger",
 )
 _HALF_PIXEL = 0.5
+_WORLD = "the file does not say what its world frame is; taken to be the radar's (x forward, y left, z up), in metres"
 
 
 def _write(file: CalibrationFile) -> bytes:
@@ -55,16 +58,29 @@ def _colmap_camera(camera: Camera) -> tuple[str, list[float]]:
 
 
 def _recognizes(content: Content) -> bool:
-    return any("images.txt" in name for name in content.members)
+    if any("images.txt" in name for name in content.members):
+        return True
+    return "cameras.txt" in content.beside and content.syntax == "lines" and _is_image(content.lines[:1])
+
+
+def _is_image(lines: Sequence[str]) -> bool:
+    """Return whether a line is that of an image: its id, seven numbers, the camera's id and a name."""
+    words = lines[0].split() if lines else []
+    try:
+        return len(words) == 10 and len([float(word) for word in words[:9]]) == 9
+    except ValueError:
+        return False
 
 
 def _read(content: Content, source: str) -> ImportedCalibration:
-    """Read the image of a zipped COLMAP text model and its camera.
+    """Read the image of a COLMAP text model and its camera: zipped, or images.txt with cameras.txt beside it.
 
     Raises:
         InputError: a file or a number is missing, or there are several images.
     """
     members = {name.rsplit("/", 1)[-1]: data for name, data in content.members.items()}
+    if content.syntax == "lines":
+        members = {**content.beside, "images.txt": content.text.encode()}
     if not {"cameras.txt", "images.txt"} <= set(members):
         raise InputError(f"{source}: cameras.txt or images.txt is missing; give a zipped COLMAP text model")
     text = members["images.txt"].decode("utf-8", errors="replace")
@@ -78,6 +94,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         "colmap",
         WrittenPose("quaternion_wxyz", np.array(numbers[:4]), np.array(numbers[4:]), "camera_from_radar"),
         camera=_camera(camera, source=source),
+        assumptions=() if stated_frames(text) else (_WORLD,),
     )
     return with_statement(found, text).checked(source)
 
@@ -119,5 +136,5 @@ COLMAP = Format(
     comment="#",
     notes=_NOTES,
     write=_write,
-    reads=Reads(_recognizes, _read),
+    reads=Reads(_recognizes, _read, beside=("cameras.txt",)),
 )

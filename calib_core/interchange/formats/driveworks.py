@@ -16,7 +16,7 @@ from calib_core.interchange.rotations import LINK_FROM_OPTICAL, matrix_from_rpy,
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.json_text import json_text
 
-__all__ = ["DRIVEWORKS"]
+__all__ = ["CORRECTED", "DRIVEWORKS", "is_corrected", "posed_sensor"]
 
 _NOTES = (
     "nominalSensor2Rig_FLU is the sensor's pose in the rig: metres, roll-pitch-yaw in degrees about fixed axes, the camera with "
@@ -26,10 +26,11 @@ _NOTES = (
 )
 _POSE = "nominalSensor2Rig_FLU"
 _ROTATION_CORRECTION, _POSITION_CORRECTION = "correction_sensor_R_FLU", "correction_rig_T"
-_CORRECTED = (
+CORRECTED = (
     f"the format's description does not say how corrections apply; {_ROTATION_CORRECTION} was applied in the sensor's frame "
     f"(nominal times correction) and {_POSITION_CORRECTION} added in the rig's, as published readers of such rigs do"
 )
+"""What reading takes for granted where a sensor has corrections."""
 
 
 def _write(file: CalibrationFile) -> str:
@@ -79,7 +80,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         raise InputError(
             f"{source}: rig.sensors: {len(radars)} radars and {len(cameras)} cameras by protocol; keep one of each"
         )
-    rig_from_radar, rig_from_link = (_posed(sensor, source=source) for sensor in (radars[0], cameras[0]))
+    rig_from_radar, rig_from_link = (posed_sensor(sensor, source=source) for sensor in (radars[0], cameras[0]))
     pose, both, note = rig_from_link, None, "the format defines the camera axes as body axes (x forward, y left, z up)"
     if np.abs(rig_from_radar.as_written().as_matrix() - np.eye(4)).max() > 0:
         radar_from_link = rig_from_radar.as_written().inverse() @ rig_from_link.as_written()
@@ -87,14 +88,19 @@ def _read(content: Content, source: str) -> ImportedCalibration:
             "matrix", radar_from_link.rotation, radar_from_link.translation_m, "radar_from_camera", "link"
         )
         both = rig_from_radar, rig_from_link
-    assumptions = (_CORRECTED,) if any(_is_corrected(sensor) for sensor in (radars[0], cameras[0])) else ()
+    assumptions = (CORRECTED,) if any(is_corrected(sensor) for sensor in (radars[0], cameras[0])) else ()
     properties = cameras[0].get("properties")
     text = stated_lines(properties.get(STATEMENT_KEY)) if isinstance(properties, Mapping) else ""
     found = ImportedCalibration("driveworks", pose, notes=(note,), assumptions=assumptions, in_third_frame=both)
     return with_statement(found, text).checked(source)
 
 
-def _posed(sensor: Mapping[str, Any], *, source: str) -> WrittenPose:
+def posed_sensor(sensor: Mapping[str, Any], *, source: str) -> WrittenPose:
+    """Return a sensor's pose in the rig with its corrections applied, as written if it has none.
+
+    Raises:
+        InputError: a number is missing, or a correction is of an unknown kind.
+    """
     place = f"rig.sensors {sensor.get('name')!r}"
     known = (_ROTATION_CORRECTION, _POSITION_CORRECTION)
     for key in sensor:
@@ -106,7 +112,7 @@ def _posed(sensor: Mapping[str, Any], *, source: str) -> WrittenPose:
     angles_deg = floats(pose.get("roll-pitch-yaw"), source=source, place=f"{place}.roll-pitch-yaw", length=3)
     position_m = floats(pose.get("t"), source=source, place=f"{place}.t", length=3)
     nominal = WrittenPose("rpy", np.deg2rad(angles_deg), np.array(position_m), "radar_from_camera", "link", "deg")
-    if not _is_corrected(sensor):
+    if not is_corrected(sensor):
         return nominal
     turn_deg = _correction(sensor, _ROTATION_CORRECTION, source=source, place=place)
     shift_m = _correction(sensor, _POSITION_CORRECTION, source=source, place=place)
@@ -114,7 +120,8 @@ def _posed(sensor: Mapping[str, Any], *, source: str) -> WrittenPose:
     return WrittenPose("matrix", rotation, np.array(position_m) + shift_m, "radar_from_camera", "link")
 
 
-def _is_corrected(sensor: Mapping[str, Any]) -> bool:
+def is_corrected(sensor: Mapping[str, Any]) -> bool:
+    """Return whether a sensor has a correction that is not zero."""
     return any(any(_numbers(sensor[key])) for key in (_ROTATION_CORRECTION, _POSITION_CORRECTION) if key in sensor)
 
 

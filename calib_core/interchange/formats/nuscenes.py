@@ -12,7 +12,13 @@ from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix
 from calib_core.interchange.calibration_file import CalibrationFile
 from calib_core.interchange.cameras.fields import floats
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.statement import STATEMENT_KEY, stated_lines, statement, with_statement
+from calib_core.interchange.formats.statement import (
+    STATEMENT_KEY,
+    stated_frames,
+    stated_lines,
+    statement,
+    with_statement,
+)
 from calib_core.interchange.imported import ImportedCalibration, WrittenPose
 from calib_core.interchange.syntax.content import Content, decoded
 from calib_core.interchange.syntax.json_text import json_text
@@ -101,6 +107,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         assumptions.append("no radar record; assumed that the ego frame is the radar frame")
         found = ImportedCalibration("nuscenes", camera_pose, assumptions=tuple(assumptions), matrix_px=matrix_px)
         return with_statement(found, text).checked(source)
+    if stated_frames(text) is None:
+        assumptions.append("the sensor without camera_intrinsic is taken to be the radar")
     radar_pose, both = _posed(radars[0], source=source), None
     ego_from_radar = radar_pose.as_written()
     if np.abs(ego_from_radar.as_matrix() - np.eye(4)).max() > 0:

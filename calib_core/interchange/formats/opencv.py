@@ -9,15 +9,19 @@ from calib_core.errors import InputError
 from calib_core.geometry import rotation_log
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
 from calib_core.interchange.cameras.fields import find_cameras, floats
+from calib_core.interchange.evidence import stated_evidence
 from calib_core.interchange.format import Format, Reads
 from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
+from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.syntax.yaml_text import numbers_text, quoted
 from calib_core.lens_models.naming import written_lens
 
 __all__ = ["OPENCV"]
+
+_OF_SECOND_CAMERA = ("M2", "K2", "cameraMatrix2", "camera_matrix_2", "R2", "P2")
 
 
 def _write(file: CalibrationFile) -> str:
@@ -50,6 +54,7 @@ def _write(file: CalibrationFile) -> str:
         + hash_comment(statement(file, meaning))
         + f"equation: {quoted(EQUATION)}\n"
         + f"radar_frame: {quoted(file.frames.radar)}\ncamera_frame: {quoted(file.frames.camera)}\n"
+        + f"evidence: {quoted(file.rests_on)}\ncalibration_sha256: {quoted(calibration_sha256(file))}\n"
         + f"image_width: {camera.width_px}\nimage_height: {camera.height_px}\n"
         + f"distortion_model: {quoted(lens.name)}\nprojection_function: {quoted(function)}\n"
         + "".join(_matrix(key, matrix) for key, matrix in matrices)
@@ -73,6 +78,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         InputError: a number is missing.
     """
     values = content.mapping
+    _refuse_stereo(values, source=source)
     rotation = floats(values["R"], source=source, place="R", length=9)
     translation_m = floats(values["T"], source=source, place="T", length=3)
     cameras = find_cameras(values, source=source)
@@ -88,7 +94,22 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         frames=frames,
         check_point=_check_point(values, source) or stated_check_point(content.text),
         assumptions=assumptions,
+        evidence=stated_evidence(str(values["evidence"])) if values.get("evidence") else None,
+        calibration_sha256=str(values.get("calibration_sha256") or "") or None,
     ).checked(source)
+
+
+def _refuse_stereo(values: Mapping[str, Any], *, source: str) -> None:
+    """Refuse what stereoCalibrate wrote: its R and T are between two cameras.
+
+    Raises:
+        InputError: the file has a second camera.
+    """
+    second = next((key for key in _OF_SECOND_CAMERA if key in values), None)
+    if second is not None:
+        raise InputError(
+            f"{source}: a stereo pair ({second}): its R and T are between two cameras; give those between radar and camera"
+        )
 
 
 def _check_point(values: Mapping[str, Any], source: str) -> StatedCheckPoint | None:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from calib_core.interchange.imported import looks_like_camera, looks_like_radar
+from calib_core.interchange.imported import Direction, looks_like_camera, looks_like_radar
 
 __all__ = ["KeyHints", "Part", "hints_of", "part_of", "unit_in", "words_of"]
 
@@ -63,8 +63,9 @@ _OF_AXES = {
 }
 _OTHERS = frozenset(
     {"lidar", "velo", "velodyne", "livox", "ouster", "hesai", "imu", "gps", "gnss", "ego", "vehicle", "chassis"}
-    | {"base", "world", "map"}
+    | {"base", "world", "map", "robot", "rig", "platform", "odom", "gripper", "tool", "flange", "effector", "drone"}
 )
+_NAMED = 0.2
 _FROM, _TO = ("from", "wrt", "in"), ("to", "2")
 
 
@@ -78,7 +79,8 @@ class KeyHints:
         radar_axes: the same for the radar.
         unit: of length that a name mentions; "" if none does.
         names_radar: whether a name mentions a radar.
-        other: another sensor or frame that a name mentions although none mentions a radar, such as "lidar"; "" if none does.
+        other: another sensor or frame that a name mentions although none mentions a radar, or none a camera, such as
+            "lidar"; "" if none does.
     """
 
     carries_radar: float = 0.5
@@ -87,6 +89,13 @@ class KeyHints:
     unit: str = ""
     names_radar: bool = False
     other: str = ""
+
+    @property
+    def named_direction(self) -> Direction | None:
+        """The direction that the names state; None if they leave it open."""
+        if abs(self.carries_radar - 0.5) < _NAMED:
+            return None
+        return "camera_from_radar" if self.carries_radar > 0.5 else "radar_from_camera"
 
 
 def words_of(key: object) -> tuple[str, ...]:
@@ -127,8 +136,10 @@ def hints_of(keys: Sequence[object], texts: Sequence[str] = ()) -> KeyHints:
     innermost = next((hint for name in names if (hint := _direction(words_of(name))) != 0.5), 0.5)
     units = [*(unit_in(key) for key in reversed(keys)), *(_UNITS.get(text.strip().lower(), "") for text in texts)]
     unit = next((unit for unit in units if unit in ("mm", "cm", "m")), "")
-    names_radar = any(looks_like_radar(word) for one in (*keys, *texts) for word in words_of(one))
-    other = "" if names_radar else next((word for word in words if word in _OTHERS), "")
+    said = [word for one in (*keys, *texts) for word in words_of(one)]
+    names_radar = any(map(looks_like_radar, said))
+    names_both = names_radar and any(map(looks_like_camera, said))
+    other = "" if names_both else next((word for word in words if word in _OTHERS), "")
     return KeyHints(innermost, axes.get("camera", ""), axes.get("radar", ""), unit, names_radar, other)
 
 

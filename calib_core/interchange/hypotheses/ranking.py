@@ -13,7 +13,7 @@ from calib_core.interchange.hypotheses.found_poses import FoundPose
 from calib_core.interchange.hypotheses.meanings import Meaning, meanings_of
 from calib_core.interchange.hypotheses.mounting import is_usual, mounting_weight, mounting_words
 
-__all__ = ["Hypothesis", "clear_one", "hypotheses_of", "likely_ones"]
+__all__ = ["Hypothesis", "clear_one", "contradicts_names", "hypotheses_of", "likely_ones"]
 
 _SAME_RAD, _SAME_M = 1e-4, 1e-4
 _CLEAR = 0.95
@@ -99,7 +99,9 @@ def hypotheses_of(
 
 
 def clear_one(pose: FoundPose, hypotheses: Sequence[Hypothesis]) -> Hypothesis | None:
-    """Return the only hypothesis that is plausible; None if several are, or none, or if the pose seems to be another sensor's.
+    """Return the only hypothesis that is plausible; None if several are, or none.
+
+    Without a test it is also None if the pose seems to be another sensor's, or if its names state the other direction.
 
     Args:
         pose: the numbers.
@@ -107,7 +109,14 @@ def clear_one(pose: FoundPose, hypotheses: Sequence[Hypothesis]) -> Hypothesis |
     """
     first = hypotheses[0]
     tested = not (math.isnan(first.miss_px) and math.isnan(first.apart[0]))
-    return first if first.fits and first.share >= _CLEAR and (tested or not pose.hints.other) else None
+    as_named = not pose.hints.other and not contradicts_names(pose, first)
+    return first if first.fits and first.share >= _CLEAR and (tested or as_named) else None
+
+
+def contradicts_names(pose: FoundPose, hypothesis: Hypothesis) -> bool:
+    """Return whether the names around a pose state the other direction than a hypothesis about it."""
+    named = pose.hints.named_direction
+    return named is not None and all(meaning.direction != named for meaning in hypothesis.meanings)
 
 
 def likely_ones(hypotheses: Sequence[Hypothesis]) -> Sequence[Hypothesis]:

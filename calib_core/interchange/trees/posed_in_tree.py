@@ -49,6 +49,8 @@ def chained_calibration(content: Content, frames: WantedFrames, *, source: str) 
     if not frames.is_given and below is None and (stated is not None or not may_have_several_joints(content)):
         return None
     part = tree_in(content, content.text, source)
+    if part is not None and not part.joints and part.hint:
+        raise InputError(f"{source}: no joint in it that can be read; {part.hint}")
     if part is None or not part.joints or (len(part.joints) < 2 and below is None and not frames.is_given):
         return None
     if below is not None and stated is not None:

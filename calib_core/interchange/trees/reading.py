@@ -1,4 +1,4 @@
-"""Read the frame tree in one file, several files or a folder: URDF, transforms of ROS, Autoware, Apollo, nuScenes, DriveWorks."""
+"""Read the frame tree in one file, several files or a folder: URDF, transforms of ROS, Autoware, Apollo, nuScenes, rigs."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from calib_core.interchange.trees.joint import Joint
 from calib_core.interchange.trees.readers.autoware import read_autoware, recognizes_autoware
 from calib_core.interchange.trees.readers.camera_frames import cameras_named_in
 from calib_core.interchange.trees.readers.driveworks import has_one_of_each, read_driveworks, recognizes_driveworks
+from calib_core.interchange.trees.readers.foxglove import has_several_transforms, read_foxglove, recognizes_foxglove
 from calib_core.interchange.trees.readers.nuscenes import read_nuscenes, recognizes_poses, recognizes_sensors
 from calib_core.interchange.trees.readers.publishers import PUBLISHER, read_publishers, recognizes_publishers
 from calib_core.interchange.trees.readers.stamped import read_stamped, recognizes_stamped
@@ -90,6 +91,8 @@ def tree_in(content: Content, text: str, source: str) -> TreePart | None:
         return read_autoware(text, source)
     if recognizes_driveworks(content):
         return read_driveworks(content, source)
+    if recognizes_foxglove(content):
+        return read_foxglove(content, source)
     if recognizes_poses(content) and len(content.value) > 2:
         return next(_posed_by_tables([(content, source)], {}))
     return None
@@ -101,6 +104,8 @@ def may_have_several_joints(content: Content) -> bool:
         return content.text.count(PUBLISHER) > 1
     if recognizes_driveworks(content):
         return not has_one_of_each(content)
+    if recognizes_foxglove(content):
+        return has_several_transforms(content)
     if recognizes_stamped(content):
         return len(content.documents) > 1 or len(content.mapping.get("transforms") or ()) > 1
     return True

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from calib_core.errors import InputError
-from calib_core.geometry import RigidTransform
+from calib_core.geometry import RigidTransform, rotation_exp
 from calib_core.interchange import (
     FORMATS,
     CalibrationFile,
@@ -30,6 +30,7 @@ from calib_core.interchange import (
     read_camera,
     write_calibration,
 )
+from calib_core.interchange.rotations import quaternion_xyzw_from_matrix
 from calib_core.interchange.syntax.mat_file import load_mat
 from calib_core.interchange.syntax.zip_archives import pack, unpack
 
@@ -222,6 +223,34 @@ def test_a_bare_matrix_that_looks_sideways_is_a_warning_with_a_guess(file):
     assert "the direction is swapped" in result.hint
 
 
+def test_a_camera_that_lies_on_its_side_is_doubtful_where_its_axes_are_assumed():
+    optical_in_radar = rotation_exp(np.array([0, 0, np.radians(95)])) @ np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
+    x, y, z, w = quaternion_xyzw_from_matrix(optical_in_radar)
+    text = f"static_transform_publisher 1 0 0 {x} {y} {z} {w} radar camera_left"
+
+    report = check(read_any(text, "file"))
+
+    assert [result.code for result in report.results if result.level == "warning"] == ["on-its-side"]
+    assert report.verdict == "doubtful"
+    assert check(read_any(text.replace("camera_left", "camera_left_optical"))).results[0].code == "looks-elsewhere"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n",
+        '<robot name="car"><link name="radar"/><link name="camera_link"/><joint name="j" type="fixed"><parent link="radar"/>'
+        '<child link="camera_link"/><origin xyz="0 0 0" rpy="0 0 0"/></joint></robot>',
+    ],
+    ids=["matrix", "urdf"],
+)
+def test_the_identity_of_a_template_is_doubtful(text):
+    report = check(read_any(text, "file"))
+
+    assert "placeholder" in [result.code for result in report.results if result.level == "warning"]
+    assert report.verdict == "doubtful"
+
+
 def test_a_check_point_in_pixels_without_a_camera_is_reported_as_unused(file):
     text = text_of(file, "opencv").replace("image_width: 640\n", "")
     text = without_comments(text)
@@ -276,7 +305,7 @@ def test_the_pixel_uncertainty_is_what_scattered_poses_show(file):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("", "no pose of a camera and a radar in it"),
+        ("", "the file is empty"),
         ("hello: world", "no pose of a camera and a radar in it .found hello"),
         ("{}", "no pose of a camera and a radar in it"),
         ("[]", "0 records with camera_intrinsic"),

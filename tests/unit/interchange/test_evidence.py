@@ -93,8 +93,21 @@ def test_an_export_states_figures_verdict_and_warnings(file):
 
 def test_what_a_text_states_in_other_words_is_no_origin():
     assert stated_origin("evidence: clicked") == stated_origin("")
-    broken = "evidence: certain; from the calibration with sha256 " + "0" * 64
-    assert stated_origin(broken).evidence is None
+
+
+@pytest.mark.parametrize("level", ["certain", "imported-assumed"])
+def test_a_level_that_is_not_known_counts_as_the_weakest(level):
+    text = f"evidence: {level}; from the calibration with sha256 {'0' * 64}"
+    assert stated_origin(text).evidence == "imported_assumed"
+
+
+def test_opencvs_storage_keeps_the_evidence_where_a_program_writes_it_again_without_comments(file):
+    assumed = dataclasses.replace(file, evidence="imported_assumed")
+    rewritten = "".join(line for line in text_of(assumed, "opencv").splitlines(keepends=True) if line[0] != "#")
+    found = read_any(rewritten)
+    assert (found.evidence, found.calibration_sha256) == ("imported_assumed", calibration_sha256(assumed))
+    assert found.check_point is not None
+    assert adopt(found, "t.yml", camera=file.calibration.camera).rests_on == "imported_assumed"
 
 
 def test_a_bare_matrix_is_assumed_and_a_check_point_proves_a_file(file):

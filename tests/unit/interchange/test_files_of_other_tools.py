@@ -1,6 +1,8 @@
 """Readers of other tools' files: variants of each shape, what they refuse, and what they take for granted."""
 
+import io
 import json
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,7 @@ import pytest
 
 from calib_core.camera import Camera
 from calib_core.errors import InputError
-from calib_core.interchange import CalibrationFile, export, read_any, read_calibration
+from calib_core.interchange import CalibrationFile, WantedFrames, export, read_any, read_any_file, read_calibration
 from calib_core.interchange.formats.foreign.pose_parts import direction_by_facing
 
 FORWARD = [0.1, -0.2, 0.3, -0.5, 0.5, -0.5, 0.5]  # a camera that looks along the radar's x axis, x y z qx qy qz qw
@@ -141,7 +143,7 @@ def test_of_several_extrinsics_the_one_of_the_radar_is_taken():
         ({"extrinsics": {"translation": dict(x=0, y=0, z=0)}}, "extrinsics.rotation: missing"),
         (
             {"transforms": [{"parent_frame_id": "base", "child_frame_id": name} for name in ("camera", "radar")]},
-            "contains 2 transforms",
+            "transforms[0].translation: missing",
         ),
     ],
 )
@@ -230,3 +232,107 @@ def test_a_log_line_before_the_text_is_not_taken_for_json():
     text = "[INFO] [1.5] [tf2_echo]: Waiting for transform radar ->  camera_optical: no\n" + echo(POSITION, TURN)
     assert read_any(text).format == "tf-echo"
     assert "not JSON" in refusal("[1, 2")
+
+
+def test_a_stereo_pair_is_not_taken_for_radar_and_camera():
+    matrices = "".join(
+        f"{key}: !!opencv-matrix\n   rows: 3\n   cols: {len(values) // 3}\n   dt: d\n   data: {values}\n"
+        for key, values in {
+            "M1": [5.0] * 9,
+            "M2": [5.0] * 9,
+            "R": [1, 0, 0, 0, 1, 0, 0, 0, 1],
+            "T": [-0.1, 0, 0],
+        }.items()
+    )
+    assert "a stereo pair (M2): its R and T are between two cameras" in refusal("%YAML:1.0\n---\n" + matrices)
+
+
+def test_openlabels_radar_of_another_stream_type_is_found_by_its_name():
+    systems = {
+        name: {"type": "sensor_cs", "parent": "car", "pose_wrt_parent": {"matrix4x4": np.ravel(matrix).tolist()}}
+        for name, matrix in (("RADAR_FRONT", np.eye(4)), ("CAM_FRONT", MATRIX))
+    }
+    label = labelled(systems, {"RADAR_FRONT": {"type": "other"}, "CAM_FRONT": {"type": "camera"}})
+    np.testing.assert_allclose(read_any(json.dumps(label)).pose.as_written().as_matrix(), MATRIX)
+
+
+def test_a_folder_of_colmaps_text_files_is_read_as_its_archive(tmp_path, file):
+    unpacked = zipfile.ZipFile(io.BytesIO(export(file, "colmap").data))
+    unpacked.extractall(tmp_path)
+
+    found = read_any_file(tmp_path)
+
+    assert found.camera is not None
+    np.testing.assert_allclose(found.camera.matrix_px, file.calibration.camera.matrix_px, rtol=1e-12)
+    assert found.evidence == file.rests_on
+    assert found.assumptions == ()
+    np.testing.assert_allclose(
+        found.camera_from_radar.as_matrix(), file.calibration.camera_from_radar.as_matrix(), rtol=0, atol=1e-12
+    )
+    images = tmp_path / "images.txt"
+    images.write_text("".join(line for line in images.read_text().splitlines(keepends=True) if line[0] != "#"))
+    assert "what its world frame is" in read_any_file(images).assumptions[0]
+    images.write_text(images.read_text() * 2)
+    with pytest.raises(InputError, match="contains 2 images"):
+        read_any_file(images)
+
+
+def test_kittis_folder_is_read_and_its_imu_refused(tmp_path):
+    numbers = "calib_time: 1\nR: 0 -1 0 0 0 -1 1 0 0\nT: 0.1 0.2 0.3\n"
+    (tmp_path / "calib_imu_to_velo.txt").write_text(numbers)
+    (tmp_path / "calib_velo_to_cam.txt").write_text(numbers)
+
+    np.testing.assert_array_equal(read_any_file(tmp_path).pose.translation_m, [0.1, 0.2, 0.3])
+    with pytest.raises(InputError, match=r"between IMU and Velodyne.*give calib_velo_to_cam.txt"):
+        read_any_file(tmp_path / "calib_imu_to_velo.txt")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [("", "the file is empty"), ("no pose at all", "found text"), ("Größe: 1".encode("latin-1"), "save it as UTF-8")],
+)
+def test_a_file_without_a_calibration_is_named_in_words(content, words):
+    with pytest.raises(InputError, match=words):
+        read_any(content, "file")
+
+
+def _published(parent: str, child: str, position: list[float]) -> str:
+    numbers = " ".join(map(str, position + TURN))
+    return f"ros2 run tf2_ros static_transform_publisher {numbers} {parent} {child}\n"
+
+
+@pytest.mark.parametrize("other", ["base_link", "velodyne", "imu_link", "novatel"])
+def test_the_camera_in_the_vehicle_or_another_sensor_is_not_taken_for_the_radars(other):
+    text = _published(other, "camera_optical", POSITION)
+    assert (
+        f"{other!r} is no radar by its name; if it is the radar's frame, say so with --radar-frame {other}"
+        in refusal(text)
+    )
+    named = read_any(text, "file", WantedFrames(other))
+    np.testing.assert_allclose(named.pose.as_written().translation_m, POSITION)
+    transform = {
+        "parent_frame_id": other,
+        "child_frame_id": "camera_optical",
+        "translation": dict(zip("xyz", POSITION, strict=True)),
+        "rotation": dict(zip("xyzw", TURN, strict=True)),
+    }
+    assert "is no radar by its name" in refusal(transform)
+    assert read_any(json.dumps(transform), "file", WantedFrames(other)).frames.radar == other
+
+
+def test_the_frame_that_is_a_camera_by_name_is_never_the_radars():
+    found = read_any(_published("camera_optical", "front_sensor", POSITION))
+    assert (found.frames.radar, found.frames.camera) == ("front_sensor", "camera_optical")
+    assert found.pose.direction == "camera_from_radar"
+    assert "assumed 'front_sensor'" in found.assumptions[0]
+
+
+def test_an_echo_with_too_few_decimals_is_refused_with_how_to_print_more():
+    assert "too few decimals; print more with -p 9" in refusal(echo(POSITION, [0.6, -0.4, 0.4, -0.5]))
+
+
+def test_nuscenes_says_which_of_two_unnamed_sensors_is_taken_for_the_radar():
+    pose = {"translation": [0, 0, 1], "rotation": [0.5, -0.5, 0.5, -0.5]}
+    camera = pose | {"camera_intrinsic": [[500, 0, 320], [0, 500, 240], [0, 0, 1]]}
+    found = read_any(json.dumps([camera, {"translation": [0, 0, 0], "rotation": [1, 0, 0, 0], "camera_intrinsic": []}]))
+    assert "the sensor without camera_intrinsic is taken to be the radar" in found.assumptions

@@ -1,6 +1,7 @@
 """KITTI's raw data (calib_velo_to_cam.txt with calib_cam_to_cam.txt beside it) and odometry (calib.txt with Tr)."""
 
 from collections.abc import Mapping
+from pathlib import PurePath
 
 import numpy as np
 
@@ -53,8 +54,12 @@ def _read_raw(content: Content, source: str) -> ImportedCalibration:
     """Read the Velodyne's pose, in the rectified camera 2 if the cameras' file is beside it.
 
     Raises:
-        InputError: a line is missing or has the wrong number of values.
+        InputError: a line is missing or has the wrong number of values, or by its name the file is about the IMU.
     """
+    if "imu_to_velo" in PurePath(source).name:
+        raise InputError(
+            f"{source}: KITTI's pose between IMU and Velodyne, without a camera; give calib_velo_to_cam.txt"
+        )
     lines = _keyed(content.text, source=source)
     rotation = _numbers(lines, "R", 9, source=source)
     translation_m = _numbers(lines, "T", 3, source=source)

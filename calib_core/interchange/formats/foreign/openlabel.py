@@ -36,6 +36,7 @@ _ASSUMPTIONS = (
     "assumed that pose_wrt_parent is the pose in the parent, as the standard words it; some data sets write the inverse",
     "assumed a radar with x forward, y left, z up, and optical camera axes",
 )
+_UNTYPED = (None, "", "other")  # OpenLABEL's types of streams are camera, lidar, radar, gps_imu and other
 
 
 def _write(file: CalibrationFile) -> str:
@@ -134,7 +135,7 @@ def _one(systems: Mapping[str, Any], streams: Mapping[str, Any], role: str, *, s
     """Return the one coordinate system of a radar or camera, by the type of its stream, else by name."""
     by_name = looks_like_radar if role == "radar" else looks_like_camera
     typed = {name: _mapping(streams, name).get("type") for name in systems}
-    fitting = [name for name in systems if typed[name] == role or (not typed[name] and by_name(name))]
+    fitting = [name for name in systems if typed[name] == role or (typed[name] in _UNTYPED and by_name(name))]
     if len(fitting) != 1:
         named = f" ({', '.join(fitting)})" if fitting else ""
         raise InputError(

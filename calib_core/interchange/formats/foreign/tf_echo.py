@@ -23,6 +23,7 @@ _NAMES = (re.compile(r"tf2?_echo\s+(\S+)\s+(\S+)"), re.compile(r"Waiting for tra
 _PRINTED = "printed with three decimals: the translation is good to 0.5 mm"
 _ROUNDED_M, _ROUNDED_DEG = 0.002, 0.3
 _STEEP_DEG = 89.0
+_LENGTH = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,6 +74,10 @@ def _one(text: str, *, source: str) -> _Printed:
         raise InputError(f"{source}: a translation without its quaternion; copy the whole output")
     position_m = _numbers(translation[1], 3, "Translation", source=source)
     xyzw = _numbers(quaternion[1], 4, "Rotation: in Quaternion", source=source)
+    if abs(float(np.linalg.norm(xyzw)) - 1.0) > _LENGTH:
+        raise InputError(
+            f"{source}: the quaternion's length is {np.linalg.norm(xyzw):.4g}: too few decimals; print more with -p 9"
+        )
     by_quaternion = rigid("quaternion_xyzw", xyzw, position_m, source=source)
     as_written = WrittenPose("quaternion_xyzw", np.array(xyzw), np.array(position_m), "radar_from_camera")
     if degrees is None:

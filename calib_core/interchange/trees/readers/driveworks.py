@@ -1,12 +1,11 @@
-"""The joints of a DriveWorks rig: each sensor's nominal pose in the rig, angles in degrees, all with body axes."""
+"""The joints of a DriveWorks rig: each sensor's pose in the rig with its corrections, all with body axes."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from calib_core.interchange.cameras.fields import floats
-from calib_core.interchange.imported import WrittenPose
+from calib_core.errors import InputError
+from calib_core.interchange.formats.driveworks import CORRECTED, is_corrected, posed_sensor
 from calib_core.interchange.syntax.content import Content
 from calib_core.interchange.trees.frame_tree import Sensor
 from calib_core.interchange.trees.joint import Joint, Place
@@ -33,29 +32,25 @@ def has_one_of_each(content: Content) -> bool:
 
 
 def read_driveworks(content: Content, source: str) -> TreePart:
-    """Read every sensor with a pose.
-
-    Raises:
-        InputError: a number is missing, or is none.
-    """
+    """Read every sensor with a pose; a joint whose numbers or corrections cannot be read cannot be used."""
     sensors = [one for one in content.mapping["rig"]["sensors"] if isinstance(one, Mapping) and one.get("name")]
     posed = [one for one in sensors if isinstance(one.get(_POSE), Mapping)]
     joints = tuple(_joint(one, content.text, source) for one in posed)
-    return TreePart("driveworks", joints, tuple(map(_sensor, posed)), notes=(_NOTE,))
+    corrected = any(is_corrected(one) for one in posed)
+    return TreePart(
+        "driveworks", joints, tuple(map(_sensor, posed)), notes=(_NOTE, CORRECTED) if corrected else (_NOTE,)
+    )
 
 
 def _joint(sensor: Mapping[str, Any], text: str, source: str) -> Joint:
-    name, pose = str(sensor["name"]), sensor[_POSE]
+    name = str(sensor["name"])
     at = text.find(f'"{name}"')
     place = Place(source, text.count("\n", 0, at) + 1 if at >= 0 else None)
-    corrected = [key for key in sensor if key.startswith("correction_") and any(_numbers(sensor[key]))]
-    if corrected:
-        problem = f"{corrected[0]} is not zero; apply the correction to {_POSE} first"
-        return Joint(_RIG, name, None, place, problem=problem)
-    angles_deg = floats(pose.get("roll-pitch-yaw"), source=source, place=f"{name}.roll-pitch-yaw", length=3)
-    position_m = floats(pose.get("t"), source=source, place=f"{name}.t", length=3)
-    written = WrittenPose("rpy", np.deg2rad(angles_deg), np.array(position_m), "radar_from_camera")
-    return Joint.posed(_RIG, name, written, place)
+    try:
+        written = posed_sensor(sensor, source=source)
+    except InputError as error:  # only of importance if this joint is used
+        return Joint(_RIG, name, None, place, problem=str(error).removeprefix(f"{source}: "))
+    return Joint.posed(_RIG, name, replace(written, axes="optical"), place)
 
 
 def _sensor(sensor: Mapping[str, Any]) -> Sensor:
@@ -63,8 +58,3 @@ def _sensor(sensor: Mapping[str, Any]) -> Sensor:
     if protocol.startswith("camera"):
         return Sensor(str(sensor["name"]), "camera", "link")
     return Sensor(str(sensor["name"]), "radar" if protocol.startswith("radar") else "other")
-
-
-def _numbers(value: Any) -> list[Any]:
-    inner = value.get("roll-pitch-yaw") if isinstance(value, Mapping) else value
-    return list(inner) if isinstance(inner, list) else [inner]

@@ -1,5 +1,7 @@
 """The joints of stamped transforms in YAML: Apollo's extrinsics, and what `ros2 topic echo /tf_static` prints."""
 
+from typing import Any
+
 import numpy as np
 
 from calib_core.errors import InputError
@@ -16,12 +18,19 @@ _NUMBERS = (("translation", "xyz"), ("rotation", "xyzw"))
 
 
 def recognizes_stamped(content: Content) -> bool:
-    """Return whether each document of a YAML file is a stamped transform, or a list of them."""
-    documents = content.documents
-    return bool(documents) and all(
-        isinstance(one, dict) and ("child_frame_id" in one or isinstance(one.get("transforms"), list))
-        for one in documents
-    )
+    """Return whether each document of a YAML file, or the JSON, is a stamped transform, or a list of them."""
+    documents = content.documents or (content.json_mapping,)
+    return all(map(_is_stamped, documents))
+
+
+def _is_stamped(value: Any) -> bool:
+    """Return whether a value is a stamped transform or a list of them, and not Foxglove's, which names its parent otherwise."""
+    if not isinstance(value, dict):
+        return False
+    listed = value.get("transforms")
+    if isinstance(listed, list):
+        return not any(isinstance(one, dict) and "parent_frame_id" in one for one in listed)
+    return "child_frame_id" in value and "parent_frame_id" not in value
 
 
 def read_stamped(text: str, source: str) -> TreePart:

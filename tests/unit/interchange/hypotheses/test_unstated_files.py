@@ -10,7 +10,7 @@ from scipy.io import savemat
 
 from calib_core.errors import InputError
 from calib_core.geometry import RigidTransform, quaternion_wxyz_from_matrix, rotation_exp, rotation_log
-from calib_core.interchange.hypotheses.ranking import clear_one, hypotheses_of
+from calib_core.interchange.hypotheses.ranking import clear_one, contradicts_names, hypotheses_of
 from calib_core.interchange.hypotheses.reading import as_imported, picked, read_clear, read_unstated
 
 POSE = RigidTransform(
@@ -315,3 +315,24 @@ def test_units_in_names_rank_first() -> None:
     first = hypotheses_of(file.pose_at(None))[0]
     assert first.meanings[0].unit == "mm"
     assert _is_pose(first.camera_from_radar)
+
+
+def test_numbers_that_contradict_their_name_are_left_to_a_person() -> None:
+    transposed = RigidTransform(POSE.rotation.T, POSE.translation_m)
+    file = read_unstated(json.dumps({"T_camera_radar": transposed.as_matrix().tolist()}), "file.json")
+    assert file is not None
+    pose = file.pose_at(None)
+    hypotheses = hypotheses_of(pose)
+    assert hypotheses[0].meanings[0].direction == "radar_from_camera"
+    assert contradicts_names(pose, hypotheses[0])
+    assert clear_one(pose, hypotheses) is None
+    assert clear_one(pose, hypotheses_of(pose, against=transposed)) is not None
+
+
+@pytest.mark.parametrize("name", ["T_robot_camera", "T_base_radar", "cam_to_rig", "gripper_from_camera"])
+def test_the_pose_of_one_of_the_two_in_something_else_is_left_to_a_person(name: str) -> None:
+    file = read_unstated(json.dumps({name: POSE.inverse().as_matrix().tolist()}), "file.json")
+    assert file is not None
+    pose = file.pose_at(None)
+    assert pose.hints.other
+    assert clear_one(pose, hypotheses_of(pose)) is None

@@ -1,5 +1,6 @@
 """Frame trees of whole vehicles: read, chained between radar and camera, and refused with words."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -160,7 +161,9 @@ def test_a_rig_of_many_sensors_is_chained_with_body_axes():
       {"name": "lidar", "protocol": "lidar.virtual", "nominalSensor2Rig_FLU": {"roll-pitch-yaw": [0, 0, 0], "t": [1, 0, 2]}},
       {"name": "left", "protocol": "radar.virtual", "nominalSensor2Rig_FLU": {"roll-pitch-yaw": [0, 0, 40], "t": [3, 0.5, 0.4]}},
       {"name": "right", "protocol": "radar.virtual", "nominalSensor2Rig_FLU": {"roll-pitch-yaw": [0, 0, -4], "t": [3, -0.5, 0]},
-       "correction_sensor_R_FLU": {"roll-pitch-yaw": [0.1, 0, 0]}},
+       "correction_sensor_R_FLU": {"roll-pitch-yaw": [0.1, 2, 0]}, "correction_rig_T": [0.02, 0, 0.01]},
+      {"name": "odd", "protocol": "radar.virtual", "nominalSensor2Rig_FLU": {"roll-pitch-yaw": [0, 0, -4], "t": [3, -0.5, 0]},
+       "correction_other": [0.1, 0, 0]},
       {"name": "wide", "protocol": "camera.gmsl", "nominalSensor2Rig_FLU": {"roll-pitch-yaw": [0.5, 2, -1], "t": [1.8, 0, 1.4]}}
     ]}, "version": 7}"""
     found = read_any(rig, "rig.json", WantedFrames("left"))
@@ -168,10 +171,12 @@ def test_a_rig_of_many_sensors_is_chained_with_body_axes():
     radar = pose((3, 0.5, 0.4, 0, 0, 40), degrees=True)
     camera = pose((1.8, 0, 1.4, 0.5, 2, -1), degrees=True) @ BODY_FROM_OPTICAL
     np.testing.assert_allclose(found.camera_from_radar.as_matrix(), np.linalg.inv(camera) @ radar, **CLOSE)
-    with pytest.raises(
-        InputError, match=r"rig.json:4: the joint from rig to right .*: correction_sensor_R_FLU is not zero"
-    ):
-        read_any(rig, "rig.json", WantedFrames("right"))
+    corrected = read_any(rig, "rig.json", WantedFrames("right"))
+    radar = pose((3.02, -0.5, 0.01, 0, 0, -4), degrees=True) @ pose((0, 0, 0, 0.1, 2, 0), degrees=True)
+    np.testing.assert_allclose(corrected.camera_from_radar.as_matrix(), np.linalg.inv(camera) @ radar, **CLOSE)
+    assert "how corrections apply" in " ".join(corrected.notes)
+    with pytest.raises(InputError, match=r"rig.json:6: the joint from rig to odd .*: correction_other is not zero"):
+        read_any(rig, "rig.json", WantedFrames("odd"))
 
 
 def test_several_publishers_are_chained_in_scripts_and_launch_files():
@@ -196,6 +201,35 @@ def test_several_publishers_are_chained_in_scripts_and_launch_files():
         assert found.format == name
         expected = np.linalg.inv(base_from_camera) @ base_from_radar
         np.testing.assert_allclose(found.camera_from_radar.as_matrix(), expected, **CLOSE)
+
+
+def test_a_list_of_transforms_in_json_is_chained_as_ros_and_foxglove_write_it():
+    radar, camera = pose((3.4, 0.1, 0.5, 0.02, -0.03, 0.04)), pose((1.8, 0.2, 1.4, -1.5, 0.1, -1.6))
+    foxglove, ros = [], []
+    for parent, child, matrix in (("base_link", "radar", radar), ("base_link", "camera_optical", camera)):
+        turn = dict(zip("xyzw", Rotation.from_matrix(matrix[:3, :3]).as_quat().tolist(), strict=True))
+        numbers = {"translation": dict(zip("xyz", matrix[:3, 3].tolist(), strict=True)), "rotation": turn}
+        foxglove.append({"parent_frame_id": parent, "child_frame_id": child, **numbers})
+        ros.append({"header": {"frame_id": parent}, "child_frame_id": child, "transform": numbers})
+    for transforms, name in ((foxglove, "foxglove"), (ros, "apollo")):
+        found = read_any(json.dumps({"transforms": transforms}), "message.json")
+        assert found.format == name
+        np.testing.assert_allclose(found.camera_from_radar.as_matrix(), np.linalg.inv(camera) @ radar, **CLOSE)
+    lens = {"frame_id": "front", "K": [500, 0, 320, 0, 500, 240, 0, 0, 1], "width": 640, "height": 480, "D": []}
+    foxglove[1]["child_frame_id"] = "front"
+    named = {"FrameTransforms": {"transforms": foxglove}, "CameraCalibration": lens}
+    assert read_any(json.dumps(named), "message.json").frames.camera == "front"
+    del foxglove[0]["translation"]
+    with pytest.raises(InputError, match=r"message.json: transforms\[0\].translation: missing; add it"):
+        read_any(json.dumps({"transforms": foxglove}), "message.json")
+
+
+def test_a_xacro_of_nothing_but_macros_is_refused_with_the_line_of_the_first():
+    macro = XACRO[: XACRO.index("  <joint")].replace(
+        '<xacro:property name="height" value="1"/>', '<xacro:kit n="radar"/>'
+    )
+    with pytest.raises(InputError, match=r"car.xacro:2 has <xacro:kit>, .* expand it first"):
+        read_any(macro + "</robot>", "car.xacro")
 
 
 def test_a_plain_xacro_is_read_as_xacro_expands_it(tmp_path):
