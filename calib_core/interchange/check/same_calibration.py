@@ -84,6 +84,8 @@ def _other_frames(imported: ImportedCalibration, origin: ImportedCalibration, *,
         f"the file names radar {found.radar!r} and camera {found.camera!r}, the calibration radar {wanted.radar!r} and "
         f"camera {wanted.camera!r}"
     )
+    if (found.radar, found.camera) == (wanted.camera, wanted.radar):
+        return CheckResult("error", "swapped-frames", f"the two frame names are swapped: {message}", "swap them back")
     if renamed:
         return CheckResult("warning", "other-frames", message, "right if the frames were renamed on purpose")
     return CheckResult("error", "other-frames", message, "rename the frames in one of the two")
