@@ -27,9 +27,10 @@ def by_its_calibration(imported: ImportedCalibration, origin: ImportedCalibratio
     if lenses is not None and lenses.difference is not None:
         results.append(_by_lens(lenses))
     stale = _stale(imported, origin, same_pose=results[0].level == "good")
+    old = [result for result in stale if result.level == "error"]
     if imported.frames is not None and origin.frames is not None and imported.frames != origin.frames:
         results.append(_other_frames(imported, origin, renamed=not stale and imported.calibration_sha256 is not None))
-    return [*results, *stale]
+    return [*old, *results] if old else [*results, *stale]
 
 
 def _by_pose(imported: ImportedCalibration, origin: ImportedCalibration) -> CheckResult:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat, savemat
 
+from calib_core.geometry import RigidTransform
 from calib_core.interchange import (
     CalibrationFile,
     FrameNames,
@@ -137,3 +138,13 @@ def test_a_rough_fit_names_no_slip_if_none_explains_the_check_point(file):
 
     report = check(read_any(changed), against=imported(file))
     assert [result.code for result in report.results if result.level == "error"] == ["check-point-missed", "disagrees"]
+
+
+def test_a_stale_file_is_said_to_be_stale_first(file):
+    pose = file.calibration.camera_from_radar
+    moved = RigidTransform(pose.rotation, pose.translation_m + np.array([0.03, 0.0, 0.0]))
+    newer = dataclasses.replace(
+        file, calibration=dataclasses.replace(file.calibration, camera_from_radar=moved), check_point=None
+    )
+    report = check(read_any(export(file, "tf2").data), of=imported(newer))
+    assert [result.code for result in report.results if result.level == "error"] == ["stale", "other-pose"]
