@@ -10,7 +10,7 @@ from calib_core.association.pairing import pair_clicks
 from calib_core.camera import Camera
 from calib_core.errors import InputError
 from calib_core.interchange import CheckReport, CheckResult, ImportedCalibration, adopted_calibration
-from calib_core.interchange.check.pixel_differences import lenses_of
+from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outside, lenses_of
 from calib_core.measurements import MIN_PAIRS, ReflectorClick
 from calib_core.residual_test import ResidualTest, residual_test
 from calib_core.results import Calibration, InputFile
@@ -72,20 +72,28 @@ def other_camera(found: ImportedCalibration, camera: Camera | None) -> tuple[Che
 
 
 def with_recording(
-    report: CheckReport, source: str, recording: RadarSource, clicks: Sequence[ReflectorClick]
+    report: CheckReport,
+    source: str,
+    recording: RadarSource,
+    clicks: Sequence[ReflectorClick],
+    *,
+    camera: Camera | None = None,
 ) -> CheckReport:
-    """Add to a report whether the calibration holds on a recording.
+    """Add to a report whether the calibration holds on a recording; a file of another format that is wrong stays that.
 
     Args:
         report: of the calibration.
         source: its file's name, for error messages.
         recording: where the radar scans come from.
         clicks: in this recording.
+        camera: the intrinsics, if the file has none.
 
     Raises:
-        InputError: the file has no camera, or too few of the clicks have radar returns.
+        InputError: there are no intrinsics, or too few of the clicks have radar returns.
     """
-    calibration = _calibration(report.imported, source)
+    if report.imported.file is None and not report.ok:
+        return report
+    calibration = _calibration(report.imported, source, camera)
     times = sorted({click.image_time for click in clicks})
     scans = recording.radar_scans_around(times, half_window_s(calibration.options))
     pairs = pair_clicks([click for click in clicks if click.counts], scans, calibration.options).pairs
@@ -94,21 +102,28 @@ def with_recording(
             f"{source}: {len(pairs)} clicks have radar returns in this recording; the comparison needs at least {MIN_PAIRS}"
         )
     result = _result(residual_test(pairs, calibration), calibration)
+    if report.imported.camera is None:
+        message = f"{result.message}; through the given intrinsics or the recording's, because the file has none"
+        result = dataclasses.replace(result, message=message)
     return dataclasses.replace(report, results=(*report.results, result))
 
 
-def _calibration(found: ImportedCalibration, source: str) -> Calibration:
+def _calibration(found: ImportedCalibration, source: str, camera: Camera | None) -> Calibration:
     if found.file is not None:
         return found.file.calibration
-    if found.camera is None:
-        raise InputError(f"{source}: contains no camera to project with; check calibration.json, which has it")
-    return adopted_calibration(found, source, camera=found.camera)
+    known = found.camera or camera
+    if known is None:
+        raise InputError(
+            f"{source}: neither the file nor the recording has intrinsics to project with; give --camera FILE"
+        )
+    return adopted_calibration(found, source, camera=known)
 
 
 def _result(test: ResidualTest, calibration: Calibration) -> CheckResult:
     count, misfits = len(test.ids), int(test.misfits.sum())
     median_px = float(np.median(test.distances_px))
-    seen = f"{median_px:.3g} px in the middle" if np.isfinite(median_px) else "most of them behind the camera"
+    lost = far_outside(np.array([median_px]), calibration.camera)[0]
+    seen = f"most of them {LOST_TEXT}" if lost else f"{median_px:.3g} px in the middle"
     if np.isfinite(calibration.metrics.aed_px):
         seen += f" (AED when it was solved {calibration.metrics.aed_px:.3g} px)"
     residuals = f"residuals of {count} clicks on this recording: {seen}"

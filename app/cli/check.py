@@ -128,11 +128,11 @@ class Check:
                 camera=context.camera,
                 pairs=context.pairs,
             )
-            return CheckedFile(str(path), self._on_recording(report, path) if self.recording else report)
+            return CheckedFile(str(path), self._on_recording(report, path, context) if self.recording else report)
         except CalibrationError as error:
             return CheckedFile(str(path), unreadable=str(error))
 
-    def _on_recording(self, report: "CheckReport", path: Path) -> "CheckReport":
+    def _on_recording(self, report: "CheckReport", path: Path, context: Against) -> "CheckReport":
         from dataclasses import replace
 
         from app.recording_check import other_camera, stale_inputs, with_recording
@@ -142,9 +142,8 @@ class Check:
             clicks = self._clicks(report, recording)
             stale = stale_inputs(report.imported, recording.fingerprint())
             lens = other_camera(report.imported, recording.camera())
-            return with_recording(
-                replace(report, results=(*report.results, *stale, *lens)), str(path), recording, clicks
-            )
+            known = replace(report, results=(*report.results, *stale, *lens))
+            return with_recording(known, str(path), recording, clicks, camera=context.camera or recording.camera())
 
     def _clicks(self, report: "CheckReport", recording: "Recording") -> "tuple[ReflectorClick, ...]":
         """Return the clicks: of the file given, else of the recording's session, else those in the calibration.

@@ -57,7 +57,10 @@ class Export:
         if self.to == MCAP or self.recording or self.force or self.topics != TopicFlags():
             return self._export_recording()
         if self.trees.into:
-            return self.trees.patch(self._calibration(), self.frames, to=self.to, out=self.out)
+            file = self._calibration()
+            code = self.trees.patch(file, self.frames, to=self.to, out=self.out)
+            _print_warnings(file)
+            return code
         if self.to == "list":
             formats = written_formats()
             width = max(len(known.name) for known in formats)
@@ -115,7 +118,9 @@ class Export:
                 f"export into a recording: cocalib export CALIBRATION.json --to {MCAP} --recording RECORDING... --out NEW.mcap"
             )
         file = _own_calibration(self.calibration[0])
-        return export_recording(file, self.recording, self.out, topics=self.topics, force=self.force)
+        code = export_recording(file, self.recording, self.out, topics=self.topics, force=self.force)
+        _print_warnings(file)
+        return code
 
 
 def _write_all(
@@ -146,6 +151,12 @@ def _write_all(
 
 
 def _print_warnings(file: "CalibrationFile") -> None:
+    if file.rests_on == "imported_assumed":
+        print(
+            "warning: what this calibration's numbers mean was assumed when it was imported (imported_assumed); "
+            "prove it: cocalib import FILE --pairs PAIRS or --against FILE",
+            file=sys.stderr,
+        )
     for warning in file.calibration.warnings:
         print(f"warning of the calibration: {warning.message}; {warning.hint}", file=sys.stderr)
 

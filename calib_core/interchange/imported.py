@@ -122,20 +122,22 @@ class StatedCheckPoint:
     Attributes:
         radar_m: (3,) the point in the radar frame.
         camera_m: (3,) where it must be in the camera frame; None if only the pixel is stated.
-        pixel_px: (2,) the pixel it must project to, through the lens; None if only camera_m is stated.
+        pixel_px: (2,) the pixel it must project to, through the lens; None if it is not stated.
+        rectified_px: (2,) its pixel in rectified pictures, through the camera matrix alone; None if it is not stated.
     """
 
     radar_m: Vector3
     camera_m: Vector3 | None = None
     pixel_px: Vector2 | None = None
+    rectified_px: Vector2 | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "radar_m", frozen_array(self.radar_m, (3,)))
-        if self.camera_m is not None:
-            object.__setattr__(self, "camera_m", frozen_array(self.camera_m, (3,)))
-        if self.pixel_px is not None:
-            object.__setattr__(self, "pixel_px", frozen_array(self.pixel_px, (2,)))
-        _refuse_too_large(*(part for part in (self.radar_m, self.camera_m, self.pixel_px) if part is not None))
+        for name, length in (("camera_m", 3), ("pixel_px", 2), ("rectified_px", 2)):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen_array(getattr(self, name), (length,)))
+        parts = (self.radar_m, self.camera_m, self.pixel_px, self.rectified_px)
+        _refuse_too_large(*(part for part in parts if part is not None))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,6 +1,7 @@
 """`cocalib check` as a gate: exit codes, JSON, JUnit, several files, and a recording."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -126,6 +127,20 @@ def test_a_calibration_holds_on_its_own_recording_and_not_after_the_camera_moved
     fails = cocalib("check", solved, "--recording", solved.with_name("made.mcap"), "--clicks", clicks_file)
     assert fails.code == 1
     assert "solve this recording" in fails.out
+
+
+def test_a_file_without_a_camera_is_held_against_a_recording_through_its_intrinsics(
+    cocalib: Cocalib, solved: Path, clicks_file: Path, tmp_path: Path
+) -> None:
+    right, wrong = tmp_path / "right.sh", tmp_path / "wrong.sh"
+    cocalib("export", solved, "--to", "tf2", "--out", right)
+    wrong.write_text(re.sub(r"--x \S+", "--x 9.0", right.read_text()))
+    on_it = ("--recording", solved.with_name("made.mcap"), "--clicks", clicks_file)
+
+    holds = cocalib("check", right, *on_it)
+    assert holds.code == 0
+    assert "through the given intrinsics or the recording's" in holds.out
+    assert cocalib("check", wrong, *on_it).code == 1
 
 
 def test_a_recording_without_clicks_says_what_is_needed(cocalib: Cocalib, solved: Path, tmp_path: Path) -> None:

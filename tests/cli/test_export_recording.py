@@ -178,3 +178,20 @@ def test_nothing_half_written_stays(stop, cocalib, sample, calibration, tmp_path
 
 def test_list_names_it(cocalib):
     assert "\nmcap " in cocalib("export").out
+
+
+@pytest.mark.parametrize("to", ["mcap", "tf2", "into"])
+def test_an_assumed_meaning_is_said_with_every_export(to, cocalib, sample, calibration, tmp_path):
+    content = json.loads(calibration.read_text()) | {"evidence": "imported_assumed", "warnings": []}
+    assumed, vehicle = tmp_path / "assumed.json", tmp_path / "vehicle.urdf"
+    assumed.write_text(json.dumps(content))
+    cocalib("export", calibration, "--to", "urdf", "--out", vehicle)
+    options = {
+        "mcap": ("--to", "mcap", "--recording", *files(sample), "--out", tmp_path / "new.mcap"),
+        "tf2": ("--to", "tf2"),
+        "into": ("--into", vehicle),
+    }[to]
+
+    answer = cocalib("export", assumed, *options)
+    assert answer.code == 0, answer.err
+    assert "was assumed when it was imported (imported_assumed)" in answer.err

@@ -11,12 +11,13 @@ from calib_core.interchange.check.pixel_differences import LOST_TEXT, far_outsid
 from calib_core.interchange.check.rounding import Rounding, rounding_of
 from calib_core.interchange.imported import StatedCheckPoint, WrittenPose
 
-__all__ = ["CHECK_POINT_UNUSED", "by_check_point"]
+__all__ = ["CHECK_POINT_MISSED", "CHECK_POINT_UNUSED", "by_check_point"]
 
+CHECK_POINT_MISSED = "check-point-missed"
 CHECK_POINT_UNUSED = "check-point-unused"
 _CLOSE = 1e-4
 _CLOSE_PX = 0.05
-_OWN_LENS_PX = 0.2
+_OWN_LENS_PX = 0.01
 
 
 def by_check_point(
@@ -28,7 +29,7 @@ def by_check_point(
         pose: as written.
         stated: the check point.
         camera: what projects it, if only its pixel is stated.
-        own: the camera in the file; it must project the point to the pixel, if both are stated.
+        own: the camera in the file; it must project the point in the camera frame to the pixel, if both are stated.
     """
     point = "(" + ", ".join(f"{value:.4g}" for value in stated.radar_m) + ") m"
     if stated.camera_m is None and camera is None:
@@ -57,7 +58,7 @@ def by_check_point(
         return CheckResult("error", "rounded", f"{mismatch}: {rounding.text}", "write all the digits")
     return CheckResult(
         "error",
-        "check-point-missed",
+        CHECK_POINT_MISSED,
         f"{mismatch}, and no known slip explains it",
         "the numbers were changed; export the file again",
     )
@@ -65,10 +66,12 @@ def by_check_point(
 
 def _by_own_lens(pose: WrittenPose, stated: StatedCheckPoint, own: Camera | None, point: str) -> CheckResult:
     """Return the result for a pose that reproduces the point: good, unless the file's own camera puts it elsewhere."""
-    if own is not None and stated.camera_m is not None and stated.pixel_px is not None:
-        pixel = own.project(pose.camera_from_radar() @ stated.radar_m[None])[0]
-        if not np.hypot(*(pixel - stated.pixel_px)) <= _OWN_LENS_PX:
-            mismatch = _mismatch(pose.camera_from_radar(), dataclasses.replace(stated, camera_m=None), own)
+    pixel_px = stated.pixel_px if stated.rectified_px is None else stated.rectified_px
+    if own is not None and stated.camera_m is not None and pixel_px is not None:
+        pixel = own.project(stated.camera_m[None])[0]
+        if not np.hypot(*(pixel - pixel_px)) <= _OWN_LENS_PX:
+            seen = dataclasses.replace(stated, camera_m=None, pixel_px=pixel_px)
+            mismatch = _mismatch(pose.camera_from_radar(), seen, own)
             return CheckResult(
                 "error",
                 "other-lens",
@@ -109,8 +112,9 @@ def _mismatch(candidate: RigidTransform, stated: StatedCheckPoint, camera: Camer
     if stated.pixel_px is not None and camera is not None:
         pixel = camera.project(point_camera_m)[0]
         lost = far_outside(np.linalg.norm((pixel - stated.pixel_px)[None], axis=1), camera)[0]
-        there = LOST_TEXT if lost else f"to ({pixel[0]:.1f}, {pixel[1]:.1f})"
-        return f"projects {there} instead of to pixel ({stated.pixel_px[0]:.1f}, {stated.pixel_px[1]:.1f})"
+        decimals = 1 if lost or np.abs(pixel - stated.pixel_px).max() > _CLOSE_PX * 2 else 3
+        there, right = (f"({one[0]:.{decimals}f}, {one[1]:.{decimals}f})" for one in (pixel, stated.pixel_px))
+        return f"projects {LOST_TEXT if lost else f'to {there}'} instead of to pixel {right}"
     wanted = stated.camera_m if stated.camera_m is not None else np.full(3, np.nan)
     got, want = (", ".join(f"{value:.3f}" for value in point) for point in (point_camera_m[0], wanted))
     return f"is at ({got}) m in the camera frame instead of ({want}) m"

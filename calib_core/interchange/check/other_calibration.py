@@ -26,6 +26,8 @@ def by_other_calibration(
     comparison: Comparison,
     judgement: Judgement,
     limits: AgreementLimits,
+    *,
+    changed: bool = False,
 ) -> list[CheckResult]:
     """Return whether the two agree as judged; a slip that explains their difference is named, however small its effect.
 
@@ -35,11 +37,13 @@ def by_other_calibration(
         comparison: of the two.
         judgement: on the comparison.
         limits: that it was judged by.
+        changed: no slip explains how the file misses its own check point, so none is guessed from a rough fit either.
     """
     difference = (
         f"{shown(comparison.rotation_deg)} deg and {shown(comparison.position_cm)} cm from the other calibration"
     )
-    slipped = _slipped(imported.pose, other.camera_from_radar, limits, difference, agree=judgement.agree)
+    only_exact = judgement.agree or changed
+    slipped = _slipped(imported.pose, other.camera_from_radar, limits, difference, only_exact=only_exact)
     lens = _by_lens(comparison, judgement)
     if slipped is not None:
         return [slipped, *lens]
@@ -59,14 +63,14 @@ def by_other_calibration(
 
 
 def _slipped(
-    pose: WrittenPose, other: RigidTransform, limits: AgreementLimits, difference: str, *, agree: bool
+    pose: WrittenPose, other: RigidTransform, limits: AgreementLimits, difference: str, *, only_exact: bool
 ) -> CheckResult | None:
     coarse = _misses(other, _COARSE_RAD, _COARSE_M)
     missed = coarse(pose.camera_from_radar())
     exact = explain(pose, coarse, min(_EXACT_FIT * missed, _EXACT)) if missed > _ROUNDING else None
     if exact is not None:
         return explained(exact, difference)
-    if agree:
+    if only_exact:
         return None
     deg = WITHOUT_COVARIANCE["deg"] if limits.max_deg is None else limits.max_deg
     cm = WITHOUT_COVARIANCE["cm"] if limits.max_cm is None else limits.max_cm

@@ -5,7 +5,7 @@ from typing import Literal
 
 from calib_core.camera import Camera
 from calib_core.interchange.check.agreement import AgreementLimits, Judgement, judge
-from calib_core.interchange.check.check_point import CHECK_POINT_UNUSED, by_check_point
+from calib_core.interchange.check.check_point import CHECK_POINT_MISSED, CHECK_POINT_UNUSED, by_check_point
 from calib_core.interchange.check.comparison import Comparison, compare
 from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.other_calibration import by_other_calibration
@@ -30,7 +30,11 @@ _SUMMARIES: dict[Verdict, tuple[str, ...]] = {
 _ASSUMED = "what this pose rests on was assumed when it was imported, and its own check point shows only that the file is whole"
 _OWN_WORD = frozenset({"check-point", "pairs"})
 """Results of what a file says of itself: no proof of a pose whose meaning was assumed."""
+_WORD_OF_ANOTHER = {"against": frozenset({"agrees"}), "of": frozenset({"same-pose", "same-lens"})}
+"""Results of what another file says: no proof either if the meaning of that one's pose was assumed."""
 _DIFFERENCES = frozenset({"disagrees"})
+_ANY_SIZE_PX = (1000, 1000)
+_ASSUMED_REFERENCE = "assumed-reference"
 _IMPLAUSIBLE = frozenset({"far-apart", "looks-elsewhere", "on-its-side", "placeholder"})
 
 
@@ -43,12 +47,14 @@ class CheckReport:
         results: in the order of the checks.
         comparison: with the other calibration, if one was given.
         judgement: on the comparison.
+        no_proof: codes of results that prove nothing, because they rest on a meaning that was assumed.
     """
 
     imported: ImportedCalibration
     results: tuple[CheckResult, ...]
     comparison: Comparison | None = None
     judgement: Judgement | None = None
+    no_proof: frozenset[str] = frozenset()
 
     def __str__(self) -> str:
         return "\n".join(self.lines())
@@ -63,8 +69,7 @@ class CheckReport:
         """The overall verdict."""
         if not self.ok:
             return "wrong"
-        own = _OWN_WORD if self.rests_on_assumption else frozenset()
-        if any(result.level == "good" and result.code not in own for result in self.results):
+        if any(result.level == "good" and result.code not in self.no_proof for result in self.results):
             return "right"
         return "doubtful" if any(result.code in _IMPLAUSIBLE for result in self.results) else "unproven"
 
@@ -124,18 +129,56 @@ def check(
     camera = imported.camera or camera or next((one.camera for one in known if one and one.camera), None)
     stated = imported.check_point
     if stated is not None:
-        results.append(by_check_point(imported.pose, stated, camera, own=imported.camera))
+        results.append(by_check_point(imported.pose, stated, camera, own=_own_camera(imported)))
     if of is not None:
         results += by_its_calibration(imported, of)
     comparison = compare(against, imported, camera=camera) if against is not None else None
     judgement = judge(comparison, limits or AgreementLimits()) if comparison is not None else None
     if against is not None and comparison is not None and judgement is not None:
-        results += by_other_calibration(imported, against, comparison, judgement, limits or AgreementLimits())
+        changed = any(result.code == CHECK_POINT_MISSED for result in results)
+        results += by_other_calibration(
+            imported, against, comparison, judgement, limits or AgreementLimits(), changed=changed
+        )
     if pairs is not None:
         results += by_pairs(imported, pairs.under(imported.file.calibration) if imported.file else pairs)
     results += by_own_pairs(imported)
-    own = _OWN_WORD if imported.evidence == "imported_assumed" else frozenset()
-    tested = [result for result in results if result.code not in ("contradiction", CHECK_POINT_UNUSED, *own)]
+    no_proof = _no_proof(imported, against=against, of=of)
+    results += _assumed_references(against=against, of=of)
+    untested = {"contradiction", CHECK_POINT_UNUSED, _ASSUMED_REFERENCE, *no_proof}
+    tested = [result for result in results if result.code not in untested]
     if not tested or (against is None and not any(result.level == "error" for result in tested)):
         results += by_plausibility(imported.pose, verified=bool(tested))
-    return CheckReport(imported, tuple(results), comparison, judgement)
+    return CheckReport(imported, tuple(results), comparison, judgement, no_proof)
+
+
+def _own_camera(imported: ImportedCalibration) -> Camera | None:
+    """Return the file's camera; that of rectified pictures has no size in the files, and needs none to project a point."""
+    if imported.camera is not None or imported.check_point is None or imported.check_point.rectified_px is None:
+        return imported.camera
+    try:
+        return imported.camera_for(_ANY_SIZE_PX)
+    except ValueError:  # not a camera matrix; reading or importing it says so
+        return None
+
+
+def _no_proof(imported: ImportedCalibration, **others: ImportedCalibration | None) -> frozenset[str]:
+    """Return the codes of the results that prove nothing, because what they rest on was assumed."""
+    codes = _OWN_WORD if imported.evidence == "imported_assumed" else frozenset()
+    return codes.union(*(_WORD_OF_ANOTHER[option] for option, other in others.items() if _is_assumed(other)))
+
+
+def _assumed_references(**others: ImportedCalibration | None) -> list[CheckResult]:
+    return [
+        CheckResult(
+            "warning",
+            _ASSUMED_REFERENCE,
+            f"what the file given with --{option} means was assumed when it was imported: being like it proves nothing",
+            "prove that one first: cocalib import FILE --pairs PAIRS",
+        )
+        for option, other in others.items()
+        if _is_assumed(other)
+    ]
+
+
+def _is_assumed(other: ImportedCalibration | None) -> bool:
+    return other is not None and other.evidence == "imported_assumed"

@@ -64,7 +64,8 @@ def _document(file: CheckedFile) -> dict[str, Any]:
     report = file.report
     document: dict[str, Any] = {"file": file.name, "verdict": file.verdict, "error": file.unreadable or None}
     if report is None:
-        return document
+        unknown = dict.fromkeys(("format", "evidence", "calibration_sha256", "frames", "comparison"))
+        return document | unknown | {"assumptions": [], "notes": [], "results": []}
     found = report.imported
     return document | {
         "format": found.format,

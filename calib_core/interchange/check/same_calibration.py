@@ -27,9 +27,10 @@ def by_its_calibration(imported: ImportedCalibration, origin: ImportedCalibratio
     if lenses is not None and lenses.difference is not None:
         results.append(_by_lens(lenses))
     stale = _stale(imported, origin, same_pose=results[0].level == "good")
+    old = [result for result in stale if result.level == "error"]
     if imported.frames is not None and origin.frames is not None and imported.frames != origin.frames:
         results.append(_other_frames(imported, origin, renamed=not stale and imported.calibration_sha256 is not None))
-    return [*results, *stale]
+    return [*old, *results] if old else [*results, *stale]
 
 
 def _by_pose(imported: ImportedCalibration, origin: ImportedCalibration) -> CheckResult:
@@ -84,6 +85,8 @@ def _other_frames(imported: ImportedCalibration, origin: ImportedCalibration, *,
         f"the file names radar {found.radar!r} and camera {found.camera!r}, the calibration radar {wanted.radar!r} and "
         f"camera {wanted.camera!r}"
     )
+    if (found.radar, found.camera) == (wanted.camera, wanted.radar):
+        return CheckResult("error", "swapped-frames", f"the two frame names are swapped: {message}", "swap them back")
     if renamed:
         return CheckResult("warning", "other-frames", message, "right if the frames were renamed on purpose")
     return CheckResult("error", "other-frames", message, "rename the frames in one of the two")

@@ -101,7 +101,7 @@ def _check_point(lines: dict[str, str], *, source: str) -> StatedCheckPoint | No
     if _CHECK_POINT not in lines:
         return None
     numbers = np.array(floats(lines[_CHECK_POINT].split(), source=source, place=_CHECK_POINT, length=8))
-    return StatedCheckPoint(numbers[:3], numbers[3:6])  # the pixel is one of the rectified picture
+    return StatedCheckPoint(numbers[:3], numbers[3:6], rectified_px=numbers[6:])
 
 
 def _evidence(value: str) -> Evidence | None:

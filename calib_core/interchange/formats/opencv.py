@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from calib_core.errors import InputError
-from calib_core.geometry import rotation_log
+from calib_core.geometry import rotation_exp, rotation_log
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
 from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.evidence import stated_evidence
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
+from calib_core.interchange.formats.statement import fuller_check_point, hash_comment, stated_frames, statement
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.own.camera_document import refuse_skew
@@ -22,6 +22,7 @@ from calib_core.lens_models.naming import written_lens
 __all__ = ["OPENCV"]
 
 _OF_SECOND_CAMERA = ("M2", "K2", "cameraMatrix2", "camera_matrix_2", "R2", "P2")
+_ROUNDING = 2e-3
 
 
 def _write(file: CalibrationFile) -> str:
@@ -92,10 +93,11 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         WrittenPose("matrix", np.reshape(rotation, (3, 3)), np.array(translation_m), "camera_from_radar"),
         camera=cameras[0].camera(image_size_px=None, source=source) if has_size else None,
         frames=frames,
-        check_point=_check_point(values, source) or stated_check_point(content.text),
+        check_point=fuller_check_point(_check_point(values, source), content.text),
         assumptions=assumptions,
         evidence=stated_evidence(str(values["evidence"])) if values.get("evidence") else None,
         calibration_sha256=str(values.get("calibration_sha256") or "") or None,
+        faults=_faults(values, np.reshape(rotation, (3, 3)), source) if frames else (),
     ).checked(source)
 
 
@@ -110,6 +112,14 @@ def _refuse_stereo(values: Mapping[str, Any], *, source: str) -> None:
         raise InputError(
             f"{source}: a stereo pair ({second}): its R and T are between two cameras; give those between radar and camera"
         )
+
+
+def _faults(values: Mapping[str, Any], rotation: np.ndarray, source: str) -> tuple[str, ...]:
+    """Return what contradicts R: the rotation vector beside it, which projectPoints takes instead."""
+    if "rvec" not in values:
+        return ()
+    stated = rotation_exp(np.array(floats(values["rvec"], source=source, place="rvec", length=3)))
+    return () if np.abs(stated - rotation).max() <= _ROUNDING else ("rvec is not the rotation vector of R",)
 
 
 def _check_point(values: Mapping[str, Any], source: str) -> StatedCheckPoint | None:

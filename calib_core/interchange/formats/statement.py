@@ -35,7 +35,7 @@ _STRING = r'"(?:[^"\\]|\\.)*"'
 _FRAMES = re.compile(rf"radar frame ({_STRING}) \(.*?\), camera frame ({_STRING}) \(")
 _CHECK_POINT = re.compile(
     r"check point: p_radar \[([^\]]*)\] m -> p_camera \[([^\]]*)\] m"
-    rf"(?: -> pixel \[([^\]]*)\] px(?!{_OF_RECTIFIED}))?"
+    rf"(?: -> pixel \[([^\]]*)\] px({_OF_RECTIFIED})?)?"
 )
 
 
@@ -98,7 +98,7 @@ def with_statement(found: ImportedCalibration, text: str) -> ImportedCalibration
     return replace(
         found,
         frames=found.frames or frames,
-        check_point=found.check_point or stated_check_point(text),
+        check_point=fuller_check_point(found.check_point, text),
         assumptions=() if frames else found.assumptions,
         evidence=origin.evidence,
         calibration_sha256=origin.calibration_sha256,
@@ -114,6 +114,17 @@ def stated_frames(text: str) -> FrameNames | None:
         return None
 
 
+def fuller_check_point(in_keys: StatedCheckPoint | None, text: str) -> StatedCheckPoint | None:
+    """Return the check point in a file's keys; or the same one of its comment, which has the point in the camera frame too."""
+    stated = stated_check_point(text)
+    if in_keys is None or stated is None:
+        return in_keys or stated
+    if in_keys.pixel_px is None or stated.pixel_px is None:
+        return in_keys
+    same = np.array_equal(in_keys.radar_m, stated.radar_m) and np.array_equal(in_keys.pixel_px, stated.pixel_px)
+    return stated if same else in_keys
+
+
 def stated_check_point(text: str) -> StatedCheckPoint | None:
     """Find the check point in a file's comment."""
     match = _CHECK_POINT.search(text)
@@ -122,6 +133,8 @@ def stated_check_point(text: str) -> StatedCheckPoint | None:
     try:
         radar_m, camera_m = (np.array(match[i].split(","), dtype=np.float64) for i in (1, 2))
         pixel_px = np.array(match[3].split(","), dtype=np.float64) if match[3] else None
+        if match[4]:
+            return StatedCheckPoint(radar_m, camera_m, rectified_px=pixel_px)
         return StatedCheckPoint(radar_m, camera_m, pixel_px)
     except ValueError:
         return None

@@ -76,6 +76,8 @@ def _read(content: Content, source: str) -> ImportedCalibration:
     matrix = variables.get("camera_from_radar")
     if matrix is not None:
         arrays["camera_from_radar"] = matrix.get("A") if isinstance(matrix, dict) else matrix
+        if isinstance(matrix, dict):
+            arrays |= {ours: matrix[key] for ours, key in (("R", "R"), ("t", "Translation")) if key in matrix}
     frames, check, camera = (variables.get(key) for key in ("frames", "check_point", "camera"))
     if isinstance(frames, dict):
         arrays |= {"radar_frame": frames.get("radar", ""), "camera_frame": frames.get("camera", "")}

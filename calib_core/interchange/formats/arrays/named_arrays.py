@@ -16,6 +16,8 @@ from calib_core.interchange.rotations import upper_rows
 
 __all__ = ["from_arrays"]
 
+_ROUNDING = 1e-5
+
 
 def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> ImportedCalibration:
     """Return the calibration in arrays that include camera_from_radar, or R and t.
@@ -29,12 +31,7 @@ def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> Importe
         InputError: they include neither, or no valid rotation.
     """
     try:
-        if "camera_from_radar" in arrays:
-            rows = upper_rows(arrays["camera_from_radar"])
-            rotation, translation_m = rows[:, :3], rows[:, 3]
-        else:
-            rotation = np.asarray(arrays["R"], dtype=np.float64)
-            translation_m = np.asarray(arrays["t"], dtype=np.float64).ravel()
+        rotation, translation_m = _pose(arrays)
         pose = WrittenPose("matrix", rotation, translation_m, "camera_from_radar")
         named = "radar_frame" in arrays and "camera_frame" in arrays
         check = None
@@ -50,10 +47,34 @@ def from_arrays(arrays: Mapping[str, Any], name: str, *, source: str) -> Importe
             check_point=check,
             assumptions=() if named else ("the file does not name its frames; assumed p_camera = R p_radar + t",),
             covariance=_covariance(arrays),
+            faults=_faults(arrays),
         ).checked(source)
         return with_statement(found, stated_lines(arrays.get(STATEMENT_KEY)))
     except (KeyError, ValueError, TypeError, IndexError) as error:
         raise InputError(f"{source}: needs camera_from_radar (4x4), or R and t ({error}); export it again") from None
+
+
+def _pose(arrays: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rotation (3, 3) and the translation (3,): those of the 4x4 matrix if there is one."""
+    if "camera_from_radar" in arrays:
+        rows = upper_rows(arrays["camera_from_radar"])
+        return rows[:, :3], rows[:, 3]
+    return np.asarray(arrays["R"], dtype=np.float64), np.asarray(arrays["t"], dtype=np.float64).ravel()
+
+
+def _faults(arrays: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what contradicts the 4x4 matrix: R or t beside it, which other programs read instead."""
+    rotation, translation_m = _pose(arrays)
+    beside = {"R": rotation, "t": translation_m}
+    if "camera_from_radar" not in arrays:
+        return ()
+    other = [key for key in beside if key in arrays and not _alike(arrays[key], beside[key])]
+    return tuple(f"{key} is not that of camera_from_radar" for key in other)
+
+
+def _alike(value: object, right: np.ndarray) -> bool:
+    found = np.asarray(value, dtype=np.float64)
+    return found.size == right.size and bool(np.abs(found.ravel() - right.ravel()).max() <= _ROUNDING)
 
 
 def _covariance(arrays: Mapping[str, Any]) -> Matrix66 | None:
