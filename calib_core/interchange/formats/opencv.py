@@ -10,7 +10,7 @@ from calib_core.geometry import rotation_exp, rotation_log
 from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, FrameNames
 from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.statement import fuller_check_point, hash_comment, stated_frames, statement
+from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.camera_document import refuse_skew
 from calib_core.interchange.syntax.content import Content
@@ -88,7 +88,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         WrittenPose("matrix", np.reshape(rotation, (3, 3)), np.array(translation_m), "camera_from_radar"),
         camera=cameras[0].camera(image_size_px=None, source=source) if has_size else None,
         frames=frames,
-        check_point=fuller_check_point(_check_point(values, source), content.text),
+        check_point=_check_point(values, source) or stated_check_point(content.text),
         assumptions=assumptions,
         faults=_faults(values, np.reshape(rotation, (3, 3)), source) if frames else (),
     ).checked(source)
