@@ -11,7 +11,7 @@ from calib_core.interchange.calibration_file import EQUATION, CalibrationFile, F
 from calib_core.interchange.cameras.fields import find_cameras, floats
 from calib_core.interchange.evidence import stated_evidence
 from calib_core.interchange.format import Format, Reads
-from calib_core.interchange.formats.statement import fuller_check_point, hash_comment, stated_frames, statement
+from calib_core.interchange.formats.statement import hash_comment, stated_check_point, stated_frames, statement
 from calib_core.interchange.imported import ImportedCalibration, StatedCheckPoint, WrittenPose
 from calib_core.interchange.own.calibration_json import calibration_sha256
 from calib_core.interchange.own.camera_document import refuse_skew
@@ -93,7 +93,7 @@ def _read(content: Content, source: str) -> ImportedCalibration:
         WrittenPose("matrix", np.reshape(rotation, (3, 3)), np.array(translation_m), "camera_from_radar"),
         camera=cameras[0].camera(image_size_px=None, source=source) if has_size else None,
         frames=frames,
-        check_point=fuller_check_point(_check_point(values, source), content.text),
+        check_point=_check_point(values, source) or stated_check_point(content.text),
         assumptions=assumptions,
         evidence=stated_evidence(str(values["evidence"])) if values.get("evidence") else None,
         calibration_sha256=str(values.get("calibration_sha256") or "") or None,

@@ -98,7 +98,7 @@ def with_statement(found: ImportedCalibration, text: str) -> ImportedCalibration
     return replace(
         found,
         frames=found.frames or frames,
-        check_point=fuller_check_point(found.check_point, text),
+        check_point=found.check_point or stated_check_point(text),
         assumptions=() if frames else found.assumptions,
         evidence=origin.evidence,
         calibration_sha256=origin.calibration_sha256,
@@ -112,17 +112,6 @@ def stated_frames(text: str) -> FrameNames | None:
         return FrameNames(json.loads(match[1]), json.loads(match[2])) if match else None
     except ValueError:
         return None
-
-
-def fuller_check_point(in_keys: StatedCheckPoint | None, text: str) -> StatedCheckPoint | None:
-    """Return the check point in a file's keys; or the same one of its comment, which has the point in the camera frame too."""
-    stated = stated_check_point(text)
-    if in_keys is None or stated is None:
-        return in_keys or stated
-    if in_keys.pixel_px is None or stated.pixel_px is None:
-        return in_keys
-    same = np.array_equal(in_keys.radar_m, stated.radar_m) and np.array_equal(in_keys.pixel_px, stated.pixel_px)
-    return stated if same else in_keys
 
 
 def stated_check_point(text: str) -> StatedCheckPoint | None:
