@@ -36,8 +36,8 @@ class MeaningFlags:
     """What the numbers mean, if the file does not say: a meaning from the list that this command prints."""
     sheet: File = None
     """Draw each meaning over a frame of --recording and write the picture here (PNG)."""
-    recording: Annotated[tuple[Path, ...], called("RECORDING")] = ()
-    """A recording of these sensors: --sheet draws over one of its frames."""
+    recording: Annotated[tuple[Path, ...], called("RECORDING...")] = ()
+    """A recording of these sensors, one file or several: --sheet draws over one of its frames."""
     at: Annotated[float | None, called("SECONDS")] = None
     """Which frame to draw over, in seconds after the first; by default the one in the middle."""
     topics: Topics = field(default_factory=TopicFlags)
