@@ -126,7 +126,7 @@ def adoption(
         raised = tested and found.file.rests_on == "imported_assumed" and report.verdict == "right"
         return Adoption(replace(found.file, evidence="imported_proven") if raised else found.file, report)
     known = _camera(found, camera, source=source, replace_camera=replace_camera)
-    calibration = adopted_calibration(found, source, camera=known)
+    calibration = _as_calibration(found, source, camera=known)
     file = CalibrationFile(
         calibration,
         found.frames or FrameNames(),
@@ -197,6 +197,11 @@ def adopted_calibration(found: ImportedCalibration, source: str, *, camera: Came
         InputError: the file contradicts itself, or fails its own check point.
     """
     _judged(found, source, camera=camera)
+    return _as_calibration(found, source, camera=camera)
+
+
+def _as_calibration(found: ImportedCalibration, source: str, *, camera: Camera) -> Calibration:
+    """Return what was read and checked as a calibration with a given camera."""
     assumed = tuple(DataWarning("assumed", note, "verify this assumption") for note in found.assumptions)
     return Calibration(
         camera_from_radar=found.camera_from_radar,

@@ -11,6 +11,7 @@ __all__ = [
     "looks_forward",
     "matrix_from_rpy",
     "nearest_rotation",
+    "off_forward_rad",
     "quaternion_xyzw_from_matrix",
     "rpy_from_matrix",
     "upper_rows",
@@ -25,6 +26,11 @@ OPTICAL_RPY_RAD = (-np.pi / 2, 0.0, -np.pi / 2)
 """The same rotation as URDF's roll, pitch, yaw."""
 
 _FORWARD_COS = np.cos(np.radians(35.0))
+
+
+def off_forward_rad(camera_from_radar: RigidTransform) -> float:
+    """Return the angle between the camera's viewing direction and the radar's x axis [rad]."""
+    return float(np.arccos(np.clip(camera_from_radar.rotation[2, 0], -1.0, 1.0)))
 
 
 def looks_forward(camera_from_radar: RigidTransform) -> bool:

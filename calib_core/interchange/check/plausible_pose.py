@@ -6,12 +6,12 @@ from calib_core.geometry import RigidTransform
 from calib_core.interchange.check.explanation import CheckResult
 from calib_core.interchange.check.slips import undone_slips
 from calib_core.interchange.imported import WrittenPose
+from calib_core.interchange.rotations import looks_forward, off_forward_rad
 
 __all__ = ["by_plausibility"]
 
 _FAR_M = 20.0
 _SIDEWAYS_RAD = np.radians(60.0)
-_FORWARD_RAD = np.radians(35.0)
 _NAMED = 3
 _PARALLEL = 1e-9
 _SEEN = 0.5
@@ -28,7 +28,7 @@ def by_plausibility(pose: WrittenPose, *, verified: bool) -> list[CheckResult]:
     if not verified and _is_placeholder(camera_from_radar):
         message = "the camera is exactly at the radar's place, turned by exact right angles"
         results.append(CheckResult("warning", "placeholder", message, "is this the placeholder of a template?"))
-    off = _off_forward(camera_from_radar)
+    off = off_forward_rad(camera_from_radar)
     if off > _SIDEWAYS_RAD and not verified:
         likely = [s for s in undone_slips(pose) if len(s.slips) == 1 and _is_forward(s.pose)]
         hint = "if it is not mounted like that, perhaps " + ", or ".join(
@@ -59,16 +59,9 @@ def _is_placeholder(camera_from_radar: RigidTransform) -> bool:
     return bool(parallel and not camera_from_radar.translation_m.any())
 
 
-def _off_forward(camera_from_radar: RigidTransform) -> float:
-    """Return the angle between the camera's viewing direction and the radar's x axis [rad]."""
-    return float(np.arccos(np.clip(camera_from_radar.rotation[2, 0], -1.0, 1.0)))
-
-
 def _is_forward(pose: WrittenPose) -> bool:
     """Return whether the camera is upright and looks along the radar's x axis."""
     try:
-        camera_from_radar = pose.camera_from_radar()
+        return looks_forward(pose.camera_from_radar())
     except ValueError:
         return False
-    upright = -camera_from_radar.rotation[1, 2]
-    return _off_forward(camera_from_radar) < _FORWARD_RAD and upright > np.cos(_FORWARD_RAD)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from calib_core.geometry import RigidTransform
+from calib_core.interchange.rotations import off_forward_rad
 
 __all__ = ["is_usual", "mounting_weight", "mounting_words"]
 
@@ -19,9 +20,8 @@ _SMALLEST_M = 1e-3
 def _tilts_rad(camera_from_radar: RigidTransform) -> tuple[float, float]:
     """Return the angles between the viewing direction and the radar's x axis, and of the picture's lean to one side."""
     rotation = camera_from_radar.rotation
-    along = math.acos(float(np.clip(rotation[2, 0], -1.0, 1.0)))
     lean = abs(math.atan2(rotation[0, 2], -rotation[1, 2]))  # of the radar's up axis in the picture
-    return along, lean
+    return off_forward_rad(camera_from_radar), lean
 
 
 def mounting_weight(camera_from_radar: RigidTransform) -> float:
