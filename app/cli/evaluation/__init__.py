@@ -1,0 +1,1 @@
+"""The commands that judge a calibration on a recording."""

@@ -1,0 +1,1 @@
+"""Boxes around objects, from the files of labelling tools, from topics of a recording, and from a fixed rig's pictures."""

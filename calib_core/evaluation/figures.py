@@ -1,0 +1,216 @@
+"""The figures of an evaluation, as values: what `evaluate --json`, the report, the page and Rerun all show."""
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+from calib_core.arrays import Flags, Points2, Points3, Values
+from calib_core.measurements import TimeNs
+from calib_core.results import DataWarning, Metrics
+
+__all__ = [
+    "Axis",
+    "BoxFigures",
+    "ClassFigure",
+    "Evaluation",
+    "FrameFigure",
+    "HeldOut",
+    "ResidualFigures",
+    "Sensitivity",
+    "Share",
+    "Spread",
+]
+
+Axis: TypeAlias = Literal["roll", "pitch", "yaw"]
+"""Of the camera about its own axes: roll about the viewing direction (z), pitch about x, yaw about y."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Residual lengths in one bin of range, azimuth or image position.
+
+    Attributes:
+        low: lower edge of the bin, in the unit of what it is a bin of.
+        high: upper edge.
+        n: number of pairs.
+        mean_px: mean length of their residuals (AED of the bin); NaN if there are none.
+        median_px: median length.
+    """
+
+    low: float
+    high: float
+    n: int
+    mean_px: float
+    median_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldOut:
+    """Distances from clicks to where a calibration from the other placements predicts them.
+
+    Attributes:
+        folds: number of groups; each placement is one group when one placement is left out at a time.
+        distances_px: one per pair, in the pairs' order; NaN where the rest cannot be solved.
+        aed_px: their mean.
+    """
+
+    folds: int
+    distances_px: Values
+    aed_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualFigures:
+    """Residuals at the clicks of the recording.
+
+    Attributes:
+        ids: of the pairs (n).
+        points_radar_m: (n, 3) their radar positions.
+        pixels_px: (n, 2) their clicks.
+        projected_px: (n, 2) where the calibration puts the radar positions; NaN behind the camera.
+        inliers: (n,) whether the calibration's noise explains the residual.
+        metrics: AED and CDSD (paper, equations 4 and 5: N and N - 1), RMS, n; over the projected pairs.
+        median_px: median length of the residuals.
+        inlier_share: 0 to 1.
+        by_range: bins of the range [m].
+        by_azimuth: bins of the azimuth [deg], positive to the left.
+        by_column: bins of the click's column [px].
+        by_row: bins of the click's row [px].
+        held_out: one placement left out at a time; None if it was not asked for or cannot be had.
+        k_fold: the placements in k groups; None likewise.
+    """
+
+    ids: tuple[str, ...]
+    points_radar_m: Points3
+    pixels_px: Points2
+    projected_px: Points2
+    inliers: Flags
+    metrics: Metrics
+    median_px: float
+    inlier_share: float
+    by_range: tuple[Spread, ...]
+    by_azimuth: tuple[Spread, ...]
+    by_column: tuple[Spread, ...]
+    by_row: tuple[Spread, ...]
+    held_out: HeldOut | None = None
+    k_fold: HeldOut | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FrameFigure:
+    """Acc of one frame.
+
+    Attributes:
+        image_time: the recorded stamp.
+        radar_time: stamp of the scan that was matched to it.
+        returns: number of returns that belong to targets, matched or not: the denominator.
+        inside: how many of them are within their target's box when reprojected.
+        boxes: number of boxes in the frame.
+        range_m: median range of those returns; NaN without any.
+    """
+
+    image_time: TimeNs
+    radar_time: TimeNs
+    returns: int
+    inside: int
+    boxes: int
+    range_m: float
+
+    @property
+    def share(self) -> float:
+        """Of the returns that are inside, 0 to 1; NaN without returns: such a frame does not count."""
+        return self.inside / self.returns if self.returns else float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """Returns in one bin of range.
+
+    Attributes:
+        low_m: lower edge.
+        high_m: upper edge.
+        returns: number of returns of targets.
+        inside: how many are within their target's box.
+    """
+
+    low_m: float
+    high_m: float
+    returns: int
+    inside: int
+
+
+@dataclass(frozen=True, slots=True)
+class ClassFigure:
+    """Acc of one class.
+
+    Attributes:
+        label: the class; "" for the returns of targets that no box was found for.
+        acc: the mean share over the frames with returns of this class, 0 to 1; None without any.
+        frames: number of those frames.
+        returns: number of those returns.
+        inside: how many are within their target's box.
+    """
+
+    label: str
+    acc: float | None
+    frames: int
+    returns: int
+    inside: int
+
+
+@dataclass(frozen=True, slots=True)
+class Sensitivity:
+    """Acc of the calibration turned about one axis of the camera: where it is flat, Acc says nothing.
+
+    Attributes:
+        axis: turned about.
+        angles_deg: ascending, 0 among them.
+        acc: Acc at each angle, 0 to 1.
+    """
+
+    axis: Axis
+    angles_deg: tuple[float, ...]
+    acc: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BoxFigures:
+    """Acc (paper, equation 6), and what stands behind it.
+
+    Attributes:
+        acc: mean over the frames with returns, frames of 0 % kept, 0 to 1; None if no frame counts.
+        acc_standard_error: of that mean, with neighbouring frames taken together; NaN below two groups.
+        acc_without_zero_frames: the same without the frames of 0 %, as the authors published it; None likewise.
+        frames: one per frame that has boxes or returns of targets, in order of time.
+        classes: by label.
+        ranges: the returns by range.
+        sensitivity: Acc under rotations about each axis of the camera.
+        chance: mean Acc of the calibration turned by 10 deg to each side; None if acc is.
+        rule: which returns count and how they were matched, in one sentence.
+        source: of the boxes.
+    """
+
+    acc: float | None
+    acc_standard_error: float
+    acc_without_zero_frames: float | None
+    frames: tuple[FrameFigure, ...]
+    classes: tuple[ClassFigure, ...]
+    ranges: tuple[Share, ...]
+    sensitivity: tuple[Sensitivity, ...]
+    chance: float | None
+    rule: str
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """A calibration judged on a recording.
+
+    Attributes:
+        residuals: at the clicks; None without clicks.
+        boxes: returns in boxes; None without boxes.
+        warnings: what the reader of the figures must know.
+    """
+
+    residuals: ResidualFigures | None
+    boxes: BoxFigures | None
+    warnings: tuple[DataWarning, ...] = ()
