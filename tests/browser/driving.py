@@ -47,8 +47,8 @@ class Driver:
             self.complaints.append(message.text)
 
     def forget_lost_connections(self) -> None:
-        """Drop the browser's own complaints about a server that was down or did not know the page yet."""
-        expected = ("WebSocket connection", "ERR_CONNECTION_REFUSED", "status of 401")
+        """Drop the browser's own complaints about a server that was down, still opening, or did not know the page yet."""
+        expected = ("WebSocket connection", "ERR_CONNECTION_REFUSED", "status of 401", "status of 503")
         self.complaints[:] = [text for text in self.complaints if not any(words in text for words in expected)]
 
     def until(self, condition: str, seconds: float = 40) -> None:
