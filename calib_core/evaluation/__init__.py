@@ -11,9 +11,11 @@ from calib_core.evaluation.figures import (
     Share,
     Spread,
 )
+from calib_core.evaluation.targets import BoxedReturns, TargetTrack
 
 __all__ = [
     "BoxFigures",
+    "BoxedReturns",
     "ClassFigure",
     "Evaluation",
     "FrameFigure",
@@ -22,4 +24,5 @@ __all__ = [
     "Sensitivity",
     "Share",
     "Spread",
+    "TargetTrack",
 ]
