@@ -24,6 +24,7 @@ class BoxTable:
         boxes_px: (b, 4) left, top, right, bottom.
         labels: (b,) the classes.
         tracks: (b,) equal numbers are one object in several frames.
+        names: (b,) what their source calls the objects; "" if it does not follow them.
     """
 
     times_ns: TimesNs
@@ -31,6 +32,7 @@ class BoxTable:
     boxes_px: np.ndarray
     labels: tuple[str, ...]
     tracks: Indices
+    names: tuple[str, ...]
 
     def __post_init__(self) -> None:
         count = len(self.labels)
@@ -49,7 +51,8 @@ def box_table(boxes: Boxes) -> BoxTable:
     frames = np.array([i for i, frame in enumerate(boxes) for _ in frame.boxes], dtype=np.int64)
     every = [box for frame in boxes for box in frame.boxes]
     sides = np.array([[getattr(box, side) for side in _SIDES] for box in every]).reshape(-1, 4)
-    return BoxTable(boxes.times_ns, frames, sides, tuple(box.label for box in every), _tracks(frames, every, sides))
+    labels, names = tuple(box.label for box in every), tuple(box.track for box in every)
+    return BoxTable(boxes.times_ns, frames, sides, labels, _tracks(frames, every, sides), names)
 
 
 def _tracks(frames: Indices, every: list[Box], sides: np.ndarray) -> Indices:

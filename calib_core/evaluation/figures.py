@@ -5,8 +5,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import Flags, Indices, Points2, Points3, Values
-from calib_core.evaluation.targets import BoxedReturns
+from calib_core.arrays import Flags, Indices, Points2, Points3, Values, frozen_array
 from calib_core.measurements import TimeNs, Unpaired
 from calib_core.results import DataWarning, Metrics
 
@@ -14,6 +13,7 @@ __all__ = [
     "FLAT_SHARE",
     "Axis",
     "BoxFigures",
+    "BoxedReturns",
     "ClassFigure",
     "Evaluation",
     "FrameFigure",
@@ -115,6 +115,36 @@ class ResidualFigures:
     def distances_px(self) -> Values:
         """The lengths of the residuals (n,): e_i of the paper's AED; NaN behind the camera."""
         return np.asarray(np.linalg.norm(self.projected_px - self.pixels_px, axis=1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoxedReturns:
+    """The returns that Acc counts, each with the box of its target.
+
+    Attributes:
+        frames: (n,) which of BoxFigures.frames each belongs to, ascending.
+        points_radar_m: (n, 3) as the radar reports them.
+        pixels_px: (n, 2) where the calibration puts them; NaN behind the camera.
+        boxes_px: (n, 4) left, top, right, bottom of its target's box; NaN if its target has none in the frame.
+        inside: (n,) whether the pixel is in that box.
+        targets: (n,) the target's id.
+        labels: (n,) the class of its box; "" without one.
+    """
+
+    frames: Indices
+    points_radar_m: Points3
+    pixels_px: Points2
+    boxes_px: np.ndarray
+    inside: Flags
+    targets: tuple[str, ...]
+    labels: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        n = len(self.targets)
+        object.__setattr__(self, "frames", frozen_array(self.frames, (n,), dtype=np.int64))
+        object.__setattr__(self, "inside", frozen_array(self.inside, (n,), dtype=np.bool_))
+        for name, width in (("points_radar_m", 3), ("pixels_px", 2), ("boxes_px", 4)):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (n, width)))
 
 
 @dataclass(frozen=True, slots=True)

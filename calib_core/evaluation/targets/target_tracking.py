@@ -11,9 +11,9 @@ import numpy as np
 
 from calib_core.arrays import Indices
 from calib_core.errors import InputError
-from calib_core.evaluation.moving_returns import MovingReturns, TargetOptions, moving_returns
-from calib_core.evaluation.target_clusters import TargetClusters, target_clusters
-from calib_core.evaluation.targets import TargetTrack
+from calib_core.evaluation.targets.moving_returns import MovingReturns, TargetOptions, moving_returns
+from calib_core.evaluation.targets.target_clusters import TargetClusters, target_clusters
+from calib_core.evaluation.targets.target_track import TargetTrack
 from calib_core.measurements import NS_PER_S, RadarScans
 
 __all__ = ["FoundTargets", "find_targets", "moving_targets"]

@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Values, frozen_array
-from calib_core.evaluation.ego_motion import LEAST_RETURNS, ego_velocity
+from calib_core.evaluation.targets.ego_motion import LEAST_RETURNS, ego_velocity
 from calib_core.measurements import RadarScans, joined_alternatives
 from calib_core.options import option
 from calib_core.results import DataWarning

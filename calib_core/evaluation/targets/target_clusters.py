@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Indices, Points3, Values, frozen_array
-from calib_core.evaluation.moving_returns import TargetOptions
+from calib_core.evaluation.targets.moving_returns import TargetOptions
 from calib_core.measurements import RadarScans
 from calib_core.radar import cartesian_jacobian, polar_from_cartesian
 
