@@ -142,8 +142,9 @@ def evidence_in(
     """
     options = options or EvidenceOptions()
     pairs, unpaired = _pairs(recording, clicks, camera, options.solving)
+    lost = _lost(unpaired) if pairs is None and clicks else ()
     if boxes is None:
-        return Evidence(pairs, unpaired, None, ())
+        return Evidence(pairs, unpaired, None, lost)
     _require_camera(boxes, camera)
     if labels is not None:
         reach_s = options.max_gap_s or longest_gap_s(recording.radar_times)
@@ -151,11 +152,11 @@ def evidence_in(
         returns = counted_returns(
             camera, scans, boxes, labels, classes=options.classes, max_gap_s=options.max_gap_s or reach_s
         )
-        return Evidence(pairs, unpaired, returns, _about(returns))
+        return Evidence(pairs, unpaired, returns, (*lost, *_about(returns)))
     found = find_targets(_windows(recording, boxes), options.targets, progress=progress)
     stamps = RadarScans(found.moving.scans.times_ns, np.zeros(len(found.moving.scans) + 1, dtype=np.int64))
     returns = counted_returns(camera, stamps, boxes, found.tracks, classes=options.classes, max_gap_s=options.max_gap_s)
-    return Evidence(pairs, unpaired, returns, (*found.moving.warnings, *_about(returns)))
+    return Evidence(pairs, unpaired, returns, (*lost, *found.moving.warnings, *_about(returns)))
 
 
 def judged(
@@ -223,6 +224,19 @@ def _require_camera(boxes: Boxes, camera: Camera) -> None:
             f"{boxes.source}: made on pictures of {boxes.image_size_px[0]} x {boxes.image_size_px[1]} px, but the "
             f"calibration's camera has {size[0]} x {size[1]} px; give the boxes and the calibration of one camera"
         )
+
+
+def _lost(unpaired: Sequence[Unpaired]) -> tuple[DataWarning, ...]:
+    """Warn that clicks gave no residual."""
+    if not unpaired:
+        return (
+            DataWarning(
+                "no-paired-clicks", "all clicks are excluded or untouched, so there are no residuals", "include clicks"
+            ),
+        )
+    first = unpaired[0]
+    message = f"none of {len(unpaired)} clicks has a radar position, so there are no residuals: {first.reason}"
+    return (DataWarning("no-paired-clicks", message, first.hint),)
 
 
 def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:
