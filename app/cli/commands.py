@@ -94,6 +94,11 @@ COMMANDS: Mapping[str, Command] = {
             "Write a recording with its calibration to an .rrd file for the Rerun viewer.",
         ),
         Command(
+            "rerun",
+            "app.cli.evaluation.rerun:Rerun",
+            "Show a recording with its calibration in the Rerun viewer.",
+        ),
+        Command(
             "session",
             "app.cli.session:Session",
             "List the sessions of recordings, repair a damaged one, or export its clicks.",

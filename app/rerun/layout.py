@@ -1,5 +1,6 @@
 """How the Rerun viewer opens: the picture with its overlays, the figures over time, the radar in 3D, the summary."""
 
+import rerun as rr
 import rerun.blueprint as rrb
 
 from app.recorded_view import RecordedView
@@ -12,11 +13,11 @@ _BACKGROUND = (13, 16, 20)
 
 def layout(view: RecordedView) -> rrb.Blueprint:
     """Return the blueprint for what there is to show."""
-    series = [rrb.TimeSeriesView(origin=METRICS, contents=[RETURNS_SEEN], name="Returns in the picture")]
+    series = [_series("Returns in the picture", RETURNS_SEEN)]
     if view.pairs:
-        series.insert(0, rrb.TimeSeriesView(origin=METRICS, contents=[RESIDUALS, AED], name="Residuals [px]"))
+        series.insert(0, _series("Residuals [px]", RESIDUALS, AED))
     if view.acc_by_frame():
-        series.insert(0, rrb.TimeSeriesView(origin=METRICS, contents=[ACC], name="Acc [%]"))
+        series.insert(0, _series("Acc [%]", ACC))
     picture = rrb.Spatial2DView(origin=PICTURE, name="Picture")
     far_m = view.colours.high if view.colours.quantity == "range" else 30.0
     eye = rrb.EyeControls3D(
@@ -32,4 +33,16 @@ def layout(view: RecordedView) -> rrb.Blueprint:
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_views=False,
+    )
+
+
+def _series(name: str, *contents: str) -> rrb.TimeSeriesView:
+    """Return a plot over the whole recording."""
+    always = rr.TimeRange(start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite())
+    return rrb.TimeSeriesView(
+        origin=METRICS,
+        contents=list(contents),
+        name=name,
+        axis_x=rrb.TimeAxis(view_range=always),
+        plot_legend=rrb.Corner2D.LeftTop,
     )
