@@ -23,7 +23,7 @@ STAMP_TOLERANCE_NS = 1_000_000
 """Times in names are often rounded to milliseconds; frames are further apart."""
 _LEAST_MATCHING = 0.5
 _LEAST_INSIDE = 0.5
-_LAST_NUMBER = re.compile(r"(\d+)\D*$")
+_DIGITS = re.compile(r"[0-9]+")
 _OTHER = "is it of another recording?"
 
 
@@ -146,21 +146,39 @@ def _by_number(found: FileBoxes, source: str, count: int) -> tuple[Indices, tupl
             f"{source}: has frames numbered {numbers.min()} to {numbers.max()}, which do not fit the recording's {count} "
             f"frames counted from {first}; {_OTHER}"
         )
-    return places, (f"the file has no stamps; its frame number {first} is taken for the first recorded frame ({why})",)
+    listed = len(np.unique(numbers))
+    note = f"the file has no stamps; its frame number {first} is taken for the first recorded frame ({why})"
+    part = f"{listed} of the recording's {count} frames are annotated"
+    return places, (note, part) if listed < count else (note,)
 
 
 def _numbers_of(frames: Sequence[FileFrame], source: str) -> Indices:
-    numbers = []
-    for frame in frames:
-        match = _LAST_NUMBER.search(frame.name) if frame.number is None else None
-        number = int(match[1][-18:]) if match else frame.number
-        if number is None:
+    """Return the number of each frame: stated, else in its picture's name.
+
+    Raises:
+        InputError: a picture's name has no number.
+    """
+    groups = [_DIGITS.findall(frame.name) for frame in frames]
+    for frame, found in zip(frames, groups, strict=True):
+        if frame.number is None and not found:
             raise InputError(
                 f"{source}: the picture {frame.name!r} has neither a time nor a number in its name, so its recorded frame "
                 "is unknown; name the pictures by their stamps in nanoseconds"
             )
-        numbers.append(number)
+    which = _counting_group([found for frame, found in zip(frames, groups, strict=True) if frame.number is None])
+    numbers = [
+        int(found[which][-18:]) if frame.number is None else frame.number
+        for frame, found in zip(frames, groups, strict=True)
+    ]
     return np.array(numbers, dtype=np.int64)
+
+
+def _counting_group(groups: Sequence[Sequence[str]]) -> int:
+    """Return which number in a name counts the frames: the last that differs between all, as in 000012_camera0; else the last."""
+    for which in range(-1, -1 - min(map(len, groups), default=0), -1):
+        if len({found[which] for found in groups}) == len(groups):
+            return which
+    return -1
 
 
 def _first_number(found: FileBoxes, numbers: Indices, count: int) -> tuple[int, str]:
