@@ -14,14 +14,12 @@ from calib_core.arrays import Indices, TimesNs
 from calib_core.boxes.file_frames import FileBoxes, FileFrame
 from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.errors import InputError
-from calib_core.measurements import NS_PER_S, TimeNs
+from calib_core.measurements import TimeNs
+from calib_core.recordings.boxes.stamp_matching import frames_of_stamps
 from calib_core.recordings.plain_files.name_times import times_in_names
 
-__all__ = ["STAMP_TOLERANCE_NS", "matched_boxes"]
+__all__ = ["matched_boxes"]
 
-STAMP_TOLERANCE_NS = 1_000_000
-"""Times in names are often rounded to milliseconds; frames are further apart."""
-_LEAST_MATCHING = 0.5
 _LEAST_INSIDE = 0.5
 _DIGITS = re.compile(r"[0-9]+")
 _OTHER = "is it of another recording?"
@@ -50,7 +48,7 @@ def matched_boxes(
     _refuse_other_pictures(found, source, image_size_px)
     stamps = _stamps_of(found.frames)
     if stamps is not None:
-        places, notes = _by_stamp(stamps, source, image_times)
+        places, notes = frames_of_stamps(stamps, source, image_times)
     else:
         places, notes = _by_number(found, source, len(image_times))
     frames = _joined(found.frames, places, image_times)
@@ -93,39 +91,6 @@ def _stamps_of(frames: Sequence[FileFrame]) -> TimesNs | None:
     names = [frame.name for frame in frames]
     named = times_in_names(names) if all(names) else None
     return named.times_ns if named is not None and len(named.places) == len(names) else None
-
-
-def _by_stamp(stamps: TimesNs, source: str, image_times: TimesNs) -> tuple[Indices, tuple[str, ...]]:
-    """Return the recorded frame of each stamp, -1 for stamps at which there is none.
-
-    Raises:
-        InputError: most stamps within the recorded time are of no frame, or none is within it.
-    """
-    after = np.clip(np.searchsorted(image_times, stamps), 1, max(1, len(image_times) - 1)).astype(np.int64)
-    before = after - 1
-    after = np.minimum(after, len(image_times) - 1)
-    nearer = np.abs(image_times[before] - stamps) <= np.abs(image_times[after] - stamps)
-    nearest = np.where(nearer, before, after)
-    matches = np.abs(image_times[nearest] - stamps) <= STAMP_TOLERANCE_NS
-    within = (stamps >= image_times[0] - STAMP_TOLERANCE_NS) & (stamps <= image_times[-1] + STAMP_TOLERANCE_NS)
-    if not within.any():
-        raise InputError(
-            f"{source}: its frames are from {_shown(stamps.min())} to {_shown(stamps.max())}, the recorded ones from "
-            f"{_shown(image_times[0])} to {_shown(image_times[-1])}; {_OTHER}"
-        )
-    if np.count_nonzero(matches) < _LEAST_MATCHING * np.count_nonzero(within):
-        raise InputError(
-            f"{source}: {np.count_nonzero(within & ~matches)} of {np.count_nonzero(within)} annotated frames have the stamp of "
-            f"no recorded frame (within {STAMP_TOLERANCE_NS // 1_000_000} ms); {_OTHER} If the recording is read by "
-            "receive times and the file has header stamps, add --clock header"
-        )
-    missing = int(np.count_nonzero(~matches))
-    note = f"{missing} of {len(stamps)} annotated frames are not in the recording and are left out"
-    return np.where(matches, nearest, -1), (note,) if missing else ()
-
-
-def _shown(time: int) -> str:
-    return f"{int(time) / NS_PER_S:.3f} s"
 
 
 def _by_number(found: FileBoxes, source: str, count: int) -> tuple[Indices, tuple[str, ...]]:
