@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from calib_core.recordings.messages.definitions import Definition, Field
+from calib_core.recordings.messages.definitions import PRIMITIVES, Definition, Field
 
 __all__ = ["BoxLayout", "box_layout"]
 
@@ -74,16 +74,16 @@ def _is_drawing(definition: Definition) -> bool:
 
 def _struct_layout(definition: Definition, field: Field, stamp: str) -> BoxLayout | None:
     def first(paths: Sequence[str]) -> str:
-        return next((path for path in paths if _field_at(definition, field.type, path)), "")
+        return next((path for path in paths if _is_single(_field_at(definition, field.type, path))), "")
 
     def whole(choices: Sequence[tuple[str, ...]], kind: str = field.type) -> tuple[str, ...]:
-        return next((one for one in choices if all(_field_at(definition, kind, path) for path in one)), ())
+        return next((one for one in choices if all(_is_single(_field_at(definition, kind, path)) for path in one)), ())
 
     edges, centre, size = whole(_EDGES), whole(_CENTRES), whole(_SIZES)
     if not edges and not (centre and size):
         return None
     results = _field_at(definition, field.type, "results")
-    inner = whole(_HYPOTHESES, results.type) if results is not None and results.type in definition.types else ()
+    inner = whole(_HYPOTHESES, results.type) if results is not None and results.count is not None else ()
     return BoxLayout(
         name="2D detections" if centre else "bounding boxes",
         boxes=field.name,
@@ -96,6 +96,11 @@ def _struct_layout(definition: Definition, field: Field, stamp: str) -> BoxLayou
         hypotheses=("results", *inner) if inner else (),
         track=first((*_TRACKS, "id")) if centre else first(_TRACKS),
     )
+
+
+def _is_single(field: Field | None) -> bool:
+    """Return whether a field is one number or text."""
+    return field is not None and field.count is None and (field.type in PRIMITIVES or field.type == "string")
 
 
 def _field_at(definition: Definition, kind: str, path: str) -> Field | None:

@@ -97,11 +97,11 @@ def _frames_of(layout: BoxLayout, message: Message) -> tuple[list[tuple[TimeNs, 
 
 def _box(layout: BoxLayout, element: Any) -> Box | None:
     """Return the box of one element; None if it has no finite, positive size."""
-    values = [float(_at(element, path)) for path in (layout.edges or layout.centre)]
+    values = [_number(element, path) for path in (layout.edges or layout.centre)]
     if not all(map(math.isfinite, values)):
         return None
     if layout.centre:
-        values = _upright(values, float(_at(element, layout.angle)) if layout.angle else 0.0)
+        values = _upright(values, _number(element, layout.angle) if layout.angle else 0.0)
     left_px, top_px, right_px, bottom_px = (value - _HALF_PX for value in values)
     if not (right_px >= left_px and bottom_px >= top_px):
         return None
@@ -122,22 +122,33 @@ def _class_of(layout: BoxLayout, element: Any) -> tuple[str, float]:
     """Return the class and its confidence, of several hypotheses the likeliest."""
     if not layout.hypotheses:
         label = _name(_at(element, layout.label)) if layout.label else ""
-        return label, _score(_at(element, layout.score)) if layout.score else 1.0
+        return label, _score(_number(element, layout.score)) if layout.score else 1.0
     name, class_path, score_path = layout.hypotheses
-    found = [(_score(_at(one, score_path)), _name(_at(one, class_path))) for one in _at(element, name)]
+    found = [(_score(_number(one, score_path)), _name(_at(one, class_path))) for one in _at(element, name)]
     if not found:
         return "", 1.0
     score, label = max(found, key=lambda one: one[0])
     return label, score
 
 
-def _score(value: Any) -> float:
-    number = float(value)
+def _score(number: float) -> float:
     return number if 0.0 <= number <= 1.0 else 1.0
 
 
 def _name(value: Any) -> str:
-    return value if isinstance(value, str) else str(int(value))
+    return value if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else str(int(value))
+
+
+def _number(element: Any, path: str) -> float:
+    """Return a number at a dotted path.
+
+    Raises:
+        MessageError: there is text.
+    """
+    try:
+        return float(_at(element, path))
+    except ValueError:
+        raise MessageError(f"{path} of a box is no number; it cannot be used") from None
 
 
 def _at(element: Any, path: str) -> Any:
