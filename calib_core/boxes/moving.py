@@ -27,9 +27,14 @@ _BACKGROUND_FRAMES = 25
 _FEWEST_FRAMES = 5
 _LEAST_SIGMA = 2.5
 """Grey levels: what JPEG and a sensor do to a pixel in which nothing happens."""
+_UNSTEADY_SIGMA = 10.0
+"""Grey levels: beyond it, a pixel shows different things at different times."""
 _SIGMAS = 6.0
 _LEAST_AREA = 40
 """Pixels of the working picture: a person of 5 by 16 pixels has some 50."""
+_DEEPEST_SHADOW = 0.5
+_SHADOW_TINT = 0.12
+"""Of the factor by which a shadow darkens the channels: the sky still lights it, bluer than the sun."""
 _MOST_CHANGED = 0.4
 _MOST_CHANGED_FRAMES = 0.5
 _JOIN_PX = 5
@@ -82,7 +87,7 @@ def changed_boxes(
     size = (pictures[0][1].shape[1], pictures[0][1].shape[0])
     del pictures
     background = _background(small)
-    _refuse_moving_camera([_changed(picture, background) for picture in small], source)
+    _refuse_moving_camera([_changed(picture, background) for picture in small], background, source)
     found: list[tuple[TimeNs, list[Box]]] = []
     stretches = _stretches(image_times, most_frames)
     total = sum(map(len, stretches))
@@ -145,10 +150,24 @@ def _reduced(picture: np.ndarray) -> np.ndarray:
 
 
 def _background(pictures: Sequence[np.ndarray]) -> _Background:
+    """Return the median of the frames, each brought to its brightness, and what is left of their deviations from it."""
     stack = np.stack(pictures)
+    median = np.median(stack, axis=0).astype(np.float32)
+    for picture in stack:
+        picture[...] = np.clip(picture / _gain(picture.astype(np.float32), median), 0, 255)
     median = np.median(stack, axis=0).astype(np.float32)
     deviation = np.median(np.abs(stack - median), axis=0).astype(np.float32)
     return _Background(median, np.maximum(1.4826 * deviation, _LEAST_SIGMA).astype(np.float32))
+
+
+def _gain(values: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """Return by how much a frame is brighter than the background: (3,), the median over the pixels that are not at an end."""
+    usable = (middle > 8) & (middle < 247)
+    gains = [
+        float(np.median(values[..., channel][mask] / middle[..., channel][mask])) if mask.any() else 1.0
+        for channel, mask in enumerate(np.moveaxis(usable, -1, 0))
+    ]
+    return np.clip(np.array(gains, dtype=np.float32), 0.5, 2.0)
 
 
 def _changed(picture: np.ndarray, background: _Background) -> np.ndarray:
@@ -156,28 +175,32 @@ def _changed(picture: np.ndarray, background: _Background) -> np.ndarray:
     import cv2
 
     values = picture.astype(np.float32)
-    middle = background.median
-    usable = (middle > 8) & (middle < 247)
-    gains = [
-        float(np.median(values[..., channel][mask] / middle[..., channel][mask])) if mask.any() else 1.0
-        for channel, mask in enumerate(np.moveaxis(usable, -1, 0))
-    ]
-    gain = np.clip(np.array(gains, dtype=np.float32), 0.5, 2.0)
-    off = np.abs(values - gain * middle) / background.sigma
-    strong = (off.max(axis=-1) > _SIGMAS).astype(np.uint8)
+    expected = _gain(values, background.median) * background.median
+    off = np.abs(values - expected) / background.sigma
+    strong = ((off.max(axis=-1) > _SIGMAS) & ~_is_shadow(values, expected)).astype(np.uint8)
     kernel = np.ones((3, 3), dtype=np.uint8)
     opened = cv2.morphologyEx(strong, cv2.MORPH_OPEN, kernel)
-    joined = cv2.morphologyEx(opened, cv2.MORPH_CLOSE, np.ones((2 * _JOIN_PX + 1,) * 2, dtype=np.uint8))
-    return np.asarray(joined).astype(bool)
+    framed = cv2.copyMakeBorder(opened, *(_JOIN_PX,) * 4, cv2.BORDER_CONSTANT, value=0)
+    joined = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, np.ones((2 * _JOIN_PX + 1,) * 2, dtype=np.uint8))
+    return np.asarray(joined)[_JOIN_PX:-_JOIN_PX, _JOIN_PX:-_JOIN_PX].astype(bool)
 
 
-def _refuse_moving_camera(masks: Sequence[np.ndarray], source: str) -> None:
+def _is_shadow(values: np.ndarray, expected: np.ndarray) -> np.ndarray:
+    """Return which pixels are the background in shadow: (h, w) bool. A shadow darkens all channels by about one factor."""
+    share = values / np.maximum(expected, 1.0)
+    darkest, brightest = share.min(axis=-1), share.max(axis=-1)
+    inside = (darkest > _DEEPEST_SHADOW) & (brightest < 1.0)
+    return np.asarray(inside & (brightest - darkest < _SHADOW_TINT))
+
+
+def _refuse_moving_camera(masks: Sequence[np.ndarray], background: _Background, source: str) -> None:
     """Refuse frames in which most of the picture changes.
 
     Raises:
         InputError: it does, in most frames.
     """
-    shares = np.array([mask.mean() for mask in masks])
+    unsteady = background.sigma.max(axis=-1) > _UNSTEADY_SIGMA
+    shares = np.array([(mask | unsteady).mean() for mask in masks])
     moved = int(np.count_nonzero(shares > _MOST_CHANGED))
     if moved > _MOST_CHANGED_FRAMES * len(shares):
         raise InputError(
