@@ -37,6 +37,7 @@ from calib_core.recordings.messages.definitions import parse_definition
 from calib_core.recordings.radar.axes import parse_radar_axes
 from calib_core.recordings.radar.layouts import recognise
 from calib_core.recordings.time.written_times import read_time, time_from_name
+from tests.fuzz.box_targets import FILE_SEEDS, FILE_TOKENS, MESSAGE_SEEDS, box_file_reader, box_message_reader
 from tests.fuzz.fuzzing import Target
 from tests.fuzz.tree_target import SEEDS, tree_reader
 from tests.unit.recordings.conftest import START_NS, Ros, plain_rows, write_rows
@@ -323,6 +324,8 @@ TARGETS: tuple[Target, ...] = (
     Target("frame-tree", tree_reader(_swallow), _fixed(*SEEDS), (b"${", b"&x", b"xacro:", b"<origin", b"1e999", b"---\n")),
     Target("unstated", lambda data, _: _swallow(lambda: _unstated(data)), _unstated_files, (b"NaN", b"rpy", b"rvec", b"1e308")),
     Target("own-files", _own, _own_files, (b'"pairs"', b'"clicks"', b'"cocalib/pairs-1"', b'"cocalib/clicks-1"')),
+    Target("boxes", box_file_reader(_swallow), _fixed(*FILE_SEEDS), FILE_TOKENS),
+    Target("box-messages", box_message_reader(_swallow), _fixed(*MESSAGE_SEEDS), (b"bbox", b"results", b"points")),
     Target("session", _session, _sessions, (b'"n"', b'"step"', b'"undo"', b"\n")),
     Target("messages", _messages, _fixed(*_MESSAGES), (b'"type"', b'"request"', b'"click_moved"', b'"import"')),
     Target("request", _request, _fixed(*_REQUESTS), (b"%2e", b"//", b"token=", b"Cookie: ", b"cocalib=", b"Origin: ")),

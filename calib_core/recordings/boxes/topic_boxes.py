@@ -16,7 +16,7 @@ from calib_core.recordings.boxes.stamp_matching import frames_of_stamps
 from calib_core.recordings.messages.decoding import Message, decode
 from calib_core.recordings.topics import Topic
 
-__all__ = ["boxes_in_topic"]
+__all__ = ["boxes_in_topic", "frames_in_message"]
 
 _HALF_PX = 0.5
 """Detectors count from the corner of the top-left pixel, whose centre is our (0, 0)."""
@@ -45,7 +45,7 @@ def boxes_in_topic(topic: Topic, *, stamps_ns: TimesNs, times_ns: TimesNs) -> Bo
         layout = layouts[part]
         assert layout is not None
         try:
-            frames, invalid = _frames_of(layout, decode(topic.definition(part), topic.payload(row)))
+            frames, invalid = frames_in_message(layout, decode(topic.definition(part), topic.payload(row)))
         except RecordingError as error:
             lost.append(str(error))
             continue
@@ -76,7 +76,7 @@ def _joined(found: Sequence[tuple[Box, ...]], places: Sequence[int], times_ns: T
     return tuple(FrameBoxes(TimeNs(int(times_ns[place])), tuple(boxes[place])) for place in sorted(boxes))
 
 
-def _frames_of(layout: BoxLayout, message: Message) -> tuple[list[tuple[TimeNs, tuple[Box, ...]]], int]:
+def frames_in_message(layout: BoxLayout, message: Message) -> tuple[list[tuple[TimeNs, tuple[Box, ...]]], int]:
     """Return the stamp and boxes of each frame in a message, and how many boxes are none.
 
     Raises:

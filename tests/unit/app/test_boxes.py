@@ -1,0 +1,83 @@
+"""What --boxes takes: a file, a topic, or the word moving; anything else is refused with what there is."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.boxes import find_boxes, find_labels
+from calib_core.boxes import boxes_text, labels_text
+from calib_core.detections import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels
+from calib_core.errors import InputError
+from calib_core.measurements import TimeNs
+from calib_core.recordings import Recording, inspect_recording
+from tests.unit.recordings.box_messages import FIRST_FRAME_NS, recorded
+from tests.unit.recordings.conftest import Ros, write_rows
+
+FRAME = FrameBoxes(TimeNs(FIRST_FRAME_NS), (Box(1.0, 2.0, 30.0, 40.0, "person"),))
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Recording]:
+    import cv2
+    import numpy as np
+
+    ros = Ros(2)
+    picture = bytes(cv2.imencode(".jpg", np.full((48, 64, 3), 90, dtype=np.uint8))[1])
+    path = write_rows(tmp_path_factory.mktemp("drive") / "drive", ros, recorded(ros, picture, "new"), "mcap")
+    with inspect_recording(path) as opened:
+        yield opened
+
+
+def test_a_file_is_read_for_the_frames_of_the_recording(recording, tmp_path):
+    path = tmp_path / "boxes.json"
+    path.write_text(boxes_text(Boxes((FRAME,), "anything", (64, 48))), encoding="utf-8")
+
+    assert find_boxes(str(path), recording) == Boxes((FRAME,), "boxes.json", (64, 48))
+
+
+def test_a_file_for_pictures_of_another_size_is_refused(recording, tmp_path):
+    path = tmp_path / "boxes.json"
+    path.write_text(boxes_text(Boxes((FRAME,), "anything", (1920, 1080))), encoding="utf-8")
+
+    with pytest.raises(InputError, match="made on pictures of 1920 x 1080 px, the recorded ones have 64 x 48"):
+        find_boxes(str(path), recording)
+
+
+def test_a_topic_is_read(recording):
+    assert len(find_boxes("/boxes", recording)) == 3
+
+
+def test_the_word_moving_looks_at_the_pictures(recording):
+    seen: list[tuple[int, int]] = []
+    boxes = find_boxes("moving", recording, progress=lambda done, total: seen.append((done, total)))
+
+    assert boxes.times_ns.tolist() == recording.image_times.tolist()
+    assert boxes.labels == ()
+    assert seen[-1] == (8, 8)
+
+
+@pytest.mark.parametrize("name", ["missing.json", "/detections", "a\0b", "x" * 5000])
+def test_anything_else_is_refused_with_what_there_is(recording, name):
+    with pytest.raises(InputError, match=r"neither a file nor a topic of .* \(its topics with boxes: /boxes\)"):
+        find_boxes(name, recording)
+
+
+def test_labels_are_read(tmp_path):
+    labels = ReturnLabels((LabelledScan(TimeNs(5), ("", "p1")),), "labels.json")
+    path = tmp_path / "labels.json"
+    path.write_text(labels_text(labels), encoding="utf-8")
+
+    assert find_labels(path) == labels
+
+
+@pytest.mark.parametrize(
+    ("content", "words"), [(None, "cannot be read"), (b"\xff\xfe\0", "not text"), (b"{}", "schema")]
+)
+def test_labels_that_cannot_be_read_are_refused(tmp_path: Path, content, words):
+    path = tmp_path / "labels.json"
+    if content is not None:
+        path.write_bytes(content)
+
+    with pytest.raises(InputError, match=words):
+        find_labels(path)
