@@ -9,7 +9,7 @@ __all__ = ["page"]
 
 _HEAD = """# Accuracy
 
-Written by `make bench-accuracy`; do not edit. Everything except the real pairs is simulated, with a fixed seed per trial: the
+Written by `COMMAND`; do not edit. Everything except the real pairs is simulated, with a fixed seed per trial: the
 figures do not depend on the number of processors, and every method gets the same draws. `make bench-accuracy SEED=fresh` draws
 from the hash of the present commit instead, so that nobody has seen the draws before; where it was run, its figures stand next
 to those of the fixed seeds.
@@ -31,17 +31,24 @@ one row in forty is missed by chance.
 """
 
 
-def page(sections: Sequence[Section], fresh: Sequence[Section] = (), *, commit: str = "") -> str:
+def page(
+    sections: Sequence[Section],
+    fresh: Sequence[Section] = (),
+    *,
+    commit: str = "",
+    command: str = "make bench-accuracy",
+) -> str:
     """Return the page in Markdown.
 
     Args:
         sections: of the fixed seeds.
         fresh: the same sections of the fresh seeds; none if they were not run.
         commit: whose hash gave the fresh seeds.
+        command: what wrote the page.
     """
     others = fresh or [None] * len(sections)
     shown = [_section(one, other) for one, other in zip(sections, others, strict=True)]
-    return "\n".join([_HEAD, _summary(_claims(sections), _claims(fresh), commit), *shown])
+    return "\n".join([_HEAD.replace("COMMAND", command), _summary(_claims(sections), _claims(fresh), commit), *shown])
 
 
 def _claims(sections: Sequence[Section]) -> list[Claim]:
