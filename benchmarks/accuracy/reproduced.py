@@ -5,6 +5,7 @@ method the radar's sigmas and the click's.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -111,7 +112,8 @@ def bias_compensated_pnp(
     """Bias-compensated PnP for spherical noise, after the two steps of 3DUPnP (arXiv 2507.19829).
 
     First a linear solution whose expectation is right although positions and pixels are noisy, then Gauss-Newton on the
-    reprojection error, weighted by the covariance that the noise of position and pixel gives it.
+    reprojection error, weighted by the covariance that the noise of position and pixel gives it. With few pairs the linear
+    solution can be far off, so SQPnP's is refined too and the likelier result is returned: kinder than the paper.
 
     Args:
         points_radar_m: (n, 3).
@@ -123,22 +125,38 @@ def bias_compensated_pnp(
     if len(points_radar_m) < _FEWEST:
         return None
     points = unbiased_positions(points_radar_m, sigma_polar)
-    covariances_m2 = covariance_from_sigma_polar(points, sigma_polar)
-    pose = _bias_free_linear(points, covariances_m2, camera.rays(pixels_px), sigma_px / float(camera.matrix_px[0, 0]))
-    return None if pose is None else _reprojection_refined(pose, points, pixels_px, covariances_m2, sigma_px, camera)
+    noise = _Noise(covariance_from_sigma_polar(points, sigma_polar), sigma_px)
+    starts = (
+        _bias_free_linear(points, noise, camera.rays(pixels_px), camera),
+        solve_pnp(points, pixels_px, camera, "sqpnp"),
+    )
+    found = [_refined(start, points, pixels_px, noise, camera) for start in starts if start is not None]
+    usable = [(score, pose) for score, pose in found if pose is not None]
+    return min(usable, key=lambda one: one[0])[1] if usable else None
 
 
-def _bias_free_linear(
-    points: Points3, covariances_m2: np.ndarray, rays: Points3, sigma_plane: float
-) -> RigidTransform | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Noise:
+    """Covariances (n, 3, 3) of the positions [m^2], and the standard deviation of a click per axis [px]."""
+
+    covariances_m2: np.ndarray
+    sigma_px: float
+
+    def spread(self, pose: RigidTransform, points: Points3, camera: Camera) -> np.ndarray:
+        """Return the covariances (n, 2, 2) of the reprojection errors [px^2]."""
+        towards = camera.project_with_jacobian(pose @ points)[1] @ pose.rotation
+        return np.asarray(towards @ self.covariances_m2 @ np.swapaxes(towards, 1, 2) + self.sigma_px**2 * np.eye(2))
+
+
+def _bias_free_linear(points: Points3, noise: _Noise, rays: Points3, camera: Camera) -> RigidTransform | None:
     """Solve x (r3 p + t3) = r1 p + t1 and the same of y, with what noise adds to the squares taken off."""
     centre, scale = points.mean(axis=0), float(np.std(points))
     n = len(points)
     one = np.concatenate([(points - centre) / scale, np.ones((n, 1))], axis=1)
     moment = one[:, :, None] * one[:, None, :]
-    moment[:, :3, :3] -= covariances_m2 / scale**2
+    moment[:, :3, :3] -= noise.covariances_m2 / scale**2
     x, y = (rays[:, :2] / rays[:, 2:]).T
-    squared = x**2 + y**2 - 2.0 * sigma_plane**2
+    squared = x**2 + y**2 - 2.0 * (noise.sigma_px / float(camera.matrix_px[0, 0])) ** 2
     top = moment.sum(axis=0)
     by_x, by_y = (-(value[:, None, None] * moment).sum(axis=0) for value in (x, y))
     zero = np.zeros((4, 4))
@@ -157,34 +175,31 @@ def _bias_free_linear(
     return RigidTransform(rotation, sign * shift / size)
 
 
-def _reprojection_refined(
-    start: RigidTransform,
-    points: Points3,
-    pixels_px: Points2,
-    covariances_m2: np.ndarray,
-    sigma_px: float,
-    camera: Camera,
-) -> RigidTransform | None:
-    """Minimise the Mahalanobis reprojection error; its weights follow the pose from step to step."""
+def _refined(
+    start: RigidTransform, points: Points3, pixels_px: Points2, noise: _Noise, camera: Camera
+) -> tuple[float, RigidTransform | None]:
+    """Minimise the Mahalanobis reprojection error; its weights follow the pose. Return minus twice the log likelihood too."""
     pose = start
     for _ in range(_STEPS):
-        pixels, d_point = camera.project_with_jacobian(pose @ points)
-        if not np.isfinite(pixels).all():
-            return None
-        towards = d_point @ pose.rotation
-        spread = towards @ covariances_m2 @ np.swapaxes(towards, 1, 2) + sigma_px**2 * np.eye(2)
-        weights = np.linalg.inv(spread)
+        if not np.isfinite(camera.project(pose @ points)).all():
+            return float("inf"), None
+        weights = np.linalg.inv(noise.spread(pose, points, camera))
 
         def cost(tried: RigidTransform, weights: np.ndarray = weights) -> float:
             gap = pixels_px - camera.project(tried @ points)
-            squared = np.einsum("ni,nij,nj->", gap, weights, gap)
-            return float(squared) if np.isfinite(squared) else float("inf")
+            squared = float(np.einsum("ni,nij,nj->", gap, weights, gap))
+            return squared if np.isfinite(squared) else float("inf")
 
-        weighted = np.swapaxes(camera.pose_jacobian(pose, points), 1, 2) @ weights
-        normal = (weighted @ camera.pose_jacobian(pose, points)).sum(axis=0)
-        gradient = (weighted @ (pixels_px - pixels)[..., None]).sum(axis=0)[:, 0]
-        step = np.linalg.lstsq(normal, gradient, rcond=1e-14)[0]
+        jacobian = camera.pose_jacobian(pose, points)
+        weighted = np.swapaxes(jacobian, 1, 2) @ weights
+        gap = pixels_px - camera.project(pose @ points)
+        step = np.linalg.lstsq(
+            (weighted @ jacobian).sum(axis=0), (weighted @ gap[..., None]).sum(axis=0)[:, 0], rcond=1e-14
+        )[0]
         pose, _, moved = _improved(pose, step, cost(pose), cost)
         if moved < _CONVERGED:
             break
-    return pose
+    spread = noise.spread(pose, points, camera)
+    gap = pixels_px - camera.project(pose @ points)
+    squared = np.einsum("ni,nij,nj->", gap, np.linalg.inv(spread), gap)
+    return float(squared + np.linalg.slogdet(spread)[1].sum()), pose
