@@ -237,6 +237,10 @@ class BoardOptions:
     reach_squares: float = option(
         0.35, "A click farther than this from every corner is not on one [squares].", low=0.01, high=0.5
     )
+    registration: Literal["rigid", "linear"] = option(
+        "rigid",
+        "Register by the best rotation and shift, or by twelve free numbers made a rotation afterwards, which flat boards upset.",
+    )
 
 
 @dataclass(frozen=True, slots=True)

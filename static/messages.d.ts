@@ -137,6 +137,7 @@ export interface BoardOptions {
   rows: number;
   square_m: number;
   reach_squares: number;
+  registration: "rigid" | "linear";
 }
 
 /** All options of a calibration. */

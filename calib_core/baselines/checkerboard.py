@@ -12,7 +12,7 @@ import numpy as np
 
 from calib_core.arrays import Indices, Points2
 from calib_core.baselines.judging import judged
-from calib_core.baselines.registration import Registration, register
+from calib_core.baselines.registration import Registration, register, register_linearly
 from calib_core.camera import Camera
 from calib_core.measurements import Pair, Unpaired, Unsolvable
 from calib_core.options import BoardOptions, CalibrationOptions
@@ -92,12 +92,13 @@ def calibrate_on_board(
     if distinct < _FEWEST_CORNERS:
         return Unsolvable("too-few-corners", *_too_few(distinct, on, len(unpaired)), unpaired, tuple(pairs))
     radar_m = np.array([pair.candidates[0].position_radar_m for pair in on.pairs])
-    found = register(radar_m, view.corners_camera_m[list(on.corners)])
+    solve = register if board.registration == "rigid" else register_linearly
+    found = solve(radar_m, view.corners_camera_m[list(on.corners)])
     if found is None:
         return Unsolvable(
             "points-in-one-line",
-            f"the {distinct} corners with the reflector lie on one line, or the radar reports them so",
-            "put the reflector on corners of at least two rows and two columns, as far apart as the board allows",
+            f"the {distinct} corners with the reflector are too few for this registration or lie on one line",
+            "put the reflector on four or more corners of at least two rows and two columns, as far apart as the board allows",
             unpaired,
             tuple(pairs),
         )

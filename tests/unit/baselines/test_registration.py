@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calib_core.baselines.registration import register
+from calib_core.baselines.registration import register, register_linearly
 from calib_core.geometry import RigidTransform, rotation_exp
 
 TRUTH = RigidTransform(rotation_exp(np.array([0.3, -1.1, 0.8])), np.array([0.2, -0.5, 1.0]))
@@ -62,3 +62,23 @@ def test_a_small_board_far_away_is_worse_conditioned_with_the_fourth_power() -> 
         assert found is not None
         conditions.append(found.condition)
     assert conditions[1] / conditions[0] == pytest.approx(16.0, rel=0.05)
+
+
+def test_twelve_free_numbers_give_the_exact_transform_of_exact_points_in_space() -> None:
+    points = np.random.default_rng(8).uniform(-2.0, 2.0, (6, 3))
+    found = register_linearly(points, TRUTH @ points)
+    assert found is not None
+    assert found.camera_from_radar.as_matrix() == pytest.approx(TRUTH.as_matrix(), abs=1e-9)
+    assert register_linearly(points[:3], points[:3]) is None
+
+
+def test_noise_on_a_flat_board_upsets_twelve_free_numbers_but_not_a_rotation() -> None:
+    board = np.array([[5.0, y, z] for y in (-0.9, 0.9) for z in (-0.4, 0.4)])
+    noisy = board + 0.02 * np.random.default_rng(9).standard_normal((4, 3))
+    rigid, linear = register(noisy, TRUTH @ board), register_linearly(noisy, TRUTH @ board)
+    assert rigid is not None
+    assert linear is not None
+    off = [np.linalg.norm(one.camera_from_radar.error_from(TRUTH)[3:]) for one in (rigid, linear)]
+    assert off[0] < np.deg2rad(2.0)
+    assert off[1] > np.deg2rad(20.0)
+    assert linear.condition > 100.0
