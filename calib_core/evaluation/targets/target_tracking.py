@@ -18,7 +18,8 @@ from calib_core.measurements import NS_PER_S, RadarScans
 
 __all__ = ["FoundTargets", "find_targets", "moving_targets"]
 
-_GATE = 11.829158081900795  # the 99.73 % quantile of chi2 with 2 degrees of freedom
+_GATE = 14.156413609126675  # the 99.73 % quantile of chi2 with 3 degrees of freedom
+_DOPPLER_SIGMA_MPS = 0.7  # of a cluster's mean Doppler speed: limbs and wheels move for themselves
 _ACCELERATION_MPS2 = 2.0  # standard deviation of a target's acceleration
 _FIRST_SPEED_MPS = 3.0  # standard deviation of a new target's velocity, where Doppler does not tell
 _COAST_S = 1.0  # longest time that a target stays alive without being seen
@@ -138,6 +139,7 @@ def _assign(alive: list[_Target], rows: Indices, clusters: TargetClusters, time_
     innovations = covariances[:, None] + clusters.covariances_m2[rows][None]
     steps = clusters.positions_m[rows, :2][None] - states[:, None]
     squared = np.einsum("tci,tcij,tcj->tc", steps, np.linalg.inv(innovations), steps)
+    squared += _doppler_squared(alive, clusters, rows)
     cost = np.where(squared <= _GATE, squared, 100.0 * _GATE)
     given: set[int] = set()
     for i, j in zip(*linear_sum_assignment(cost), strict=True):
@@ -147,6 +149,16 @@ def _assign(alive: list[_Target], rows: Indices, clusters: TargetClusters, time_
             alive[i].seen_ns = time_ns
             given.add(int(rows[j]))
     return given
+
+
+def _doppler_squared(alive: list[_Target], clusters: TargetClusters, rows: Indices) -> np.ndarray:
+    """Return the squared distance (t, c) of each cluster's Doppler speed from each target's; 0 where unknown."""
+    along = clusters.positions_m[rows, :2]
+    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    expected = np.array([target.state[2:] for target in alive]) @ along.T
+    velocity_m2 = np.array([target.covariance[2:, 2:] for target in alive])
+    variance = np.einsum("ci,tij,cj->tc", along, velocity_m2, along) + _DOPPLER_SIGMA_MPS**2
+    return np.asarray(np.nan_to_num((clusters.doppler_mps[rows] - expected) ** 2 / variance))
 
 
 def _new(clusters: TargetClusters, row: int, time_ns: int) -> _Target:
