@@ -99,6 +99,16 @@ COMMANDS: Mapping[str, Command] = {
             "Write the camera's frames to a video, each at its recorded time; recorded JPEG is not re-encoded.",
         ),
         Command(
+            "record-rrd",
+            "app.cli.evaluation.record_rrd:RecordRrd",
+            "Write a recording with its calibration to an .rrd file for the Rerun viewer.",
+        ),
+        Command(
+            "rerun",
+            "app.cli.evaluation.rerun:Rerun",
+            "Show a recording with its calibration in the Rerun viewer.",
+        ),
+        Command(
             "session",
             "app.cli.session:Session",
             "List the sessions of recordings, repair a damaged one, or export its clicks.",
