@@ -1,4 +1,4 @@
-"""Box tracks: which boxes of successive frames are around one object, as their source says, or by how they move and overlap."""
+"""Box tracks: which boxes of successive frames are around one object, as their source says, or by how they move."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from calib_core.detections import Box, Boxes
 
 __all__ = ["BoxTable", "box_table"]
 
-_LEAST_OVERLAP = 0.25  # intersection over union of two boxes of one object in successive frames
+_LONGEST_STEP = 0.8  # widths or heights from where a box is expected, for a box of the same object
 _LONGEST_GAP = 3  # frames that an object may be missed in
 _NEW_SHARE = 0.3  # of the newest step in the mean step of a box
 _SIDES = ("left_px", "top_px", "right_px", "bottom_px")
@@ -47,7 +47,7 @@ def box_table(boxes: Boxes) -> BoxTable:
     """Lay boxes out as columns, and follow the objects whose source does not.
 
     Args:
-        boxes: with the tracks of their source where it states them; other boxes are linked by their overlap.
+        boxes: with the tracks of their source where it states them; other boxes are linked by how they move.
     """
     frames = np.array([i for i, frame in enumerate(boxes) for _ in frame.boxes], dtype=np.int64)
     every = [box for frame in boxes for box in frame.boxes]
@@ -101,17 +101,17 @@ def _tracks(frames: Indices, every: list[Box], sides: np.ndarray) -> Indices:
 def _linked(
     followed: list[_Object], now: list[int], frame: int, every: list[Box], sides: np.ndarray
 ) -> dict[int, _Object]:
-    """Return for boxes of this frame the object that they continue: the largest overlaps with where it is expected."""
+    """Return for boxes of this frame the object that they continue: the nearest to where it is expected."""
     if not followed:
         return {}
-    overlap = _overlap(np.array([one.expected(sides, frame) for one in followed]), sides[now])
+    steps = _steps(np.array([one.expected(sides, frame) for one in followed]), sides[now])
     same = np.array([[every[one.row].label == every[row].label for row in now] for one in followed])
-    overlap = np.where(same, overlap, 0.0)
+    steps = np.where(same, steps, np.inf)
     linked: dict[int, _Object] = {}
     taken: set[int] = set()
-    for flat in np.argsort(-overlap, axis=None, kind="stable").tolist():
+    for flat in np.argsort(steps, axis=None, kind="stable").tolist():
         i, j = divmod(flat, len(now))
-        if overlap[i, j] < _LEAST_OVERLAP:
+        if steps[i, j] > _LONGEST_STEP:
             break
         if i not in taken and now[j] not in linked:
             linked[now[j]] = followed[i]
@@ -119,11 +119,10 @@ def _linked(
     return linked
 
 
-def _overlap(some: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the intersection over union (a, b) of boxes (a, 4) and (b, 4)."""
-    low = np.maximum(some[:, None, :2], others[None, :, :2])
-    high = np.minimum(some[:, None, 2:], others[None, :, 2:])
-    both = np.prod(np.maximum(high - low, 0.0), axis=2)
-    areas = [np.prod(one[:, 2:] - one[:, :2], axis=1) for one in (some, others)]
-    union = areas[0][:, None] + areas[1][None] - both
-    return np.asarray(both / np.where(union > 0, union, 1.0))
+def _steps(expected: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Return how far boxes (b, 4) are from expected ones (a, 4), in widths and heights, sizes included: (a, b)."""
+    size = np.maximum(
+        np.maximum((expected[:, 2:] - expected[:, :2])[:, None], (found[:, 2:] - found[:, :2])[None]), 1.0
+    )
+    apart = (found[None] - expected[:, None]).reshape(len(expected), len(found), 2, 2)
+    return np.asarray(np.sqrt(((apart / size[:, :, None]) ** 2).sum(axis=3).mean(axis=2)))
