@@ -195,7 +195,7 @@ def _refined(meetings: _Meetings, bearings: Bearings) -> Bearings:
     turn = bearings.turn_rad
     rest = _wrapped(kept.apart_rad - turn)
     weight = 1.0 / kept.tolerance_rad
-    prior = np.array([[0.0, 1.0 / _MOST_PARALLAX_M]]) * float(np.sqrt(len(rest))) * 0.1 * weight.mean()
+    prior = np.array([[0.0, 1.0 / _MOST_PARALLAX_M]])
     design = np.concatenate([np.stack([np.ones(len(rest)), kept.inverse_range], axis=1) * weight[:, None], prior])
     more, parallax = np.linalg.lstsq(design, np.append(rest * weight, 0.0), rcond=None)[0].tolist()
     return Bearings(

@@ -11,7 +11,13 @@ from calib_core.measurements import RadarScan, RadarScans, TimeNs
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 
 START_NS = 1_700_000_000_000_000_000
-CAMERA = Camera("pinhole", 1280, 720, np.array([[900.0, 0.0, 639.5], [0.0, 900.0, 359.5], [0.0, 0.0, 1.0]]))
+CAMERA = Camera(
+    "plumb_bob",
+    1280,
+    720,
+    np.array([[900.0, 0.0, 639.5], [0.0, 900.0, 359.5], [0.0, 0.0, 1.0]]),
+    np.array([-0.12, 0.03, 0.001, -0.0005, 0.0]),
+)
 OPTICAL_FROM_RADAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 TRUE_POSE = RigidTransform(
     rotation_exp(np.deg2rad([2.0, -6.0, 1.0])) @ OPTICAL_FROM_RADAR, np.array([0.25, 0.1, -0.05])
