@@ -199,6 +199,8 @@ def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, o
             rig.camera.project(rig.camera_from_world @ batch), margin_px=-_RIM_SHARE * options.width_px
         )
         whole &= in_sight(added, batch)
+        if scene.board is not None:
+            whole &= ~scene.board.hides(batch)
         for position in batch[whole]:
             apart = all(np.linalg.norm(position[:2] - other[:2]) >= layout.separation_m for other in found)
             if apart and scene.free(position[:2], 0.7) and len(found) < options.placements:
