@@ -75,6 +75,8 @@ class FrameRenderer:
             noise_grey: standard deviation of the sensor's noise [grey levels].
             rng: random generator of that noise.
         """
+        import cv2
+
         levels = self.still.levels.copy()
         things = self._things(moment, person)
         for thing in things:
@@ -84,7 +86,7 @@ class FrameRenderer:
             thing.draw(levels)
         if noise_grey > 0.0 and rng is not None:
             levels += noise_grey * rng.standard_normal(levels.shape, dtype=np.float32)
-        return np.ascontiguousarray(np.clip(levels + 0.5, 0.0, 255.0).astype(np.uint8)[..., ::-1])
+        return cv2.cvtColor(np.clip(levels + 0.5, 0.0, 255.0).astype(np.uint8), cv2.COLOR_RGB2BGR)
 
     def _things(self, moment: Moment, person: bool) -> list[_Thing]:
         """List what moves, people first: so do their shadows fall."""
