@@ -79,6 +79,11 @@ COMMANDS: Mapping[str, Command] = {
             "Check calibration files for errors, or compare them. Exit code 1: wrong; 3: looks wrong, not proven.",
         ),
         Command(
+            "report",
+            "app.cli.evaluation.report:Report",
+            "Write a report on a calibration: one HTML file, and a PDF if wanted: how good, where, and how one knows.",
+        ),
+        Command(
             "import",
             "app.cli.import_file:Import",
             "Convert a calibration from any known format to cocalib/calibration-1 JSON.",
