@@ -2,11 +2,13 @@
 
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
+from app.box_tracks.carried import CarriedTrack, Followed, carried_boxes, carried_tracks
+from app.box_tracks.stretches import Stretch
 from app.hypothesis_sheet import OpenMeaning
 from app.session import (
     AssumedReading,
@@ -28,6 +30,7 @@ from app.view import Reference, View, view
 from calib_core.arrays import TimesNs
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
+from calib_core.detections import Boxes
 from calib_core.errors import InputError
 from calib_core.input_files import name_text
 from calib_core.interchange import CameraFile, read_clicks, write_clicks
@@ -115,6 +118,7 @@ class Workspace:
         self.reference = reference
         self._history = restored.history
         self._placements: tuple[Placement, ...] | None = None
+        self._followed: Mapping[Stretch, Followed] = {}
         self._journal = journal
         self._solver = solver
         self._lock = threading.Lock()
@@ -139,12 +143,29 @@ class Workspace:
         return self._view_of(self._history)
 
     def _view_of(self, history: History) -> View:
-        return view(history, self.facts, self.reference, self._placements)
+        return view(history, self.facts, self.reference, self._placements, self._followed)
 
     def show_placements(self, placements: Sequence[Placement]) -> None:
         """Take in the placements that were found in the radar data, so that the View says how many have no click."""
         with self._lock:
             self._placements = tuple(placements)
+            self._pending.append((self._view_of(self._history), self._subscribers))
+        self._notify()
+
+    @property
+    def carried(self) -> tuple[CarriedTrack, ...]:
+        """The boxes of the session in every frame, as far as they have been followed."""
+        return carried_tracks(self.session.boxes, self.facts, self._followed)
+
+    @property
+    def boxes(self) -> Boxes:
+        """The same as a file of boxes would state them."""
+        return carried_boxes(self.carried, self.session, self.facts)
+
+    def show_followed(self, followed: Mapping[Stretch, Followed]) -> None:
+        """Take in what following the boxes through the pictures has given so far."""
+        with self._lock:
+            self._followed = dict(followed)
             self._pending.append((self._view_of(self._history), self._subscribers))
         self._notify()
 

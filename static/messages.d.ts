@@ -161,6 +161,19 @@ export interface DismissedRow {
   position_m: [number, number, number];
 }
 
+/** One object with a box: its row in the table. */
+export interface BoxTrackRow {
+  id: string;
+  label: string;
+  first: number;
+  last: number;
+  boxes: number;
+  keyframes: number[];
+  hidden: number[];
+  note: string;
+  following: boolean;
+}
+
 /** One error that all pairs share, as a row of a table. */
 export interface SystematicErrorRow {
   key: string;
@@ -217,6 +230,8 @@ export interface View {
   assumptions: AssumptionRow[];
   dismissed: DismissedRow[];
   acknowledged: string[];
+  boxes: BoxTrackRow[];
+  box_labels: string[];
   systematic_errors: SystematicErrorTable;
   verdict: VerdictRow;
 }
@@ -501,6 +516,16 @@ export interface Overlay {
   guesses: OverlayGuess[];
 }
 
+/** One box in a frame; written as an array, since it is sent with every frame. */
+export type BoxInFrame = [id: string, label: string, left_px: number, top_px: number, right_px: number, bottom_px: number, kind: "stated" | "followed" | "between", confidence: number];
+
+/** The boxes of the frame that a page shows. */
+export interface FrameBoxes {
+  type: "frame_boxes";
+  index: number;
+  boxes: BoxInFrame[];
+}
+
 /** One radar return that may belong to a click. */
 export interface CandidateRow {
   position_m: [number, number, number];
@@ -776,6 +801,77 @@ export interface AssumptionsConfirmedForm {
   request?: number;
 }
 
+/** A box drawn around an object that had none: left, top, right, bottom. */
+export interface BoxDrawnForm {
+  type: "box_drawn";
+  image_time: StampForm;
+  box_px: [number, number, number, number];
+  label: string;
+  request?: number;
+}
+
+/** The box of an object corrected in a frame. */
+export interface BoxMovedForm {
+  type: "box_moved";
+  id: string;
+  image_time: StampForm;
+  box_px: [number, number, number, number];
+  request?: number;
+}
+
+/** An object hidden from a frame on. */
+export interface BoxHiddenForm {
+  type: "box_hidden";
+  id: string;
+  image_time: StampForm;
+  request?: number;
+}
+
+/** What was said about an object in a frame taken back. */
+export interface BoxKeyframeRemovedForm {
+  type: "box_keyframe_removed";
+  id: string;
+  image_time: StampForm;
+  request?: number;
+}
+
+/** All boxes of an object deleted. */
+export interface BoxRemovedForm {
+  type: "box_removed";
+  id: string;
+  request?: number;
+}
+
+/** An object given another class. */
+export interface BoxLabelledForm {
+  type: "box_labelled";
+  id: string;
+  label: string;
+  request?: number;
+}
+
+/** A frame in which the box of an object is stated; null: it is hidden from there on. */
+export interface BoxKeyframeForm {
+  image_time: StampForm;
+  box_px: [number, number, number, number] | null;
+}
+
+/** The boxes of one object. */
+export interface BoxTrackForm {
+  id: string;
+  label: string;
+  keyframes: BoxKeyframeForm[];
+  carried: boolean;
+}
+
+/** Boxes from a file, in place of all others. */
+export interface BoxesLoadedForm {
+  type: "boxes_loaded";
+  tracks: BoxTrackForm[];
+  empty_frames?: StampForm[];
+  request?: number;
+}
+
 /** The last change undone. */
 export interface UndoForm {
   type: "undo";
@@ -934,6 +1030,7 @@ export type FromServer =
   | RadarMap
   | SpaceLook
   | Overlay
+  | FrameBoxes
   | PairCandidates
   | Review
   | PairReview
@@ -957,6 +1054,13 @@ export type FromPage =
   | ClicksImportedForm
   | ColumnsMappedForm
   | AssumptionsConfirmedForm
+  | BoxDrawnForm
+  | BoxMovedForm
+  | BoxHiddenForm
+  | BoxKeyframeRemovedForm
+  | BoxRemovedForm
+  | BoxLabelledForm
+  | BoxesLoadedForm
   | UndoForm
   | RedoForm
   | HelloForm

@@ -79,6 +79,16 @@ COMMANDS: Mapping[str, Command] = {
             "Check calibration files for errors, or compare them. Exit code 1: wrong; 3: looks wrong, not proven.",
         ),
         Command(
+            "evaluate",
+            "app.cli.evaluation.evaluate:Evaluate",
+            "Judge a calibration on a recording: residuals at clicks (AED, CDSD), radar returns in boxes (Acc).",
+        ),
+        Command(
+            "compare",
+            "app.cli.evaluation.compare:Compare",
+            "Compare two calibrations; with a recording, say which is better there, and whether that is more than noise.",
+        ),
+        Command(
             "report",
             "app.cli.evaluation.report:Report",
             "Write a report on a calibration: one HTML file, and a PDF if wanted: how good, where, and how one knows.",
@@ -92,6 +102,16 @@ COMMANDS: Mapping[str, Command] = {
             "video",
             "app.cli.video:Video",
             "Write the camera's frames to a video, each at its recorded time; recorded JPEG is not re-encoded.",
+        ),
+        Command(
+            "record-rrd",
+            "app.cli.evaluation.record_rrd:RecordRrd",
+            "Write a recording with its calibration to an .rrd file for the Rerun viewer.",
+        ),
+        Command(
+            "rerun",
+            "app.cli.evaluation.rerun:Rerun",
+            "Show a recording with its calibration in the Rerun viewer.",
         ),
         Command(
             "session",

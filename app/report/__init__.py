@@ -1,6 +1,6 @@
 """The report: one self-contained HTML file that says how good a calibration is, where, and how one knows."""
 
-from app.report.making import against_of, calibration_of, subject_of
+from app.report.making import against_of, known_calibration, subject_of
 from app.report.page import report_html
 from app.report.printing import PrintingError, print_pdf
 from app.report.subject import Against, Judged, Picture, ReportSubject, Watched
@@ -14,7 +14,7 @@ __all__ = [
     "ReportSubject",
     "Watched",
     "against_of",
-    "calibration_of",
+    "known_calibration",
     "print_pdf",
     "report_html",
     "subject_of",

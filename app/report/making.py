@@ -1,40 +1,30 @@
 """From what was read to what is reported: the calibration with a camera, and another one to compare with."""
 
-from app.report.subject import Against, Judged, ReportSubject, Watched
+from collections.abc import Sequence
+
+from app.recording_check import calibration_of
+from app.report.subject import Against, ReportSubject
 from app.resources import version
 from calib_core.camera import Camera
 from calib_core.input_files import name_text
-from calib_core.interchange import ImportedCalibration, adoption, compare
+from calib_core.interchange import ImportedCalibration, compare
 from calib_core.results import Calibration, InputFile
 
-__all__ = ["against_of", "calibration_of", "subject_of"]
+__all__ = ["against_of", "known_calibration", "subject_of"]
 
 
-def subject_of(
-    name: str,
-    inputs: tuple[InputFile, ...],
-    found: ImportedCalibration,
-    *,
-    calibration: Calibration | None,
-    recording: Watched | None = None,
-    judged: Judged | None = None,
-    against: Against | None = None,
-) -> ReportSubject:
-    """Return what is reported.
+def subject_of(found: ImportedCalibration, calibration: Calibration | None, name: str) -> ReportSubject:
+    """Return what is reported when nothing but the calibration is known.
 
     Args:
-        name: of the calibration's file, without its folder.
-        inputs: the files that it was read from.
         found: what was read.
-        calibration: the same with a camera, as `calibration_of` returns it.
-        recording: that it is judged on.
-        judged: what the recording says of it.
-        against: another calibration.
+        calibration: the same with a camera, as `known_calibration` returns it.
+        name: of the file, without its folder.
     """
-    return ReportSubject(name_text(name), inputs, found, calibration, version(), recording, judged, against)
+    return ReportSubject(name_text(name), found, calibration, version())
 
 
-def calibration_of(found: ImportedCalibration, name: str, *, camera: Camera | None) -> Calibration | None:
+def known_calibration(found: ImportedCalibration, name: str, *, camera: Camera | None) -> Calibration | None:
     """Return a calibration with the camera that it states, else with the given one; None if there is neither.
 
     Args:
@@ -43,11 +33,11 @@ def calibration_of(found: ImportedCalibration, name: str, *, camera: Camera | No
         camera: the user's intrinsics, or those of the recording.
 
     Raises:
-        InputError: the file contradicts itself, fails its own check point, or states another camera.
+        InputError: the file contradicts itself, or fails its own check point.
     """
     if found.file is None and found.camera is None and camera is None:
         return None
-    return adoption(found, name_text(name), camera=camera).file.calibration
+    return calibration_of(found, name_text(name), camera)
 
 
 def against_of(
@@ -57,6 +47,7 @@ def against_of(
     found: ImportedCalibration,
     *,
     camera: Camera | None = None,
+    judged: Sequence[str] = (),
 ) -> Against:
     """Compare with another calibration.
 
@@ -66,5 +57,6 @@ def against_of(
         other: what was read.
         found: the calibration that is reported.
         camera: the intrinsics, if neither has any.
+        judged: which one is better on the recording.
     """
-    return Against(name_text(name), inputs, compare(other, found, camera=camera))
+    return Against(name_text(name), inputs, compare(other, found, camera=camera), tuple(judged))

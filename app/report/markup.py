@@ -50,7 +50,7 @@ def tag(name: str, /, *children: Child, **attributes: str | float | None) -> Mar
 
 def joined(children: Iterable[Child]) -> Markup:
     """Return several children as one."""
-    parts = (child.text if isinstance(child, Markup) else _escaped(child) for child in children if child is not None)
+    parts = (child.text if isinstance(child, Markup) else _text(child) for child in children if child is not None)
     return Markup("".join(parts))
 
 
@@ -60,11 +60,16 @@ def number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
+def _text(text: str) -> str:
+    """Escape text for reading: none is endless."""
+    return _escaped(text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…")
+
+
 def _escaped(text: str) -> str:
-    """Escape text; characters that are invisible or turn the writing direction are replaced, and no text is endless."""
-    shown = text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
-    visible = "".join(
-        "\N{REPLACEMENT CHARACTER}" if unicodedata.category(one) in _REPLACED and one not in _KEPT_CONTROLS else one
-        for one in shown
-    )
+    """Escape text; characters that are invisible or turn the writing direction are replaced."""
+    visible = "".join("\N{REPLACEMENT CHARACTER}" if _is_hidden(one) else one for one in text)
     return html.escape(visible, quote=True)
+
+
+def _is_hidden(character: str) -> bool:
+    return unicodedata.category(character) in _REPLACED and character not in _KEPT_CONTROLS

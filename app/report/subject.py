@@ -63,11 +63,13 @@ class Against:
         name: of its file.
         inputs: its files, by their content.
         comparison: the other one is the first of the two.
+        judged: which one is better on the recording, as sentences without their final periods.
     """
 
     name: str
     inputs: tuple[InputFile, ...]
     comparison: Comparison
+    judged: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,20 +78,20 @@ class ReportSubject:
 
     Attributes:
         name: of the calibration's file, without its folder.
-        inputs: the files that it was read from, by their content.
         found: what was read.
         calibration: the same with a camera; None if no camera is known.
         version: of the program that writes the report.
+        inputs: the files that it was read from, by their content.
         recording: that it is judged on.
         judged: what the recording says of it.
         against: another calibration.
     """
 
     name: str
-    inputs: tuple[InputFile, ...]
     found: ImportedCalibration
     calibration: Calibration | None
     version: str
+    inputs: tuple[InputFile, ...] = ()
     recording: Watched | None = None
     judged: Judged | None = None
     against: Against | None = None

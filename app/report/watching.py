@@ -1,12 +1,15 @@
 """What a report takes from a recording: its files' hashes, topics, warnings, and one frame to draw over."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from app.report.subject import Picture, Watched
 from calib_core.errors import CalibrationError
-from calib_core.measurements import time_parts
+from calib_core.interchange import CheckResult
+from calib_core.measurements import TimeNs, time_parts
 from calib_core.recordings import Recording
-from calib_core.results import Calibration, InputFile
+from calib_core.results import Calibration, DataWarning, InputFile
 
 __all__ = ["watched"]
 
@@ -14,13 +17,19 @@ _WIDTH_PX = 640
 _QUALITY = 70
 
 
-def watched(recording: Recording, calibration: Calibration | None, inputs: tuple[InputFile, ...]) -> Watched:
+def watched(
+    recording: Recording,
+    calibration: Calibration | None,
+    inputs: tuple[InputFile, ...],
+    doubts: Sequence[CheckResult] = (),
+) -> Watched:
     """Return what the report takes from a recording.
 
     Args:
         recording: open.
         calibration: whose pairs choose the frame.
         inputs: the recording's files, by their content.
+        doubts: whether it is a recording of the calibration's camera.
     """
     topics = (
         ("radar", recording.radar_topic, recording.radar_clock),
@@ -30,7 +39,7 @@ def watched(recording: Recording, calibration: Calibration | None, inputs: tuple
         name=recording.name,
         inputs=inputs,
         topics=tuple((what, f"{name}, by {clock} stamps" if clock else name) for what, name, clock in topics if name),
-        warnings=recording.warnings,
+        warnings=(*(DataWarning(one.code, one.message, one.hint) for one in doubts), *recording.warnings),
         picture=_picture(recording, calibration),
     )
 
@@ -52,7 +61,7 @@ def _picture(recording: Recording, calibration: Calibration | None) -> Picture |
     size = min(_WIDTH_PX, width), max(1, round(height * min(_WIDTH_PX, width) / width))
     grey = cv2.cvtColor(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
     _, jpeg = cv2.imencode(".jpg", grey, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    sec, nanosec = time_parts(int(recording.image_times[index]))
+    sec, nanosec = time_parts(TimeNs(int(recording.image_times[index])))
     return Picture(jpeg.tobytes(), f"the frame at {sec}.{nanosec:09d} s")
 
 

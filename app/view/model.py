@@ -12,6 +12,7 @@ from calib_core.verdict import VerdictLevel
 
 __all__ = [
     "Advice",
+    "BoxTrackRow",
     "ClickRow",
     "ClickState",
     "DismissedRow",
@@ -87,6 +88,33 @@ class ClickRow:
     mark: Mark = "clicked"
     sigma_px: float | None = None
     chosen: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class BoxTrackRow:
+    """One object with a box: its row in the table.
+
+    Attributes:
+        id: of its track.
+        label: its class.
+        first: index of the first frame with its box.
+        last: index of the last one.
+        boxes: number of frames with its box.
+        keyframes: indices of the frames in which a person stated something about it; empty for boxes from a file.
+        hidden: those of them from which on it is hidden.
+        note: where and why its box ends; "" when there is nothing to say.
+        following: it is being followed through the frames.
+    """
+
+    id: str
+    label: str
+    first: int
+    last: int
+    boxes: int
+    keyframes: tuple[int, ...]
+    hidden: tuple[int, ...]
+    note: str
+    following: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,6 +281,8 @@ class View:
         verdict: how far the calibration can be trusted, and what to do next.
         dismissed: the placements that the user dismissed.
         acknowledged: the codes of the warnings that the user has read.
+        boxes: around moving objects, one row per object.
+        box_labels: the classes to choose from.
     """
 
     revision: int
@@ -279,5 +309,7 @@ class View:
     assumptions: tuple[AssumptionRow, ...] = ()
     dismissed: tuple[DismissedRow, ...] = ()
     acknowledged: tuple[str, ...] = ()
+    boxes: tuple[BoxTrackRow, ...] = ()
+    box_labels: tuple[str, ...] = ()
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)
     verdict: VerdictRow = VerdictRow("nothing", "nothing yet", "")

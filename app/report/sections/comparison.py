@@ -27,6 +27,7 @@ def comparison(against: Against, name: str) -> Markup:
             class_="figures",
         ),
         tag("p", sentence(found.verdict(against.name, name))),
+        *(tag("p", sentence(line)) for line in against.judged),
         *(tag("p", sentence(line), class_="note") for line in found.lines()[known:]),
         id="comparison",
     )

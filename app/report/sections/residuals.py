@@ -3,7 +3,7 @@
 import numpy as np
 
 from app.report.markup import Child, Markup, tag
-from app.report.plots import Axes, captioned, drawing, mark, rounded_step, text
+from app.report.plots import Axes, MarkKind, captioned, drawing, mark, rounded_step, text
 from app.report.residual_rows import ResidualRows
 from app.report.sections.uncertainty import picture_layer
 from app.report.trends import azimuth_sentence, place_sentence, range_sentence, shift_sentence, time_sentence
@@ -68,7 +68,11 @@ def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_pic
 
 def legend() -> list[Child]:
     """Return what the marks mean."""
-    shapes = (("used", "agrees"), ("disagrees", "disagrees"), ("excluded", "left out by the user"))
+    shapes: tuple[tuple[MarkKind, str], ...] = (
+        ("used", "agrees"),
+        ("disagrees", "disagrees"),
+        ("excluded", "left out by the user"),
+    )
     return [
         child
         for kind, words in shapes
@@ -80,7 +84,7 @@ def legend() -> list[Child]:
                 class_="key",
                 aria_hidden="true",
                 xmlns="http://www.w3.org/2000/svg",
-            ),  # type: ignore[arg-type]
+            ),
             f" {words}  ",
         )
     ]

@@ -7,6 +7,7 @@ from typing import Protocol
 from app.error_boundary import error_boundary
 from app.session import Step
 from app.view import sentence
+from app.view.box_rows import boxes_in_frame
 from app.web.channel.click_candidates import candidates_of
 from app.web.channel.desk import answer_of
 from app.web.channel.hub import Hub
@@ -21,6 +22,7 @@ from app.web.messages import (
     Command,
     CursorMoved,
     Done,
+    FrameBoxes,
     FrameHeader,
     FrameWanted,
     Hello,
@@ -74,6 +76,7 @@ class Channel:
         self._candidates = NewestWins(self._send_candidates, self._report)
         self._forward = True
         self._has_candidates = False
+        self._has_boxes = False
 
     async def run(self, socket: Socket) -> None:
         """Serve the page until it disconnects; the socket's exception is then raised to the caller."""
@@ -104,10 +107,19 @@ class Channel:
 
     def refresh(self) -> None:
         """Draw again, after a change of the session or once the 3D view is connected."""
+        self.show_boxes()
         self._overlay.give(self._cursor)
         self._space.give(self._cursor)
         if not self._cursor.playing:
             self._candidates.give(self._cursor)
+
+    def show_boxes(self) -> None:
+        """Send the boxes of the frame on the page; nothing as long as there are none, as before."""
+        carried = self._hub.workspace.carried
+        if carried or self._has_boxes:
+            self._has_boxes = bool(carried)
+            index = self._cursor.index
+            self.outbox.put(encode(FrameBoxes(index, boxes_in_frame(carried, index))), kind="boxes")
 
     async def _read(self, socket: Socket) -> None:
         while True:

@@ -53,6 +53,9 @@ class Tab(Protocol):
     def show(self) -> None:
         """Send the newest View, or what differs from the one that the page has."""
 
+    def show_boxes(self) -> None:
+        """Send the boxes of the frame on the page."""
+
     def refresh(self) -> None:
         """Draw the overlay and the 3D view again, after a change of the session."""
 
@@ -150,6 +153,8 @@ class Hub:
         for tab in self.tabs:
             tab.show()
         if view.solving:
+            for tab in self.tabs:
+                tab.show_boxes()
             return  # overlay and 3D view show the last answer until the next one; redrawing would only slow the solver
         for tab in self.tabs:
             tab.refresh()

@@ -4,6 +4,7 @@ A page's message is a JSON object with a "type" and, if it wants an answer, a "r
 writes the types as TypeScript; `static/messages.d.ts` holds its output, and a test compares the two.
 """
 
+from app.web.messages.box_messages import FrameBoxes
 from app.web.messages.incoming import (
     MAX_TEXT_BYTES,
     Command,
@@ -84,6 +85,7 @@ __all__ = [
     "FolderListing",
     "FolderWanted",
     "FollowNote",
+    "FrameBoxes",
     "FrameHeader",
     "FrameWanted",
     "FramesAdded",

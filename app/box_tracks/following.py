@@ -1,0 +1,1 @@
+"""Following boxes through the pictures of a recording."""
