@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeAlias
 
-__all__ = ["Child", "Markup", "joined", "number", "tag"]
+__all__ = ["Child", "Markup", "joined", "number", "scrolled", "tag"]
 
 _EMPTY = frozenset(
     {"br", "col", "hr", "image", "img", "line", "link", "meta", "path", "rect", "circle", "polygon", "use"}
@@ -52,6 +52,11 @@ def joined(children: Iterable[Child]) -> Markup:
     """Return several children as one."""
     parts = (child.text if isinstance(child, Markup) else _text(child) for child in children if child is not None)
     return Markup("".join(parts))
+
+
+def scrolled(name: str, *parts: Child, class_: str) -> Markup:
+    """Return a wide table in a frame of its own that scrolls on a narrow screen, also by keyboard."""
+    return tag("div", tag("table", *parts, class_=class_), class_="wide", role="region", aria_label=name, tabindex="0")
 
 
 def number(value: float) -> str:

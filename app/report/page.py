@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 
 from app.report.markup import Child, Markup, tag
-from app.report.residual_rows import ResidualRows, rows_at_clicks, rows_of_pairs
+from app.report.residual_rows import rows_at_clicks, rows_of_pairs
 from app.report.sections.acc import acc
 from app.report.sections.answer import answer
 from app.report.sections.cautions import cautions
@@ -61,22 +61,21 @@ def _sections(subject: ReportSubject) -> list[Child]:
 
 def _of_pairs(subject: ReportSubject, calibration: Calibration) -> list[Child]:
     """Return residuals, coverage and the table: at the clicks of the recording if it was judged there, else of the own pairs."""
-    rows, of, own = _rows(subject, calibration)
+    figures = subject.judged.evaluation.residuals if subject.judged is not None else None
+    if figures is not None and subject.judged is not None and subject.recording is not None:
+        rows = rows_at_clicks(figures, subject.judged.clicks, calibration)
+        known = ", which it was solved from" if rows.solved_from else ""
+        of = f"at the clicks in {subject.recording.name}{known}"
+    else:
+        rows, of = rows_of_pairs(calibration), "of the calibration's own pairs"
     if not len(rows):
         return []
     with_picture = subject.recording is not None and subject.recording.picture is not None
     return [
         residuals(calibration, rows, of=of, with_picture=with_picture),
         coverage(calibration, rows, with_picture=with_picture),
-        pair_table(calibration, rows, own=own),
+        pair_table(rows),
     ]
-
-
-def _rows(subject: ReportSubject, calibration: Calibration) -> tuple[ResidualRows, str, bool]:
-    figures = subject.judged.evaluation.residuals if subject.judged is not None else None
-    if figures is None or subject.judged is None or subject.recording is None:
-        return rows_of_pairs(calibration), "of the calibration's own pairs", True
-    return rows_at_clicks(figures, subject.judged.clicks), f"at the clicks in {subject.recording.name}", False
 
 
 def _what(subject: ReportSubject) -> Markup:

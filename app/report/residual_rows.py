@@ -1,7 +1,8 @@
 """Residuals for the plots and the table: of the calibration's own pairs, or at the clicks of a recording."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from calib_core.arrays import Flags, Points2, Points3, Values, frozen_array
 from calib_core.evaluation import ResidualFigures
 from calib_core.measurements import ReflectorClick
 from calib_core.radar import polar_from_cartesian
-from calib_core.results import Calibration
+from calib_core.results import Calibration, PairResult
 
 __all__ = ["ResidualRows", "rows_at_clicks", "rows_of_pairs"]
 
@@ -30,6 +31,9 @@ class ResidualRows:
         times_s: (n,) since the first of them; NaN where unknown.
         expected_px: (n,) root mean square length under the noise model; NaN where there is none.
         held_out_px: (n,) distance to where the other pairs predict the click; NaN where unknown.
+        outlier_probability: (n,) 0 to 1; NaN where unknown.
+        influence: (n,) how far the pose moves without the pair, in standard deviations; NaN where unknown.
+        solved_from: whether the calibration was solved from these clicks.
     """
 
     ids: tuple[str, ...]
@@ -40,12 +44,15 @@ class ResidualRows:
     times_s: Values
     expected_px: Values
     held_out_px: Values
+    outlier_probability: Values
+    influence: Values
+    solved_from: bool
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points_radar_m", frozen_array(self.points_radar_m, (None, 3)))
         object.__setattr__(self, "pixels_px", frozen_array(self.pixels_px, (None, 2)))
         object.__setattr__(self, "projected_px", frozen_array(self.projected_px, (None, 2)))
-        for name in ("times_s", "expected_px", "held_out_px"):
+        for name in ("times_s", "expected_px", "held_out_px", "outlier_probability", "influence"):
             object.__setattr__(self, name, frozen_array(getattr(self, name), (None,)))
 
     def __len__(self) -> int:
@@ -96,7 +103,6 @@ class ResidualRows:
 def rows_of_pairs(calibration: Calibration) -> ResidualRows:
     """Return the residuals of the calibration's own pairs, in their order."""
     pairs = calibration.pairs
-    covariances = np.array([pair.expected_covariance_px2 for pair in pairs]).reshape(-1, 2, 2)
     return ResidualRows(
         ids=tuple(pair.id for pair in pairs),
         kinds=tuple("excluded" if pair.excluded else "used" if pair.inlier else "disagrees" for pair in pairs),
@@ -104,15 +110,21 @@ def rows_of_pairs(calibration: Calibration) -> ResidualRows:
         pixels_px=np.array([pair.pixel_px for pair in pairs]).reshape(-1, 2),
         projected_px=np.array([pair.projected_px for pair in pairs]).reshape(-1, 2),
         times_s=_seconds([pair.image_time for pair in pairs]),
-        expected_px=np.sqrt(np.trace(covariances, axis1=1, axis2=2)),
-        held_out_px=np.array([pair.held_out_px for pair in pairs], dtype=np.float64),
+        expected_px=_values(pairs, _expected_px),
+        held_out_px=_values(pairs, attrgetter("held_out_px")),
+        outlier_probability=_values(pairs, attrgetter("outlier_probability")),
+        influence=_values(pairs, attrgetter("influence")),
+        solved_from=True,
     )
 
 
-def rows_at_clicks(figures: ResidualFigures, clicks: Sequence[ReflectorClick]) -> ResidualRows:
-    """Return the residuals at the clicks of a recording."""
+def rows_at_clicks(
+    figures: ResidualFigures, clicks: Sequence[ReflectorClick], calibration: Calibration
+) -> ResidualRows:
+    """Return the residuals at the clicks of a recording; what the calibration states of the same clicks comes along."""
     times = {click.id: click.image_time for click in clicks}
-    unknown = np.full(len(figures.ids), np.nan)
+    stated = {(pair.id, *pair.pixel_px.tolist()): pair for pair in calibration.pairs if not pair.excluded}
+    same = [stated.get((id_, *place)) for id_, place in zip(figures.ids, figures.pixels_px.tolist(), strict=True)]
     return ResidualRows(
         ids=figures.ids,
         kinds=tuple("used" if inlier else "disagrees" for inlier in figures.inliers.tolist()),
@@ -120,9 +132,21 @@ def rows_at_clicks(figures: ResidualFigures, clicks: Sequence[ReflectorClick]) -
         pixels_px=figures.pixels_px,
         projected_px=figures.projected_px,
         times_s=_seconds([times.get(id_) for id_ in figures.ids]),
-        expected_px=unknown,
-        held_out_px=unknown if figures.held_out is None else figures.held_out.distances_px,
+        expected_px=_values(same, _expected_px),
+        held_out_px=np.full(len(figures.ids), np.nan) if figures.held_out is None else figures.held_out.distances_px,
+        outlier_probability=_values(same, attrgetter("outlier_probability")),
+        influence=_values(same, attrgetter("influence")),
+        solved_from=2 * sum(pair is not None for pair in same) >= len(same) > 0,
     )
+
+
+def _values(pairs: Sequence[PairResult | None], value_of: Callable[[PairResult], float]) -> Values:
+    """Return one value of each pair; NaN where there is no pair."""
+    return np.array([np.nan if pair is None else value_of(pair) for pair in pairs], dtype=np.float64)
+
+
+def _expected_px(pair: PairResult) -> float:
+    return float(np.sqrt(np.trace(pair.expected_covariance_px2)))
 
 
 def _seconds(times: Sequence[int | None]) -> Values:

@@ -19,7 +19,7 @@ __all__ = ["answer"]
 _SIGNS = {"good": "●", "usable": "◐", "weak": "○", "contradictory": "✕", "nothing": "–", "not judged": "–"}
 """The level as a shape, for print without colour."""
 _ROW = 15.0
-_GOOD_LIMITS = "1 deg and 10 cm"
+_GOOD_LIMITS = "10 cm and 1 deg"
 
 
 def answer(subject: ReportSubject) -> Markup:
@@ -131,7 +131,7 @@ def _error_bars(calibration: Calibration) -> Markup:
         _bars(calibration, keys, rows),
         tag(
             "p",
-            f"Camera in the radar's axes, ± one standard deviation. Bars: ± two; the tick is {_GOOD_LIMITS}.",
+            f"Camera in the radar's axes, ± one standard deviation. Bars: ± two. Ticks: {_GOOD_LIMITS}.",
             class_="note",
         ),
         tag("p", f"Assumed, because this radar measures no elevation: {assumed}.", class_="note") if assumed else None,

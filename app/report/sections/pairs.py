@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from app.report.markup import Markup, tag
+from app.report.markup import Markup, scrolled, tag
 from app.report.residual_rows import ResidualRows
 from app.view.number_format import plain
-from calib_core.results import Calibration
 
 __all__ = ["pair_table"]
 
@@ -28,14 +27,8 @@ _HEADS = (
 )
 
 
-def pair_table(calibration: Calibration, rows: ResidualRows, *, own: bool) -> Markup | None:
-    """Return the table; None without pairs.
-
-    Args:
-        calibration: that has the pairs.
-        rows: their residuals.
-        own: whether they are the calibration's own, which have an outlier probability and an influence.
-    """
+def pair_table(rows: ResidualRows) -> Markup | None:
+    """Return the table; None without pairs."""
     if not len(rows):
         return None
     shown = _shown(rows)
@@ -44,15 +37,13 @@ def pair_table(calibration: Calibration, rows: ResidualRows, *, own: bool) -> Ma
         if len(shown) < len(rows)
         else f"All {len(rows)} pairs."
     )
-    extra = [(pair.outlier_probability, pair.influence) for pair in calibration.pairs] if own else []
-    unknown = (float("nan"), float("nan"))
-    body = (_row(rows, index, extra[index] if extra else unknown) for index in shown)
+    body = (_row(rows, index) for index in shown)
     return tag(
         "section",
         tag("h2", "Pairs"),
         tag("p", f"{note} Influence: how far the pose moves without the pair, in standard deviations.", class_="note"),
-        tag(
-            "table",
+        scrolled(
+            "Pairs",
             tag("thead", tag("tr", *(tag("th", head, scope="col") for head in _HEADS))),
             tag("tbody", *body),
             class_="pairs",
@@ -69,10 +60,10 @@ def _shown(rows: ResidualRows) -> list[int]:
     return sorted(np.argsort(-lengths, kind="stable")[:_MOST].tolist())
 
 
-def _row(rows: ResidualRows, index: int, extra: tuple[float, float]) -> Markup:
+def _row(rows: ResidualRows, index: int) -> Markup:
     u, v = rows.pixels_px[index].tolist()
     right, down = rows.residuals_px[index].tolist()
-    probability, influence = extra
+    probability = float(rows.outlier_probability[index])
     cells = (
         f"{rows.ranges_m[index]:.2f}",
         f"{rows.azimuths_deg[index]:.1f}",
@@ -84,7 +75,7 @@ def _row(rows: ResidualRows, index: int, extra: tuple[float, float]) -> Markup:
         plain(float(rows.lengths_px[index])),
         plain(float(rows.held_out_px[index])),
         "< 0.01" if probability < 0.01 else plain(probability, 2),
-        plain(influence, 2),
+        plain(float(rows.influence[index]), 2),
         _WORDS[rows.kinds[index]],
     )
     return tag(

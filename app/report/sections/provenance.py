@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from app.report.markup import Markup, tag
+from app.report.markup import Markup, scrolled, tag
 from app.report.subject import ReportSubject
 from app.view.wording import sentence
 from calib_core.options import CalibrationOptions
@@ -22,14 +22,14 @@ _RESTS_ON = {
 
 def provenance(subject: ReportSubject) -> Markup:
     """Return the tables of files and facts."""
-    files = list(_files(subject))
+    files = _files(subject)
     hidden = f"{len(files) - _MOST_FILES} more files." if len(files) > _MOST_FILES else None
     facts = list(_facts(subject))
     return tag(
         "section",
         tag("h2", "Provenance"),
-        tag(
-            "table",
+        scrolled(
+            "Files",
             tag("thead", tag("tr", *(tag("th", head, scope="col") for head in ("file", "what", "bytes", "SHA-256")))),
             tag("tbody", *(_file_row(what, one) for what, one in files[:_MOST_FILES])),
             class_="files",
@@ -47,15 +47,20 @@ def _file_row(what: str, file: InputFile) -> Markup:
     )
 
 
-def _files(subject: ReportSubject) -> Iterator[tuple[str, InputFile]]:
-    """Yield every file with what it is to this report."""
-    yield from (("this calibration", one) for one in subject.inputs)
-    if subject.found.file is not None:
-        yield from (("it was made from", one) for one in subject.found.file.provenance.inputs)
-    if subject.recording is not None:
-        yield from (("judged on", one) for one in subject.recording.inputs)
-    if subject.against is not None:
-        yield from (("compared with", one) for one in subject.against.inputs)
+def _files(subject: ReportSubject) -> list[tuple[str, InputFile]]:
+    """Return every file once, with what it is to this report."""
+    made_from = subject.found.file.provenance.inputs if subject.found.file is not None else ()
+    parts = (
+        ("this calibration", subject.inputs),
+        ("it was made from", made_from),
+        ("judged on", subject.recording.inputs if subject.recording is not None else ()),
+        ("compared with", subject.against.inputs if subject.against is not None else ()),
+    )
+    roles: dict[InputFile, list[str]] = {}
+    for role, files in parts:
+        for one in files:
+            roles.setdefault(one, []).append(role)
+    return [(", ".join(dict.fromkeys(names)), one) for one, names in roles.items()]
 
 
 def _facts(subject: ReportSubject) -> Iterator[tuple[str, str]]:

@@ -60,7 +60,7 @@ def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_pic
     return tag(
         "section",
         heading,
-        tag("p", *legend(), f" Length: distance from click to reprojection.{thinned}", class_="note"),
+        tag("p", *legend(), f"Length: distance from click to reprojection.{thinned}", class_="note keys"),
         tag("div", *plots, class_="three"),
         id="residuals",
     )
@@ -73,21 +73,18 @@ def legend() -> list[Child]:
         ("disagrees", "disagrees"),
         ("excluded", "left out by the user"),
     )
-    return [
-        child
-        for kind, words in shapes
-        for child in (
-            tag(
-                "svg",
-                mark(kind, 5, 5),
-                viewBox="0 0 10 10",
-                class_="key",
-                aria_hidden="true",
-                xmlns="http://www.w3.org/2000/svg",
-            ),
-            f" {words}  ",
-        )
-    ]
+    return [tag("span", _key(kind), f" {words}") for kind, words in shapes]
+
+
+def _key(kind: MarkKind) -> Markup:
+    return tag(
+        "svg",
+        mark(kind, 5.0, 5.0),
+        viewBox="0 0 10 10",
+        class_="key",
+        aria_hidden="true",
+        xmlns="http://www.w3.org/2000/svg",
+    )
 
 
 def _vectors(calibration: Calibration, rows: ResidualRows, every: int, *, with_picture: bool) -> Markup:
@@ -111,8 +108,8 @@ def _vectors(calibration: Calibration, rows: ResidualRows, every: int, *, with_p
         width=_WIDTH,
         height=height,
     )
-    times = "" if factor == 1.0 else f", {factor:g} times as long"
-    return captioned(f"Vectors from click to reprojection{times}", picture, words)
+    times = "" if factor == 1.0 else f", {factor:g} times long"
+    return captioned(f"From click to reprojection{times}", picture, words)
 
 
 def _against(
