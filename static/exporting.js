@@ -14,6 +14,9 @@ import { on, state } from "./state.js";
 /** The server's preview of a format: ExportPreview in app/web/channel/export_preview.py. @typedef {Record<string, any>} Preview */
 const KEPT = "cocalib-export";
 const CLICKS = "clicks";
+const REPORT = "report";
+/** What is downloaded as it is, without fields to fill in. @type {Record<string, string>} */
+const PLAIN = { [CLICKS]: "api/clicks.json", [REPORT]: "api/report.html" };
 const ASKING = "Asking the server for the file…";
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("export-dialog"));
 const button = /** @type {HTMLButtonElement} */ (document.getElementById("export"));
@@ -68,7 +71,7 @@ async function loadFormats() {
   const given = answer && (await content(answer.json()));
   if (!given) return;
   formats = given;
-  if (!formats.some((format) => format.key === kept.format) && kept.format !== CLICKS) kept.format = "json";
+  if (!formats.some((format) => format.key === kept.format) && !(kept.format in PLAIN)) kept.format = "json";
   drawList();
 }
 
@@ -109,10 +112,11 @@ function build() {
   dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, names.element, rectified.row, parent.element, before, text, notes]), side, foot);
 }
 
-/** The formats, and the clicks as one of them. */
+/** The formats, and the clicks and the report as two of them. */
 function drawList() {
   const clicks = { key: CLICKS, label: "Clicks, to continue elsewhere", group: "Go on", also: "clicks.json session", takes_parent: false, takes_rectified: false };
-  drawFormats([...formats, clicks], kept.format);
+  const report = { key: REPORT, label: "Report: how good, where, and why", group: "Go on", also: "report.html pdf print quality", takes_parent: false, takes_rectified: false };
+  drawFormats([...formats, clicks, report], kept.format);
 }
 
 /** Keep Tab inside the panel. @param {KeyboardEvent} event */
@@ -133,12 +137,13 @@ async function load() {
   const mine = ++asked;
   if (!formats.length) await loadFormats();
   const key = kept.format;
-  const { answer, reason, isLost } = await ask(key === CLICKS ? "api/clicks.json" : address("preview"));
-  const said = answer && (await content(key === CLICKS ? answer.text() : answer.json()));
+  const { answer, reason, isLost } = await ask(PLAIN[key] ?? address("preview"));
+  const said = answer && (await content(key in PLAIN ? answer.text() : answer.json()));
   if (mine !== asked) return;
   if (said === null) drawReason(reason || BROKE_OFF, isLost || !reason);
   else if (said.reason) drawReason(said.reason, false, said.field);
   else if (key === CLICKS) drawClicks(said);
+  else if (key === REPORT) drawReport(said);
   else drawPreview(said);
 }
 
@@ -180,6 +185,15 @@ function drawClicks(content) {
   head.replaceChildren(make("span", "", `${count} click${count === 1 ? "" : "s"} with the stamps of their frames, for cocalib solve or to load on another machine`));
   drawFields({});
   show(content, "clicks.json", false);
+  for (const part of [before, notes, side]) part.replaceChildren();
+}
+
+/** Show what the report contains: its headings. @param {string} page */
+function drawReport(page) {
+  const found = new DOMParser().parseFromString(page, "text/html").querySelectorAll("h2, h3");
+  head.replaceChildren(make("span", "", "One HTML file for a colleague: opens in any browser, prints to at most four pages"), make("span", "kind", size(page.length)));
+  drawFields({});
+  show([...found].map((one) => `${one.tagName === "H3" ? "  " : ""}${one.textContent}`).join("\n"), "report.html", true);
   for (const part of [before, notes, side]) part.replaceChildren();
 }
 
@@ -229,7 +243,7 @@ async function copyText() {
 /** Download the file under the name in the field; if the server refuses, show why. */
 async function download() {
   if (save.disabled) return;
-  const { answer, reason, isLost } = await ask(kept.format === CLICKS ? "api/clicks.json" : address("export"));
+  const { answer, reason, isLost } = await ask(PLAIN[kept.format] ?? address("export"));
   const file = answer && (await content(answer.blob()));
   if (!file) return drawReason(reason || BROKE_OFF, isLost || !reason);
   const url = URL.createObjectURL(file);

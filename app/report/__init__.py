@@ -1,5 +1,6 @@
 """The report: one self-contained HTML file that says how good a calibration is, where, and how one knows."""
 
+from app.report.current_report import current_report
 from app.report.making import against_of, known_calibration, subject_of
 from app.report.page import report_html
 from app.report.printing import PrintingError, print_pdf
@@ -14,6 +15,7 @@ __all__ = [
     "ReportSubject",
     "Watched",
     "against_of",
+    "current_report",
     "known_calibration",
     "print_pdf",
     "report_html",

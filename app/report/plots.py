@@ -85,7 +85,8 @@ class Axes:
 
 
 def ticks(low: float, high: float, *, count: int = 6) -> list[float]:
-    """Return round values between two, at most this many."""
+    """Return round values between two in either order, about this many."""
+    low, high = min(low, high), max(low, high)
     step = rounded_step((high - low) / count)
     return [
         round(index * step, 9)

@@ -16,6 +16,8 @@ _BINS = 10
 _LINES = ("contour a", "contour b", "contour c")
 _DASHES = ("solid", "dashed", "dotted")
 _MOST_CLASSES = 8
+_FULL = 20
+"""With fewer returns a bin of range says nothing."""
 
 
 def acc(figures: BoxFigures) -> Markup:
@@ -88,11 +90,12 @@ def _by_range(figures: BoxFigures) -> Markup:
         )
     axes = Axes(min(one.low_m for one in bins), max(one.high_m for one in bins), 0.0, 1.05)
     bars = [_bar(axes, one.low_m, one.high_m, one.inside / one.returns) for one in bins]
-    best, worst = (choose(bins, key=lambda one: one.inside / one.returns) for choose in (max, min))
+    full = [one for one in bins if one.returns >= _FULL] or bins
+    best, worst = (choose(full, key=lambda one: one.inside / one.returns) for choose in (max, min))
     said = (
         f"Best at {_bin_words(best)}, worst at {_bin_words(worst)}."
-        if len(bins) > 1
-        else f"All returns are at {_bin_words(best)}."
+        if len(full) > 1
+        else f"Nearly all returns are at {_bin_words(best)}."
     )
     drawn = drawing(f"Acc against range. {said}", axes.drawn("range [m]", "returns inside [%]", y_percent=True), *bars)
     return captioned("Acc against range", drawn, said)

@@ -8,7 +8,7 @@ from app.view.number_format import plain
 
 __all__ = ["pair_table"]
 
-_MOST = 40
+_MOST = 30
 _WORDS = {"used": "● agrees", "disagrees": "✕ disagrees", "excluded": "□ left out"}
 _HEADS = (
     "pair",

@@ -50,7 +50,7 @@ def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_pic
             rows,
             from_middle,
             every,
-            ("Length against place in the picture", "distance from the middle [px]", place_sentence(rows, size_px)),
+            ("Length across the picture", "distance from the middle [px]", place_sentence(rows, size_px)),
         ),
         _against(
             rows, rows.times_s, every, ("Length against time", "time since the first pair [s]", time_sentence(rows))
@@ -109,7 +109,7 @@ def _vectors(calibration: Calibration, rows: ResidualRows, every: int, *, with_p
         height=height,
     )
     times = "" if factor == 1.0 else f", {factor:g} times long"
-    return captioned(f"From click to reprojection{times}", picture, words)
+    return captioned(f"Click to reprojection{times}", picture, words)
 
 
 def _against(
