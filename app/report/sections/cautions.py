@@ -28,8 +28,14 @@ def cautions(subject: ReportSubject) -> Markup:
     ]
     if len(unpaired) > _MOST_UNPAIRED:
         items.append(tag("li", f"{len(unpaired) - _MOST_UNPAIRED} more clicks have no pair."))
-    body = tag("ul", *items, class_="cautions") if items else tag("p", "No warnings.", class_="note")
+    body = tag("ul", *items, class_="cautions") if items else tag("p", _no_warnings(subject), class_="note")
     return tag("section", tag("h2", "Cautions"), body, id="cautions")
+
+
+def _no_warnings(subject: ReportSubject) -> str:
+    if subject.judged is None and (subject.calibration is None or not subject.calibration.pairs):
+        return "No warnings; but without pairs, and without clicks or boxes in a recording, hardly anything could be checked."
+    return "No warnings."
 
 
 def _all_warnings(subject: ReportSubject) -> Iterator[DataWarning]:

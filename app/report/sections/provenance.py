@@ -68,7 +68,8 @@ def _facts(subject: ReportSubject) -> Iterator[tuple[str, str]]:
     file = subject.found.file
     yield "format", "cocalib/calibration-1" if file is not None else subject.found.format
     evidence = file.rests_on if file is not None else subject.found.evidence or "imported_assumed"
-    yield "evidence", _RESTS_ON[evidence]
+    said = ", as the file states" if file is None and subject.found.evidence is not None else ""
+    yield "evidence", f"{_RESTS_ON[evidence]}{said}"
     yield "report by", f"cocalib {subject.version}"
     if file is not None:
         made = file.provenance

@@ -35,7 +35,9 @@ def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_pic
     centre = (np.array(size_px) - 1) / 2
     from_middle = np.linalg.norm(rows.pixels_px - centre, axis=1)
     every = max(1, int(np.ceil(rows.drawn.sum() / _MOST_DRAWN)))
-    thinned = f" One in {every} pairs is drawn." if every > 1 else ""
+    notes = ["Length: distance from click to reprojection.", _judged_words(rows)]
+    if every > 1:
+        notes.append(f"One in {every} pairs is drawn.")
     plots: list[Child] = [
         _vectors(calibration, rows, every, with_picture=with_picture),
         _against(rows, rows.ranges_m, every, ("Length against range", "range [m]", range_sentence(rows))),
@@ -60,10 +62,19 @@ def residuals(calibration: Calibration, rows: ResidualRows, *, of: str, with_pic
     return tag(
         "section",
         heading,
-        tag("p", *legend(), f"Length: distance from click to reprojection.{thinned}", class_="note keys"),
+        tag("p", *legend(), " ".join(notes), class_="note keys"),
         tag("div", *plots, class_="three"),
         id="residuals",
     )
+
+
+def _judged_words(rows: ResidualRows) -> str:
+    """Say which pairs the sentences under the plots are about."""
+    if rows.used.sum() == rows.drawn.sum():
+        return "The sentences are about all pairs."
+    if rows.judged.sum() == rows.used.sum():
+        return "The sentences are about the pairs that agree."
+    return "Fewer than half of the pairs agree, so the sentences are about all of them."
 
 
 def legend() -> list[Child]:
@@ -99,7 +110,7 @@ def _vectors(calibration: Calibration, rows: ResidualRows, every: int, *, with_p
         x, y = ((rows.pixels_px[index] + 0.5) * scale).tolist()
         dx, dy = (rows.residuals_px[index] * scale * factor).tolist()
         drawn += [tag("line", x1=x, y1=y, x2=x + dx, y2=y + dy, class_="vector"), mark(rows.kinds[index], x, y)]
-    shown = tag("svg", *drawn, x=0.0, y=0.0, width=_WIDTH, height=height, class_="clip")
+    shown = tag("svg", *drawn, x=0.0, y=0.0, width=_WIDTH, height=height, class_="clip", aria_hidden="true")
     words = shift_sentence(rows)
     picture = drawing(
         f"Residual vectors over the picture, drawn {factor:g} times as long. {words}",
