@@ -15,6 +15,15 @@ import { on, state } from "./state.js";
 const KEPT = "cocalib-export";
 const CLICKS = "clicks";
 const REPORT = "report";
+const IN_REPORT = [
+  "Answer: verdict, transform both ways, error bars",
+  "Cautions: warnings, and what to do",
+  "Uncertainty in the picture at 5, 20 and 60 m",
+  "Residuals against range, azimuth, place and time",
+  "Coverage of picture and range",
+  "Pairs",
+  "Provenance: files by their hashes, options, versions",
+];
 /** What is downloaded as it is, without fields to fill in. @type {Record<string, string>} */
 const PLAIN = { [CLICKS]: "api/clicks.json", [REPORT]: "api/report.html" };
 const ASKING = "Asking the server for the file…";
@@ -137,12 +146,12 @@ async function load() {
   const mine = ++asked;
   if (!formats.length) await loadFormats();
   const key = kept.format;
-  const { answer, reason, isLost } = await ask(PLAIN[key] ?? address("preview"));
-  const said = answer && (await content(key in PLAIN ? answer.text() : answer.json()));
+  const { answer, reason, isLost } = await ask(key === CLICKS ? PLAIN[key] : key === REPORT ? "api/preview/json" : address("preview"));
+  const said = answer && (await content(key === CLICKS ? answer.text() : answer.json()));
   if (mine !== asked) return;
   if (said === null) drawReason(reason || BROKE_OFF, isLost || !reason);
-  else if (said.reason) drawReason(said.reason, false, said.field);
   else if (key === CLICKS) drawClicks(said);
+  else if (said.reason) drawReason(said.reason, false, key === REPORT ? null : said.field);
   else if (key === REPORT) drawReport(said);
   else drawPreview(said);
 }
@@ -188,13 +197,14 @@ function drawClicks(content) {
   for (const part of [before, notes, side]) part.replaceChildren();
 }
 
-/** Show what the report contains: its headings. @param {string} page */
-function drawReport(page) {
-  const found = new DOMParser().parseFromString(page, "text/html").querySelectorAll("h2, h3");
-  head.replaceChildren(make("span", "", "One HTML file for a colleague: opens in any browser, prints to at most four pages"), make("span", "kind", size(page.length)));
+/** Say what the report contains; it is written when it is downloaded. @param {Preview} preview of calibration.json */
+function drawReport(preview) {
+  head.replaceChildren(make("span", "", "One HTML file for a colleague: opens in any browser without a network, prints to at most four pages"));
   drawFields({});
-  show([...found].map((one) => `${one.tagName === "H3" ? "  " : ""}${one.textContent}`).join("\n"), "report.html", true);
-  for (const part of [before, notes, side]) part.replaceChildren();
+  show(IN_REPORT.join("\n"), "report.html", true);
+  notes.replaceChildren();
+  before.replaceChildren();
+  side.replaceChildren(...(preview.pose ? [frameDrawing(preview.pose), make("p", "direction", preview.pose.words)] : []));
 }
 
 /** Show why there is nothing to save yet. @param {string} reason @param {boolean} [canRetry] @param {"frames"|"parent"|"rectified"|null} [field] that has to be filled in or corrected */

@@ -3,18 +3,31 @@
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from app.report.making import subject_of
 from app.report.residual_rows import ResidualRows
-from app.report.subject import ReportSubject
-from calib_core.interchange import imported, read_calibration
-from calib_core.results import Calibration
+from app.report.subject import Against, Judged, Picture, ReportSubject, Watched
+from calib_core.evaluation import BoxFigures, ClassFigure, Evaluation, FrameFigure, Sensitivity, Share
+from calib_core.interchange import compare, imported, read_calibration
+from calib_core.measurements import TimeNs
+from calib_core.results import Calibration, DataWarning, InputFile
 
-__all__ = ["SIZE_PX", "golden", "planted_rows", "subject_for"]
+__all__ = [
+    "FILE",
+    "SIZE_PX",
+    "box_figures",
+    "fullest_subject",
+    "golden",
+    "planted_rows",
+    "subject_for",
+    "watched_recording",
+]
 
 SIZE_PX = (640, 480)
 _N = 60
+FILE = InputFile("radar.bag", 12, "5e" * 32)
 
 
 def planted_rows(*, growing_with: str = "", shift_px: float = 0.0, n: int = _N) -> ResidualRows:
@@ -71,3 +84,60 @@ def subject_for(project_root: Path, calibration: Calibration | None = None) -> R
     file = read_calibration(path.read_text(encoding="utf-8"), path.name)
     file = file if calibration is None else replace(file, calibration=calibration)
     return subject_of(imported(file), file.calibration, path.name)
+
+
+def watched_recording(**changes: object) -> Watched:
+    """Return a recording with a frame to draw over."""
+    picture = Picture(b"\xff\xd8 a picture", "the frame at 1.000000000 s")
+    return replace(Watched("radar.bag", (FILE,), (("radar", "/radar"),), (), picture), **changes)
+
+
+def box_figures() -> BoxFigures:
+    """Return figures of nine frames with four returns each."""
+    frames = tuple(FrameFigure(TimeNs(k), TimeNs(k), 4, (4, 0, 3)[k % 3], 1, 5.0) for k in range(9))
+    return BoxFigures(
+        acc=0.58,
+        acc_standard_error=0.1,
+        acc_without_zero_frames=0.87,
+        frames=frames,
+        classes=(ClassFigure("person", 0.6, 9, 36, 21), ClassFigure("", None, 0, 0, 0)),
+        ranges=(Share(0.0, 5.0, 30, 10), Share(5.0, 10.0, 40, 38), Share(10.0, 15.0, 1, 0)),
+        sensitivity=(
+            Sensitivity("roll", (-1.0, 0.0, 1.0), (0.58, 0.58, 0.579)),
+            Sensitivity("pitch", (-1.0, 0.0, 1.0), (0.5, 0.58, 0.6)),
+            Sensitivity("yaw", (-1.0, 0.0, 1.0), (0.3, 0.58, 0.2)),
+        ),
+        chance=0.02,
+        rule="each return counts once",
+        source="boxes.json",
+    )
+
+
+def fullest_subject(project_root: Path) -> ReportSubject:
+    """Return as much as a report can be about: many pairs, warnings, files, boxes, a recording, another calibration."""
+    calibration = golden(project_root)
+    rng = np.random.default_rng(2)
+    one = calibration.pairs[0]
+    pairs = tuple(
+        replace(
+            one, id=f"c{k}", pixel_px=(place := rng.uniform((0, 0), SIZE_PX)), projected_px=place + rng.normal(0, 4, 2)
+        )
+        for k in range(80)
+    )
+    long = (
+        "the residuals of the pairs at the left edge are twice as long as the noise of clicks and radar explains, " * 2
+    )
+    warnings = tuple(DataWarning(f"code-{k}", long, "place the reflector elsewhere, " * 4) for k in range(20))
+    unpaired = tuple(replace(calibration.unpaired[0], id=f"u{k}", reason=long) for k in range(20))
+    full = replace(calibration, pairs=pairs, warnings=warnings, unpaired=unpaired)
+    subject = subject_for(project_root, full)
+    files = tuple(InputFile(f"part_{k}.bag", 10**9 + k, f"{k:064x}") for k in range(40))
+    frame = np.full((480, 640, 3), 200, np.uint8)
+    jpeg = cv2.imencode(".jpg", frame)[1].tobytes()
+    seen = watched_recording(inputs=files, warnings=warnings, picture=Picture(jpeg, "the frame at 1.000000000 s"))
+    moved = replace(full, camera_from_radar=full.camera_from_radar.perturbed(np.full(6, 0.01)))
+    against = Against(
+        "other.json", (FILE,), compare(subject_for(project_root, moved).found, subject.found), (long,) * 4
+    )
+    judged = Judged(Evaluation(None, replace(box_figures(), rule=long)))
+    return replace(subject, recording=seen, judged=judged, against=against, inputs=(FILE,))

@@ -8,18 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.report import Against, Judged, Picture, ReportSubject, Watched, known_calibration, report_html, subject_of
+from app.report import Against, Judged, ReportSubject, known_calibration, report_html, subject_of
 from app.view.number_format import plain
-from calib_core.evaluation import BoxFigures, ClassFigure, Evaluation, FrameFigure, Sensitivity, Share
+from calib_core.evaluation import Evaluation
 from calib_core.geometry import quaternion_wxyz_from_matrix
 from calib_core.interchange import compare, export, imported, read_any
-from calib_core.measurements import TimeNs
-from calib_core.results import DataWarning, InputFile
-from tests.unit.app.report.planted import golden, subject_for
+from calib_core.results import DataWarning
+from tests.unit.app.report.planted import FILE, box_figures, golden, subject_for, watched_recording
 
 _HTML = "{http://www.w3.org/1999/xhtml}"
 _SVG = "{http://www.w3.org/2000/svg}"
-_FILE = InputFile("radar.bag", 12, "5e" * 32)
 
 
 def _parsed(subject: ReportSubject) -> ElementTree.Element:
@@ -30,40 +28,17 @@ def _words(subject: ReportSubject) -> str:
     return " ".join("".join(_parsed(subject).find(f"{_HTML}body").itertext()).split())  # type: ignore[union-attr]
 
 
-def _watched(**changes: object) -> Watched:
-    picture = Picture(b"\xff\xd8 a picture", "the frame at 1.000000000 s")
-    return replace(Watched("radar.bag", (_FILE,), (("radar", "/radar"),), (), picture), **changes)
-
-
-def _acc() -> BoxFigures:
-    frames = tuple(FrameFigure(TimeNs(k), TimeNs(k), 4, (4, 0, 3)[k % 3], 1, 5.0) for k in range(9))
-    return BoxFigures(
-        acc=0.58,
-        acc_standard_error=0.1,
-        acc_without_zero_frames=0.87,
-        frames=frames,
-        classes=(ClassFigure("person", 0.6, 9, 36, 21), ClassFigure("", None, 0, 0, 0)),
-        ranges=(Share(0.0, 5.0, 30, 10), Share(5.0, 10.0, 40, 38), Share(10.0, 15.0, 1, 0)),
-        sensitivity=(
-            Sensitivity("roll", (-1.0, 0.0, 1.0), (0.58, 0.58, 0.579)),
-            Sensitivity("pitch", (-1.0, 0.0, 1.0), (0.5, 0.58, 0.6)),
-            Sensitivity("yaw", (-1.0, 0.0, 1.0), (0.3, 0.58, 0.2)),
-        ),
-        chance=0.02,
-        rule="each return counts once",
-        source="boxes.json",
-    )
-
-
 def test_the_same_inputs_give_the_same_bytes(project_root: Path) -> None:
-    full = replace(subject_for(project_root), recording=_watched(), judged=Judged(Evaluation(None, _acc())))
+    full = replace(
+        subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, box_figures()))
+    )
     assert report_html(full) == report_html(
         replace(subject_for(project_root), recording=full.recording, judged=full.judged)
     )
 
 
 def test_it_is_small_and_needs_nothing_from_elsewhere(project_root: Path) -> None:
-    html = report_html(replace(subject_for(project_root), recording=_watched()))
+    html = report_html(replace(subject_for(project_root), recording=watched_recording()))
     assert len(html.encode()) < 3_000_000
     addresses = re.findall(r'(?:href|src|url\(|action)="?([^"\s)]+)', html)
     assert addresses
@@ -88,7 +63,11 @@ def test_the_numbers_are_those_of_the_calibration(project_root: Path) -> None:
 
 
 def test_every_drawing_and_table_can_be_heard(project_root: Path) -> None:
-    page = _parsed(replace(subject_for(project_root), recording=_watched(), judged=Judged(Evaluation(None, _acc()))))
+    page = _parsed(
+        replace(
+            subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, box_figures()))
+        )
+    )
     drawings = [one for one in page.iter(f"{_SVG}svg") if one.get("aria-hidden") != "true"]
     assert len(drawings) >= 14
     assert all(one.get("role") == "img" and one.findtext(f"{_SVG}title") for one in drawings)
@@ -108,7 +87,9 @@ def test_text_of_a_recording_or_a_file_stays_text(project_root: Path) -> None:
         calibration, pairs=tuple(replace(one, id=evil) for one in calibration.pairs), warnings=(warning,)
     )
     found = subject_for(project_root, calibration).found
-    seen = _watched(name=evil, topics=(("radar", evil),), warnings=(warning,), inputs=(replace(_FILE, name=evil),))
+    seen = watched_recording(
+        name=evil, topics=(("radar", evil),), warnings=(warning,), inputs=(replace(FILE, name=evil),)
+    )
     against = Against(evil, (), compare(found, found), (evil,))
     subject = replace(subject_for(project_root, calibration), name=evil, recording=seen, against=against)
     html = report_html(subject)
@@ -149,7 +130,11 @@ def test_an_imported_calibration_is_not_judged(project_root: Path) -> None:
 
 
 def test_acc_comes_with_the_sentence_that_it_is_not_accuracy(project_root: Path) -> None:
-    words = _words(replace(subject_for(project_root), recording=_watched(), judged=Judged(Evaluation(None, _acc()))))
+    words = _words(
+        replace(
+            subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, box_figures()))
+        )
+    )
     assert (
         "Acc 58.0 ± 10.0 % over 9 frames (without the frames of 0 %: 87.0 %; turned by 10 deg, which is about chance: 2.0 %)"
         in words
@@ -164,15 +149,17 @@ def test_acc_comes_with_the_sentence_that_it_is_not_accuracy(project_root: Path)
 
 
 def test_a_file_without_frames_with_returns_has_no_acc(project_root: Path) -> None:
-    none = replace(_acc(), acc=None, acc_without_zero_frames=None, chance=None, frames=(), classes=(), ranges=())
-    words = _words(replace(subject_for(project_root), recording=_watched(), judged=Judged(Evaluation(None, none))))
+    none = replace(box_figures(), acc=None, acc_without_zero_frames=None, chance=None, frames=(), classes=(), ranges=())
+    words = _words(
+        replace(subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, none)))
+    )
     assert "Acc is unknown: no frame has returns of targets." in words
 
 
 def test_files_are_named_once_with_all_that_they_are(project_root: Path) -> None:
-    subject = replace(subject_for(project_root), inputs=(_FILE,), recording=_watched())
+    subject = replace(subject_for(project_root), inputs=(FILE,), recording=watched_recording())
     words = _words(subject)
-    assert words.count(_FILE.sha256) == 1
+    assert words.count(FILE.sha256) == 1
     assert "this calibration, judged on" in words
 
 
