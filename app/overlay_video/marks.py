@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from app.colours import residual_colours
+from app.recorded_view import box_words
 from calib_core.arrays import Flags, Points2
 from calib_core.detections import Box
 
@@ -105,7 +106,7 @@ def draw_boxes(picture: np.ndarray, boxes: Sequence[Box], labels: Sequence[str])
         corners = (_fixed(box.left_px, box.top_px), _fixed(box.right_px, box.bottom_px))
         cv2.rectangle(picture, *corners, _EDGE, 4, cv2.LINE_AA, _SHIFT)
         cv2.rectangle(picture, *corners, hue, 2, cv2.LINE_AA, _SHIFT)
-        words = " ".join(filter(None, (box.label, box.track)))
+        words = box_words(box)
         if words:
             label(picture, words, (box.left_px, box.top_px - 0.6 * text_height_px(picture)), hue, plate=True)
 
