@@ -973,6 +973,12 @@ export interface SnapForm {
   request?: number;
 }
 
+/** Boxes are to be followed no farther. */
+export interface StopFollowingForm {
+  type: "stop_following";
+  request?: number;
+}
+
 /** A page asks what can be chosen. */
 export interface ChoicesWanted {
   type: "choices";
@@ -1074,6 +1080,7 @@ export type FromPage =
   | CompareForm
   | UncertaintyForm
   | SnapForm
+  | StopFollowingForm
   | ChoicesWanted
   | FolderWanted
   | RecentForgotten

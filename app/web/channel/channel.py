@@ -22,6 +22,7 @@ from app.web.messages import (
     Command,
     CursorMoved,
     Done,
+    FollowingStopped,
     FrameBoxes,
     FrameHeader,
     FrameWanted,
@@ -107,7 +108,6 @@ class Channel:
 
     def refresh(self) -> None:
         """Draw again, after a change of the session or once the 3D view is connected."""
-        self.show_boxes()
         self._overlay.give(self._cursor)
         self._space.give(self._cursor)
         if not self._cursor.playing:
@@ -159,6 +159,8 @@ class Channel:
         elif isinstance(command, ViewpointWanted):
             if self.scene is not None:
                 self.scene.look_from(command.viewpoint)
+        elif isinstance(command, FollowingStopped):
+            self._hub.box_following.stop()
         elif isinstance(command, SnapWanted):
             hub = self._hub
             self.outbox.put(encode(await snapped(command, hub.moments, hub.frames, hub.executor)))
@@ -199,6 +201,7 @@ class Channel:
         if not 0 <= command.index < len(self._hub.moments):
             return
         self._cursor = command
+        self.show_boxes()
         self.refresh()
 
     async def _greet(self, _wanted: Hello) -> None:
