@@ -15,7 +15,7 @@ from calib_core.measurements import MIN_PAIRS, ReflectorClick
 from calib_core.residual_test import ResidualTest, residual_test
 from calib_core.results import Calibration, InputFile
 
-__all__ = ["clicks_in", "other_camera", "stale_inputs", "with_recording"]
+__all__ = ["calibration_of", "clicks_in", "other_camera", "stale_inputs", "with_recording"]
 
 _LEAST_P = 0.01
 _MOST_MISFITS = 0.2
@@ -93,7 +93,7 @@ def with_recording(
     """
     if report.imported.file is None and not report.ok:
         return report
-    calibration = _calibration(report.imported, source, camera)
+    calibration = calibration_of(report.imported, source, camera)
     times = sorted({click.image_time for click in clicks})
     scans = recording.radar_scans_around(times, half_window_s(calibration.options))
     pairs = pair_clicks([click for click in clicks if click.counts], scans, calibration.options).pairs
@@ -108,7 +108,17 @@ def with_recording(
     return dataclasses.replace(report, results=(*report.results, result))
 
 
-def _calibration(found: ImportedCalibration, source: str, camera: Camera | None) -> Calibration:
+def calibration_of(found: ImportedCalibration, source: str, camera: Camera | None) -> Calibration:
+    """Return what was read as a calibration.
+
+    Args:
+        found: what was read.
+        source: the file's name, for error messages.
+        camera: the intrinsics, if the file has none.
+
+    Raises:
+        InputError: there are none, or the file contradicts itself.
+    """
     if found.file is not None:
         return found.file.calibration
     known = found.camera or camera

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-__all__ = ["write_whole", "writing_whole"]
+__all__ = ["whole_path", "write_whole", "writing_whole"]
 
 _PATIENCE_S = 2.0
 
@@ -62,6 +62,30 @@ def writing_whole(path: Path) -> Iterator[BinaryIO]:
             yield file
             file.flush()
             os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    _sync_folder(path.parent)
+
+
+@contextmanager
+def whole_path(path: Path) -> Iterator[Path]:
+    """Yield a name to write a file to by other means; it takes its own name at the end, and nothing is left if that fails.
+
+    A symbolic link is followed. The name yielded has the suffix of the file's own.
+
+    Raises:
+        OSError: it cannot be written; the old file stays.
+    """
+    path = path.resolve()
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "is not a regular file; name a file", str(path))
+    if not path.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, f"the folder {path.parent} does not exist; create it", str(path))
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(6)}.part{path.suffix}")
+    try:
+        temporary.touch(exist_ok=False)
+        yield temporary
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)

@@ -58,12 +58,15 @@ def frozen_array(values: Any, shape: tuple[int | None, ...], *, dtype: Any = np.
     array = np.array(values, dtype=dtype, order="C", copy=None if _is_frozen(values) else True)
     if array.size == 0 and len(shape) == 2 and array.ndim == 1:
         array = array.reshape(0, shape[1] or 0)
-    fits = array.ndim == len(shape) and all(want in (None, have) for want, have in zip(shape, array.shape, strict=True))
-    if not fits:
+    if array.shape != shape and not _fits(array.shape, shape):
         wanted = " x ".join("n" if length is None else str(length) for length in shape)
         raise ValueError(f"expected an array of {wanted}, got {' x '.join(map(str, array.shape)) or 'a single number'}")
     array.setflags(write=False)
     return array
+
+
+def _fits(have: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    return len(have) == len(wanted) and all(want in (None, length) for want, length in zip(wanted, have, strict=True))
 
 
 def _is_frozen(values: Any) -> bool:

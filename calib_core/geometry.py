@@ -134,10 +134,15 @@ def euler_from_rotation(rotation: Matrix33) -> Vector3:
     return np.array([np.arctan2(r[2, 1], r[2, 2]), y_rad, np.arctan2(r[1, 0], r[0, 0])])
 
 
-def _determinant(matrix: Matrix33) -> float:
-    """Expand the determinant: for a single 3 x 3 matrix this is much faster than NumPy's factorisation."""
-    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
-    return float(a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
+def _dot(x: list[float], y: list[float]) -> float:
+    """Multiply two rows of three: scalars, which for a single small matrix are much faster than NumPy."""
+    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+
+
+def _determinant(x: list[float], y: list[float], z: list[float]) -> float:
+    """Expand the determinant of three rows."""
+    (a, b, c), (d, e, f), (g, h, i) = x, y, z
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,12 +162,13 @@ class RigidTransform:
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", frozen_array(self.rotation, (3, 3)))
         object.__setattr__(self, "translation_m", frozen_array(self.translation_m, (3,)))
-        r = self.rotation
-        if not (np.all(np.isfinite(r)) and np.all(np.isfinite(self.translation_m))):
+        x, y, z = self.rotation.tolist()
+        if not all(map(math.isfinite, (*x, *y, *z, *self.translation_m.tolist()))):
             raise ValueError("a transform must be finite")
-        if np.abs(r @ r.T - np.eye(3)).max() > _ROTATION_TOLERANCE:
+        off = (_dot(x, x) - 1.0, _dot(y, y) - 1.0, _dot(z, z) - 1.0, _dot(x, y), _dot(x, z), _dot(y, z))
+        if max(map(abs, off)) > _ROTATION_TOLERANCE:
             raise ValueError("the rotation is not orthonormal")
-        if _determinant(r) < 0:
+        if _determinant(x, y, z) < 0:
             raise ValueError("the rotation is left-handed (determinant -1): an axis is mirrored")
 
     @classmethod

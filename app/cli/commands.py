@@ -79,6 +79,16 @@ COMMANDS: Mapping[str, Command] = {
             "Check calibration files for errors, or compare them. Exit code 1: wrong; 3: looks wrong, not proven.",
         ),
         Command(
+            "evaluate",
+            "app.cli.evaluation.evaluate:Evaluate",
+            "Judge a calibration on a recording: residuals at clicks (AED, CDSD), radar returns in boxes (Acc).",
+        ),
+        Command(
+            "compare",
+            "app.cli.evaluation.compare:Compare",
+            "Compare two calibrations; with a recording, say which is better there, and whether that is more than noise.",
+        ),
+        Command(
             "import",
             "app.cli.import_file:Import",
             "Convert a calibration from any known format to cocalib/calibration-1 JSON.",
@@ -87,6 +97,16 @@ COMMANDS: Mapping[str, Command] = {
             "video",
             "app.cli.video:Video",
             "Write the camera's frames to a video, each at its recorded time; recorded JPEG is not re-encoded.",
+        ),
+        Command(
+            "record-rrd",
+            "app.cli.evaluation.record_rrd:RecordRrd",
+            "Write a recording with its calibration to an .rrd file for the Rerun viewer.",
+        ),
+        Command(
+            "rerun",
+            "app.cli.evaluation.rerun:Rerun",
+            "Show a recording with its calibration in the Rerun viewer.",
         ),
         Command(
             "session",

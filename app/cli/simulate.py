@@ -24,6 +24,10 @@ class DefectFlags(RadarDefects):
     scatter_range_m: Annotated[float | None, called("FLOAT")] = same(RadarDefects, "scatter_range_m")
     scatter_azimuth_deg: Annotated[float | None, called("FLOAT")] = same(RadarDefects, "scatter_azimuth_deg")
     scatter_elevation_deg: Annotated[float | None, called("FLOAT")] = same(RadarDefects, "scatter_elevation_deg")
+    constant_azimuth_deg: Annotated[float | None, called("FLOAT")] = same(RadarDefects, "constant_azimuth_deg")
+    constant_elevation_deg: Annotated[float | None, called("FLOAT")] = same(RadarDefects, "constant_elevation_deg")
+    threshold_db: Annotated[float | None, called("FLOAT")] = same(RadarDefects, "threshold_db")
+    max_speed_mps: Annotated[float | None, called("FLOAT")] = same(RadarDefects, "max_speed_mps")
 
 
 @dataclass(frozen=True, slots=True)

@@ -150,7 +150,7 @@ def _scans(
                 hidden=np.zeros(len(speeds), dtype=np.bool_),
             )
             time = TimeNs(round((_BETWEEN_S * i + _PERIOD_S * k) * NS_PER_S))
-            scans.append(measure(rng, targets, profile=profile, time=time, calibration_phase=phase))
+            scans.append(measure(rng, targets, profile=profile, time=time, calibration_phase=phase).scan)
     return RadarScans.from_scans(scans)
 
 

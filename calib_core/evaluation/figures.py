@@ -1,15 +1,19 @@
 """The figures of an evaluation, as values: what `evaluate --json`, the report, the page and Rerun all show."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from calib_core.arrays import Flags, Points2, Points3, Values
-from calib_core.measurements import TimeNs
+import numpy as np
+
+from calib_core.arrays import Flags, Indices, Points2, Points3, Values, frozen_array
+from calib_core.measurements import TimeNs, Unpaired
 from calib_core.results import DataWarning, Metrics
 
 __all__ = [
+    "FLAT_SHARE",
     "Axis",
     "BoxFigures",
+    "BoxedReturns",
     "ClassFigure",
     "Evaluation",
     "FrameFigure",
@@ -20,8 +24,15 @@ __all__ = [
     "Spread",
 ]
 
+FLAT_SHARE = 0.01
+"""Acc that changes by less than this within 1 deg about an axis does not see that axis."""
+
 Axis: TypeAlias = Literal["roll", "pitch", "yaw"]
 """Of the camera about its own axes: roll about the viewing direction (z), pitch about x, yaw about y."""
+
+
+def _no_indices() -> Indices:
+    return np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +88,9 @@ class ResidualFigures:
         by_row: bins of the click's row [px].
         held_out: one placement left out at a time; None if it was not asked for or cannot be had.
         k_fold: the placements in k groups; None likewise.
+        placements: (n,) number of the placement that each pair belongs to, from 0.
+        unpaired: clicks without a radar position.
+        association: how the return of each click was chosen, in one sentence.
     """
 
     ids: tuple[str, ...]
@@ -93,6 +107,44 @@ class ResidualFigures:
     by_row: tuple[Spread, ...]
     held_out: HeldOut | None = None
     k_fold: HeldOut | None = None
+    placements: Indices = field(default_factory=_no_indices)
+    unpaired: tuple[Unpaired, ...] = ()
+    association: str = ""
+
+    @property
+    def distances_px(self) -> Values:
+        """The lengths of the residuals (n,): e_i of the paper's AED; NaN behind the camera."""
+        return np.asarray(np.linalg.norm(self.projected_px - self.pixels_px, axis=1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoxedReturns:
+    """The returns that Acc counts, each with the box of its target.
+
+    Attributes:
+        frames: (n,) which of BoxFigures.frames each belongs to, ascending.
+        points_radar_m: (n, 3) as the radar reports them.
+        pixels_px: (n, 2) where the calibration puts them; NaN behind the camera.
+        boxes_px: (n, 4) left, top, right, bottom of its target's box; NaN if its target has none in the frame.
+        inside: (n,) whether the pixel is in that box.
+        targets: (n,) the target's id.
+        labels: (n,) the class of its box; "" without one.
+    """
+
+    frames: Indices
+    points_radar_m: Points3
+    pixels_px: Points2
+    boxes_px: np.ndarray
+    inside: Flags
+    targets: tuple[str, ...]
+    labels: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        n = len(self.targets)
+        object.__setattr__(self, "frames", frozen_array(self.frames, (n,), dtype=np.int64))
+        object.__setattr__(self, "inside", frozen_array(self.inside, (n,), dtype=np.bool_))
+        for name, width in (("points_radar_m", 3), ("pixels_px", 2), ("boxes_px", 4)):
+            object.__setattr__(self, name, frozen_array(getattr(self, name), (n, width)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +223,17 @@ class Sensitivity:
     angles_deg: tuple[float, ...]
     acc: tuple[float, ...]
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether Acc cannot see this axis: it changes by less than a percentage point."""
+        return max(self.acc) - min(self.acc) < FLAT_SHARE
+
+    @property
+    def best_deg(self) -> float:
+        """The angle at which Acc is highest; of several, the one nearest to 0."""
+        best = max(self.acc)
+        return min((angle for angle, acc in zip(self.angles_deg, self.acc, strict=True) if acc == best), key=abs)
+
 
 @dataclass(frozen=True, slots=True)
 class BoxFigures:
@@ -187,6 +250,11 @@ class BoxFigures:
         chance: mean Acc of the calibration turned by 10 deg to each side; None if acc is.
         rule: which returns count and how they were matched, in one sentence.
         source: of the boxes.
+        groups: number of groups of neighbouring frames that the standard error comes from.
+        area_chance: mean share of the picture that a target's box covers: what returns at random pixels would score.
+        targets: number of moving targets that were found.
+        matched_targets: number of them that have boxes.
+        returns: every return that counts; None in a file.
     """
 
     acc: float | None
@@ -199,6 +267,11 @@ class BoxFigures:
     chance: float | None
     rule: str
     source: str
+    groups: int = 0
+    area_chance: float | None = None
+    targets: int = 0
+    matched_targets: int = 0
+    returns: BoxedReturns | None = None
 
 
 @dataclass(frozen=True, slots=True)

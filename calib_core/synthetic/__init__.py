@@ -1,5 +1,6 @@
 """Simulation: scenes, sensors and recordings with a known camera_from_radar, for tests and benchmarks."""
 
+from calib_core.synthetic.annotations import true_boxes, true_labels
 from calib_core.synthetic.clicking import SimulatedClick
 from calib_core.synthetic.files import write_recording
 from calib_core.synthetic.options import (
@@ -13,6 +14,7 @@ from calib_core.synthetic.options import (
     SceneName,
     SimulationOptions,
     Surroundings,
+    Traffic,
 )
 from calib_core.synthetic.pairs.simulated import (
     AISLE,
@@ -62,11 +64,14 @@ __all__ = [
     "SimulationOptions",
     "Surroundings",
     "SystematicErrors",
+    "Traffic",
     "draw_systematic_errors",
     "random_rig",
     "simulate",
     "simulate_pairs",
     "simulate_scans",
+    "true_boxes",
+    "true_labels",
     "typical_camera",
     "write_recording",
 ]

@@ -46,6 +46,8 @@ def clicks_of(stage: Stage, placements: tuple[SimulatedPlacement, ...]) -> tuple
     noise = options.click_sigma_px * child_rng(options, 8).standard_normal((len(placements), 2))
     rng = child_rng(options, 17)  # for whatever the default does not do
     intentions = _intentions(rng, stage, placements)
+    if not intentions:
+        return ()
     first = min(intentions, key=lambda one: one.time)
     clicks = []
     for number, one in enumerate(intentions):

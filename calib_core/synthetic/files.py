@@ -4,8 +4,10 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeAlias
 
+from calib_core.boxes import boxes_text, labels_text
 from calib_core.lens_models.naming import written_lens
 from calib_core.recordings.containers.writing import write_ros1_bag, write_ros2
+from calib_core.synthetic.annotations import is_annotated, true_boxes, true_labels
 from calib_core.synthetic.messages import all_messages, camera_messages, radar_messages
 from calib_core.synthetic.options import Container
 from calib_core.synthetic.plain_files import write_plain_files
@@ -26,6 +28,8 @@ def write_recording(
     progress: Progress = lambda done, total: None,
 ) -> tuple[Path, ...]:
     """Write recording, truth.json and clicks.json, and return the data files.
+
+    If people, robots or cars move that are worth judging, boxes.json and labels.json are written too.
 
     Args:
         recording: what to write.
@@ -57,6 +61,9 @@ def write_recording(
             written.append(write_ros2(name, messages, container="mcap" if container == "mcap" else "sqlite3"))
     (folder / "truth.json").write_text(truth_text(recording), encoding="utf-8")
     (folder / "clicks.json").write_text(clicks_text(recording), encoding="utf-8")
+    if is_annotated(recording):
+        (folder / "boxes.json").write_text(boxes_text(true_boxes(recording)), encoding="utf-8")
+        (folder / "labels.json").write_text(labels_text(true_labels(recording)), encoding="utf-8")
     return tuple(written)
 
 

@@ -23,9 +23,10 @@ __all__ = [
     "SecondAzimuth",
     "SimulationOptions",
     "Surroundings",
+    "Traffic",
 ]
 
-SceneName = Literal["rooftop", "field", "aisle", "checkerboard"]
+SceneName = Literal["rooftop", "field", "aisle", "checkerboard", "open-rooftop", "open-yard", "road"]
 RadarName = Literal["awr1843", "imaging"]
 RadarMessage = Literal["filled", "stock", "cloud", "vendor"]
 Clutter = Literal["none", "scene", "heavy"]
@@ -71,6 +72,23 @@ class RadarDefects:
     scatter_elevation_deg: float | None = option(
         None, "Standard deviation of one scan's elevation [deg]; by default the radar's.", low=0.0, high=20.0
     )
+    constant_azimuth_deg: float | None = option(
+        None,
+        "Standard deviation of the azimuth error that stays the same while an object stands still [deg]; "
+        "by default the radar's.",
+        low=0.0,
+        high=20.0,
+    )
+    constant_elevation_deg: float | None = option(
+        None, "The same for the elevation [deg]; by default the radar's.", low=0.0, high=20.0
+    )
+    threshold_db: float | None = option(None, "Least SNR of a return [dB]; by default the radar's.", low=0.0, high=60.0)
+    gain_db: float = option(
+        0.0, "How much stronger every echo is, as with more antennas or a longer chirp [dB].", low=-40.0, high=40.0
+    )
+    max_speed_mps: float | None = option(
+        None, "Largest speed that does not wrap around [m/s]; by default the radar's.", low=0.5, high=100.0
+    )
     near_and_far: bool = option(
         False, "Publish near scans (25 Hz, up to 10 m) and far scans (20 Hz, from 5 m) as clouds in two topics."
     )
@@ -111,6 +129,29 @@ class Surroundings:
         high=40,
     )
     passers_by: int = option(0, "Number of people who walk through the scene; every third stops on the way.", low=0)
+    ghost_share: float = option(
+        0.25, "Share of the placements with a reflection by way of the ground or a wall.", low=0.0, high=1.0
+    )
+    clutter_db: float = option(
+        0.0, "How much stronger than usual the echoes of the visible scene are [dB].", low=-60.0, high=30.0
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Traffic:
+    """Who moves in front of the sensors to be judged: boxes.json has their boxes, labels.json their returns."""
+
+    walkers: int = option(0, "Number of people who walk about in front of the sensors.", low=0, high=6)
+    robots: int = option(0, "Number of robot cars that drive in the aisle.", low=0, high=2)
+    cars: int = option(0, "Number of cars that drive on the road, in both directions.", low=0, high=8)
+    nearest_m: float = option(5.0, "Where the cars turn at the near end of their round [m].", low=3.0, high=80.0)
+    farthest_m: float = option(20.0, "Where they turn at its far end [m].", low=15.0, high=120.0)
+    duration_s: float = option(60.0, "Length of a recording without placements [s].", low=5.0, high=3600.0)
+
+    @property
+    def any(self) -> bool:
+        """Whether anything of it moves."""
+        return bool(self.walkers or self.robots or self.cars)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,10 +183,11 @@ class SimulationOptions:
 
     scene: SceneName = option(
         "rooftop",
-        "Scene: a rooftop, an open field, a narrow aisle between shelves, or a yard with a checkerboard wall.",
+        "Scene: a rooftop, an open field, a narrow aisle between shelves, a yard with a checkerboard wall, a rooftop and a "
+        "yard with nothing that echoes within 20 m (the yard has a checkerboard on a stand), or a road.",
     )
     radar: RadarName = option("awr1843", "Radar: a TI AWR1843 with its bins, or a finer imaging radar.")
-    placements: int = option(20, "Number of placements of the reflector.")
+    placements: int = option(20, "Number of placements of the reflector; 0 for none, where something else moves.")
     dwell_s: float = option(6.0, "How long the reflector stays at each placement, from release to pick-up [s].")
     heights: bool = option(False, "Put the reflector on a tripod of varying height instead of on the ground.")
     clutter: Clutter = option(
@@ -191,9 +233,22 @@ class SimulationOptions:
         IntrinsicsErrors(), "How the published intrinsics differ from those of the pictures."
     )
     clicking: Clicking = option(Clicking(), "How the example clicks are made.")
+    traffic: Traffic = option(Traffic(), "Who moves in front of the sensors to be judged.")
+    reflector_edge_m: float = option(
+        0.16,
+        "Length of the edges that meet at the reflector's apex [m]; its echo grows with the fourth power.",
+        low=0.05,
+    )
+    board_corners: int = option(
+        0, "Number of further placements, in front of inner corners of the checkerboard.", low=0, high=40
+    )
+    person_leaves: bool = option(
+        False,
+        "Have the person walk behind the sensors while the reflector stands; dwell_s is how long they stay there.",
+    )
 
     def __post_init__(self) -> None:
-        _require(self.placements >= 1, "placements", self.placements, "at least 1")
+        _require(self.placements >= 0, "placements", self.placements, "at least 0")
         _require(self.dwell_s >= 3.5, "dwell_s", self.dwell_s, "at least 3.5 s, for the person to step away and return")
         _require(min(self.camera_rate_hz, self.radar_rate_hz) > 0, "rates", self.camera_rate_hz, "more than 0 Hz")
         _require(1 <= self.jpeg_quality <= 100, "jpeg_quality", self.jpeg_quality, "1 to 100")
@@ -202,6 +257,40 @@ class SimulationOptions:
         roomy = self.scene != "aisle" or not (self.surroundings.parked_cars or self.surroundings.fence)
         _require(roomy, "scene", self.scene, "another one: the aisle has no room for parked cars or a fence")
         _check_ranges(self)
+        _check_traffic(self)
+
+    @property
+    def standing_places(self) -> int:
+        """The number of placements, those at the checkerboard's corners included."""
+        return self.placements + self.board_corners
+
+
+def _check_traffic(options: SimulationOptions) -> None:
+    """Check that what moves has room for it, and that there is something to record.
+
+    Raises:
+        OptionError: says what does not go together, and what to do.
+    """
+    traffic, scene = options.traffic, options.scene
+    only = (
+        (traffic.robots, "traffic.robots", ("aisle",), "--scene aisle"),
+        (traffic.cars, "traffic.cars", ("road",), "--scene road"),
+        (options.board_corners, "board_corners", ("checkerboard", "open-yard"), "--scene open-yard"),
+    )
+    for number, name, scenes, remedy in only:
+        _require(not number or scene in scenes, name, number, f"0 in the scene {scene}; ask for {remedy}")
+    _require(
+        not traffic.walkers or scene != "road", "traffic.walkers", traffic.walkers, "0 on the road, where cars drive"
+    )
+    length_m = traffic.farthest_m - traffic.nearest_m
+    _require(length_m >= 12.0, "traffic.farthest_m", traffic.farthest_m, "at least 12 m beyond traffic.nearest_m")
+    room = int((2.0 * length_m + 20.0) / 12.0)
+    _require(traffic.cars <= room, "traffic.cars", traffic.cars, f"at most {room} on a round of this length")
+    several = options.defects.near_and_far or options.defects.side_radar or options.defects.second_azimuth != "none"
+    _require(not (traffic.any and several), "traffic", "given", "without a radar of several topics")
+    if not options.standing_places:
+        _require(traffic.any, "placements", 0, "at least 1 where nothing else moves; or ask for --traffic.walkers 2")
+        _require(not options.islands, "islands", True, "False without placements, around which islands are recorded")
 
 
 def _check_ranges(options: Any, prefix: str = "") -> None:

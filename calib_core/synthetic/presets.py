@@ -3,7 +3,14 @@
 from collections.abc import Mapping
 from typing import Literal, TypeAlias
 
-from calib_core.synthetic.options import Clicking, IntrinsicsErrors, RadarDefects, SimulationOptions, Surroundings
+from calib_core.synthetic.options import (
+    Clicking,
+    IntrinsicsErrors,
+    RadarDefects,
+    SimulationOptions,
+    Surroundings,
+    Traffic,
+)
 from calib_core.synthetic.rig import RigOptions
 
 __all__ = ["PRESETS", "PresetName"]
@@ -45,10 +52,24 @@ PresetName: TypeAlias = Literal[
     "late-clicks",
     "careless-clicks",
     "unkind",
+    "paper-d1",
+    "paper-d2",
+    "paper-d3",
+    "paper-dr-a",
+    "paper-dr-b",
+    "people",
+    "robot",
+    "cars-near",
+    "cars-far",
 ]
 
 _LEVEL = RigOptions(radar_height_m=0.5, radar_tilt_deg=0.0)
 """A radar at the height of a bumper that looks straight ahead."""
+_BARE = Surroundings(ghost_share=0.0)
+"""Nothing near that reflects the reflector's echo."""
+_PAPER_RADAR = RadarDefects(threshold_db=15.0, constant_azimuth_deg=0.5, constant_elevation_deg=1.0)
+_ROAD_RADAR = RadarDefects(gain_db=10.0, max_speed_mps=16.0)
+"""A radar that sees cars at 60 m and tells speeds up to 16 m/s apart."""
 _CAR_PARK = Surroundings(parked_cars=3, fence=True, strong_target_dbsm=29.0)
 
 PRESETS: Mapping[PresetName, SimulationOptions] = {
@@ -136,6 +157,55 @@ PRESETS: Mapping[PresetName, SimulationOptions] = {
         defects=RadarDefects(azimuth_scale=1.02, elevation_scale=0.97, scaled="sine", range_bias_m=0.05),
         surroundings=Surroundings(parked_cars=2, strong_target_dbsm=29.0, passers_by=4),
         clicking=Clicking(clicks_per_placement=2, low_m=0.05, late_share=0.1, hasty_first_px=40.0),
+    ),
+    "paper-d1": SimulationOptions(
+        scene="open-rooftop", person_leaves=True, camera_rate_hz=2.0, defects=_PAPER_RADAR, surroundings=_BARE
+    ),
+    "paper-d2": SimulationOptions(
+        scene="open-yard",
+        board_corners=12,
+        person_leaves=True,
+        camera_rate_hz=2.0,
+        defects=_PAPER_RADAR,
+        surroundings=_BARE,
+    ),
+    "paper-d3": SimulationOptions(
+        scene="aisle",
+        reflector_edge_m=0.3,
+        person_leaves=True,
+        camera_rate_hz=2.0,
+        defects=RadarDefects(threshold_db=26.0, constant_azimuth_deg=0.5, constant_elevation_deg=1.0),
+        surroundings=Surroundings(ghost_share=0.0, clutter_db=-12.0),
+    ),
+    "paper-dr-a": SimulationOptions(
+        scene="open-rooftop",
+        person_leaves=True,
+        camera_rate_hz=2.0,
+        rig=RigOptions(radar_height_m=1.0, radar_tilt_deg=6.0, camera_offset_m=(0.02, 0.10, 0.06)),
+        defects=_PAPER_RADAR,
+        surroundings=_BARE,
+        seed=2,
+    ),
+    "paper-dr-b": SimulationOptions(
+        scene="open-rooftop",
+        person_leaves=True,
+        camera_rate_hz=2.0,
+        rig=RigOptions(radar_height_m=1.6, radar_tilt_deg=13.0, camera_offset_m=(-0.05, -0.15, 0.12)),
+        defects=_PAPER_RADAR,
+        surroundings=_BARE,
+        seed=3,
+    ),
+    "people": SimulationOptions(placements=0, traffic=Traffic(walkers=3)),
+    "robot": SimulationOptions(scene="aisle", placements=0, traffic=Traffic(robots=1)),
+    "cars-near": SimulationOptions(
+        scene="road", radar="imaging", placements=0, defects=_ROAD_RADAR, traffic=Traffic(cars=2)
+    ),
+    "cars-far": SimulationOptions(
+        scene="road",
+        radar="imaging",
+        placements=0,
+        defects=_ROAD_RADAR,
+        traffic=Traffic(cars=4, nearest_m=20.0, farthest_m=60.0),
     ),
 }
 """The presets by name; what one does not name has its default."""

@@ -93,7 +93,7 @@ class SimulatedRecording:
             limit: number of frames from the start; None for all.
         """
         stage, options = self.stage, self.options
-        renderer = FrameRenderer.of(stage.scene, stage.rig, options.surroundings)
+        renderer = FrameRenderer.of(stage.scene, stage.rig, options.surroundings, options.reflector_edge_m)
         rng = child_rng(options, 11)
         for i, moment_s in enumerate(stage.frame_times.moment_s[:limit]):
             moment = stage.story.at(float(moment_s))

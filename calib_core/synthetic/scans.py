@@ -17,13 +17,17 @@ from calib_core.synthetic.radar.defects import second_azimuths, second_is_true
 from calib_core.synthetic.radar.returns import Targets, measure
 from calib_core.synthetic.scene.person import PersonState, capsules
 from calib_core.synthetic.scene.placements import SimulatedPlacement, placements_of
+from calib_core.synthetic.scene.scenes import USUAL_EDGE_M
 from calib_core.synthetic.scene.stage import Stage, child_rng, set_stage
 from calib_core.synthetic.scene.story import Moment, Resting
 from calib_core.synthetic.scene.surroundings import cart_position
+from calib_core.synthetic.scene.traffic import Actor
+from calib_core.synthetic.scene.vehicles import VehicleState, echo_places, hidden_by
 
 __all__ = [
     "SimulatedScans",
     "antenna_scans",
+    "labelled_scans",
     "radar_scans",
     "side_scans",
     "simulate_scans",
@@ -32,6 +36,7 @@ __all__ = [
 ]
 
 _REFLECTOR_DBSM = 12.0
+"""Of a reflector of the usual size."""
 _CARRIED_DBSM = 0.0
 _SHOULDER_M = 0.24
 _STEP_S = 0.01
@@ -108,6 +113,11 @@ def radar_scans(stage: Stage) -> Iterator[RadarScan]:
 
 def antenna_scans(stage: Stage, antenna: Antenna) -> Iterator[RadarScan]:
     """Yield the scans of one antenna."""
+    return (scan for scan, _ in labelled_scans(stage, antenna))
+
+
+def labelled_scans(stage: Stage, antenna: Antenna) -> Iterator[tuple[RadarScan, tuple[str, ...]]]:
+    """Yield the scans of one antenna, each with the track that each of its returns comes from; "" for anything else."""
     number = 20 * stage.antennas.index(antenna)
     rng = child_rng(stage.options, 9 + number)
     phase = float(child_rng(stage.options, 10 + number).uniform(0.0, 2.0 * np.pi))
@@ -115,7 +125,7 @@ def antenna_scans(stage: Stage, antenna: Antenna) -> Iterator[RadarScan]:
         targets = targets_at(stage, float(moment_s))
         if antenna.name:
             targets = targets.within(antenna.min_range_m, antenna.max_range_m)
-        scan = measure(
+        found = measure(
             rng,
             targets,
             profile=antenna.profile,
@@ -126,7 +136,8 @@ def antenna_scans(stage: Stage, antenna: Antenna) -> Iterator[RadarScan]:
         )
         defects = stage.options.defects
         certain = defects.second_azimuth == "none" or defects.ideal_topic
-        yield scan if certain else with_wrong_azimuths(stage, scan)
+        tracks = tuple(targets.tracks[i] if i >= 0 else "" for i in found.target.tolist())
+        yield found.scan if certain else with_wrong_azimuths(stage, found.scan), tracks
 
 
 def side_scans(stage: Stage) -> Iterator[RadarScan]:
@@ -138,7 +149,7 @@ def side_scans(stage: Stage) -> Iterator[RadarScan]:
     for moment_s, stamp in zip(times.moment_s, times.header_ns, strict=True):
         targets = targets_at(stage, float(moment_s) + _SIDE_LATER_S)
         turned = replace(targets, points_radar_m=targets.points_radar_m @ turn.T)
-        yield measure(rng, turned, profile=weaker, time=TimeNs(int(stamp) + round(_SIDE_LATER_S * NS_PER_S)))
+        yield measure(rng, turned, profile=weaker, time=TimeNs(int(stamp) + round(_SIDE_LATER_S * NS_PER_S))).scan
 
 
 def with_wrong_azimuths(stage: Stage, scan: RadarScan) -> RadarScan:
@@ -159,16 +170,18 @@ class _Echo:
     rcs_dbsm: tuple[float, ...]
     fading_db: float
     bias: Points3
+    track: str = ""
 
 
 def targets_at(stage: Stage, time_s: float) -> Targets:
     """List the objects in front of the radar at a time: clutter, reflectors and their ghosts, people's limbs."""
-    before, now, after = (stage.story.at(time_s + step) for step in (-_STEP_S, 0.0, _STEP_S))
+    story, moments_s = stage.story, (time_s - _STEP_S, time_s, time_s + _STEP_S)
+    before, now, after = (story.at(moment_s) for moment_s in moments_s)
     echoes = [_clutter_echo(stage), *_flicker_echoes(stage, time_s), *_reflector_echoes(stage, before, now, after)]
-    if stage.options.person:
-        echoes.append(_person_echo(before.person, after.person))
-    if len(before.passers_by) == len(after.passers_by):
-        echoes += [_person_echo(*states) for states in zip(before.passers_by, after.passers_by, strict=True)]
+    people = [story.people_at(moment_s, person=stage.options.person) for moment_s in moments_s]
+    count = len(people[0]) if len(people[0]) == len(people[2]) else int(stage.options.person)
+    echoes += [_actor_echo(stage, *actors) for actors in zip(people[0][:count], people[2][:count], strict=True)]
+    echoes += [_actor_echo(stage, *actors) for actors in zip(before.traffic, after.traffic, strict=True)]
     from_world = stage.rig.radar_from_world
     start = from_world @ np.concatenate([echo.before_m for echo in echoes])
     end = from_world @ np.concatenate([echo.after_m for echo in echoes])
@@ -176,8 +189,10 @@ def targets_at(stage: Stage, time_s: float) -> Targets:
     speed = (np.linalg.norm(end, axis=1) - np.linalg.norm(start, axis=1)) / (2.0 * _STEP_S)
     world = np.concatenate([0.5 * (echo.before_m + echo.after_m) for echo in echoes])
     hidden = np.zeros(len(world), dtype=np.bool_)
-    for person in (now.person, *now.passers_by) if stage.options.person else now.passers_by:
-        hidden |= _behind(person, world)
+    eye_m = stage.rig.radar_from_world.inverse().translation_m
+    for actor in (*people[1], *now.traffic):
+        state = actor.state
+        hidden |= hidden_by(state, eye_m, world) if isinstance(state, VehicleState) else _behind(state, world)
     return Targets(
         middle,
         speed,
@@ -185,6 +200,7 @@ def targets_at(stage: Stage, time_s: float) -> Targets:
         np.concatenate([np.full(len(echo.rcs_dbsm), echo.fading_db) for echo in echoes]),
         np.concatenate([echo.bias for echo in echoes]),
         hidden,
+        tuple(echo.track for echo in echoes for _ in echo.rcs_dbsm),
     )
 
 
@@ -206,18 +222,25 @@ def _reflector_echoes(stage: Stage, before: Moment, now: Moment, after: Moment) 
     echoes = [echo for resting in standing for echo in _standing_echoes(stage, resting)]
     if now.resting is None and stage.options.person:
         still = np.zeros((1, 3))
-        echoes.append(_Echo(before.reflector_m[None], after.reflector_m[None], (_CARRIED_DBSM,), 5.0, still))
+        echoes.append(
+            _Echo(before.reflector_m[None], after.reflector_m[None], (_CARRIED_DBSM + _larger_db(stage),), 5.0, still)
+        )
         if stage.options.surroundings.companion:
             carts = [cart_position(moment.reflector_m, stage.options.surroundings)[None] for moment in (before, after)]
             echoes.append(_Echo(carts[0], carts[1], (stage.options.surroundings.companion_dbsm,), 5.0, still))
     return echoes
 
 
+def _larger_db(stage: Stage) -> float:
+    """Return how much stronger the reflector's echo is than that of one of the usual size."""
+    return 40.0 * float(np.log10(stage.options.reflector_edge_m / USUAL_EDGE_M))
+
+
 def _standing_echoes(stage: Stage, resting: Resting) -> list[_Echo]:
     """List a reflector at rest, its ghost, and the cart behind it."""
     place = resting.position_m[None]
     bias = stage.reflector_bias[resting.index][None]
-    echoes = [_Echo(place, place, (_REFLECTOR_DBSM,), 1.0, bias)]
+    echoes = [_Echo(place, place, (_REFLECTOR_DBSM + _larger_db(stage),), 1.0, bias)]
     ghost = stage.ghosts[resting.index]
     if ghost is not None:
         mirrored = np.array([[ghost.x_m, ghost.y_m, ghost.z_m]])
@@ -226,6 +249,22 @@ def _standing_echoes(stage: Stage, resting: Resting) -> list[_Echo]:
         cart = cart_position(resting.position_m, stage.options.surroundings)[None]
         echoes.append(_Echo(cart, cart, (stage.options.surroundings.companion_dbsm,), 1.5, bias))
     return echoes
+
+
+def _actor_echo(stage: Stage, before: Actor, after: Actor) -> _Echo:
+    if isinstance(before.state, VehicleState) and isinstance(after.state, VehicleState):
+        return _vehicle_echo(stage, before.state, after.state, before.track)
+    assert isinstance(before.state, PersonState), "what is not a vehicle is a person"
+    assert isinstance(after.state, PersonState), "and stays one"
+    return replace(_person_echo(before.state, after.state), track=before.track)
+
+
+def _vehicle_echo(stage: Stage, before: VehicleState, after: VehicleState, track: str) -> _Echo:
+    radar_m = stage.rig.radar_from_world.inverse().translation_m[:2]
+    facing, start, rcs_dbsm = echo_places(before, radar_m)
+    _, end, _ = echo_places(after, radar_m)
+    strengths = tuple(rcs_dbsm[facing].tolist())
+    return _Echo(start[facing], end[facing], strengths, 5.0, np.zeros((len(strengths), 3)), track)
 
 
 def _person_echo(before: PersonState, after: PersonState) -> _Echo:

@@ -14,6 +14,11 @@ from calib_core.recordings import Recording, open_recording
 from tests.browser.driving import FLAGS, Driver
 from tests.find_browser import find_browser
 
+EMPTY_3D_VIEW = """document.addEventListener("readystatechange", () => {
+  if (document.readyState === "interactive") document.getElementById("space-view")?.setAttribute("src", "about:blank");
+});"""
+"""The page loads viser only where its frame is empty."""
+
 
 @pytest.fixture(scope="module")
 def playwright_driver() -> Iterator[Playwright]:
@@ -89,8 +94,12 @@ def radar_only_server(project_root: Path, tmp_path: Path) -> Iterator[RunningSer
 
 
 @pytest.fixture
-def open_page(chromium: Browser) -> Iterator[Callable[..., Driver]]:
-    """Open pages; at the end, check that none logged an error or contacted another machine."""
+def open_page(chromium: Browser, request: pytest.FixtureRequest) -> Iterator[Callable[..., Driver]]:
+    """Open pages; at the end, check that none logged an error or contacted another machine.
+
+    Those marked no_3d_view have an empty frame in the place of the 3D view, whose loading costs two seconds.
+    """
+    without_3d_view = request.node.get_closest_marker("no_3d_view") is not None
     drivers: list[Driver] = []
     contexts = []
 
@@ -99,6 +108,8 @@ def open_page(chromium: Browser) -> Iterator[Callable[..., Driver]]:
     ) -> Driver:
         context = (browser or chromium).new_context(**{"viewport": {"width": 1280, "height": 720}, **context_options})
         contexts.append(context)
+        if without_3d_view:
+            context.add_init_script(EMPTY_3D_VIEW)
         drivers.append(Driver(context.new_page(), url, ready))
         return drivers[-1]
 

@@ -13,7 +13,7 @@ from calib_core.synthetic import PRESETS, SimulationOptions, simulate, write_rec
 from tests.browser.driving import Driver
 from tests.served_process import ServedProcess, served_process
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 DIALOG = "document.querySelector('#opening-dialog[open]')"
 SMALL: dict[str, Any] = {"dwell_s": 4.0, "width_px": 320, "height_px": 200, "camera_rate_hz": 2.0}

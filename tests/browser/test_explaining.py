@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
 def overlap(page: Driver, one: str, other: str) -> bool:

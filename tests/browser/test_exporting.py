@@ -14,7 +14,7 @@ from app.workspace import Workspace
 from calib_core.interchange import FORMATS, check, format_named, read_any, read_any_file
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 DIALOG = "#export-dialog"
 RECTIFIED = f"{DIALOG} .rectified input"
 

@@ -6,7 +6,7 @@ import pytest
 
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
 def test_a_wrong_click_is_named_and_found_by_j(page: Driver, truth: Any) -> None:

@@ -11,7 +11,7 @@ from calib_core.recordings import RecordingOptions, open_recording
 from tests.browser.driving import Driver
 from tests.vendor_recording import vendor_sample
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
 def test_clocks_axes_and_warnings_of_the_recording_are_on_the_page(

@@ -13,7 +13,7 @@ from app.workspace import open_workspace
 from tests.browser.driving import Driver
 from tests.picture_recording import PictureRecording
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 DOTS = [(200, 150), (641, 77), (333, 402)]
 """White pixels on black pictures, one per frame."""

@@ -7,7 +7,7 @@ import pytest
 
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
 def place(page: Driver, placement: Any) -> None:

@@ -15,7 +15,7 @@ from tests.browser.accessibility import violations
 from tests.browser.driving import Driver
 from tests.served_process import ServedProcess, served_process
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 DIALOG = "document.querySelector('#meanings-dialog[open]')"
 RIGHT = "radar_from_camera,body,m"

@@ -15,7 +15,7 @@ from app.workspace import Workspace
 from calib_core.measurements import ReflectorClick, time_from_parts
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
 def clicks_of(truth: Any) -> list[ReflectorClick]:

@@ -13,7 +13,7 @@ from app.workspace import open_workspace
 from calib_core.recordings import Recording
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
 def test_a_calibration_is_shown_checked_and_compared(

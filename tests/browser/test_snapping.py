@@ -7,7 +7,7 @@ import pytest
 
 from tests.browser.driving import Driver
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 
 def test_a_mark_beside_the_reflector_snaps_to_its_apex_and_counts(page: Driver, truth: Any) -> None:

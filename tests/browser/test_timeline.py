@@ -13,7 +13,7 @@ from calib_core.measurements import NS_PER_S
 from tests.browser.driving import Driver
 from tests.picture_recording import START, PictureRecording, grey_pictures
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.no_3d_view]
 
 STARTS_S = (0, 258, 700, 1500, 1720, 2600, 2700, 2958, 3400, 4130)
 LENGTHS_S = (6, 6, 2, 15, 8, 12, 7, 5, 4, 15)

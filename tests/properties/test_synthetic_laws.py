@@ -31,7 +31,7 @@ def test_whatever_is_in_front_a_scan_is_finite_forward_and_on_its_bins(
     targets = Targets(
         points, velocity, np.full(6, 20.0), np.full(6, 3.0), np.zeros((6, 3)), np.zeros(6, dtype=np.bool_)
     )
-    scan = measure(np.random.default_rng(seed), targets, profile=profile, time=TimeNs(1))
+    scan = measure(np.random.default_rng(seed), targets, profile=profile, time=TimeNs(1)).scan
     r, u, _ = direction_cosines(scan.points_radar_m).T
     assert np.isfinite(scan.points_radar_m).all()
     assert (scan.points_radar_m[:, 0] >= 0.0).all()
@@ -46,7 +46,7 @@ def test_whatever_is_in_front_a_scan_is_finite_forward_and_on_its_bins(
 def test_what_is_hidden_or_still_is_not_seen_or_not_moving(seed: int, hidden: np.ndarray) -> None:
     points = np.stack([np.arange(4.0, 14.0, 2.0), np.zeros(5), np.zeros(5)], axis=1)
     targets = Targets(points, np.zeros(5), np.full(5, 15.0), np.zeros(5), np.zeros((5, 3)), hidden)
-    scan = measure(np.random.default_rng(seed), targets, profile=RADAR_PROFILES["awr1843"], time=TimeNs(1))
+    scan = measure(np.random.default_rng(seed), targets, profile=RADAR_PROFILES["awr1843"], time=TimeNs(1)).scan
     loud = scan.snr_db > 20.0
     gaps = np.abs(np.linalg.norm(scan.points_radar_m[loud], axis=1)[:, None] - points[:, 0][None])
     assert (scan.doppler_mps[loud] == 0.0).all()

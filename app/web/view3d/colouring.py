@@ -4,23 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.colours import RETURN_RAMPS, STAYING, ramp_colours
 from app.web.messages import RadarMap, ReturnColour, SpaceLegend
 from app.web.view3d.extent import Extent
 from app.web.view3d.returns import Returns
 from app.web.view3d.shapes import DARK, LIGHT
 from calib_core.arrays import Values
 
-__all__ = ["Colouring", "map_colours", "ramp_colours"]
+__all__ = ["Colouring", "map_colours"]
 
 _OLDEST_WEIGHT = 0.2
 _BACKGROUND = {False: np.array([13, 16, 20]), True: np.array([233, 236, 240])}
-_STAYING = {False: (128, 146, 164), True: (96, 110, 126)}
-_RAMPS = {
-    ("rising", False): ((78, 66, 190), (150, 60, 180), (214, 82, 120), (246, 150, 70), (250, 226, 92)),
-    ("rising", True): ((240, 190, 110), (226, 120, 86), (180, 56, 120), (112, 36, 140), (44, 12, 92)),
-    ("signed", False): ((96, 176, 255), (96, 132, 170), (132, 140, 148), (190, 132, 92), (255, 150, 70)),
-    ("signed", True): ((10, 96, 190), (70, 110, 150), (112, 120, 128), (160, 100, 50), (200, 76, 0)),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +63,7 @@ class Colouring:
         scale = self._scale()
         if scale is None:
             return SpaceLegend("", "static", "moving", (_css(palette.still), _css(palette.moving)), ramp=False)
-        ramp = _RAMPS["signed" if self.colour == "doppler" else "rising", self.light]
+        ramp = RETURN_RAMPS["signed" if self.colour == "doppler" else "rising", self.light]
         low, high = (f"{end:+.0f}" if self.colour == "doppler" else f"{end:.{_decimals(scale)}f}" for end in scale)
         unit = {"range": "m", "doppler": "m/s", "amplitude": "dB", "height": "m"}[self.colour]
         title = {"range": "Range", "doppler": "Doppler", "amplitude": "SNR", "height": "Height"}[self.colour]
@@ -92,16 +86,7 @@ def map_colours(radar_map: RadarMap, colour: ReturnColour, *, light: bool) -> np
         values = np.array(radar_map.snr_db)
         return np.rint(ramp_colours(values, radar_map.low_db, radar_map.high_db, light=light)).astype(np.uint8)
     share = np.clip(1.0 + np.log10(np.maximum(radar_map.share, 1e-9)) / 3.0, 0.15, 1.0)
-    return _mixed(np.tile(_STAYING[light], (len(share), 1)), share, light=light)
-
-
-def ramp_colours(values: Values, low: float, high: float, *, light: bool, signed: bool = False) -> np.ndarray:
-    """Return the colour (n, 3) of values between two ends; grey where one is not known."""
-    ramp = np.array(_RAMPS["signed" if signed else "rising", light], dtype=np.float64)
-    share = np.clip((values - low) / max(high - low, 1e-9), 0.0, 1.0)
-    colours = np.stack([np.interp(share, np.linspace(0, 1, len(ramp)), channel) for channel in ramp.T], axis=1)
-    colours[np.isnan(values)] = _STAYING[light]
-    return colours
+    return _mixed(np.tile(STAYING[light], (len(share), 1)), share, light=light)
 
 
 def _mixed(colours: np.ndarray, weight: Values, *, light: bool) -> np.ndarray:

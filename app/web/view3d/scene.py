@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from app.colours import residual_colours
 from app.web.messages import Viewpoint
 from app.web.view3d.extent import UNKNOWN, Extent, fitted_stand, ring_ranges_m
 from app.web.view3d.nodes import add_cloud, add_lines, fill_cloud, fill_lines
@@ -17,7 +18,6 @@ from app.web.view3d.shapes import (
     nominal_camera_from_radar,
     range_rings,
     rays_to,
-    residual_colours,
     vertical_field_of_view_rad,
 )
 from app.web.view3d.sight import Sight, true_positions

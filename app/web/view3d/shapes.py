@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
-from calib_core.arrays import Points3, Values
+from app.colours import Colour
+from calib_core.arrays import Points3
 from calib_core.camera import Camera
 from calib_core.geometry import RigidTransform
 from calib_core.options import NoiseOptions
@@ -22,12 +22,8 @@ __all__ = [
     "nominal_camera_from_radar",
     "range_rings",
     "rays_to",
-    "residual_colours",
     "vertical_field_of_view_rad",
 ]
-
-GREY = (120, 132, 145)
-Colour: TypeAlias = tuple[int, int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,19 +59,9 @@ LIGHT = Palette(
     still=(20, 120, 190), moving=(205, 85, 15), window=(70, 85, 100), ray=(20, 30, 40), next=(10, 90, 160),
     solved=(10, 111, 179), rings=(140, 152, 165), cells=(200, 207, 215),
 )  # fmt: skip
-_RAMP_AT = np.array([0.0, 0.35, 0.6, 0.8, 1.0])
-_RAMP = np.array([[74, 170, 235], [143, 200, 226], [236, 214, 150], [240, 158, 66], [226, 82, 44]], dtype=np.float64)
 _CHI2_95_3D = 7.814727903251178  # 95 % quantile of chi-squared with 3 degrees of freedom
 _CIRCLE = 28
 _DASH_STEPS = 3
-
-
-def residual_colours(residuals_px: Values, limit_px: float) -> np.ndarray:
-    """Return (n, 3) colours of residuals: blue for small ones, sand near the limit, red for large ones, grey for NaN."""
-    share = np.clip(residuals_px / max(limit_px, 1e-9), 0.0, 1.0)
-    colours = np.stack([np.interp(share, _RAMP_AT, channel) for channel in _RAMP.T], axis=1)
-    colours[np.isnan(residuals_px)] = GREY
-    return np.rint(colours).astype(np.uint8)
 
 
 def range_rings(ranges_m: Sequence[float], *, half_angle_rad: float = np.deg2rad(70.0)) -> np.ndarray:

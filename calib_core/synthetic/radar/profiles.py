@@ -102,6 +102,8 @@ RADAR_PROFILES: dict[RadarName, RadarProfile] = {
 
 def profile_with(name: RadarName, defects: RadarDefects) -> RadarProfile:
     """Return a radar's profile with the bins and the scatter that the options ask for."""
+    usual = RADAR_PROFILES[name]
+    fastest_mps = defects.max_speed_mps
     changes: dict[str, float | int | None] = {
         "range_bin_m": defects.range_bin_m,
         "angle_bins": defects.azimuth_bins,
@@ -109,8 +111,13 @@ def profile_with(name: RadarName, defects: RadarDefects) -> RadarProfile:
         "range_sigma_m": defects.scatter_range_m,
         "azimuth_sigma": _sine(defects.scatter_azimuth_deg),
         "elevation_sigma": _sine(defects.scatter_elevation_deg),
+        "azimuth_bias_sigma": _sine(defects.constant_azimuth_deg),
+        "elevation_bias_sigma": _sine(defects.constant_elevation_deg),
+        "threshold_db": defects.threshold_db,
+        "snr_at_10_m_db": usual.snr_at_10_m_db + defects.gain_db,
+        "doppler_bin_mps": None if fastest_mps is None else 2.0 * fastest_mps / usual.doppler_bins,
     }
-    return replace(RADAR_PROFILES[name], **{key: value for key, value in changes.items() if value is not None})  # type: ignore[arg-type]
+    return replace(usual, **{key: value for key, value in changes.items() if value is not None})  # type: ignore[arg-type]
 
 
 def _sine(angle_deg: float | None) -> float | None:

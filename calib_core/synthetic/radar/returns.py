@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib_core.arrays import Flags, Points3, Values, frozen_array
+from calib_core.arrays import Flags, Indices, Points3, Values, frozen_array
 from calib_core.measurements import RadarScan, TimeNs
 from calib_core.radar import direction_cosines
 from calib_core.synthetic.options import RadarDefects
 from calib_core.synthetic.radar.defects import distorted, reported_points
 from calib_core.synthetic.radar.profiles import RadarProfile
 
-__all__ = ["Targets", "measure"]
+__all__ = ["Measured", "Targets", "measure"]
 
 _MISSED = 0.02
 _SIDE_LOBE_SHARE = 0.12
@@ -30,6 +30,7 @@ class Targets:
         fading_db: (n,) standard deviation of the echo's level from scan to scan.
         bias: (n, 3) constant errors of each object: range [m], sines of azimuth and elevation.
         hidden: (n,) whether a person stands in the way.
+        tracks: the object that each is a part of, if that is to be known; "" for what nobody judges.
     """
 
     points_radar_m: Points3
@@ -38,6 +39,7 @@ class Targets:
     fading_db: Values
     bias: Points3
     hidden: Flags
+    tracks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(self.points_radar_m)
@@ -65,7 +67,24 @@ class Targets:
             self.fading_db[rows],
             self.bias[rows],
             self.hidden[rows],
+            tuple(track for track, row in zip(self.tracks, rows, strict=True) if row) if self.tracks else (),
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """A scan and the origin of its returns.
+
+    Attributes:
+        scan: as the sensor sends it.
+        target: (m,) for each return in the scan's order, the target it comes from; -1 for a false alarm.
+    """
+
+    scan: RadarScan
+    target: Indices
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "target", frozen_array(self.target, (len(self.scan),), dtype=np.int64))
 
 
 def measure(
@@ -77,7 +96,7 @@ def measure(
     angle_bins: bool = True,
     calibration_phase: float = 0.0,
     defects: RadarDefects = _NO_DEFECTS,
-) -> RadarScan:
+) -> Measured:
     """Measure all targets once.
 
     Positions are as the sensor sends them: on bins, in single precision. The stock demo computes
@@ -92,29 +111,45 @@ def measure(
         calibration_phase: where the smooth angle error is zero; a property of one radar.
         defects: how the radar differs from a perfect one.
     """
-    cosines, velocity, snr = _echoes(rng, targets, profile, calibration_phase)
-    cosines, velocity, snr = _with_side_lobes(rng, cosines, velocity, snr, profile)
-    cosines, velocity, snr = _with_false_alarms(rng, cosines, velocity, snr, profile)
-    cosines = distorted(cosines, defects)
-    cosines, velocity = _on_bins(cosines, velocity, profile, angle_bins)
-    kept = _resolved(cosines, velocity, snr, profile)
+    echoes = _echoes(rng, targets, profile, calibration_phase)
+    echoes = _with_side_lobes(rng, echoes, profile)
+    echoes = _with_false_alarms(rng, echoes, profile)
+    cosines, velocity = _on_bins(distorted(echoes.cosines, defects), echoes.velocity_mps, profile, angle_bins)
+    kept = _resolved(cosines, velocity, echoes.snr_db, profile)
     kept = kept[np.argsort(cosines[kept, 0], kind="stable")]
     points = reported_points(rng, cosines[kept], defects).astype(np.float32).astype(np.float64)
     n = len(points)
-    return RadarScan(
+    scan = RadarScan(
         time,
         points,
         velocity[kept].astype(np.float32).astype(np.float64),
-        (np.round(10.0 * snr[kept]) / 10.0).astype(np.float32).astype(np.float64),
+        (np.round(10.0 * echoes.snr_db[kept]) / 10.0).astype(np.float32).astype(np.float64),
         np.full((n, 3), np.nan),
     )
+    return Measured(scan, echoes.target[kept])
 
 
-_Echoes = tuple[Points3, Values, Values]
+@dataclass(frozen=True, slots=True, eq=False)
+class _Echoes:
+    """What is detected: (m, 3) range and sines of the angles, (m,) speeds, SNR and number of the target or -1."""
+
+    cosines: Points3
+    velocity_mps: Values
+    snr_db: Values
+    target: Indices
+
+    def and_also(self, cosines: Points3, velocity_mps: Values, snr_db: Values, target: Indices) -> "_Echoes":
+        """Append others."""
+        return _Echoes(
+            np.concatenate([self.cosines, cosines]),
+            np.concatenate([self.velocity_mps, velocity_mps]),
+            np.concatenate([self.snr_db, snr_db]),
+            np.concatenate([self.target, target]),
+        )
 
 
 def _echoes(rng: np.random.Generator, targets: Targets, profile: RadarProfile, phase: float) -> _Echoes:
-    """Return (r, u, w), speed and SNR of the targets that are detected."""
+    """Return the targets that are detected."""
     n = len(targets)
     true = direction_cosines(targets.points_radar_m)
     azimuth = np.arcsin(np.clip(true[:, 1], -1.0, 1.0))
@@ -131,37 +166,29 @@ def _echoes(rng: np.random.Generator, targets: Targets, profile: RadarProfile, p
     cosines[:, 2] += profile.calibration_elevation * np.cos(4.0 * true[:, 1] + 6.0 * true[:, 2] + phase)
     missed = rng.uniform(size=n) < _MISSED
     seen = (snr > profile.threshold_db) & ~missed & ~targets.hidden & (targets.points_radar_m[:, 0] > 0.1)
-    return cosines[seen], targets.velocity_mps[seen], snr[seen]
+    return _Echoes(cosines[seen], targets.velocity_mps[seen], snr[seen], np.flatnonzero(seen))
 
 
-def _with_side_lobes(
-    rng: np.random.Generator, cosines: Points3, velocity: Values, snr: Values, profile: RadarProfile
-) -> _Echoes:
+def _with_side_lobes(rng: np.random.Generator, echoes: _Echoes, profile: RadarProfile) -> _Echoes:
     """Let strong echoes occasionally appear in a neighbouring range bin too."""
+    snr = echoes.snr_db
     spill = (snr > profile.threshold_db + _SIDE_LOBE_DB + 3.0) & (rng.uniform(size=len(snr)) < _SIDE_LOBE_SHARE)
-    extra = cosines[spill].copy()
+    extra = echoes.cosines[spill].copy()
     extra[:, 0] += rng.choice([-2.0, 2.0], size=len(extra)) * profile.range_bin_m
     extra[:, 2] += 2.0 * profile.elevation_sigma * rng.standard_normal(len(extra))
-    return (
-        np.concatenate([cosines, extra]),
-        np.concatenate([velocity, velocity[spill]]),
-        np.concatenate([snr, snr[spill] - _SIDE_LOBE_DB]),
-    )
+    return echoes.and_also(extra, echoes.velocity_mps[spill], snr[spill] - _SIDE_LOBE_DB, echoes.target[spill])
 
 
-def _with_false_alarms(
-    rng: np.random.Generator, cosines: Points3, velocity: Values, snr: Values, profile: RadarProfile
-) -> _Echoes:
+def _with_false_alarms(rng: np.random.Generator, echoes: _Echoes, profile: RadarProfile) -> _Echoes:
     """Add false returns."""
     n = int(rng.poisson(profile.false_alarms))
     fastest = 0.5 * profile.doppler_bins * profile.doppler_bin_mps
     anywhere = np.stack(
         [rng.uniform(0.6, 28.0, n), rng.uniform(-0.8, 0.8, n), rng.uniform(-0.3, 0.3, n)], axis=1
     ).reshape(-1, 3)
-    return (
-        np.concatenate([cosines, anywhere]),
-        np.concatenate([velocity, rng.uniform(-fastest, fastest, n)]),
-        np.concatenate([snr, profile.threshold_db + rng.exponential(1.5, n)]),
+    speeds = rng.uniform(-fastest, fastest, n)
+    return echoes.and_also(
+        anywhere, speeds, profile.threshold_db + rng.exponential(1.5, n), np.full(n, -1, dtype=np.int64)
     )
 
 

@@ -18,15 +18,20 @@ from calib_core.synthetic.rendering.reflector import (
     stand_limbs,
 )
 from calib_core.synthetic.rendering.still import Still, trace_still
+from calib_core.synthetic.rendering.vehicles import vehicle_facets, vehicle_shadow
 from calib_core.synthetic.rig import Rig
 from calib_core.synthetic.scene.person import Capsule, PersonState, capsules
-from calib_core.synthetic.scene.scenes import Scene
+from calib_core.synthetic.scene.scenes import USUAL_EDGE_M, Scene
 from calib_core.synthetic.scene.story import Moment
 from calib_core.synthetic.scene.surroundings import cart_position
+from calib_core.synthetic.scene.vehicles import VehicleState
 
 __all__ = ["FrameRenderer"]
 
 _FINE = 8
+_COARSE = 3
+_LARGE_PX = 150.0
+"""Larger vehicles are drawn on a coarser window; it would need hundreds of megabytes."""
 _SHIFT = 6
 _SOFT_SHADOW = 0.62
 _NOTHING_ELSE = Surroundings()
@@ -50,11 +55,14 @@ class FrameRenderer:
     still: Still
     towards: Vector3
     surroundings: Surroundings = _NOTHING_ELSE
+    edge_m: float = USUAL_EDGE_M
 
     @classmethod
-    def of(cls, scene: Scene, rig: Rig, surroundings: Surroundings = _NOTHING_ELSE) -> "FrameRenderer":
+    def of(
+        cls, scene: Scene, rig: Rig, surroundings: Surroundings = _NOTHING_ELSE, edge_m: float = USUAL_EDGE_M
+    ) -> "FrameRenderer":
         """Trace the backdrop, which takes some seconds, and return a renderer."""
-        return cls(scene, rig, trace_still(scene, rig), sun_direction(scene), surroundings)
+        return cls(scene, rig, trace_still(scene, rig), sun_direction(scene), surroundings, edge_m)
 
     def render(
         self, moment: Moment, *, person: bool = True, noise_grey: float = 0.0, rng: np.random.Generator | None = None
@@ -67,6 +75,8 @@ class FrameRenderer:
             noise_grey: standard deviation of the sensor's noise [grey levels].
             rng: random generator of that noise.
         """
+        import cv2
+
         levels = self.still.levels.copy()
         things = self._things(moment, person)
         for thing in things:
@@ -76,7 +86,7 @@ class FrameRenderer:
             thing.draw(levels)
         if noise_grey > 0.0 and rng is not None:
             levels += noise_grey * rng.standard_normal(levels.shape, dtype=np.float32)
-        return np.ascontiguousarray(np.clip(levels + 0.5, 0.0, 255.0).astype(np.uint8)[..., ::-1])
+        return cv2.cvtColor(np.clip(levels + 0.5, 0.0, 255.0).astype(np.uint8), cv2.COLOR_RGB2BGR)
 
     def _things(self, moment: Moment, person: bool) -> list[_Thing]:
         """List what moves, people first: so do their shadows fall."""
@@ -84,6 +94,8 @@ class FrameRenderer:
         people = [
             self._person(state) for state in ((moment.person, *moment.passers_by) if person else moment.passers_by)
         ]
+        states = [actor.state for actor in moment.traffic]
+        people += [self._vehicle(state) if isinstance(state, VehicleState) else self._person(state) for state in states]
         reflectors = [self._reflector(moment)] if shown else []
         for resting in moment.standing:
             height_m = float(resting.position_m[2])
@@ -100,6 +112,18 @@ class FrameRenderer:
         distance = float(np.linalg.norm(np.array([state.x_m, state.y_m, 1.0]) - self.still.eye_m))
         return _Thing(distance, lambda levels: self._draw_limbs(levels, limbs), (limbs,))
 
+    def _vehicle(self, state: VehicleState) -> _Thing:
+        facets = vehicle_facets(state, scene=self.scene, towards=self.towards, eye_m=self.still.eye_m)
+        distance = float(np.linalg.norm([state.x_m, state.y_m, 0.5 * state.size_m[2]] - self.still.eye_m))
+        reach = 0.5 * float(np.hypot(*state.size_m[:2]))  # the ground below its near end is no nearer than that
+        outlines = [self.rig.camera.project(self.rig.camera_from_world @ facet.corners_m) for facet in facets]
+        shown = [facet for facet, outline in zip(facets, outlines, strict=True) if np.isfinite(outline).all()]
+        spans = [np.ptp(outline, axis=0).max() for outline in outlines if np.isfinite(outline).all()]
+        fine = _FINE if max(spans, default=0.0) < _LARGE_PX else _COARSE
+        return _Thing(
+            distance, lambda levels: self._draw_facets(levels, shown, distance - reach, fine), (vehicle_shadow(state),)
+        )
+
     def _reflector(self, moment: Moment) -> _Thing:
         raised = not on_block(moment.next_height_m)
         stand = stand_limbs(moment.reflector_m, at_rest=moment.resting is not None) if raised else ()
@@ -109,7 +133,7 @@ class FrameRenderer:
             self._draw_reflector(levels, moment)
 
         distance = float(np.linalg.norm(moment.reflector_m - self.still.eye_m))
-        return _Thing(distance, draw, ((*shadow_limbs(moment.reflector_m, moment.facing_rad), *stand),))
+        return _Thing(distance, draw, ((*shadow_limbs(moment.reflector_m, moment.facing_rad, self.edge_m), *stand),))
 
     def _cart(self, apex_m: Vector3) -> _Thing:
         place = cart_position(apex_m, self.surroundings)
@@ -147,25 +171,26 @@ class FrameRenderer:
             towards=self.towards,
             eye_m=self.still.eye_m,
             ground_stand=on_block(moment.next_height_m),
+            edge_m=self.edge_m,
         )
         self._draw_facets(levels, facets, float(np.linalg.norm(moment.reflector_m - self.still.eye_m)))
 
-    def _draw_facets(self, levels: np.ndarray, facets: list[Facet], distance_m: float) -> None:
-        """Fill polygons on an eight times finer window and downsample, which keeps edges smooth and unshifted."""
+    def _draw_facets(self, levels: np.ndarray, facets: list[Facet], distance_m: float, fine: int = _FINE) -> None:
+        """Fill polygons on a finer window and downsample, which keeps edges smooth and unshifted."""
         import cv2
 
         camera = self.rig.camera
         outlines = [camera.project(self.rig.camera_from_world @ facet.corners_m) for facet in facets]
-        window = Window.around(np.concatenate(outlines), camera)
+        window = Window.around(np.concatenate(outlines), camera) if outlines else None
         if window is None:
             return
         height, width = window.rows.stop - window.rows.start, window.columns.stop - window.columns.start
-        colour = np.zeros((_FINE * height, _FINE * width, 3), dtype=np.float32)
-        cover = np.zeros((_FINE * height, _FINE * width), dtype=np.uint8)
+        colour = np.zeros((fine * height, fine * width, 3), dtype=np.float32)
+        cover = np.zeros((fine * height, fine * width), dtype=np.uint8)
         origin = np.array([window.columns.start, window.rows.start])
         for facet, outline in zip(facets, outlines, strict=True):
-            fine = (outline - origin + 0.5) * _FINE - 0.5
-            points = np.round(fine * (1 << _SHIFT)).astype(np.int32)
+            inside = (outline - origin + 0.5) * fine - 0.5
+            points = np.round(inside * (1 << _SHIFT)).astype(np.int32)
             level = display(facet.colour[None].astype(np.float32))[0]
             cv2.fillPoly(colour, [points], [float(c) for c in level], cv2.LINE_8, _SHIFT)
             cv2.fillPoly(cover, [points], [255], cv2.LINE_8, _SHIFT)

@@ -22,6 +22,7 @@ _ALBEDO: dict[Surface, tuple[float, float, float]] = {
     "shoe": (0.035, 0.030, 0.028),
     "stripe": (0.85, 0.85, 0.80),
 }
+_CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 _PENUMBRA = 0.035
 """How fast a shadow's edge softens with the distance to the object that casts it."""
 
@@ -49,11 +50,10 @@ class Window:
 
 def _outline(limb: Capsule, inflate_m: float = 0.0) -> np.ndarray:
     """Return points (16, 3) around a limb; their pixels bound it."""
-    corners = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
     return np.concatenate(
         [
-            limb.start_m + (limb.start_radius_m + inflate_m) * corners,
-            limb.end_m + (limb.end_radius_m + inflate_m) * corners,
+            limb.start_m + (limb.start_radius_m + inflate_m) * _CORNERS,
+            limb.end_m + (limb.end_radius_m + inflate_m) * _CORNERS,
         ]
     )
 

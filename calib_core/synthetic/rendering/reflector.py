@@ -11,12 +11,9 @@ import numpy as np
 from calib_core.arrays import Points3, Vector3
 from calib_core.synthetic.rendering.light import lit
 from calib_core.synthetic.scene.person import Capsule
-from calib_core.synthetic.scene.scenes import Scene
+from calib_core.synthetic.scene.scenes import USUAL_EDGE_M, Scene
 
-__all__ = ["EDGE_M", "Facet", "apex_edges", "on_block", "reflector_facets", "shadow_limbs", "stand_limbs"]
-
-EDGE_M = 0.16
-"""Length of the three edges that meet at the apex [m]."""
+__all__ = ["Facet", "apex_edges", "on_block", "reflector_facets", "shadow_limbs", "stand_limbs"]
 
 _BASE_HALF_M = 0.095
 _GROUND_STAND_M = 0.35
@@ -61,7 +58,14 @@ def _subdivided(corners: np.ndarray) -> np.ndarray:
 
 
 def reflector_facets(
-    apex_m: Vector3, facing_rad: float, *, scene: Scene, towards: Vector3, eye_m: Vector3, ground_stand: bool
+    apex_m: Vector3,
+    facing_rad: float,
+    *,
+    scene: Scene,
+    towards: Vector3,
+    eye_m: Vector3,
+    ground_stand: bool,
+    edge_m: float = USUAL_EDGE_M,
 ) -> list[Facet]:
     """Build the polygons of reflector and base block, farthest first.
 
@@ -72,8 +76,9 @@ def reflector_facets(
         towards: (3,) direction of the sun.
         eye_m: (3,) the camera.
         ground_stand: whether it sits on its block (else on a tripod).
+        edge_m: length of the three edges that meet at the apex.
     """
-    edges = EDGE_M * apex_edges(facing_rad, np.deg2rad(9.0))
+    edges = edge_m * apex_edges(facing_rad, np.deg2rad(9.0))
     facets: list[Facet] = []
     if ground_stand:
         facets += _base(apex_m, edges, facing_rad, scene, towards, eye_m)
@@ -146,9 +151,9 @@ def on_block(height_m: float) -> bool:
     return height_m < _GROUND_STAND_M
 
 
-def shadow_limbs(apex_m: Vector3, facing_rad: float) -> tuple[Capsule, ...]:
+def shadow_limbs(apex_m: Vector3, facing_rad: float, edge_m: float = USUAL_EDGE_M) -> tuple[Capsule, ...]:
     """Return capsules that cast about the same shadow as sheets and block."""
-    edges = EDGE_M * apex_edges(facing_rad, np.deg2rad(9.0))
+    edges = edge_m * apex_edges(facing_rad, np.deg2rad(9.0))
     tips = apex_m + edges
     centre = np.array([apex_m[0] + 0.055 * np.cos(facing_rad), apex_m[1] + 0.055 * np.sin(facing_rad), 0.0])
     bottom = centre + np.array([0.0, 0.0, max(0.05, float(tips[:, 2].min()) - 0.09)])

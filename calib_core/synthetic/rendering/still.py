@@ -19,7 +19,7 @@ _SAMPLES = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))
 _SUN_RADIUS = 0.012
 _LENS_BLUR_PX = 0.5
 """Standard deviation of the lens blur of the backdrop."""
-_FAR_M = {"tiles": 22.3, "grass": 400.0, "floor": 22.0, "asphalt": 12.0}
+_FAR_M = {"tiles": 22.3, "grass": 400.0, "floor": 22.0, "asphalt": 12.0, "yard": 400.0, "road": 400.0}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

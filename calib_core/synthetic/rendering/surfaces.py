@@ -111,11 +111,33 @@ def _asphalt(p: Patch) -> np.ndarray:
     return _mixed(colour, (0.66, 0.66, 0.63), np.maximum(bay, front) * worn)
 
 
+def _yard(p: Patch) -> np.ndarray:
+    level = 0.17 * (1.0 + 0.13 * p.noise(2.2, 4, 1) + 0.10 * p.noise(0.05, 2, 2))
+    colour = level[:, None] * np.array([1.0, 0.99, 0.97], dtype=np.float32)
+    patched = np.clip(3.0 * p.noise(5.0, 2, 4) - 1.2, 0.0, 0.35)
+    return _mixed(colour, (0.10, 0.10, 0.10), patched)
+
+
+def _road(p: Patch) -> np.ndarray:
+    level = 0.14 * (1.0 + 0.10 * p.noise(2.6, 4, 1) + 0.10 * p.noise(0.05, 2, 2))
+    colour = level[:, None] * np.array([1.0, 0.99, 0.97], dtype=np.float32)
+    across = np.minimum(p.footprint_m, 1.0)
+    lanes = np.clip((0.06 - np.abs(np.abs(p.v_m) - 6.1)) / across + 0.5, 0.0, 1.0)
+    dashes = np.clip((0.07 - np.abs(p.v_m)) / across + 0.5, 0.0, 1.0) * ((p.u_m % 6.0) < 3.0)
+    worn = np.clip(0.85 + 0.4 * p.noise(0.3, 3, 3), 0.3, 1.0)
+    colour = _mixed(colour, (0.70, 0.70, 0.67), np.maximum(lanes, dashes) * worn)
+    verge = np.clip((np.abs(p.v_m) - 6.6) / across + 0.5, 0.0, 1.0)
+    green = 0.16 * (1.0 + 0.2 * p.noise(3.0, 4, 5) + 0.16 * p.noise(0.10, 3, 6))
+    return _mixed(colour, green[:, None] * np.array([0.62, 1.0, 0.32], dtype=np.float32), verge)
+
+
 _GROUNDS: dict[Ground, Callable[[Patch], np.ndarray]] = {
     "tiles": _tiles,
     "grass": _grass,
     "floor": _floor,
     "asphalt": _asphalt,
+    "yard": _yard,
+    "road": _road,
 }
 
 

@@ -10,6 +10,7 @@ from calib_core.measurements import TimeNs
 from calib_core.synthetic.scene.person import PersonState, capsules
 from calib_core.synthetic.scene.stage import Stage
 from calib_core.synthetic.scene.story import Resting
+from calib_core.synthetic.scene.vehicles import VehicleState, hidden_by
 
 __all__ = ["SimulatedPlacement", "clear_frames", "placements_of"]
 
@@ -80,6 +81,12 @@ def clear_frames(stage: Stage, resting: Resting) -> Iterator[TimeNs]:
     for i in inside[np.argsort(np.abs(moments[inside] - middle_s), kind="stable")].tolist():
         moment = stage.story.at(float(moments[i]))
         people = (moment.person, *moment.passers_by) if stage.options.person else moment.passers_by
+        states = [actor.state for actor in moment.traffic]
+        people = (*people, *(state for state in states if isinstance(state, PersonState)))
+        vehicles = [state for state in states if isinstance(state, VehicleState)]
+        eye_m, apex_m = stage.rig.camera_position_world_m, resting.position_m[None]
+        if any(hidden_by(vehicle, eye_m, apex_m)[0] for vehicle in vehicles):
+            continue
         if all(_shows(stage, person, resting.position_m) for person in people):
             yield TimeNs(int(stage.frame_times.header_ns[i]))
 

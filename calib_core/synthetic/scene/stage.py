@@ -14,15 +14,18 @@ from calib_core.synthetic.radar.antennas import Antenna, antennas_of
 from calib_core.synthetic.radar.defects import radar_from_reported
 from calib_core.synthetic.radar.profiles import RadarProfile, profile_with
 from calib_core.synthetic.rig import Rig, random_rig, typical_camera
+from calib_core.synthetic.scene.built_scenes import scene_named
 from calib_core.synthetic.scene.passers_by import draw_passers_by
-from calib_core.synthetic.scene.scenes import Scatterer, Scene, scene_named
+from calib_core.synthetic.scene.scenes import STANDS_LOWER, USUAL_EDGE_M, Scatterer, Scene
 from calib_core.synthetic.scene.story import Story, tell_story
 from calib_core.synthetic.scene.surroundings import Flicker, draw_flickers, furnished, in_sight
+from calib_core.synthetic.scene.traffic import draw_movers
 from calib_core.synthetic.timeline import Islands, SensorTimes, draw_islands, draw_times
 
 __all__ = ["Stage", "child_rng", "set_stage"]
 
-_GHOST_SHARE = 0.25
+_BEFORE_BOARD_M = 0.02
+"""How far in front of the board's surface the apex is; the reflector's edges reach no farther back."""
 _TRIPOD_M = 1.4
 _RIM_SHARE = 0.03
 """Share of the image's width at its border where no reflector is put, so that all of it is visible."""
@@ -101,6 +104,8 @@ def child_rng(options: SimulationOptions, number: int) -> np.random.Generator:
 
 def set_stage(options: SimulationOptions) -> Stage:
     """Decide where everything is at any time, from the options alone."""
+    if not options.standing_places:
+        options = replace(options, person=False)
     scene, added = furnished(child_rng(options, 13), scene_named(options.scene), options.surroundings)
     camera = typical_camera(
         options.camera_model,
@@ -119,8 +124,8 @@ def set_stage(options: SimulationOptions) -> Stage:
     )
     rng = child_rng(options, 5)
     bias_sigma = [0.004, profile.azimuth_bias_sigma, profile.elevation_bias_sigma]
-    bias = rng.standard_normal((options.placements, 3)) * bias_sigma
-    ghosts = tuple(_ghost(rng, resting.position_m) for resting in story.restings)
+    bias = rng.standard_normal((len(positions), 3)) * bias_sigma
+    ghosts = tuple(_ghost(rng, resting.position_m, options.surroundings.ghost_share) for resting in story.restings)
     clutter = _clutter(child_rng(options, 6), scene, options)
     clutter_bias = child_rng(options, 7).standard_normal((len(clutter), 3)) * bias_sigma
     flickers = draw_flickers(child_rng(options, 18), options.surroundings.flickering_targets, scene)
@@ -130,13 +135,20 @@ def set_stage(options: SimulationOptions) -> Stage:
 
 
 def _story(positions_m: Points3, scene: Scene, options: SimulationOptions) -> Story:
-    story = tell_story(
-        child_rng(options, 2),
-        positions_m=positions_m,
-        dwell_s=options.dwell_s,
-        narrow=scene.narrow,
-        reflectors=options.reflectors,
-    )
+    if len(positions_m):
+        story = tell_story(
+            child_rng(options, 2),
+            positions_m=positions_m,
+            dwell_s=options.dwell_s,
+            narrow=scene.narrow,
+            reflectors=options.reflectors,
+            leaves=options.person_leaves,
+        )
+    else:
+        story = Story((), options.traffic.duration_s, (), np.zeros(0))
+    if options.traffic.any:
+        movers = draw_movers(child_rng(options, 20), options.traffic, scene, duration_s=story.duration_s)
+        story = replace(story, movers=movers)
     if not options.surroundings.passers_by:
         return story
     passers_by = draw_passers_by(
@@ -171,7 +183,12 @@ def _islands(story: Story, options: SimulationOptions) -> Islands | None:
 
 def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, options: SimulationOptions) -> Points3:
     """Draw apex positions in the world, clear of the solids."""
+    if not options.placements:
+        return _board_places(rng, scene, options)
     layout = scene.layout
+    lifted_m = STANDS_LOWER * (options.reflector_edge_m - USUAL_EDGE_M)
+    if lifted_m > 0.0:
+        layout = replace(layout, height_m=layout.height_m + lifted_m)
     if options.heights:
         layout = replace(layout, max_height_m=_TRIPOD_M)
     world_from_radar = rig.radar_from_world.inverse()
@@ -187,16 +204,33 @@ def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, o
             if apart and scene.free(position[:2], 0.7) and len(found) < options.placements:
                 found.append(position)
         if len(found) == options.placements:
-            return np.array(found)
+            return np.concatenate([np.array(found), _board_places(rng, scene, options)])
     raise ValueError(f"only {len(found)} of {options.placements} placements fit in the {scene.name}")
+
+
+def _board_places(rng: np.random.Generator, scene: Scene, options: SimulationOptions) -> Points3:
+    """Draw apex positions in front of inner corners of the scene's checkerboard, each another corner.
+
+    Raises:
+        ValueError: the board has fewer corners.
+    """
+    corners = scene.board_corners_m
+    if options.board_corners > len(corners):
+        raise ValueError(f"the checkerboard has {len(corners)} inner corners; ask for at most as many placements")
+    if not options.board_corners:
+        return np.zeros((0, 3))
+    chosen = rng.choice(len(corners), options.board_corners, replace=False)
+    return corners[chosen] - [_BEFORE_BOARD_M, 0.0, 0.0]
 
 
 def _clutter(rng: np.random.Generator, scene: Scene, options: SimulationOptions) -> tuple[Scatterer, ...]:
     """Return the static objects that the radar sees; heavy clutter adds strong ones among the placements."""
     if options.clutter == "none":
         return ()
+    louder_db = options.surroundings.clutter_db
+    visible = tuple(replace(one, rcs_dbsm=one.rcs_dbsm + louder_db) for one in scene.scatterers)
     if options.clutter == "scene":
-        return scene.scatterers
+        return visible
     reach = min(scene.layout.max_lateral_m + 0.4, 7.0)
     hidden = tuple(
         Scatterer(
@@ -207,13 +241,13 @@ def _clutter(rng: np.random.Generator, scene: Scene, options: SimulationOptions)
         )
         for _ in range(8)
     )
-    return scene.scatterers + hidden
+    return visible + hidden
 
 
-def _ghost(rng: np.random.Generator, position_m: Vector3) -> Scatterer | None:
+def _ghost(rng: np.random.Generator, position_m: Vector3, wanted_share: float) -> Scatterer | None:
     """Draw the static reflection that comes and goes with a placement: farther away, slightly to the side, weaker."""
     share, extra_m, aside_rad, rcs_dbsm = rng.uniform([0.0, 0.8, -0.08, -4.0], [1.0, 3.5, 0.08, 3.0])
-    if share > _GHOST_SHARE:
+    if share > wanted_share:
         return None
     range_m = float(np.linalg.norm(position_m[:2])) + extra_m
     azimuth_rad = float(np.arctan2(position_m[1], position_m[0])) + aside_rad

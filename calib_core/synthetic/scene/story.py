@@ -6,25 +6,22 @@ Times here are seconds from the start of the recording.
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from calib_core.arrays import Values, Vector2, Vector3
 from calib_core.synthetic.scene.passers_by import PasserBy
 from calib_core.synthetic.scene.person import PersonState, hand_position
+from calib_core.synthetic.scene.script import PUT_DOWN_S, STEP_AWAY_S, Leg, Script
+from calib_core.synthetic.scene.traffic import Actor, Mover
 
 __all__ = ["Moment", "Resting", "Story", "tell_story"]
 
-_SPEED_MPS = 1.25
-_PUT_DOWN_S = 0.8
-_STEP_AWAY_S = 1.3
 _LEAD_IN_S = 0.6
 _TURNING_S = 0.5
 _BEHIND_M = 0.52
 """How far behind the reflector, seen from the radar, the person stands to put it down."""
-
-_Action = Literal["walk", "stand", "put", "pick"]
+_NOBODY = PersonState(-3.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +57,7 @@ class Moment:
         next_height_m: height of the apex at the present, previous or next placement.
         standing: the placements of the other reflectors.
         passers_by: people who walk through the scene.
+        traffic: who is there to be judged.
     """
 
     person: PersonState
@@ -69,19 +67,7 @@ class Moment:
     next_height_m: float
     standing: tuple[Resting, ...] = ()
     passers_by: tuple[PersonState, ...] = ()
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Leg:
-    start_s: float
-    end_s: float
-    start_m: Vector2
-    end_m: Vector2
-    heading_rad: float
-    action: _Action
-    carrying: bool
-    walked_m: float
-    placement: int
+    traffic: tuple[Actor, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,16 +76,33 @@ class Story:
 
     restings: tuple[Resting, ...]
     duration_s: float
-    _legs: tuple[_Leg, ...]
+    _legs: tuple[Leg, ...]
     _ends_s: Values
     passers_by: tuple[PasserBy, ...] = ()
+    movers: tuple[Mover, ...] = ()
 
     def at(self, time_s: float) -> Moment:
         """Return the person and the reflectors at a time."""
+        traffic = tuple(mover.at(time_s) for mover in self.movers)
+        if not self.restings:
+            return Moment(_NOBODY, np.zeros(3), 0.0, None, 0.0, traffic=traffic)
         moment = self._moment(time_s)
+        if traffic:
+            moment = replace(moment, traffic=traffic)
         resting = [one for one in self.restings if one.start_s <= time_s < one.end_s and one is not moment.resting]
         passing = [state for one in self.passers_by if (state := one.at(time_s)) is not None]
         return replace(moment, standing=tuple(resting), passers_by=tuple(passing)) if resting or passing else moment
+
+    def people_at(self, time_s: float, *, person: bool) -> tuple[Actor, ...]:
+        """Return the people besides the traffic, each with a name: who carries the reflector, if shown, and passers-by."""
+        number = 1 + sum(mover.label == "person" for mover in self.movers)
+        found = [Actor(f"person-{number}", "person", self._moment(time_s).person)] if person and self.restings else []
+        for passer_by in self.passers_by:
+            number += 1
+            state = passer_by.at(time_s)
+            if state is not None:
+                found.append(Actor(f"person-{number}", "person", state))
+        return tuple(found)
 
     def _moment(self, time_s: float) -> Moment:
         number = min(int(np.searchsorted(self._ends_s, time_s, side="right")), len(self._legs) - 1)
@@ -133,7 +136,7 @@ def _eased(share: float) -> float:
     return s * s * s * (s * (6.0 * s - 15.0) + 10.0)
 
 
-def _person(leg: _Leg, before: _Leg, time_s: float) -> PersonState:
+def _person(leg: Leg, before: Leg, time_s: float) -> PersonState:
     share = (time_s - leg.start_s) / max(leg.end_s - leg.start_s, 1e-9)
     eased = _eased(share)
     place = leg.start_m + eased * (leg.end_m - leg.start_m)
@@ -150,59 +153,6 @@ def _person(leg: _Leg, before: _Leg, time_s: float) -> PersonState:
     return PersonState(
         float(place[0]), float(place[1]), heading, leg.walked_m + eased * length_m, pace, crouch, holding
     )
-
-
-class _Script:
-    """Collects legs one after the other."""
-
-    def __init__(self, place_m: Vector2) -> None:
-        self.legs: list[_Leg] = []
-        self.time_s = 0.0
-        self.walked_m = 0.0
-        self.place_m = place_m
-        self.heading_rad = 0.0
-
-    def walk(self, to_m: Vector2, *, carrying: bool, placement: int = -1, duration_s: float | None = None) -> None:
-        step = to_m - self.place_m
-        length_m = float(np.linalg.norm(step))
-        if length_m > 0.05:
-            self.heading_rad = float(np.arctan2(step[1], step[0]))
-        self._add("walk", to_m, duration_s or 0.5 + length_m / _SPEED_MPS, carrying, placement)
-        self.walked_m += length_m
-
-    def stay(self, action: _Action, duration_s: float, *, carrying: bool, placement: int, facing_m: Vector2) -> None:
-        look = facing_m - self.place_m
-        self.heading_rad = float(np.arctan2(look[1], look[0]))
-        self._add(action, self.place_m, duration_s, carrying, placement)
-
-    def put_down(self, stand_m: Vector2, placement: int, apex_m: Vector2) -> float:
-        """Carry the reflector to a placement and put it down; return when it is released."""
-        self.walk(stand_m, carrying=True, placement=placement)
-        self.stay("put", _PUT_DOWN_S, carrying=False, placement=placement, facing_m=apex_m)
-        return self.time_s
-
-    def wait(self, aside_m: Vector2, dwell_s: float, placement: int, apex_m: Vector2) -> None:
-        """Step aside and stand there, until it is time to come back."""
-        self.walk(aside_m, carrying=False, placement=placement, duration_s=_STEP_AWAY_S)
-        wait_s = dwell_s - 2.0 * _STEP_AWAY_S
-        self.stay("stand", wait_s, carrying=False, placement=placement, facing_m=apex_m)
-
-    def _add(self, action: _Action, to_m: Vector2, duration_s: float, carrying: bool, placement: int) -> None:
-        end_s = self.time_s + duration_s
-        self.legs.append(
-            _Leg(
-                self.time_s,
-                end_s,
-                self.place_m,
-                to_m,
-                self.heading_rad,
-                action,
-                carrying,
-                self.walked_m,
-                placement,
-            )
-        )
-        self.time_s, self.place_m = end_s, to_m
 
 
 def _in_order(positions: np.ndarray, start_m: Vector2) -> list[int]:
@@ -224,6 +174,7 @@ def tell_story(
     narrow: bool = False,
     start_m: tuple[float, float] = (2.6, -1.2),
     reflectors: int = 1,
+    leaves: bool = False,
 ) -> Story:
     """Let a person carry the reflector to each position, always to the nearest one next.
 
@@ -234,8 +185,9 @@ def tell_story(
         narrow: the person steps back, not to the side.
         start_m: where the person comes from, and where further reflectors wait.
         reflectors: how many, carried in turn; the last ones stay until the end.
+        leaves: the person walks behind the sensors for that time instead of stepping aside.
     """
-    script = _Script(np.array(start_m))
+    script = Script(np.array(start_m))
     restings: list[Resting] = []
     stands: list[Vector2] = []
     for index, chosen in enumerate(_in_order(positions_m, script.place_m)):
@@ -243,7 +195,11 @@ def tell_story(
         away = position[:2] / np.linalg.norm(position[:2])
         stands.append(position[:2] + _BEHIND_M * away)
         start_s = script.put_down(stands[index], index, position[:2])
-        script.wait(_aside(rng, stands[index], away, narrow), dwell_s, index, position[:2])
+        aside_m = _aside(rng, stands[index], away, narrow)
+        if leaves:
+            script.leave(stands[index], dwell_s, index, position[:2])
+        else:
+            script.wait(aside_m, dwell_s, index, position[:2])
         facing_rad = float(np.arctan2(-away[1], -away[0]) + np.deg2rad(6.0) * rng.standard_normal())
         left_s = script.time_s if reflectors > 1 else math.inf
         restings.append(Resting(index, start_s, math.inf, position, facing_rad, left_s))
@@ -251,10 +207,10 @@ def tell_story(
         if taken < 0:
             script.walk(np.array(start_m), carrying=False, placement=index)
             continue
-        quickly_s = _STEP_AWAY_S if taken == index else None
+        quickly_s = STEP_AWAY_S if taken == index else None
         script.walk(stands[taken], carrying=False, placement=index, duration_s=quickly_s)
         restings[taken] = replace(restings[taken], end_s=script.time_s)
-        script.stay("pick", _PUT_DOWN_S, carrying=False, placement=taken, facing_m=restings[taken].position_m[:2])
+        script.stay("pick", PUT_DOWN_S, carrying=False, placement=taken, facing_m=restings[taken].position_m[:2])
     home = script.place_m + np.array([-1.0, 1.5 if script.place_m[1] < 0 else -1.5])
     script.walk(home, carrying=len(restings) >= reflectors, placement=len(restings) - 1)
     duration_s = script.time_s + _LEAD_IN_S

@@ -29,7 +29,7 @@ def scans_by(profile: RadarProfile, *, scans: int = 30, seed: int = 0, things: n
         things, np.zeros(n), np.full(n, 14.0), np.full(n, 1.0), np.zeros((n, 3)), np.zeros(n, dtype=np.bool_)
     )
     return RadarScans.from_scans(
-        [measure(rng, targets, profile=profile, time=TimeNs(k * NS_PER_S // 10)) for k in range(scans)]
+        [measure(rng, targets, profile=profile, time=TimeNs(k * NS_PER_S // 10)).scan for k in range(scans)]
     )
 
 

@@ -15,8 +15,9 @@ SMALL = {"placements": 4, "dwell_s": 3.5, "radar_rate_hz": 2.0, "camera_rate_hz"
 def test_every_preset_is_a_recording_of_its_own(name: PresetName) -> None:
     options = PRESETS[name]
     assert (options == SimulationOptions()) == (name == "default")
-    recording = simulate(replace(options, **SMALL))  # type: ignore[arg-type]
-    assert len(recording.placements) == 4
+    small = replace(options, **SMALL)  # type: ignore[arg-type]
+    recording = simulate(small)
+    assert len(recording.placements) == small.standing_places
     assert len(recording.clicks) >= 4
     assert len(next(recording.scans())) > 0
 

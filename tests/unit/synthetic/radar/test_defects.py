@@ -48,7 +48,7 @@ def _reported(defects: RadarDefects) -> np.ndarray:
     targets = Targets(PLACES, np.zeros(4), np.full(4, 20.0), np.zeros(4), np.zeros((4, 3)), np.zeros(4, dtype=bool))
     found = np.full((4, 3), np.nan)
     for seed in range(20):  # a scan misses a target now and then, and adds side lobes
-        scan = measure(np.random.default_rng(seed), targets, profile=EXACT, time=TimeNs(0), defects=defects)
+        scan = measure(np.random.default_rng(seed), targets, profile=EXACT, time=TimeNs(0), defects=defects).scan
         loud = scan.snr_db > scan.snr_db.max() - 20.0
         if len(scan) == 4 and loud.all():
             found = scan.points_radar_m

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.colours import residual_colours
 from app.session import DismissedPlacement, History, RecordingFacts, Session
 from app.view import Advice, view
 from app.web.frames import Frame
@@ -23,7 +24,6 @@ from app.web.view3d.shapes import (
     nominal_camera_from_radar,
     range_rings,
     rays_to,
-    residual_colours,
     vertical_field_of_view_rad,
 )
 from app.web.view3d.sight import Sight

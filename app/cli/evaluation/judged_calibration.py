@@ -1,0 +1,75 @@
+"""A calibration that is to be judged on a recording: read from any format, with a lens that fits the recording."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from calib_core.errors import InputError
+
+if TYPE_CHECKING:
+    from app.cli.tree_flags import FrameFlags
+    from calib_core.camera import Camera
+    from calib_core.interchange import ImportedCalibration
+    from calib_core.recordings import Recording
+    from calib_core.results import Calibration, DataWarning
+
+__all__ = ["JudgedCalibration", "judged_calibration"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedCalibration:
+    """A calibration and what the recording says of its lens.
+
+    Attributes:
+        found: what was read.
+        calibration: with a lens.
+        warnings: about the lens, and about the recording if the calibration names another.
+    """
+
+    found: "ImportedCalibration"
+    calibration: "Calibration"
+    warnings: "tuple[DataWarning, ...]"
+
+
+def judged_calibration(
+    path: Path, recording: "Recording", *, frames: "FrameFlags", camera: "Camera | None"
+) -> JudgedCalibration:
+    """Read a calibration that is to be judged on a recording.
+
+    Args:
+        path: of its file.
+        recording: that it is judged on.
+        frames: which frames of a tree.
+        camera: the intrinsics, if the file has none.
+
+    Raises:
+        InputError: it cannot be read, there are no intrinsics, or they are of pictures of another size.
+    """
+    from app.recording_check import calibration_of, other_camera
+    from calib_core.results import DataWarning
+
+    found, _ = frames.read([path])
+    recorded = recording.camera()
+    calibration = calibration_of(found, str(path), camera or recorded)
+    _require_size(calibration.camera, recording, path)
+    lens = other_camera(found, recorded)
+    return JudgedCalibration(
+        found, calibration, tuple(DataWarning(one.code, f"{path.name}: {one.message}", one.hint) for one in lens)
+    )
+
+
+def _require_size(camera: "Camera", recording: "Recording", path: Path) -> None:
+    """Refuse a calibration for pictures of another size.
+
+    Raises:
+        InputError: the recording's camera has another size.
+    """
+    recorded = recording.camera()
+    if recorded is None:
+        return
+    size, wanted = (camera.width_px, camera.height_px), (recorded.width_px, recorded.height_px)
+    if size != wanted:
+        raise InputError(
+            f"{path}: calibrated for pictures of {size[0]} x {size[1]} px, but the recording's camera has {wanted[0]} x "
+            f"{wanted[1]} px; give the calibration of this camera"
+        )

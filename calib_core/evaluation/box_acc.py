@@ -1,0 +1,264 @@
+"""Acc (paper, equation 6): the share of targets' returns that a calibration puts into the boxes of those targets."""
+
+import itertools
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from calib_core.arrays import Flags, Indices, Points2, Points3, TimesNs, Values, Vector3
+from calib_core.camera import Camera
+from calib_core.detections import Boxes, ReturnLabels
+from calib_core.evaluation.bins import edges_of
+from calib_core.evaluation.counted_returns import CountedReturns, counted_returns
+from calib_core.evaluation.figures import Axis, BoxedReturns, BoxFigures, ClassFigure, FrameFigure, Sensitivity, Share
+from calib_core.evaluation.targets import TargetOptions, TargetTrack, moving_targets
+from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
+from calib_core.radar import RadarErrors
+
+__all__ = [
+    "ANGLES_DEG",
+    "AXES",
+    "box_figures",
+    "frame_groups",
+    "grouped_error",
+    "inside_own_boxes",
+    "judged_by_boxes",
+    "seen_pixels",
+]
+
+ANGLES_DEG = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
+AXES: dict[Axis, tuple[float, float, float]] = {
+    "roll": (0.0, 0.0, 1.0),
+    "pitch": (1.0, 0.0, 0.0),
+    "yaw": (0.0, 1.0, 0.0),
+}
+"""The camera's own axes: x right, y down, z forward."""
+
+_CHANCE_DEG = 10.0
+_GROUPS_S = (1.0, 2.0, 5.0, 10.0)
+_LEAST_GROUPS = 6
+_MARGIN = 1.1  # of the angle from the axis to the corner of the picture
+
+
+def box_figures(
+    camera_from_radar: RigidTransform,
+    camera: Camera,
+    scans: RadarScans,
+    boxes: Boxes,
+    *,
+    labels: ReturnLabels | None = None,
+    targets: Sequence[TargetTrack] | None = None,
+    radar_errors: RadarErrors | None = None,
+    classes: Sequence[str] = (),
+    max_gap_s: float | None = None,
+    options: TargetOptions | None = None,
+) -> BoxFigures:
+    """Compute Acc of a pose on a recording, with what stands behind it.
+
+    Args:
+        camera_from_radar: the pose that is judged.
+        camera: the lens.
+        scans: of the recording.
+        boxes: of its frames.
+        labels: the true origin of each return, which then decides instead of the radar's own targets.
+        targets: what `moving_targets` found; None searches the scans.
+        radar_errors: of the radar, taken out before the projection.
+        classes: count only targets of these classes; all if empty.
+        max_gap_s: longest time between a frame and its scan; None takes half the period of the scans.
+        options: of the search for targets.
+
+    Raises:
+        InputError: the boxes are of another recording, or no class matches.
+    """
+    if labels is None and targets is None:
+        targets = moving_targets(scans, options)
+    found = labels if labels is not None else targets or ()
+    counted = counted_returns(camera, scans, boxes, found, classes=classes, max_gap_s=max_gap_s)
+    return judged_by_boxes(camera_from_radar, camera, counted, radar_errors=radar_errors)
+
+
+def judged_by_boxes(
+    camera_from_radar: RigidTransform,
+    camera: Camera,
+    counted: CountedReturns,
+    *,
+    radar_errors: RadarErrors | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> BoxFigures:
+    """Compute Acc of a pose from the returns that count.
+
+    Args:
+        camera_from_radar: the pose.
+        camera: the lens.
+        counted: returns and boxes; the same for every pose.
+        radar_errors: taken out before the projection.
+        progress: called with the poses tried and their number.
+    """
+    points_camera_m = camera_from_radar @ (radar_errors or RadarErrors()).corrected(counted.points_radar_m)
+    pixels_px = seen_pixels(points_camera_m, camera)
+    inside = inside_own_boxes(pixels_px, counted.boxes_px)
+    shares, rows = _shares(inside, counted.frames)
+    error, groups = grouped_error(shares, counted.image_times[rows])
+    above = shares[shares > 0]
+    return BoxFigures(
+        acc=float(shares.mean()) if len(shares) else None,
+        acc_standard_error=error,
+        acc_without_zero_frames=float(above.mean()) if len(above) else None,
+        frames=_frames(counted, inside),
+        classes=_classes(counted, inside),
+        ranges=_ranges(counted, inside),
+        sensitivity=_sensitivity(points_camera_m, camera, counted, progress) if len(shares) else (),
+        chance=_chance(points_camera_m, camera, counted) if len(shares) else None,
+        rule=counted.rule,
+        source=counted.source,
+        groups=groups,
+        area_chance=_area_chance(counted, camera) if len(shares) else None,
+        targets=counted.found_targets,
+        matched_targets=counted.matched_targets,
+        returns=BoxedReturns(
+            counted.frames, counted.points_radar_m, pixels_px, counted.boxes_px, inside, counted.targets, counted.labels
+        ),
+    )
+
+
+def inside_own_boxes(pixels_px: Points2, boxes_px: np.ndarray) -> Flags:
+    """Return which pixels (n,) lie in their own box (n, 4), edges included; without a box or behind the camera none does."""
+    with np.errstate(invalid="ignore"):
+        within = (pixels_px >= boxes_px[:, :2]) & (pixels_px <= boxes_px[:, 2:])
+    return np.asarray(within.all(axis=1))
+
+
+def seen_pixels(points_camera_m: Points3, camera: Camera) -> Points2:
+    """Project points (n, 3) to pixels (n, 2); NaN beyond what the lens images, where its distortion may fold back.
+
+    Args:
+        points_camera_m: in the camera frame.
+        camera: the lens.
+    """
+    right, bottom = camera.width_px - 0.5, camera.height_px - 0.5
+    columns, rows = np.linspace(-0.5, right, 17), np.linspace(-0.5, bottom, 17)
+    border = [(column, row) for column in columns for row in (-0.5, bottom)]
+    border += [(column, row) for column in (-0.5, right) for row in rows]
+    widest = np.cos(min(np.pi, _MARGIN * float(np.nan_to_num(np.arccos(camera.rays(np.array(border))[:, 2])).max())))
+    pixels = camera.project(points_camera_m)
+    length = np.linalg.norm(points_camera_m, axis=1)
+    beyond = points_camera_m[:, 2] < widest * length
+    return np.asarray(np.where(beyond[:, None], np.nan, pixels))
+
+
+def frame_groups(image_times: TimesNs, length_s: float) -> Indices:
+    """Number the groups of neighbouring frames (f,): those of one interval of this length since the first frame."""
+    if not len(image_times):
+        return np.zeros(0, dtype=np.int64)
+    return np.unique((image_times - image_times[0]) // round(length_s * NS_PER_S), return_inverse=True)[1]
+
+
+def grouped_error(values: Values, image_times: TimesNs) -> tuple[float, int]:
+    """Return the standard error of the mean of one value per frame, and the number of groups that it comes from.
+
+    Neighbouring frames show the same targets, so they are taken together: the largest of the errors with groups of 1, 2, 5
+    and 10 s that leave enough groups. NaN below two groups.
+
+    Args:
+        values: (f,).
+        image_times: (f,) ascending.
+    """
+    best, count = float("nan"), 0
+    for length_s in _GROUPS_S:
+        group = frame_groups(image_times, length_s)
+        groups = int(group.max(initial=-1)) + 1
+        if groups < 2 or (count and groups < _LEAST_GROUPS):
+            break
+        sums = np.bincount(group, weights=values - values.mean())
+        error = float(np.sqrt(groups / (groups - 1) * (sums**2).sum()) / len(values))
+        if not error <= best:
+            best, count = error, groups
+    return best, count
+
+
+def _shares(inside: Flags, frames: Indices) -> tuple[Values, Indices]:
+    """Return the share of each frame that has returns, and which frames these are."""
+    rows, own = np.unique(frames, return_inverse=True)
+    return np.bincount(own, weights=inside) / np.maximum(np.bincount(own), 1), rows
+
+
+def _mean_share(inside: Flags, frames: Indices) -> float:
+    return float(_shares(inside, frames)[0].mean())
+
+
+def _turned(points_camera_m: Points3, axis: Vector3, angle_deg: float) -> np.ndarray:
+    return points_camera_m @ rotation_exp(np.deg2rad(angle_deg) * np.asarray(axis)).T
+
+
+def _sensitivity(
+    points_camera_m: Points3,
+    camera: Camera,
+    counted: CountedReturns,
+    progress: Callable[[int, int], None] | None,
+) -> tuple[Sensitivity, ...]:
+    curves = []
+    for number, (name, axis) in enumerate(AXES.items()):
+        accs = []
+        for step, angle in enumerate(ANGLES_DEG):
+            pixels = seen_pixels(_turned(points_camera_m, np.array(axis), angle), camera)
+            accs.append(_mean_share(inside_own_boxes(pixels, counted.boxes_px), counted.frames))
+            if progress is not None:
+                progress(number * len(ANGLES_DEG) + step + 1, len(AXES) * len(ANGLES_DEG))
+        curves.append(Sensitivity(name, ANGLES_DEG, tuple(accs)))
+    return tuple(curves)
+
+
+def _chance(points_camera_m: Points3, camera: Camera, counted: CountedReturns) -> float:
+    """Return the mean Acc of the calibration turned by 10 deg to the left and to the right."""
+    yaw = np.array(AXES["yaw"])
+    pixels = [seen_pixels(_turned(points_camera_m, yaw, side * _CHANCE_DEG), camera) for side in (-1.0, 1.0)]
+    return float(np.mean([_mean_share(inside_own_boxes(one, counted.boxes_px), counted.frames) for one in pixels]))
+
+
+def _area_chance(counted: CountedReturns, camera: Camera) -> float:
+    """Return what returns at random pixels would score: the share of the picture that each one's own box covers."""
+    last = np.array([camera.width_px, camera.height_px]) - 0.5
+    low, high = np.clip(counted.boxes_px[:, :2], -0.5, last), np.clip(counted.boxes_px[:, 2:], -0.5, last)
+    areas = np.nan_to_num(np.prod(high - low, axis=1)) / (camera.width_px * camera.height_px)
+    own = np.unique(counted.frames, return_inverse=True)[1]
+    return float((np.bincount(own, weights=areas) / np.bincount(own)).mean())
+
+
+def _frames(counted: CountedReturns, inside: Flags) -> tuple[FrameFigure, ...]:
+    count = len(counted.image_times)
+    returns = np.bincount(counted.frames, minlength=count)
+    within = np.bincount(counted.frames, weights=inside, minlength=count).astype(np.int64)
+    range_m = np.linalg.norm(counted.points_radar_m, axis=1)
+    ends = np.concatenate([[0], np.cumsum(returns)])
+    return tuple(
+        FrameFigure(
+            image_time=TimeNs(int(counted.image_times[i])),
+            radar_time=TimeNs(int(counted.radar_times[i])),
+            returns=int(returns[i]),
+            inside=int(within[i]),
+            boxes=int(counted.box_counts[i]),
+            range_m=float(np.median(range_m[ends[i] : ends[i + 1]])) if returns[i] else float("nan"),
+        )
+        for i in np.flatnonzero((returns > 0) | (counted.box_counts > 0)).tolist()
+    )
+
+
+def _classes(counted: CountedReturns, inside: Flags) -> tuple[ClassFigure, ...]:
+    labels = np.array(counted.labels, dtype=object)
+    figures = []
+    for label in sorted(set(counted.labels), key=lambda name: (not name, name)):
+        own = labels == label
+        shares, rows = _shares(inside[own], counted.frames[own])
+        figures.append(ClassFigure(label, float(shares.mean()), len(rows), int(own.sum()), int(inside[own].sum())))
+    return tuple(figures)
+
+
+def _ranges(counted: CountedReturns, inside: Flags) -> tuple[Share, ...]:
+    range_m = np.linalg.norm(counted.points_radar_m, axis=1)
+    edges = edges_of(range_m)
+    rows = np.clip(np.searchsorted(edges, range_m, side="right") - 1, 0, max(len(edges) - 2, 0))
+    return tuple(
+        Share(float(low), float(high), int((rows == i).sum()), int(inside[rows == i].sum()))
+        for i, (low, high) in enumerate(itertools.pairwise(edges))
+    )

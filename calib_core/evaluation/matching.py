@@ -1,0 +1,233 @@
+"""Matching: which box is around which target. The calibration that is judged has no say in it.
+
+Radar and camera see a target at a bearing each. Whatever the pose, the two differ by one angle that all targets share, and
+by the parallax, which falls with the range. Both are found from all targets and boxes together: the angle is the one under
+which most sightings meet a box. Each target is then given the box track that it meets best over the life that both share,
+the longest agreement first, and in each frame a target has at most one box and a box at most one target.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import Flags, Indices, Values, frozen_array
+from calib_core.camera import Camera
+from calib_core.evaluation.box_tracks import BoxTable
+from calib_core.evaluation.sightings import Sightings
+
+__all__ = ["Bearings", "Matches", "match_by_bearing", "match_by_name"]
+
+_TOLERANCE_RAD = np.deg2rad(2.5)  # of a target's azimuth, beyond half the width of its box
+_TOLERANCE_M = 0.3  # across the line of sight
+_MOST_PARALLAX_M = 3.0  # distance between the sensors, across
+_STEP_RAD = np.deg2rad(0.5)
+_MOST_VOTES = 20_000
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Bearings:
+    """How a target's bearing in the picture follows from the radar's azimuth: azimuth + turn + parallax / range.
+
+    Attributes:
+        turn_rad: of the camera against the radar, about the vertical; positive to the left.
+        parallax_m: distance between the sensors, across.
+    """
+
+    turn_rad: float
+    parallax_m: float
+
+    def of(self, sightings: Sightings) -> Values:
+        """Return the bearing (s,) at which the camera sees each sighting [rad], positive to the left."""
+        return _wrapped(sightings.azimuth_rad + self.turn_rad + self.parallax_m / np.maximum(sightings.range_m, 0.5))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Matches:
+    """The box of each sighting, and whether the sighting counts.
+
+    Attributes:
+        boxes: (s,) row of the table; -1 for none.
+        counts: (s,) whether it has a box, or would be in the picture: what the camera cannot see has no box.
+        bearings: how the two sensors see the same target; None if nothing shows it, and everything counts.
+    """
+
+    boxes: Indices
+    counts: Flags
+    bearings: Bearings | None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "boxes", frozen_array(self.boxes, (None,), dtype=np.int64))
+        object.__setattr__(self, "counts", frozen_array(self.counts, (len(self.boxes),), dtype=np.bool_))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Meetings:
+    """Every sighting with every box of its frame: m rows.
+
+    Attributes:
+        sightings: (m,) ascending.
+        boxes: (m,).
+        apart_rad: (m,) bearing of the box's middle minus the azimuth.
+        inverse_range: (m,) [1/m].
+        tolerance_rad: (m,).
+    """
+
+    sightings: Indices
+    boxes: Indices
+    apart_rad: Values
+    inverse_range: Values
+    tolerance_rad: Values
+
+    def some(self, kept: Flags | Indices) -> "_Meetings":
+        return _Meetings(
+            self.sightings[kept],
+            self.boxes[kept],
+            self.apart_rad[kept],
+            self.inverse_range[kept],
+            self.tolerance_rad[kept],
+        )
+
+    def misfits(self, bearings: Bearings) -> Values:
+        """Return how far each box is from its sighting (m,), in tolerances."""
+        expected = bearings.turn_rad + bearings.parallax_m * self.inverse_range
+        return np.asarray(np.abs(_wrapped(self.apart_rad - expected)) / self.tolerance_rad)
+
+
+def match_by_bearing(sightings: Sightings, table: BoxTable, camera: Camera) -> Matches:
+    """Match targets and box tracks over their common lives.
+
+    Args:
+        sightings: of the targets that the radar followed.
+        table: the boxes.
+        camera: the lens alone; no pose enters.
+    """
+    meetings = _meetings(sightings, table, camera)
+    if not len(meetings.sightings):
+        return _matches(sightings, np.full(len(sightings.frames), -1), None, camera)
+    bearings = Bearings(_turn(meetings), 0.0)
+    chosen = _chosen(meetings, sightings, table, bearings)
+    for _ in range(_ROUNDS - 1):
+        bearings = _refined(meetings.some(chosen), bearings)
+        chosen = _chosen(meetings, sightings, table, bearings)
+    boxes = np.full(len(sightings.frames), -1)
+    boxes[meetings.sightings[chosen]] = meetings.boxes[chosen]
+    return _matches(sightings, boxes, bearings if len(chosen) else None, camera)
+
+
+def match_by_name(sightings: Sightings, table: BoxTable, camera: Camera) -> Matches:
+    """Match sightings and boxes of the same name, as labels of a simulation give them."""
+    meetings = _meetings(sightings, table, camera)
+    same = [
+        bool(table.names[box]) and sightings.names[target] == table.names[box]
+        for target, box in zip(sightings.targets[meetings.sightings].tolist(), meetings.boxes.tolist(), strict=True)
+    ]
+    own = meetings.some(np.array(same, dtype=np.bool_))
+    boxes = np.full(len(sightings.frames), -1)
+    boxes[own.sightings] = own.boxes
+    bearings = None
+    if len(own.boxes):
+        bearings = _refined(own, Bearings(_middle(own.apart_rad), 0.0))
+    return _matches(sightings, boxes, bearings, camera)
+
+
+def _matches(sightings: Sightings, boxes: Indices, bearings: Bearings | None, camera: Camera) -> Matches:
+    if bearings is None:
+        return Matches(boxes, np.ones(len(boxes), dtype=np.bool_), None)
+    row = (camera.height_px - 1) / 2.0
+    left_rad, right_rad = _bearings(camera, np.array([[0.0, row], [camera.width_px - 1.0, row]]))
+    seen_rad = bearings.of(sightings)
+    return Matches(boxes, (boxes >= 0) | ((seen_rad <= left_rad) & (seen_rad >= right_rad)), bearings)
+
+
+def _meetings(sightings: Sightings, table: BoxTable, camera: Camera) -> _Meetings:
+    low, high = (np.searchsorted(table.frames, sightings.frames, side=side) for side in ("left", "right"))
+    counts = high - low
+    own = np.repeat(np.arange(len(sightings.frames)), counts)
+    boxes = np.repeat(low, counts) + np.arange(len(own)) - np.repeat(np.cumsum(counts) - counts, counts)
+    middle, half = _middles(table, camera)
+    inverse_range = 1.0 / np.maximum(sightings.range_m[own], 0.5)
+    tolerance = _TOLERANCE_RAD + half[boxes] + _TOLERANCE_M * inverse_range
+    return _Meetings(own, boxes, _wrapped(middle[boxes] - sightings.azimuth_rad[own]), inverse_range, tolerance)
+
+
+def _middles(table: BoxTable, camera: Camera) -> tuple[Values, Values]:
+    """Return the bearing of each box's middle (b,) and half the angle that it covers (b,) [rad]."""
+    last = np.array([camera.width_px - 1.0, camera.height_px - 1.0])
+    left, top, right, bottom = table.boxes_px.T
+    row = (top + bottom) / 2.0
+    edges = [_bearings(camera, np.clip(np.stack([column, row], axis=1), 0.0, last)) for column in (left, right)]
+    return (edges[0] + edges[1]) / 2.0, np.abs(edges[0] - edges[1]) / 2.0
+
+
+def _bearings(camera: Camera, pixels_px: np.ndarray) -> Values:
+    """Return the bearing (n,) of pixels (n, 2) [rad], positive to the left; where the lens has none, that of its axis."""
+    rays = camera.rays(pixels_px)
+    return np.nan_to_num(-np.arctan2(rays[:, 0], rays[:, 2]))
+
+
+def _turn(meetings: _Meetings) -> float:
+    """Return the turn under which the sightings meet boxes best: the most votes on a grid of all turns."""
+    count = len(meetings.sightings)
+    if count > _MOST_VOTES:
+        meetings = meetings.some(np.isin(meetings.sightings, meetings.sightings[:: count // _MOST_VOTES + 1]))
+    turns = np.arange(-np.pi, np.pi, _STEP_RAD)
+    first = np.flatnonzero(np.diff(meetings.sightings, prepend=-1))
+    votes = []
+    for turn in turns.tolist():
+        agreement = np.maximum(1.0 - meetings.misfits(Bearings(turn, 0.0)), 0.0)
+        votes.append(float(np.maximum.reduceat(agreement, first).sum()))
+    best = np.flatnonzero(np.array(votes) >= max(votes) - 1e-9)
+    return float(turns[best[np.abs(turns[best]).argmin()]])
+
+
+def _refined(meetings: _Meetings, bearings: Bearings) -> Bearings:
+    """Fit turn and parallax to matched sightings, those of narrow boxes first, without the ones that are far off."""
+    if not len(meetings.sightings):
+        return bearings
+    kept = meetings.some(meetings.misfits(bearings) <= 1.0)
+    if not len(kept.sightings):
+        return bearings
+    turn = bearings.turn_rad
+    rest = _wrapped(kept.apart_rad - turn)
+    weight = 1.0 / kept.tolerance_rad
+    prior = np.array([[0.0, 1.0 / _MOST_PARALLAX_M]]) * float(np.sqrt(len(rest))) * 0.1 * weight.mean()
+    design = np.concatenate([np.stack([np.ones(len(rest)), kept.inverse_range], axis=1) * weight[:, None], prior])
+    more, parallax = np.linalg.lstsq(design, np.append(rest * weight, 0.0), rcond=None)[0].tolist()
+    return Bearings(
+        float(_wrapped(np.array(turn + more))), float(np.clip(parallax, -_MOST_PARALLAX_M, _MOST_PARALLAX_M))
+    )
+
+
+def _chosen(meetings: _Meetings, sightings: Sightings, table: BoxTable, bearings: Bearings) -> Indices:
+    """Return the meetings that become matches: pairs of a target and a box track, those that agree longest first."""
+    misfits = meetings.misfits(bearings)
+    targets, tracks = sightings.targets[meetings.sightings], table.tracks[meetings.boxes]
+    _, pair = np.unique(targets * (int(tracks.max(initial=0)) + 1) + tracks, return_inverse=True)
+    agreement = np.bincount(pair, weights=np.maximum(1.0 - misfits, 0.0))
+    order = np.argsort(pair, kind="stable")
+    ends = np.searchsorted(pair[order], np.arange(len(agreement) + 1))
+    taken_sightings = np.zeros(len(sightings.frames), dtype=np.bool_)
+    taken_boxes = np.zeros(len(table.frames), dtype=np.bool_)
+    chosen = [np.zeros(0, dtype=np.int64)]
+    for one in np.argsort(-agreement, kind="stable").tolist():
+        rows = order[ends[one] : ends[one + 1]]
+        if agreement[one] <= 0.0:
+            break
+        free = rows[~taken_sightings[meetings.sightings[rows]] & ~taken_boxes[meetings.boxes[rows]]]
+        if 2 * len(free) < len(rows) or np.median(misfits[rows]) > 1.0:
+            continue
+        taken_sightings[meetings.sightings[free]] = True
+        taken_boxes[meetings.boxes[free]] = True
+        chosen.append(free)
+    return np.sort(np.concatenate(chosen))
+
+
+def _middle(angles_rad: Values) -> float:
+    """Return the median of angles that lie near one another, wherever on the circle."""
+    centre = float(np.arctan2(np.sin(angles_rad).mean(), np.cos(angles_rad).mean()))
+    return centre + float(np.median(_wrapped(angles_rad - centre)))
+
+
+def _wrapped(angles_rad: np.ndarray) -> np.ndarray:
+    return np.asarray((angles_rad + np.pi) % (2.0 * np.pi) - np.pi)

@@ -1,0 +1,206 @@
+"""Moving returns: those whose Doppler speed over ground says that their target moves."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from calib_core.arrays import Flags, Indices, Values, frozen_array
+from calib_core.evaluation.targets.ego_motion import LEAST_RETURNS, ego_velocity
+from calib_core.measurements import RadarScans, joined_alternatives
+from calib_core.options import option
+from calib_core.results import DataWarning
+
+__all__ = ["MovingReturns", "SensorMotion", "TargetOptions", "moving_returns"]
+
+SensorMotion: TypeAlias = Literal["auto", "still", "moving"]
+
+_MOVING_SHARE = 0.1  # of the scans that look as if the sensors moved
+_UNKNOWN_SHARE = 0.5  # of returns without a Doppler speed: the radar then measures none
+
+
+@dataclass(frozen=True, slots=True)
+class TargetOptions:
+    """How moving targets are found in radar scans."""
+
+    min_speed_mps: float = option(
+        0.3, "Least Doppler speed over ground of a moving target's return [m/s].", low=0.01, high=100.0
+    )
+    sensors: SensorMotion = option(
+        "auto", "Whether the sensors stood still or moved; auto finds out from the returns' Doppler speeds."
+    )
+    spacing_m: float = option(
+        0.4, "Distance between neighbouring returns of one target, noise apart [m].", low=0.01, high=10.0
+    )
+    sigma_range_m: float = option(
+        0.1, "Standard deviation of a return's range where the message gives none [m].", low=1e-3, high=10.0
+    )
+    sigma_azimuth_deg: float = option(
+        1.0, "Standard deviation of a return's azimuth where the message gives none [deg].", low=1e-3, high=45.0
+    )
+    sigma_elevation_deg: float = option(
+        2.0, "Standard deviation of a return's elevation where the message gives none [deg].", low=1e-3, high=45.0
+    )
+    max_range_m: float = option(200.0, "Farthest return kept [m].", low=0.1, high=1000.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MovingReturns:
+    """The returns of a recording that move, or all of them if the radar measures no Doppler speed.
+
+    Attributes:
+        scans: every scan, with these returns only.
+        rows: (n,) which rows of the scans that were given.
+        speeds_mps: (n,) over ground; NaN without Doppler.
+        by_doppler: whether the speeds decided.
+        sensors_moved: whether the radar's own speed was taken out.
+        searched: number of returns that were looked at.
+        warnings: about the sensors' motion.
+    """
+
+    scans: RadarScans
+    rows: Indices
+    speeds_mps: Values
+    by_doppler: bool
+    sensors_moved: bool
+    searched: int
+    warnings: tuple[DataWarning, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rows", frozen_array(self.rows, (None,), dtype=np.int64))
+        object.__setattr__(self, "speeds_mps", frozen_array(self.speeds_mps, (len(self.rows),)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sifted:
+    """The returns of some scans that may be moving, whether or not the sensors do.
+
+    Attributes:
+        scans: with those returns only.
+        rows: (n,) of the scans that were given.
+        as_still: (n,) speed if the sensors stand still.
+        as_moving: (n,) speed with the radar's own velocity taken out; NaN where that cannot be found.
+        fitted: number of scans in which most returns move alike, as they do if the sensors move.
+        unfitted: number of scans in which most returns move, but not alike.
+        judged: number of scans with enough returns.
+        unknown: number of returns without a speed.
+        searched: number of returns.
+    """
+
+    scans: RadarScans
+    rows: Indices
+    as_still: Values
+    as_moving: Values
+    fitted: int
+    unfitted: int
+    judged: int
+    unknown: int
+    searched: int
+
+
+def moving_returns(windows: Iterable[RadarScans], options: TargetOptions) -> MovingReturns:
+    """Keep the returns that move.
+
+    Args:
+        windows: the scans in order of time, in one or several pieces; only what may move is kept of each.
+        options: the least speed, and whether the sensors moved.
+    """
+    pieces: list[_Sifted] = []
+    offset = 0
+    for window in windows:
+        pieces.append(_sifted(window, options, offset))
+        offset += len(window.points_radar_m)
+    scans = _joined([piece.scans for piece in pieces])
+    rows = np.concatenate([np.zeros(0, dtype=np.int64), *(piece.rows for piece in pieces)])
+    searched = sum(piece.searched for piece in pieces)
+    if sum(piece.unknown for piece in pieces) > _UNKNOWN_SHARE * searched:
+        return MovingReturns(scans, rows, np.full(len(rows), np.nan), False, False, searched, _without_doppler(options))
+    fitted, unfitted, judged = (sum(getattr(one, name) for one in pieces) for name in ("fitted", "unfitted", "judged"))
+    moved = options.sensors == "moving" or (options.sensors == "auto" and fitted > _MOVING_SHARE * max(judged, 1))
+    speeds = np.concatenate([np.zeros(0), *(one.as_moving if moved else one.as_still for one in pieces)])
+    kept = np.flatnonzero(np.abs(np.nan_to_num(speeds)) >= options.min_speed_mps)
+    warnings = _unclear(unfitted, judged) if options.sensors == "auto" and not moved else ()
+    return MovingReturns(scans.take(kept), rows[kept], speeds[kept], True, moved, searched, warnings)
+
+
+def _sifted(scans: RadarScans, options: TargetOptions, offset: int) -> _Sifted:
+    usable = _usable(scans, options)
+    speeds = np.where(usable, scans.doppler_mps, np.nan)
+    unknown = usable & ~np.isfinite(speeds)
+    as_moving = np.full(len(speeds), np.nan)
+    fitted = unfitted = judged = 0
+    for first, last in zip(scans.first_return[:-1].tolist(), scans.first_return[1:].tolist(), strict=True):
+        rows = slice(first, last)
+        known = np.isfinite(speeds[rows])
+        if options.sensors == "still" or known.sum() < LEAST_RETURNS:
+            continue
+        judged += 1
+        mostly = bool((np.abs(speeds[rows][known]) >= options.min_speed_mps).mean() > 0.5)
+        ego = ego_velocity(scans.points_radar_m[rows], speeds[rows], tolerance_mps=options.min_speed_mps)
+        if ego is not None:
+            as_moving[rows] = ego.speeds_mps
+        fitted += mostly and ego is not None
+        unfitted += mostly and ego is None
+    fast = [np.abs(np.nan_to_num(some)) >= options.min_speed_mps for some in (speeds, as_moving)]
+    kept = np.flatnonzero(unknown | fast[0] | fast[1])
+    return _Sifted(
+        scans.take(kept), kept + offset, speeds[kept], as_moving[kept], fitted, unfitted, judged, int(unknown.sum()),
+        int(usable.sum()),
+    )  # fmt: skip
+
+
+def _usable(scans: RadarScans, options: TargetOptions) -> Flags:
+    """Return which returns are somewhere in reach; of the alternative positions of one return, the first."""
+    points = scans.points_radar_m
+    range_m = np.linalg.norm(points, axis=1)
+    with np.errstate(invalid="ignore"):
+        usable = np.isfinite(points).all(axis=1) & (range_m > 0) & (range_m <= options.max_range_m)
+    if scans.alternative_of is not None:
+        numbered = np.flatnonzero(scans.alternative_of >= 0)
+        keys = np.stack([scans.scan_of_return()[numbered], scans.alternative_of[numbered]], axis=1)
+        first = np.unique(keys, axis=0, return_index=True)[1] if len(keys) else np.zeros(0, dtype=np.int64)
+        usable[np.delete(numbered, first)] = False
+    return np.asarray(usable)
+
+
+def _joined(pieces: list[RadarScans]) -> RadarScans:
+    if len(pieces) == 1:
+        return pieces[0]
+    if not pieces:
+        return RadarScans()
+    ends = np.concatenate([np.diff(piece.first_return) for piece in pieces])
+    return RadarScans(
+        times_ns=np.concatenate([piece.times_ns for piece in pieces]),
+        first_return=np.concatenate([[0], np.cumsum(ends)]),
+        points_radar_m=np.concatenate([piece.points_radar_m for piece in pieces]),
+        doppler_mps=np.concatenate([piece.doppler_mps for piece in pieces]),
+        snr_db=np.concatenate([piece.snr_db for piece in pieces]),
+        sigma_polar=np.concatenate([piece.sigma_polar for piece in pieces]),
+        alternative_of=joined_alternatives(pieces),
+    )
+
+
+def _without_doppler(options: TargetOptions) -> tuple[DataWarning, ...]:
+    still = options.sensors == "still"
+    assumed = "" if still else "; this assumes that the sensors stood still, which nobody said"
+    return (
+        DataWarning(
+            "no-doppler",
+            f"the radar reports no Doppler speeds, so targets count as moving by how far they travel{assumed}",
+            "if the sensors moved, Acc cannot be computed from this recording",
+        ),
+    )
+
+
+def _unclear(unfitted: int, judged: int) -> tuple[DataWarning, ...]:
+    if unfitted <= 0.5 * max(judged, 1):
+        return ()
+    return (
+        DataWarning(
+            "mostly-moving",
+            f"most returns move in {unfitted} of {judged} scans, but not as they would if the sensors did: the radar's own "
+            "speed cannot be found, and the sensors are taken to stand still",
+            "right if the radar leaves out what stands still; if the sensors moved, Acc says nothing here",
+        ),
+    )

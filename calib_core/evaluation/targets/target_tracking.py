@@ -1,0 +1,208 @@
+"""Tracking: clusters of moving returns become targets that are followed from scan to scan, without any calibration.
+
+A Kalman filter with constant velocity per target, clusters assigned to all targets at once by the least sum of squared
+distances within a gate. A target is born of a cluster that belongs to none, and ends when it is not seen for a while.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calib_core.arrays import Indices
+from calib_core.errors import InputError
+from calib_core.evaluation.targets.moving_returns import MovingReturns, TargetOptions, moving_returns
+from calib_core.evaluation.targets.target_clusters import TargetClusters, target_clusters
+from calib_core.evaluation.targets.target_track import TargetTrack
+from calib_core.measurements import NS_PER_S, RadarScans
+
+__all__ = ["FoundTargets", "find_targets", "moving_targets"]
+
+_GATE = 11.829158081900795  # the 99.73 % quantile of chi2 with 2 degrees of freedom
+_ACCELERATION_MPS2 = 2.0  # standard deviation of a target's acceleration
+_FIRST_SPEED_MPS = 3.0  # standard deviation of a new target's velocity, where Doppler does not tell
+_COAST_S = 1.0  # longest time that a target stays alive without being seen
+_COAST_SCANS = 3  # or as many scans, if that is longer
+_LEAST_SIGHTINGS = 3
+_LEAST_TRAVEL_M = 1.0  # of a target without Doppler speeds
+_LEAST_TRAVEL_SIGMAS = 6.0
+_TOLD_EVERY = 200  # scans
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundTargets:
+    """The moving targets of a recording.
+
+    Attributes:
+        tracks: in order of their first scans.
+        moving: the returns that they were found in.
+    """
+
+    tracks: tuple[TargetTrack, ...]
+    moving: MovingReturns
+
+
+@dataclass(slots=True, eq=False)
+class _Target:
+    """A target while it is followed."""
+
+    state: np.ndarray  # x, y [m], their speeds [m/s]
+    covariance: np.ndarray
+    time_ns: int  # of the state
+    seen_ns: int
+    clusters: list[int] = field(default_factory=list)
+
+
+def moving_targets(scans: RadarScans, options: TargetOptions | None = None) -> tuple[TargetTrack, ...]:
+    """Find and follow the moving targets of a recording, from its radar returns alone.
+
+    Args:
+        scans: of the whole recording, or of a part without gaps.
+        options: None takes the defaults.
+
+    Raises:
+        InputError: the sensors are said to move, but the radar measures no Doppler speeds.
+    """
+    return find_targets([scans], options).tracks
+
+
+def find_targets(
+    windows: Iterable[RadarScans],
+    options: TargetOptions | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> FoundTargets:
+    """Find and follow the moving targets; the scans may come in pieces, of which only moving returns are kept.
+
+    Args:
+        windows: the scans in order of time.
+        options: None takes the defaults.
+        progress: called with the scans done and their number.
+
+    Raises:
+        InputError: the sensors are said to move, but the radar measures no Doppler speeds.
+    """
+    options = options or TargetOptions()
+    moving = moving_returns(windows, options)
+    if not moving.by_doppler and options.sensors == "moving" and moving.searched:
+        raise InputError(
+            "the radar reports no Doppler speeds, so what moves cannot be told from moving sensors; evaluate a recording in "
+            "which the sensors stand still, or one with Doppler speeds"
+        )
+    clusters = target_clusters(moving.scans, options)
+    followed = _followed(clusters, moving.scans, progress)
+    if not moving.by_doppler:
+        followed = [target for target in followed if _travels(target, clusters)]
+    order = np.argsort(clusters.of_return, kind="stable")
+    ends = np.searchsorted(clusters.of_return[order], np.arange(len(clusters.scans) + 1))
+    tracks = tuple(
+        _track(f"target-{number}", np.array(target.clusters), clusters, moving, order, ends)
+        for number, target in enumerate(followed, start=1)
+    )
+    return FoundTargets(tracks, moving)
+
+
+def _followed(
+    clusters: TargetClusters, scans: RadarScans, progress: Callable[[int, int], None] | None
+) -> list[_Target]:
+    """Follow the clusters through the scans; return the targets with enough sightings, in order of their first."""
+    ends = np.searchsorted(clusters.scans, np.arange(len(scans) + 1))
+    period_ns = float(np.median(np.diff(scans.times_ns))) if len(scans) > 1 else 0.0
+    coast_ns = max(_COAST_S * NS_PER_S, _COAST_SCANS * period_ns)
+    alive: list[_Target] = []
+    born: list[_Target] = []
+    for scan, time_ns in enumerate(scans.times_ns.tolist()):
+        if progress is not None and scan % _TOLD_EVERY == 0:
+            progress(scan, len(scans))
+        rows = np.arange(ends[scan], ends[scan + 1])
+        if not len(rows):
+            continue
+        alive = [target for target in alive if time_ns - target.seen_ns <= coast_ns]
+        taken = _assign(alive, rows, clusters, time_ns)
+        new = [_new(clusters, int(row), time_ns) for row in rows if int(row) not in taken]
+        alive += new
+        born += new
+    return [target for target in born if len(target.clusters) >= _LEAST_SIGHTINGS]
+
+
+def _assign(alive: list[_Target], rows: Indices, clusters: TargetClusters, time_ns: int) -> set[int]:
+    """Predict every target, give each at most one cluster, update it; return the clusters given away."""
+    from scipy.optimize import linear_sum_assignment
+
+    if not alive:
+        return set()
+    for target in alive:
+        _predict(target, time_ns)
+    states = np.array([target.state[:2] for target in alive])
+    covariances = np.array([target.covariance[:2, :2] for target in alive])
+    innovations = covariances[:, None] + clusters.covariances_m2[rows][None]
+    steps = clusters.positions_m[rows, :2][None] - states[:, None]
+    squared = np.einsum("tci,tcij,tcj->tc", steps, np.linalg.inv(innovations), steps)
+    cost = np.where(squared <= _GATE, squared, 100.0 * _GATE)
+    given: set[int] = set()
+    for i, j in zip(*linear_sum_assignment(cost), strict=True):
+        if squared[i, j] <= _GATE:
+            _update(alive[i], innovations[i, j], steps[i, j])
+            alive[i].clusters.append(int(rows[j]))
+            alive[i].seen_ns = time_ns
+            given.add(int(rows[j]))
+    return given
+
+
+def _new(clusters: TargetClusters, row: int, time_ns: int) -> _Target:
+    """Start a target; Doppler gives its velocity along the line of sight."""
+    position = clusters.positions_m[row, :2]
+    state, covariance = np.zeros(4), np.zeros((4, 4))
+    state[:2], covariance[:2, :2] = position, clusters.covariances_m2[row]
+    covariance[2:, 2:] = _FIRST_SPEED_MPS**2 * np.eye(2)
+    away_mps, distance_m = float(clusters.doppler_mps[row]), float(np.linalg.norm(position))
+    if np.isfinite(away_mps) and distance_m > 0:
+        along = position / distance_m
+        state[2:] = away_mps * along
+        covariance[2:, 2:] -= 0.9 * _FIRST_SPEED_MPS**2 * np.outer(along, along)
+    return _Target(state, covariance, time_ns, time_ns, [row])
+
+
+def _predict(target: _Target, time_ns: int) -> None:
+    step_s = (time_ns - target.time_ns) / NS_PER_S
+    if step_s <= 0.0:
+        return
+    transition = np.eye(4)
+    transition[0, 2] = transition[1, 3] = step_s
+    gain = np.array([[0.5 * step_s**2, 0.0], [0.0, 0.5 * step_s**2], [step_s, 0.0], [0.0, step_s]])
+    target.state = transition @ target.state
+    target.covariance = transition @ target.covariance @ transition.T + _ACCELERATION_MPS2**2 * gain @ gain.T
+    target.time_ns = time_ns
+
+
+def _update(target: _Target, innovation_m2: np.ndarray, step_m: np.ndarray) -> None:
+    gain = np.linalg.solve(innovation_m2, target.covariance[:2]).T
+    target.state = target.state + gain @ step_m
+    covariance = target.covariance - gain @ target.covariance[:2]
+    target.covariance = 0.5 * (covariance + covariance.T)
+
+
+def _travels(target: _Target, clusters: TargetClusters) -> bool:
+    """Return whether a target gets so far from where it is first seen that noise does not explain it."""
+    rows = np.array(target.clusters)
+    third = max(1, len(rows) // 3)
+    start, end = (clusters.positions_m[part, :2].mean(axis=0) for part in (rows[:third], rows[-third:]))
+    sigma_m = float(np.sqrt(np.trace(clusters.covariances_m2[rows[0]]) / third))
+    return bool(np.linalg.norm(end - start) >= max(_LEAST_TRAVEL_M, _LEAST_TRAVEL_SIGMAS * sigma_m))
+
+
+def _track(
+    name: str, own: Indices, clusters: TargetClusters, moving: MovingReturns, order: Indices, ends: Indices
+) -> TargetTrack:
+    """Collect the returns of a target's clusters (c,), given all returns in order of their clusters."""
+    kept = np.sort(np.concatenate([order[ends[cluster] : ends[cluster + 1]] for cluster in own]))
+    scans = clusters.scans[own]
+    return TargetTrack(
+        id=name,
+        times_ns=moving.scans.times_ns[scans],
+        scans=scans,
+        positions_m=clusters.positions_m[own],
+        rows=moving.rows[kept],
+        scan_of_row=moving.scans.scan_of_return()[kept],
+        points_radar_m=moving.scans.points_radar_m[kept],
+    )

@@ -1,0 +1,192 @@
+"""Who moves in front of the sensors to be judged: people who walk about, robot cars in an aisle, cars on a road."""
+
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from calib_core.arrays import Points2, Values, Vector2, frozen_array
+from calib_core.synthetic.options import Traffic
+from calib_core.synthetic.scene.person import PersonState
+from calib_core.synthetic.scene.scenes import Scene
+from calib_core.synthetic.scene.vehicles import VehicleState
+
+__all__ = ["Actor", "ActorLabel", "Mover", "draw_movers"]
+
+ActorLabel: TypeAlias = Literal["person", "robot", "car"]
+
+_WALKED_DEG = 27.0
+"""How far to the side people walk: so far a camera of 75 deg sees them."""
+_WALK_M = (2.6, 15.0)
+_LANE_M = 3.2
+_TURNING_MPS = 3.0
+_BRAKING_MPS2 = 1.5
+_STEP_M = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Actor:
+    """One moving object at one time.
+
+    Attributes:
+        track: the same at all times, such as "person-1".
+        label: its class.
+        state: where it is and how it stands.
+    """
+
+    track: str
+    label: ActorLabel
+    state: PersonState | VehicleState
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mover:
+    """One object on its way, given at some times; between these it moves straight.
+
+    Attributes:
+        label: its class.
+        number: of its class, from 1.
+        times_s: (k,) of the story, ascending.
+        places_m: (k, 2) on the ground, in the world.
+        headings_rad: (k,) where it faces, without jumps.
+        walked_m: (k,) how far it has come.
+    """
+
+    label: ActorLabel
+    number: int
+    times_s: Values
+    places_m: Points2
+    headings_rad: Values
+    walked_m: Values = field(init=False)
+
+    def __post_init__(self) -> None:
+        k = len(self.times_s)
+        object.__setattr__(self, "times_s", frozen_array(self.times_s, (k,)))
+        object.__setattr__(self, "places_m", frozen_array(self.places_m, (k, 2)))
+        object.__setattr__(self, "headings_rad", frozen_array(np.unwrap(self.headings_rad), (k,)))
+        steps = np.linalg.norm(np.diff(self.places_m, axis=0), axis=1)
+        object.__setattr__(self, "walked_m", frozen_array(np.concatenate([[0.0], np.cumsum(steps)]), (k,)))
+
+    @property
+    def track(self) -> str:
+        """The object's name in boxes and labels."""
+        return f"{self.label}-{self.number}"
+
+    def at(self, time_s: float) -> Actor:
+        """Return the object at a time."""
+        x_m, y_m, heading_rad, walked_m = (
+            float(np.interp(time_s, self.times_s, values))
+            for values in (*self.places_m.T, self.headings_rad, self.walked_m)
+        )
+        if self.label != "person":
+            return Actor(self.track, self.label, VehicleState(self.label, x_m, y_m, heading_rad, self.number))
+        around = np.interp([time_s - 0.15, time_s + 0.15], self.times_s, self.walked_m)
+        pace = float(np.clip((around[1] - around[0]) / 0.27, 0.0, 1.0))
+        return Actor(self.track, self.label, PersonState(x_m, y_m, heading_rad, walked_m, pace))
+
+
+def draw_movers(rng: np.random.Generator, traffic: Traffic, scene: Scene, *, duration_s: float) -> tuple[Mover, ...]:
+    """Draw where everybody goes during the story.
+
+    Args:
+        rng: the only source of randomness.
+        traffic: who moves.
+        scene: its solids are in the way.
+        duration_s: of the story.
+    """
+    walkers = (_wandering(rng, "person", number, scene, duration_s) for number in range(1, traffic.walkers + 1))
+    robots = (_wandering(rng, "robot", number, scene, duration_s) for number in range(1, traffic.robots + 1))
+    cars = (_round_trip(rng, number, traffic, duration_s) for number in range(1, traffic.cars + 1))
+    return (*walkers, *robots, *cars)
+
+
+def _wandering(
+    rng: np.random.Generator, label: Literal["person", "robot"], number: int, scene: Scene, duration_s: float
+) -> Mover:
+    """Let a person or a robot go from place to place, turn there, and sometimes wait."""
+    speed_mps = float(rng.uniform(0.9, 1.4) if label == "person" else rng.uniform(0.6, 0.9))
+    clearance_m = 0.45 if label == "person" else 0.3
+    here = _place(rng, scene, label, clearance_m)
+    times, places, headings = [0.0], [here], [float(rng.uniform(-np.pi, np.pi))]
+    while times[-1] < duration_s + 1.0:
+        there = _next_place(rng, scene, label, here, clearance_m)
+        way = there - here
+        heading = float(np.arctan2(way[1], way[0]))
+        waits_s = float(rng.uniform(1.0, 2.0)) if rng.uniform() < 0.2 else 0.0
+        turns_s = 0.3 + 0.25 * abs((heading - headings[-1] + np.pi) % (2.0 * np.pi) - np.pi)
+        for passed_s, place, faces in (
+            (waits_s + 1e-3, here, headings[-1]),
+            (turns_s, here, heading),
+            (float(np.linalg.norm(way)) / speed_mps, there, heading),
+        ):
+            times.append(times[-1] + passed_s)
+            places.append(place)
+            headings.append(faces)
+        here = there
+    return Mover(label, number, np.array(times), np.array(places), np.array(headings))
+
+
+def _next_place(
+    rng: np.random.Generator, scene: Scene, label: ActorLabel, here: Vector2, clearance_m: float
+) -> Vector2:
+    """Draw where to go next: some metres away, with nothing in between.
+
+    Raises:
+        ValueError: there is no way out.
+    """
+    for _ in range(500):
+        there = _place(rng, scene, label, clearance_m)
+        steps = np.linspace(0.0, 1.0, 40)[:, None] * (there - here) + here
+        if np.linalg.norm(there - here) > 2.0 and all(scene.free(step, clearance_m) for step in steps):
+            return there
+    raise ValueError(f"no room to move in the {scene.name}: ask for another scene")
+
+
+def _place(rng: np.random.Generator, scene: Scene, label: ActorLabel, clearance_m: float) -> Vector2:
+    """Draw a place that is free and in front of the camera."""
+    layout = scene.layout
+    for _ in range(500):
+        x_m = float(rng.uniform(_WALK_M[0], min(_WALK_M[1], layout.max_range_m)))
+        aside_m = min(
+            x_m * float(np.tan(np.deg2rad(_WALKED_DEG))), layout.max_lateral_m * (0.8 if label == "robot" else 1.0)
+        )
+        place = np.array([x_m, float(rng.uniform(-aside_m, aside_m))])
+        if scene.free(place, clearance_m):
+            return place
+    raise ValueError(f"no room to move in the {scene.name}: ask for another scene")
+
+
+def _round_trip(rng: np.random.Generator, number: int, traffic: Traffic, duration_s: float) -> Mover:
+    """Let a car drive away on the right, turn at the far end, come back on the left and turn at the near end."""
+    near_m, far_m = traffic.nearest_m + _LANE_M, traffic.farthest_m - _LANE_M
+    half_turn_m = np.pi * _LANE_M
+    round_m = 2.0 * (far_m - near_m + half_turn_m)
+    top_mps = 4.0 if far_m - near_m < 20.0 else 10.0
+    start_m = round_m * (number - 1 + 0.3 * float(rng.uniform())) / traffic.cars
+    times, places, headings = [0.0], [], []
+    along_m = start_m
+    while True:
+        place, heading, straight_left_m = _on_round(along_m % round_m, near_m, far_m)
+        places.append(place)
+        headings.append(heading)
+        if times[-1] > duration_s + 1.0:
+            return Mover("car", number, np.array(times), np.array(places), np.array(headings))
+        speed_mps = min(top_mps, float(np.sqrt(_TURNING_MPS**2 + 2.0 * _BRAKING_MPS2 * straight_left_m)))
+        times.append(times[-1] + _STEP_M / speed_mps)
+        along_m += _STEP_M
+
+
+def _on_round(along_m: float, near_m: float, far_m: float) -> tuple[Vector2, float, float]:
+    """Return place and heading on the round, and the distance to the nearer end of the straight part."""
+    straight_m, half_turn_m = far_m - near_m, np.pi * _LANE_M
+    if along_m < straight_m:
+        return np.array([near_m + along_m, -_LANE_M]), 0.0, min(along_m, straight_m - along_m)
+    along_m -= straight_m
+    if along_m < half_turn_m:
+        turn = along_m / _LANE_M
+        return np.array([far_m + _LANE_M * np.sin(turn), -_LANE_M * np.cos(turn)]), turn, 0.0
+    along_m -= half_turn_m
+    if along_m < straight_m:
+        return np.array([far_m - along_m, _LANE_M]), np.pi, min(along_m, straight_m - along_m)
+    turn = (along_m - straight_m) / _LANE_M
+    return np.array([near_m - _LANE_M * np.sin(turn), _LANE_M * np.cos(turn)]), np.pi + turn, 0.0
