@@ -27,7 +27,7 @@ from app.session import (
 )
 from app.session.file import Closed, Restored, open_session_file
 from app.solver_worker import SolverWorker
-from app.view import Reference, View, view
+from app.view import AccPanel, Reference, View, view
 from calib_core.arrays import TimesNs
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
@@ -98,6 +98,7 @@ class Workspace:
         camera: the intrinsics to solve with; None if there are none.
         camera_file: the file that they come from; None for the recording's own.
         intrinsics: where they come from, in words; "" if there are none.
+        acc: what the boxes say about the calibration, as last judged.
         open_meaning: a calibration that does not state what its numbers mean, for a person to pick; None if there is none.
     """
 
@@ -105,6 +106,7 @@ class Workspace:
     camera_file: CameraFile | None = None
     intrinsics: str = ""
     open_meaning: OpenMeaning | None = None
+    acc: AccPanel = AccPanel()
 
     def __init__(
         self,
@@ -146,7 +148,7 @@ class Workspace:
         return self._view_of(self._history)
 
     def _view_of(self, history: History) -> View:
-        return view(history, self.facts, self.reference, self._placements, self._carried_of(history.present))
+        return view(history, self.facts, self.reference, self._placements, self._carried_of(history.present), self.acc)
 
     def show_placements(self, placements: Sequence[Placement]) -> None:
         """Take in the placements that were found in the radar data, so that the View says how many have no click."""
@@ -171,6 +173,13 @@ class Workspace:
     def boxes(self) -> Boxes:
         """The same as a file of boxes would state them."""
         return carried_boxes(self.carried, self.session, self.facts)
+
+    def show_acc(self, acc: AccPanel) -> None:
+        """Take in what the boxes say about the calibration."""
+        with self._lock:
+            self.acc = acc
+            self._pending.append((self._view_of(self._history), self._subscribers))
+        self._notify()
 
     def show_followed(self, followed: Mapping[Start, Followed]) -> None:
         """Take in what following the boxes through the pictures has given so far."""

@@ -9,7 +9,7 @@ import { nudgeBy, removeSelected, toggleExcluded, turnBack } from "./clicking.js
 import { toggleContours } from "./contours.js";
 import { enterCross, toggleCross } from "./cross.js";
 import { dismissHere, withoutPlacement } from "./dismissing.js";
-import { editLabel, toggleEvaluate } from "./evaluating.js";
+import { chooseBoxes, downloadBoxes, editLabel, stopFollowing, toggleEvaluate } from "./evaluating.js";
 import { openExport } from "./exporting.js";
 import { toggleHelp } from "./help.js";
 import { loadClicks } from "./importing.js";
@@ -111,6 +111,9 @@ export const ACTIONS = [
   { id: "keyframe-back", group: "Boxes", words: "Previous keyframe of the box", keys: [","], help: "Previous or next keyframe", also: "correction jump", run: () => goToKeyframe(-1), when: withBox },
   { id: "keyframe-forward", group: "Boxes", words: "Next keyframe of the box", keys: ["."], help: "Previous or next keyframe", also: "correction jump", run: () => goToKeyframe(1), when: withBox },
   { id: "forget-keyframe", group: "Boxes", words: "Take back what was said about the box in this frame", keys: ["Shift+Delete"], also: "keyframe remove correction", run: forgetHere, when: withBox },
+  { id: "stop-following", group: "Boxes", words: "Follow the boxes no farther", also: "cancel tracking stop", run: stopFollowing, when: () => withPictures() || (state.view?.boxes.some((track) => track.following) ? "" : "No box is being followed") },
+  { id: "load-boxes", group: "Boxes", words: "Load boxes from a file", also: "import open coco yolo cvat kitti openlabel annotations", run: chooseBoxes, when: withPictures },
+  { id: "save-boxes", group: "Boxes", words: "Download the boxes", also: "export save boxes.json annotations", run: downloadBoxes, when: () => withPictures() || (state.view?.boxes.length ? "" : "There are no boxes yet") },
   { id: "remove-box", group: "Boxes", words: "Delete all boxes of the object", also: "track erase", run: removeBox, when: withBox },
 
   { id: "fit", group: "Picture", words: "Fit the picture", keys: ["F"], also: "zoom reset whole 100", run: () => (state.looking ? fitEye() : fit()), when: opened },

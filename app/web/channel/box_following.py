@@ -44,6 +44,7 @@ class BoxFollowing:
         self._wanted: tuple[Stretch, ...] = ()
         self._taken: tuple[Stretch, ...] = ()
         self._stopping = False
+        self._is_last = False
         self._task: asyncio.Task[None] | None = None
 
     def follow(self) -> None:
@@ -52,6 +53,11 @@ class BoxFollowing:
         self._wanted = tuple(stretch for track in tracks if track.is_carried for stretch in stretches_of(track, facts))
         if self._wanted != self._taken and (self._task is None or self._task.done()):
             self._task = asyncio.get_running_loop().create_task(self._run())
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether there is something left to follow."""
+        return self._task is not None and not self._task.done() and not self._is_last
 
     def stop(self) -> None:
         """End what is still being followed where it is now."""
@@ -65,7 +71,7 @@ class BoxFollowing:
 
     async def _run(self) -> None:
         with error_boundary("following boxes", _log.error):
-            told = time.monotonic()
+            told, self._is_last = time.monotonic(), False
             while self._wanted != self._taken or not self._follower.is_done:
                 if self._wanted != self._taken:
                     self._taken = self._wanted
@@ -76,7 +82,7 @@ class BoxFollowing:
                 if time.monotonic() - told > _TELL_EVERY_S:
                     told = time.monotonic()
                     self._show()
-            self._stopping = False
+            self._stopping, self._is_last = False, True
             self._show()
 
     def _order(self, stretches: tuple[Stretch, ...]) -> list[Stretch]:

@@ -119,7 +119,8 @@ class Channel:
         if carried or self._has_boxes:
             self._has_boxes = bool(carried)
             index = self._cursor.index
-            self.outbox.put(encode(FrameBoxes(index, boxes_in_frame(carried, index))), kind="boxes")
+            returns = self._hub.box_judging.returns(index)
+            self.outbox.put(encode(FrameBoxes(index, boxes_in_frame(carried, index), returns)), kind="boxes")
 
     async def _read(self, socket: Socket) -> None:
         while True:

@@ -10,8 +10,9 @@ from typing import Protocol
 
 from app.error_boundary import error_boundary
 from app.resources import version
-from app.view import View, warning_in_sentences
+from app.view import AccPanel, View, warning_in_sentences
 from app.web.channel.box_following import BoxFollowing
+from app.web.channel.box_judging import BoxJudging
 from app.web.channel.desk import ClosedDesk, Desk
 from app.web.channel.live_edge import LiveEdge
 from app.web.channel.outbox import Outbox
@@ -90,6 +91,7 @@ class Hub:
         self.box_following = BoxFollowing(
             workspace, recording, executor, lambda progress: self.broadcast(progress, "progress")
         )
+        self.box_judging = BoxJudging(workspace, recording, executor, lambda: self.box_following.is_busy)
         self._searching: asyncio.Task[None] | None = None
         self._edge = (
             LiveEdge(self, workspace, recording, self.camera) if isinstance(recording, FollowedRecording) else None
@@ -110,6 +112,7 @@ class Hub:
             self._searching.cancel()
             await asyncio.gather(self._searching, return_exceptions=True)
         await self.box_following.close()
+        await self.box_judging.close()
         await self.frames.close()
 
     @property
@@ -157,6 +160,7 @@ class Hub:
         only_boxes = _without_boxes(view) == _without_boxes(self.feed.newest)
         self.feed.take(view)
         self.box_following.follow()
+        self.box_judging.judge()
         for tab in self.tabs:
             tab.show()
             tab.show_boxes()
@@ -224,7 +228,7 @@ class Hub:
 
 def _without_boxes(view: View) -> View:
     """Return what the overlay and the 3D view depend on."""
-    return replace(view, boxes=(), box_labels=(), can_undo=False, can_redo=False)
+    return replace(view, boxes=(), box_labels=(), acc=AccPanel(), can_undo=False, can_redo=False)
 
 
 def _settled(recording: Recording) -> list[DataWarning]:
