@@ -220,7 +220,7 @@ export function boxAdvice() {
   const [track, box] = [selectedTrack(), selectedBox()];
   if (!state.view?.boxes.length) return { text: ["Drag a box around someone who moves. Wheel: zoom, ", { key: "Shift" }, "+drag: pan, ", { key: "A" }, ": back to the clicks"], act: true };
   if (!track) return { text: ["Click a box to select it, or drag a new one"], act: false };
-  if (!box) return { text: [`${track.id} has no box in this frame: drag it anew from a frame that has one, or `, { key: "," }, " goes to a keyframe"], act: false };
+  if (!box) return { text: [`${track.id} has no box in this frame: drag one to go on with it. `, { key: "Esc" }, " for another object"], act: false };
   if (track.note && state.cursor === track.last) return { text: [track.note], act: true };
   if (box.kind === "between") return { text: [`${track.id} was lost before this frame: its box is drawn straight to the next keyframe. Drag it where it is off`], act: true };
   return { text: [`${track.id}: drag to move, handles resize, `, { key: "H" }, " hidden from here on, ", { key: "." }, " next keyframe"], act: false };

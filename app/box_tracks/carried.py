@@ -130,7 +130,7 @@ def _note(found: Followed, stretch: Stretch) -> str:
     """Say where the box ends in a stretch; nothing if it goes on to the next stated one."""
     last = stretch.start.frame + len(found.boxes) + 1
     if found.ended and not stretch.next_edges_px:
-        return f"Ends in frame {last}: {found.ended}. Drag it to where it is in a later frame to go on."
+        return f"Ends in frame {last}: {found.ended}. To go on, draw it in a later frame while it is selected."
     if stretch.is_cut and found.completes(stretch):
         return f"Ends in frame {last}, after {MOST_FRAMES} frames. Correct it there to follow it farther."
     return ""
