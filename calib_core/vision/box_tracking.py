@@ -162,7 +162,10 @@ def _best_place(
     searched = _patch(picture, expected, size + 2 * margin * scale, (rows + 2 * margin, columns + 2 * margin))
     weights = _weights(rows, columns)
     both = [cv2.matchTemplate(searched, one, cv2.TM_CCOEFF_NORMED, mask=weights) for one in (first, recent)]
-    correlation = np.nan_to_num(_FIRST_SHARE * both[0] + (1 - _FIRST_SHARE) * both[1], posinf=0.0, neginf=0.0)
+    defined = [
+        np.where(np.isfinite(one), one, 0.0).clip(-1.0, 1.0) for one in both
+    ]  # it is not where all is one colour
+    correlation = _FIRST_SHARE * defined[0] + (1 - _FIRST_SHARE) * defined[1]
     places = np.arange(-margin, margin + 1) / margin
     near = np.exp(-2.0 * (places[:, None] ** 2 + places[None, :] ** 2))
     score = correlation * (_NEAR + (1 - _NEAR) * near)

@@ -115,6 +115,19 @@ def test_another_picture_altogether_loses_the_box() -> None:
     assert isinstance(found[0], LostBox)
 
 
+def test_an_object_before_a_wall_of_one_colour_is_followed() -> None:
+    def pictures() -> Iterator[np.ndarray]:
+        for step in range(20):
+            drawn = np.full(SIZE[::-1], 150, dtype=np.uint8)
+            drawn[68:132, 40 + 5 * step : 80 + 5 * step] = OBJECT.clip(0, 255)
+            yield drawn
+
+    found = followed(pictures(), (39.5, 67.5, 79.5, 131.5))
+    assert len(found) == 19
+    assert isinstance(found[-1], TrackedBox)
+    assert found[-1].edges_px == pytest.approx((134.5, 67.5, 174.5, 131.5), abs=2.0)
+
+
 def test_a_box_of_one_colour_cannot_be_followed() -> None:
     grey = np.full((240, 320), 90, dtype=np.uint8)
     [lost] = followed(iter([grey, grey]), edges((100, 100)))
