@@ -54,7 +54,7 @@ function parts(panel) {
     make("tbody", "", panel.sensitivity.map(angleRow)),
   ]);
   const rule = make("details", "acc-rule", [make("summary", "", "Which returns count"), make("p", "", panel.rule)]);
-  return [figures, make("p", "acc-caution", panel.caution), angles, classes, rule];
+  return [make("p", "acc-caution", panel.caution), figures, angles, classes, rule];
 }
 
 /** @param {Row} row */

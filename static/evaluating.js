@@ -29,6 +29,8 @@ const edges = SIDES.map(() => make("input", "", []));
 const hide = make("button", "second", "Hidden here");
 const remove = make("button", "second", "Delete");
 const add = make("button", "second", "New box");
+const edgeRow = make("div", "edges", [make("span", "", "Edges"), ...edges, make("span", "unit", "px")]);
+const large = make("button", "second", "⤢");
 const files = make("div", "box-files", []);
 const stop = make("button", "second", "Stop following");
 const save = make("button", "second", "Download boxes");
@@ -51,6 +53,12 @@ export function startEvaluating() {
 export function toggleEvaluate() {
   if (page.hidden) before = document.querySelector('#tabs [aria-selected="true"]')?.id ?? before;
   showTab(page.hidden ? "tab-evaluate" : before);
+}
+
+/** Give the tab the whole column, or the 3D view its place back. */
+function enlarge() {
+  document.body.classList.toggle("review-large");
+  emit("box");
 }
 
 /** Boxes take the pointer while the tab is open. */
@@ -80,13 +88,16 @@ function buildEdit() {
   hide.dataset.hint = "The object is hidden, or out of the picture, from this frame on. (H)";
   remove.dataset.hint = "Delete all boxes of this object. (Del)";
   add.dataset.hint = "A new box in the middle of the picture, for those who do not drag. (Enter)";
+  large.dataset.hint = "Give this tab the whole column, or the 3D view its place back.";
+  large.setAttribute("aria-label", "Enlarge");
+  large.onclick = enlarge;
   hide.onclick = hideHere;
   remove.onclick = removeBox;
   add.onclick = newBox;
   edit.append(
     make("label", "", ["Class", label, labels]),
-    make("div", "edges", [make("span", "", "Edges"), ...edges, make("span", "unit", "px")]),
-    make("div", "acts", [add, hide, remove]),
+    edgeRow,
+    make("div", "acts", [add, hide, remove, large]),
   );
 }
 
@@ -180,6 +191,7 @@ function drawEdit() {
     field.disabled = !box;
     if (document.activeElement !== field) field.value = box ? box.edges[index].toFixed(0) : "";
   });
+  edgeRow.hidden = !box;
   hide.disabled = !track || state.cursor <= track.first;
   remove.disabled = !track;
 }
