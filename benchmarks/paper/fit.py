@@ -16,8 +16,8 @@ from calib_core.results import Calibration
 
 __all__ = ["AZIMUTHS_DEG", "ELEVATIONS_DEG", "Fitted", "fit"]
 
-AZIMUTHS_DEG = (0.15, 0.25, 0.35, 0.5)
-ELEVATIONS_DEG = (0.6, 0.7, 0.8, 0.9)
+AZIMUTHS_DEG = (0.15, 0.25, 0.4)
+ELEVATIONS_DEG = (0.7, 0.8, 0.9)
 _D1 = (15.31, 9.40)
 _D2_RATIO = 2.65
 

@@ -19,6 +19,8 @@ from calib_core.synthetic import SimulatedScans
 __all__ = ["DATASETS", "Figures", "Seed", "calibrated", "measure"]
 
 DATASETS: tuple[Dataset, ...] = ("d1", "d2", "d3", "dr-a", "dr-b")
+_FEWEST_CORNERS, _MORE_CORNERS = 4, 12
+"""Four corners are the fewest that give the twelve equations of [R | t]."""
 _CORNER_PX = 0.1
 """Standard deviation of a corner found in a picture."""
 
@@ -63,8 +65,11 @@ def measure(seed: int, settings: Settings) -> Seed:
     if isinstance(by_points, Calibration) and isinstance(by_mounting, Calibration):
         rows["R_PPM+T_m+D1"] = _figures(swapped(by_points, by_mounting))
         rows["R_I+T_c+D1"] = _figures(swapped(by_mounting, by_points))
-        for name, linear in (("CCM+D1", True), ("CCM+D1 rigid", False)):
-            rows[name] = _on_board(found["d2"][0], by_points, linear=linear)
+        for corners in (_FEWEST_CORNERS, _MORE_CORNERS):
+            on_board = session("d2", seed, settings, corners)
+            for linear in (True, False):
+                name = f"CCM+D1, {corners} corners, {'linear' if linear else 'rigid'}"
+                rows[name] = _on_board(on_board, by_points, linear=linear)
         for dataset in ("d2", "d3"):
             other = found[dataset][1]  # type: ignore[index]
             if isinstance(other, Calibration):

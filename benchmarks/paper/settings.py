@@ -12,7 +12,6 @@ from calib_core.options import (
     SolvingOptions,
 )
 from calib_core.synthetic import PRESETS, PresetName, SimulatedScans, SimulationOptions, simulate_scans
-from calib_core.synthetic.options import SimulationOptions as _Defaults
 
 __all__ = [
     "FITTED",
@@ -31,7 +30,9 @@ SEEDS: Sequence[int] = range(1, 21)
 FIT_SEEDS: Sequence[int] = range(101, 107)
 """Of the fit; none of the table's."""
 
-_USUAL_EDGE_M = _Defaults().reflector_edge_m
+BOARD_CORNERS = 20
+"""Placements of D2."""
+_USUAL_EDGE_M = SimulationOptions().reflector_edge_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +61,13 @@ FITTED = Settings(constant_azimuth_deg=0.25, constant_elevation_deg=0.8)
 """Found by `python -m benchmarks.paper --fit`, on PPM+D1 and PPM+D2."""
 
 
-def options_of(dataset: Dataset, seed: int, settings: Settings) -> SimulationOptions:
+def options_of(
+    dataset: Dataset, seed: int, settings: Settings, board_corners: int = BOARD_CORNERS
+) -> SimulationOptions:
     """Return what to simulate: the preset of the data set under the settings, with nobody in the scene.
 
-    Azimuths are interpolated. The rig depends on the seed and the preset's mounting only, so D1, D2 and D3 share it.
+    Azimuths are interpolated. The rig depends on the seed and the preset's mounting only, so D1, D2 and D3 share it. In D2 the
+    reflector stands at corners of the checkerboard, nowhere else.
     """
     preset: PresetName = f"paper-{dataset}"  # type: ignore[assignment]
     options = PRESETS[preset]
@@ -74,6 +78,7 @@ def options_of(dataset: Dataset, seed: int, settings: Settings) -> SimulationOpt
         constant_azimuth_deg=share * settings.constant_azimuth_deg,
         constant_elevation_deg=share * settings.constant_elevation_deg,
     )
+    on_board = board_corners if dataset == "d2" else 0
     return replace(
         options,
         seed=seed,
@@ -81,16 +86,17 @@ def options_of(dataset: Dataset, seed: int, settings: Settings) -> SimulationOpt
         angle_bins=False,
         width_px=settings.width_px,
         height_px=settings.width_px * 9 // 16,
-        placements=settings.placements,
+        placements=0 if dataset == "d2" else settings.placements,
+        board_corners=on_board,
         person=False,
         person_leaves=False,
         dwell_s=4.0,
     )
 
 
-def session(dataset: Dataset, seed: int, settings: Settings) -> SimulatedScans:
+def session(dataset: Dataset, seed: int, settings: Settings, board_corners: int = BOARD_CORNERS) -> SimulatedScans:
     """Simulate scans and clicks of a data set."""
-    return simulate_scans(options_of(dataset, seed, settings))
+    return simulate_scans(options_of(dataset, seed, settings, board_corners))
 
 
 def ppm_options(settings: Settings) -> CalibrationOptions:
