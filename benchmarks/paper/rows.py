@@ -1,6 +1,6 @@
 """The nine rows of Table I for one seed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,9 +55,9 @@ def calibrated(dataset: Dataset, seed: int, settings: Settings) -> tuple[Simulat
     return simulated, calibrate(simulated.clicks, simulated.scans, simulated.camera, ppm_options(settings))
 
 
-def measure(seed: int, settings: Settings) -> Seed:
-    """Simulate every data set and compute the nine rows."""
-    found = {dataset: calibrated(dataset, seed, settings) for dataset in DATASETS}
+def measure(seed: int, settings: Settings, datasets: Sequence[Dataset] = DATASETS) -> Seed:
+    """Simulate data sets, D1 among them, and compute the rows that they give: of all of them, the nine and some more."""
+    found = {dataset: calibrated(dataset, seed, settings) for dataset in datasets}
     rows = {f"PPM+{dataset.upper()}": _figures(outcome) for dataset, (_, outcome) in found.items()}
     first, by_points = found["d1"]
     by_mounting = calibrate(first.clicks, first.scans, first.camera, pmm_options(first))
@@ -65,13 +65,13 @@ def measure(seed: int, settings: Settings) -> Seed:
     if isinstance(by_points, Calibration) and isinstance(by_mounting, Calibration):
         rows["R_PPM+T_m+D1"] = _figures(swapped(by_points, by_mounting))
         rows["R_I+T_c+D1"] = _figures(swapped(by_mounting, by_points))
-        for corners in (_FEWEST_CORNERS, _MORE_CORNERS):
+        for corners in (_FEWEST_CORNERS, _MORE_CORNERS) if "d2" in found else ():
             on_board = session("d2", seed, settings, corners)
             for linear in (True, False):
                 name = f"CCM+D1, {corners} corners, {'linear' if linear else 'rigid'}"
                 rows[name] = _on_board(on_board, by_points, linear=linear)
         for dataset in ("d2", "d3"):
-            other = found[dataset][1]  # type: ignore[index]
+            _, other = found.get(dataset, (None, None))
             if isinstance(other, Calibration):
                 again = judged_again(other, by_points.camera_from_radar)
                 rows[f"D1's pose on {dataset.upper()}"] = _figures(again)
