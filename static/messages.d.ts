@@ -124,9 +124,25 @@ export interface PaperOptions {
   ransac_confidence: number;
 }
 
+/** How the camera is mounted on the radar, for the method pmm: turned by roll, then pitch, then yaw about the radar's axes. */
+export interface MountingOptions {
+  roll_deg: number;
+  pitch_deg: number;
+  yaw_deg: number;
+}
+
+/** The checkerboard that the reflector is put on, for the method ccm. */
+export interface BoardOptions {
+  columns: number;
+  rows: number;
+  square_m: number;
+  reach_squares: number;
+  registration: "rigid" | "linear";
+}
+
 /** All options of a calibration. */
 export interface CalibrationOptions {
-  method: "default" | "paper";
+  method: "default" | "paper" | "pmm" | "ccm";
   gating: GatingOptions;
   locating: LocatingOptions;
   noise: NoiseOptions;
@@ -135,6 +151,8 @@ export interface CalibrationOptions {
   reflector: ReflectorOptions;
   solving: SolvingOptions;
   paper: PaperOptions;
+  mounting: MountingOptions;
+  board: BoardOptions;
 }
 
 /** Where to put the reflector next. */
@@ -172,6 +190,37 @@ export interface BoxTrackRow {
   hidden: number[];
   note: string;
   following: boolean;
+}
+
+/** Acc of one class. */
+export interface ClassRow {
+  label: string;
+  acc: string;
+  frames: number;
+  returns: number;
+  inside: number;
+}
+
+/** Acc of the calibration turned about one axis of the camera. */
+export interface SensitivityRow {
+  axis: "roll" | "pitch" | "yaw";
+  angles_deg: number[];
+  acc_percent: number[];
+  values: string[];
+  words: string;
+  is_flat: boolean;
+}
+
+/** What the boxes of the page say about the calibration on the page. */
+export interface AccPanel {
+  figures: Figure[];
+  classes: ClassRow[];
+  sensitivity: SensitivityRow[];
+  caution: string;
+  rule: string;
+  problem: string;
+  warnings: DataWarning[];
+  judging: boolean;
 }
 
 /** One error that all pairs share, as a row of a table. */
@@ -216,7 +265,7 @@ export interface View {
   can_undo: boolean;
   can_redo: boolean;
   has_calibration: boolean;
-  method: "default" | "paper";
+  method: "default" | "paper" | "pmm" | "ccm";
   clicks: ClickRow[];
   metrics: Figure[];
   pose: Figure[];
@@ -232,6 +281,7 @@ export interface View {
   acknowledged: string[];
   boxes: BoxTrackRow[];
   box_labels: string[];
+  acc: AccPanel;
   systematic_errors: SystematicErrorTable;
   verdict: VerdictRow;
 }
@@ -519,11 +569,15 @@ export interface Overlay {
 /** One box in a frame; written as an array, since it is sent with every frame. */
 export type BoxInFrame = [id: string, label: string, left_px: number, top_px: number, right_px: number, bottom_px: number, kind: "stated" | "followed" | "between", confidence: number];
 
+/** A return of a moving target on the picture; written as an array. */
+export type BoxedReturn = [u_px: number, v_px: number, box: string, inside: boolean];
+
 /** The boxes of the frame that a page shows. */
 export interface FrameBoxes {
   type: "frame_boxes";
   index: number;
   boxes: BoxInFrame[];
+  returns: BoxedReturn[];
 }
 
 /** One radar return that may belong to a click. */
@@ -973,6 +1027,12 @@ export interface SnapForm {
   request?: number;
 }
 
+/** Boxes are to be followed no farther. */
+export interface StopFollowingForm {
+  type: "stop_following";
+  request?: number;
+}
+
 /** A page asks what can be chosen. */
 export interface ChoicesWanted {
   type: "choices";
@@ -1074,6 +1134,7 @@ export type FromPage =
   | CompareForm
   | UncertaintyForm
   | SnapForm
+  | StopFollowingForm
   | ChoicesWanted
   | FolderWanted
   | RecentForgotten
