@@ -42,7 +42,9 @@ def own_boxes(content: Mapping[str, Any], source: str = "boxes") -> Boxes:
     """
     if content.get("schema") != BOXES_SCHEMA:
         found = str(content.get("schema"))
-        raise InputError(f"{source}: schema: expected {BOXES_SCHEMA!r}, found {found!r}; a later cocalib reads it")
+        raise InputError(
+            f"{source}: schema: expected {BOXES_SCHEMA!r}, found {found!r}; a later version wrote it: update this program"
+        )
     document = checked(content, BoxesDocument, source=source)
     frames = [
         FrameBoxes(

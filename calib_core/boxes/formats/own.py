@@ -19,4 +19,4 @@ def _read(file: BoxFile) -> FileBoxes:
     )
 
 
-OWN = BoxFormat("cocalib boxes-1", _recognizes, _read)
+OWN = BoxFormat("our boxes-1", _recognizes, _read)

@@ -241,7 +241,7 @@ OTHER = "is it of another recording?"
         ("<annotations>", "not XML"),
         ("{", "not JSON"),
         ({"schema": "cocalib/boxes-2"}, "expected 'cocalib/boxes-1'"),
-        ({"some": "thing"}, "is no known file of boxes; known: cocalib boxes-1, OpenLABEL"),
+        ({"some": "thing"}, "is no known file of boxes; known: our boxes-1, OpenLABEL"),
         ("some text", "is no known file of boxes"),
         ("", "is no known file of boxes"),
     ],
