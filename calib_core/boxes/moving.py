@@ -76,7 +76,7 @@ def changed_boxes(
         progress: called with the frames done and their number.
 
     Raises:
-        InputError: there are too few readable frames, or the camera itself moves.
+        InputError: there are too few readable frames, nothing moves, or the camera itself does.
     """
     pictures = list(_readable(image, _spread(len(image_times), _BACKGROUND_FRAMES)))
     if len(pictures) < _FEWEST_FRAMES:
@@ -102,6 +102,8 @@ def changed_boxes(
         tracks = tracked([boxes for _, boxes in found], first_track)
         first_track += len({box.track for boxes in tracks for box in boxes})
         named.extend(FrameBoxes(time, boxes) for (time, _), boxes in zip(found, tracks, strict=True))
+    if not any(frame.boxes for frame in named):
+        raise InputError(f"{source}: nothing moves in {len(named)} frames looked at; give a file or topic of boxes")
     note = f"boxes are around whatever changes in the picture; {len(named)} of {len(image_times)} frames were looked at"
     return Boxes(tuple(named), source, size, (note,))
 

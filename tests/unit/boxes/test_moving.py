@@ -105,3 +105,10 @@ def test_a_camera_that_moves_is_refused():
 def test_too_few_frames_are_refused():
     with pytest.raises(InputError, match="3 readable frames; finding movement needs 5"):
         changed_boxes(lambda index: picture(index, 3), times(3))
+
+
+def test_pictures_in_which_nothing_moves_are_refused():
+    still = SCENE.astype(np.uint8)
+
+    with pytest.raises(InputError, match="nothing moves in 10 frames"):
+        changed_boxes(lambda _: still, times(10))
