@@ -2,11 +2,14 @@
 /** Every action of the page, once: what it does in words, its keys, and when it can be done. Keys, help and palette are made from this table. */
 
 import { fitEye, zoomEye } from "./birdseye.js";
+import { boxing, selectBox } from "./boxes.js";
+import { forgetHere, goToKeyframe, hideHere, newBox, nextBox, nudgeBox, removeBox, withoutBox } from "./boxing.js";
 import { choose, nextCandidate, withoutCandidates } from "./candidates.js";
 import { nudgeBy, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
 import { toggleContours } from "./contours.js";
 import { enterCross, toggleCross } from "./cross.js";
 import { dismissHere, withoutPlacement } from "./dismissing.js";
+import { chooseBoxes, downloadBoxes, editLabel, stopFollowing, toggleEvaluate } from "./evaluating.js";
 import { openExport } from "./exporting.js";
 import { toggleHelp } from "./help.js";
 import { loadClicks } from "./importing.js";
@@ -47,10 +50,12 @@ const withSelected = () => withPictures() || (selectedClick() ? "" : "No pair is
 const withResiduals = () => withPictures() || (clicks().some((click) => click.residual_px !== null) ? "" : "There is no calibration yet");
 const undoable = () => withPictures() || (state.view?.can_undo ? "" : "There is nothing to undo");
 const redoable = () => withPictures() || (state.view?.can_redo ? "" : "There is nothing to redo");
+const withBoxes = () => withPictures() || (boxing.on ? "" : "Open the tab Evaluate first (A)");
+const withBox = () => withPictures() || withoutBox();
 const following = () => (state.following && !["complete", "ended"].includes(state.following.state) ? "" : "The recording is complete: no new frames come");
 
 /** @param {number} du @param {number} dv image px */
-const nudge = (du, dv) => () => nudgeBy(du, dv);
+const nudge = (du, dv) => () => (boxing.on ? nudgeBox(10 * du, 10 * dv) : nudgeBy(du, dv));
 /** @param {string} id of a button on the page */
 const press = (id) => () => document.getElementById(id)?.click();
 const zoom = (/** @type {number} */ factor) => (state.looking ? zoomEye(factor) : zoomBy(factor));
@@ -59,8 +64,8 @@ const FRAMES = { help: "Step one frame", when: withFrames };
 const TENS = { help: "Step ten frames", when: withFrames };
 const ENDS = { help: "First or last frame", when: withFrames };
 const PLACES = { help: "Next or previous placement", when: withPlacements };
-const FINE = { group: "Mark", help: "Move the mark by 0.1 px", also: "nudge shift subpixel fine", when: withMark };
-const COARSE = { group: "Mark", help: "Move the mark by 1 px", also: "nudge shift", when: withMark };
+const FINE = { group: "Mark", help: "Move the mark by 0.1 px", also: "nudge shift subpixel fine", when: () => (boxing.on ? withBox() : withMark()) };
+const COARSE = { group: "Mark", help: "Move the mark by 1 px", also: "nudge shift", when: () => (boxing.on ? withBox() : withMark()) };
 const ZOOM = { group: "Picture", help: "Zoom", when: opened };
 const OVERLAY = { group: "Picture", help: "Toggle overlays", when: withPictures };
 const SPACE = { group: "3D view", when: opened };
@@ -78,7 +83,7 @@ export const ACTIONS = [
   { id: "previous-placement", group: "Time", words: "Previous placement", keys: ["P"], also: "reflector position back", run: () => placement(-1), ...PLACES },
   { id: "live", group: "Time", words: "Show the newest frame as it comes", also: "live follow recording now", run: goLive, when: following },
 
-  { id: "place-mark", group: "Mark", words: "Show the keyboard's cross, then set the mark there", keys: ["Enter"], also: "click place add", run: enterCross, when: withPictures },
+  { id: "place-mark", group: "Mark", words: "Show the keyboard's cross, then set the mark there", keys: ["Enter"], also: "click place add", run: () => (boxing.on ? newBox() : enterCross()), when: withPictures },
   { id: "cross", group: "Mark", words: "Keyboard's cross: 1 to 9 zoom into a field, arrows move it, Backspace zooms out, Esc ends", keys: ["G"], also: "grid nine fields marking without mouse", run: toggleCross, when: withPictures },
   { id: "next-candidate", group: "Mark", words: "Take the return that fits better, or the next one", keys: ["C"], also: "candidate choose radar association", run: nextCandidate, when: () => withPictures() || withoutCandidates() },
   { id: "free-candidate", group: "Mark", words: "Leave the choice of the return to the program", keys: ["Shift+C"], also: "candidate automatic unchoose", run: () => choose(-1), when: () => withPictures() || (selectedClick()?.chosen ? "" : "No return was chosen for this mark") },
@@ -91,12 +96,26 @@ export const ACTIONS = [
   { id: "mark-right-1", words: "Move the mark right by 1 px", keys: ["Alt+Shift+ArrowRight"], run: nudge(1, 0), ...COARSE },
   { id: "mark-up-1", words: "Move the mark up by 1 px", keys: ["Alt+Shift+ArrowUp"], run: nudge(0, -1), ...COARSE },
   { id: "mark-down-1", words: "Move the mark down by 1 px", keys: ["Alt+Shift+ArrowDown"], run: nudge(0, 1), ...COARSE },
-  { id: "delete", group: "Mark", words: "Delete the click", keys: ["Delete", "Backspace"], also: "remove mark erase", run: removeSelected, when: withSelected },
+  { id: "delete", group: "Mark", words: "Delete the click", keys: ["Delete", "Backspace"], also: "remove mark erase", run: () => (boxing.on ? removeBox() : removeSelected()), when: () => (boxing.on ? withBox() : withSelected()) },
   { id: "undo", group: "Mark", words: "Undo", keys: ["Ctrl+Z"], also: "back revert take back", run: () => turnBack("undo"), when: undoable },
   { id: "redo", group: "Mark", words: "Redo", keys: ["Ctrl+Shift+Z", "Ctrl+Y"], also: "again repeat", run: () => turnBack("redo"), when: redoable },
 
   { id: "worst", group: "Pairs", words: "Next worst pair", keys: ["J"], also: "outlier residual largest wrong bad", run: nextWorst, when: withResiduals },
   { id: "exclude", group: "Pairs", words: "Exclude the pair, or include it again; without a mark, dismiss the placement", keys: ["X"], also: "leave out use ignore disable spurious", run: () => (clickIn(state.cursor) ? toggleExcluded() : dismissHere()), when: () => withPictures() || (clickIn(state.cursor) ? withSelected() : withoutPlacement()) },
+
+  { id: "evaluate", group: "Boxes", words: "Draw boxes and judge the calibration by them, or go back to the clicks", keys: ["A"], also: "tab evaluate annotate acc accuracy bounding people cars moving", run: toggleEvaluate, when: withPictures },
+  { id: "next-box", group: "Boxes", words: "Select the next box in this frame", keys: ["Q"], also: "object cycle", run: nextBox, when: withBoxes },
+  { id: "deselect-box", group: "Boxes", words: "Select no box: the next one is another object", keys: ["Escape"], also: "unselect none", run: () => selectBox(null), when: withBox },
+  { id: "new-box", group: "Boxes", words: "New box in the middle; Alt+arrows move it by 1 px, with Shift by 10", also: "draw add keyboard enter", run: newBox, when: withBoxes },
+  { id: "box-class", group: "Boxes", words: "Name the class of the box", keys: ["R"], also: "label rename person car", run: editLabel, when: withBoxes },
+  { id: "hide-box", group: "Boxes", words: "The object is hidden from this frame on", keys: ["H"], also: "end occluded left gone", run: hideHere, when: withBox },
+  { id: "keyframe-back", group: "Boxes", words: "Previous keyframe of the box", keys: [","], help: "Previous or next keyframe", also: "correction jump", run: () => goToKeyframe(-1), when: withBox },
+  { id: "keyframe-forward", group: "Boxes", words: "Next keyframe of the box", keys: ["."], help: "Previous or next keyframe", also: "correction jump", run: () => goToKeyframe(1), when: withBox },
+  { id: "forget-keyframe", group: "Boxes", words: "Take back what was said about the box in this frame", keys: ["Shift+Delete"], also: "keyframe remove correction", run: forgetHere, when: withBox },
+  { id: "stop-following", group: "Boxes", words: "Follow the boxes no farther", also: "cancel tracking stop", run: stopFollowing, when: () => withPictures() || (state.view?.boxes.some((track) => track.following) ? "" : "No box is being followed") },
+  { id: "load-boxes", group: "Boxes", words: "Load boxes from a file", also: "import open coco yolo cvat kitti openlabel annotations", run: chooseBoxes, when: withPictures },
+  { id: "save-boxes", group: "Boxes", words: "Download the boxes", also: "export save boxes.json annotations", run: downloadBoxes, when: () => withPictures() || (state.view?.boxes.length ? "" : "There are no boxes yet") },
+  { id: "remove-box", group: "Boxes", words: "Delete all boxes of the object", also: "track erase", run: removeBox, when: withBox },
 
   { id: "fit", group: "Picture", words: "Fit the picture", keys: ["F"], also: "zoom reset whole 100", run: () => (state.looking ? fitEye() : fit()), when: opened },
   { id: "zoom-in", words: "Zoom in", keys: ["+", "="], also: "magnify closer larger", run: () => zoom(1.25), ...ZOOM },

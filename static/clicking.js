@@ -1,6 +1,8 @@
 // @ts-check
 /** Pointer input on the frame: click to place, drag a mark to move it, click a candidate's number to choose it, drag elsewhere to pan, wheel to zoom at the cursor, arrow keys to nudge. */
 
+import { boxing } from "./boxes.js";
+import { boxesTake, cancelBox, cursorOver, dragBox, dropBox, pressBox } from "./boxing.js";
 import { candidateNear, choose } from "./candidates.js";
 import { leaveCross } from "./cross.js";
 import { onImage, pan, toCss, toImage, viewport } from "./geometry.js";
@@ -21,6 +23,8 @@ const REST = 250;
 
 /** @type {{x: number, y: number, lastX: number, lastY: number, u: number, v: number, moved: boolean, mark: import("./messages.js").ClickRow|null, candidate: number, pointer: number}|null} */
 let press = null;
+/** Whether the press is about a box. */
+let boxed = false;
 /** @type {{click: import("./messages.js").ClickRow, u: number, v: number, timer: number}|null} */
 let nudge = null;
 /** The frame of a new mark that is to be selected, and the marks that it had before. @type {{index: number, known: Set<string>}|null} */
@@ -32,7 +36,11 @@ export function startClicking() {
   marks.addEventListener("pointerdown", pressed);
   marks.addEventListener("pointermove", moved);
   marks.addEventListener("pointerup", released);
-  marks.addEventListener("pointercancel", () => (press = null));
+  marks.addEventListener("pointercancel", () => {
+    press = null;
+    boxed = false;
+    cancelBox();
+  });
   marks.addEventListener("pointerleave", () => hover(null));
   marks.addEventListener("wheel", wheeled, { passive: false });
   marks.addEventListener("contextmenu", (event) => event.preventDefault());
@@ -53,9 +61,15 @@ function pressed(event) {
   flushNudge();
   leaveLive();
   const [x, y] = inBox(event);
+  boxed = boxesTake() && event.button === 0 && !event.shiftKey;
+  if (boxed) {
+    pressBox(x, y, REACH);
+    marks.setPointerCapture(event.pointerId);
+    return /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
+  }
   const [u, v] = toImage(x, y);
-  const mark = event.button === 0 ? markNear(x, y) : null;
-  const candidate = event.button === 0 && !mark && !state.playing ? candidateNear(x, y) : -1;
+  const mark = boxing.on ? null : event.button === 0 ? markNear(x, y) : null;
+  const candidate = event.button === 0 && !mark && !boxing.on && !state.playing ? candidateNear(x, y) : -1;
   press = { x, y, lastX: x, lastY: y, u, v, moved: false, mark, candidate, pointer: event.button };
   marks.setPointerCapture(event.pointerId);
   /** @type {HTMLElement} */ (marks.parentElement).focus({ preventScroll: true });
@@ -75,6 +89,9 @@ export function markNear(x, y, reach = REACH) {
 /** @param {PointerEvent} event */
 function moved(event) {
   const [x, y] = inBox(event);
+  if (boxed) return dragBox(x, y);
+  if (boxing.on && !press) return void (marks.style.cursor = cursorOver(x, y));
+  marks.style.cursor = "";
   const [u, v] = toImage(x, y);
   if (!press) {
     marks.classList.toggle("grab", markNear(x, y) !== null);
@@ -96,6 +113,10 @@ function moved(event) {
 
 /** @param {PointerEvent} event */
 function released(event) {
+  if (boxed) {
+    boxed = false;
+    return dropBox();
+  }
   const done = press;
   press = null;
   marks.classList.remove("grabbing");
@@ -107,7 +128,7 @@ function released(event) {
     hold(null);
   } else if (done.mark) select(done.mark.id);
   else if (done.candidate >= 0 && !done.moved) choose(done.candidate);
-  else if (!done.moved && done.pointer === 0 && onImage(done.u, done.v)) place(done.u, done.v);
+  else if (!done.moved && !boxing.on && done.pointer === 0 && onImage(done.u, done.v)) place(done.u, done.v);
 }
 
 /** @param {{u: number, v: number}|null} point */

@@ -4,12 +4,15 @@
 import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
 import { ask, content } from "./asking.js";
+import { boxing, takeFrameBoxes } from "./boxes.js";
+import { startBoxing } from "./boxing.js";
 import { startCandidates, take as takeCandidates } from "./candidates.js";
 import { startClicking } from "./clicking.js";
 import { startCompare, takeCompared } from "./compare.js";
 import { startContours, takeUncertainty } from "./contours.js";
 import { startCross } from "./cross.js";
 import { startDescribing } from "./describing.js";
+import { startEvaluating } from "./evaluating.js";
 import { startExporting } from "./exporting.js";
 import { startFigures } from "./figures.js";
 import { onImage, toCss, toImage, viewport, zoom } from "./geometry.js";
@@ -77,6 +80,7 @@ const readers = {
     state.overlay = message;
     emit("overlay");
   },
+  frame_boxes: takeFrameBoxes,
   radar_look(message) {
     state.look = message;
     emit("look");
@@ -151,6 +155,7 @@ startLayers();
 startLoupe();
 startLive();
 startClicking();
+startBoxing();
 startTouch();
 startCandidates();
 startCross();
@@ -163,6 +168,7 @@ startScatter();
 startReview();
 startCompare();
 startContours();
+startEvaluating();
 startOptions();
 startExporting();
 startGuide();
@@ -191,5 +197,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots, boxing },
 });

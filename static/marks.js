@@ -4,6 +4,7 @@
  * 95 % of good residuals = ellipse, radar returns = dots (static) and triangles (moving).
  */
 
+import { boxing, drawBoxedReturns, drawBoxes } from "./boxes.js";
 import { drawCandidates } from "./candidates.js";
 import { ink, residualColour } from "./colours.js";
 import { drawCompared } from "./compare.js";
@@ -23,8 +24,9 @@ const CLOSE_ZOOM = 2;
 /** Draw all marks of the frame on screen. @param {Ink} pen */
 export function drawMarks(pen) {
   const index = state.shown?.index ?? -1;
-  drawContours(pen);
   const overlay = state.overlay?.index === index ? state.overlay : null;
+  if (boxing.on) return drawEvaluated(pen, overlay);
+  drawContours(pen);
   if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns);
   if (state.layers.predictions && overlay) for (const [u, v, range] of overlay.guesses) if (isOpen(index, range)) drawGuess(pen, u, v);
   if (state.layers.predictions && state.view?.advice && !state.view.verdict.done) drawAdvice(pen, state.view.advice);
@@ -34,6 +36,14 @@ export function drawMarks(pen) {
   drawCandidates(pen);
   drawCross(pen);
   drawCompared(pen);
+  drawBoxes(pen);
+}
+
+/** What moves, and the boxes around it; the clicks are out of the way. @param {Ink} pen @param {import("./messages.js").Overlay|null} overlay */
+function drawEvaluated(pen, overlay) {
+  drawBoxes(pen);
+  if (!state.layers.returns || drawBoxedReturns(pen)) return;
+  drawReturns(pen, (overlay?.returns ?? []).filter(([, , , , , isStill]) => !isStill));
 }
 
 /** Whether a placement in a frame still wants a click. @param {number} index @param {number} range its own [m] */

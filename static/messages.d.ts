@@ -124,9 +124,25 @@ export interface PaperOptions {
   ransac_confidence: number;
 }
 
+/** How the camera is mounted on the radar, for the method pmm: turned by roll, then pitch, then yaw about the radar's axes. */
+export interface MountingOptions {
+  roll_deg: number;
+  pitch_deg: number;
+  yaw_deg: number;
+}
+
+/** The checkerboard that the reflector is put on, for the method ccm. */
+export interface BoardOptions {
+  columns: number;
+  rows: number;
+  square_m: number;
+  reach_squares: number;
+  registration: "rigid" | "linear";
+}
+
 /** All options of a calibration. */
 export interface CalibrationOptions {
-  method: "default" | "paper";
+  method: "default" | "paper" | "pmm" | "ccm";
   gating: GatingOptions;
   locating: LocatingOptions;
   noise: NoiseOptions;
@@ -135,6 +151,8 @@ export interface CalibrationOptions {
   reflector: ReflectorOptions;
   solving: SolvingOptions;
   paper: PaperOptions;
+  mounting: MountingOptions;
+  board: BoardOptions;
 }
 
 /** Where to put the reflector next. */
@@ -159,6 +177,50 @@ export interface AssumptionRow {
 export interface DismissedRow {
   time: Stamp;
   position_m: [number, number, number];
+}
+
+/** One object with a box: its row in the table. */
+export interface BoxTrackRow {
+  id: string;
+  label: string;
+  first: number;
+  last: number;
+  boxes: number;
+  keyframes: number[];
+  hidden: number[];
+  note: string;
+  following: boolean;
+}
+
+/** Acc of one class. */
+export interface ClassRow {
+  label: string;
+  acc: string;
+  frames: number;
+  returns: number;
+  inside: number;
+}
+
+/** Acc of the calibration turned about one axis of the camera. */
+export interface SensitivityRow {
+  axis: "roll" | "pitch" | "yaw";
+  angles_deg: number[];
+  acc_percent: number[];
+  values: string[];
+  words: string;
+  is_flat: boolean;
+}
+
+/** What the boxes of the page say about the calibration on the page. */
+export interface AccPanel {
+  figures: Figure[];
+  classes: ClassRow[];
+  sensitivity: SensitivityRow[];
+  caution: string;
+  rule: string;
+  problem: string;
+  warnings: DataWarning[];
+  judging: boolean;
 }
 
 /** One error that all pairs share, as a row of a table. */
@@ -203,7 +265,7 @@ export interface View {
   can_undo: boolean;
   can_redo: boolean;
   has_calibration: boolean;
-  method: "default" | "paper";
+  method: "default" | "paper" | "pmm" | "ccm";
   clicks: ClickRow[];
   metrics: Figure[];
   pose: Figure[];
@@ -217,6 +279,9 @@ export interface View {
   assumptions: AssumptionRow[];
   dismissed: DismissedRow[];
   acknowledged: string[];
+  boxes: BoxTrackRow[];
+  box_labels: string[];
+  acc: AccPanel;
   systematic_errors: SystematicErrorTable;
   verdict: VerdictRow;
 }
@@ -501,6 +566,20 @@ export interface Overlay {
   guesses: OverlayGuess[];
 }
 
+/** One box in a frame; written as an array, since it is sent with every frame. */
+export type BoxInFrame = [id: string, label: string, left_px: number, top_px: number, right_px: number, bottom_px: number, kind: "stated" | "followed" | "between", confidence: number];
+
+/** A return of a moving target on the picture; written as an array. */
+export type BoxedReturn = [u_px: number, v_px: number, box: string, inside: boolean];
+
+/** The boxes of the frame that a page shows. */
+export interface FrameBoxes {
+  type: "frame_boxes";
+  index: number;
+  boxes: BoxInFrame[];
+  returns: BoxedReturn[];
+}
+
 /** One radar return that may belong to a click. */
 export interface CandidateRow {
   position_m: [number, number, number];
@@ -776,6 +855,77 @@ export interface AssumptionsConfirmedForm {
   request?: number;
 }
 
+/** A box drawn around an object that had none: left, top, right, bottom. */
+export interface BoxDrawnForm {
+  type: "box_drawn";
+  image_time: StampForm;
+  box_px: [number, number, number, number];
+  label: string;
+  request?: number;
+}
+
+/** The box of an object corrected in a frame. */
+export interface BoxMovedForm {
+  type: "box_moved";
+  id: string;
+  image_time: StampForm;
+  box_px: [number, number, number, number];
+  request?: number;
+}
+
+/** An object hidden from a frame on. */
+export interface BoxHiddenForm {
+  type: "box_hidden";
+  id: string;
+  image_time: StampForm;
+  request?: number;
+}
+
+/** What was said about an object in a frame taken back. */
+export interface BoxKeyframeRemovedForm {
+  type: "box_keyframe_removed";
+  id: string;
+  image_time: StampForm;
+  request?: number;
+}
+
+/** All boxes of an object deleted. */
+export interface BoxRemovedForm {
+  type: "box_removed";
+  id: string;
+  request?: number;
+}
+
+/** An object given another class. */
+export interface BoxLabelledForm {
+  type: "box_labelled";
+  id: string;
+  label: string;
+  request?: number;
+}
+
+/** A frame in which the box of an object is stated; null: it is hidden from there on. */
+export interface BoxKeyframeForm {
+  image_time: StampForm;
+  box_px: [number, number, number, number] | null;
+}
+
+/** The boxes of one object. */
+export interface BoxTrackForm {
+  id: string;
+  label: string;
+  keyframes: BoxKeyframeForm[];
+  carried: boolean;
+}
+
+/** Boxes from a file, in place of all others. */
+export interface BoxesLoadedForm {
+  type: "boxes_loaded";
+  tracks: BoxTrackForm[];
+  empty_frames?: StampForm[];
+  request?: number;
+}
+
 /** The last change undone. */
 export interface UndoForm {
   type: "undo";
@@ -877,6 +1027,12 @@ export interface SnapForm {
   request?: number;
 }
 
+/** Boxes are to be followed no farther. */
+export interface StopFollowingForm {
+  type: "stop_following";
+  request?: number;
+}
+
 /** A page asks what can be chosen. */
 export interface ChoicesWanted {
   type: "choices";
@@ -934,6 +1090,7 @@ export type FromServer =
   | RadarMap
   | SpaceLook
   | Overlay
+  | FrameBoxes
   | PairCandidates
   | Review
   | PairReview
@@ -957,6 +1114,13 @@ export type FromPage =
   | ClicksImportedForm
   | ColumnsMappedForm
   | AssumptionsConfirmedForm
+  | BoxDrawnForm
+  | BoxMovedForm
+  | BoxHiddenForm
+  | BoxKeyframeRemovedForm
+  | BoxRemovedForm
+  | BoxLabelledForm
+  | BoxesLoadedForm
   | UndoForm
   | RedoForm
   | HelloForm
@@ -970,6 +1134,7 @@ export type FromPage =
   | CompareForm
   | UncertaintyForm
   | SnapForm
+  | StopFollowingForm
   | ChoicesWanted
   | FolderWanted
   | RecentForgotten

@@ -1,6 +1,8 @@
 // @ts-check
 /** What to do next: three steps while there is no calibration, one line on the frame, and the same text in the status line. */
 
+import { boxing } from "./boxes.js";
+import { boxAdvice } from "./evaluating.js";
 import { make } from "./notices.js";
 import { clickIn, clicks, clicksIn, isClicked, isDismissed, isOffered, on, placementAt, placementsAt, rangeApart, state } from "./state.js";
 
@@ -13,7 +15,7 @@ const CENTRE = "the inner corner, where its three sheets meet";
 /** Text with keys in between. @typedef {(string|{key: string})[]} Words */
 
 export function startGuide() {
-  on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected"], drawGuide);
+  on(["opening", "shown", "view", "placements", "playing", "overlay", "candidates", "cross", "selected", "boxes"], drawGuide);
 }
 
 /** Three steps to the first calibration. */
@@ -67,6 +69,7 @@ function opening() {
 
 /** @param {number} index @returns {{text: Words, act: boolean}|null} */
 function advice(index) {
+  if (boxing.on) return boxAdvice();
   const placement = placementAt(index);
   const here = clickIn(index);
   if (state.cross) return atCross(state.cross);

@@ -4,8 +4,16 @@ Nothing here deals with files, threads or screens.
 """
 
 from app.session.applying import EventError, apply
+from app.session.box_tracks import BoxEdges, BoxKeyframe, BoxTrack
 from app.session.events import (
     AssumptionsConfirmed,
+    BoxDrawn,
+    BoxesLoaded,
+    BoxHidden,
+    BoxKeyframeRemoved,
+    BoxLabelled,
+    BoxMoved,
+    BoxRemoved,
     Cleared,
     ClickExcluded,
     ClickMoved,
@@ -31,6 +39,16 @@ from app.session.state import AssumedReading, DismissedPlacement, Outcome, Recor
 __all__ = [
     "AssumedReading",
     "AssumptionsConfirmed",
+    "BoxDrawn",
+    "BoxEdges",
+    "BoxHidden",
+    "BoxKeyframe",
+    "BoxKeyframeRemoved",
+    "BoxLabelled",
+    "BoxMoved",
+    "BoxRemoved",
+    "BoxTrack",
+    "BoxesLoaded",
     "Cleared",
     "ClickExcluded",
     "ClickMoved",

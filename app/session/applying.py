@@ -3,9 +3,11 @@
 import math
 from dataclasses import replace
 from functools import singledispatch
+from typing import TypeAlias
 
 from app.option_changes import changed_options
-from app.session.click_stamps import nearest_frame
+from app.session.box_applying import BoxEvent, apply_to_boxes
+from app.session.event_checks import EventError, require_frame, require_pixel
 from app.session.events import (
     AssumptionsConfirmed,
     Cleared,
@@ -25,15 +27,13 @@ from app.session.events import (
     WarningsAcknowledged,
 )
 from app.session.state import DismissedPlacement, RecordingFacts, Session
-from calib_core.errors import CalibrationError
-from calib_core.measurements import Mark, ReflectorClick, TimeNs, time_parts
+from calib_core.measurements import Mark, ReflectorClick
 from calib_core.option_checks import checked_options
 
 __all__ = ["EventError", "apply"]
 
-
-class EventError(CalibrationError):
-    """An event that does not fit the session or the recording; the session is unchanged."""
+_Aside: TypeAlias = BoxEvent | ColumnsMapped | AssumptionsConfirmed | WarningsAcknowledged | PlacementDismissed
+"""Events that no pose depends on."""
 
 
 def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
@@ -49,16 +49,24 @@ def apply(session: Session, event: Event, facts: RecordingFacts) -> Session:
         return replace(session, outcome=event.outcome, outcome_revision=event.revision, checked=event.checked)
     if isinstance(event, ScansAdded):
         return replace(session, revision=session.revision + 1)
-    if isinstance(event, ColumnsMapped | AssumptionsConfirmed):
-        return _about_reading(event, session)
-    if isinstance(event, WarningsAcknowledged):
-        return _acknowledged(event, session)
-    if isinstance(event, PlacementDismissed):
-        return _dismissed(event, session)
+    if isinstance(event, _Aside):
+        aside = _aside(event, session, facts)
+        return session if aside == session else aside
     changed = _changed(event, session, facts)
     if changed.clicks == session.clicks and changed.options == session.options:
         return session
     return replace(changed, revision=session.revision + 1)
+
+
+def _aside(event: _Aside, session: Session, facts: RecordingFacts) -> Session:
+    """Return the session after an event that no pose depends on; answers in progress stay valid."""
+    if isinstance(event, WarningsAcknowledged):
+        return _acknowledged(event, session)
+    if isinstance(event, PlacementDismissed):
+        return _dismissed(event, session)
+    if isinstance(event, ColumnsMapped | AssumptionsConfirmed):
+        return _about_reading(event, session)
+    return apply_to_boxes(event, session, facts)
 
 
 def _about_reading(event: ColumnsMapped | AssumptionsConfirmed, session: Session) -> Session:
@@ -94,8 +102,8 @@ def _changed(event: Event, session: Session, facts: RecordingFacts) -> Session:
 
 @_changed.register
 def _placed(event: ClickPlaced, session: Session, facts: RecordingFacts) -> Session:
-    _require_frame(event.image_time, facts)
-    _require_pixel(event.u_px, event.v_px, facts)
+    require_frame(event.image_time, facts)
+    require_pixel(event.u_px, event.v_px, facts)
     for click in session.clicks:
         if click.image_time != event.image_time:
             continue
@@ -124,7 +132,7 @@ def _marked(click: ReflectorClick, mark: Mark, sigma_px: float | None) -> Reflec
 
 @_changed.register
 def _moved(event: ClickMoved, session: Session, facts: RecordingFacts) -> Session:
-    _require_pixel(event.u_px, event.v_px, facts)
+    require_pixel(event.u_px, event.v_px, facts)
     click = _click(session, event.id)
     if (click.u_px, click.v_px) == (event.u_px, event.v_px) and event.mark == "moved":
         return session
@@ -169,8 +177,8 @@ def _cleared(event: Cleared, session: Session, facts: RecordingFacts) -> Session
 @_changed.register
 def _imported(event: ClicksImported, session: Session, facts: RecordingFacts) -> Session:
     for click in event.clicks:
-        _require_frame(click.image_time, facts)
-        _require_pixel(click.u_px, click.v_px, facts)
+        require_frame(click.image_time, facts)
+        require_pixel(click.u_px, click.v_px, facts)
         _require_sigma(click)
     times = {click.image_time for click in event.clicks}
     clicks = [click for click in session.clicks if click.image_time not in times]
@@ -196,35 +204,11 @@ def _click(session: Session, click_id: str) -> ReflectorClick:
     raise EventError(f"there is no click '{click_id}'; it may have been removed in another tab")
 
 
-def _require_frame(time: TimeNs, facts: RecordingFacts) -> None:
-    if facts.frame_at(time) is not None:
-        return
-    nearest = ""
-    if len(facts.image_times):
-        index = nearest_frame(facts.image_times, time)
-        nearest = f", the nearest is frame {index + 1} at {_seconds(TimeNs(int(facts.image_times[index])))}"
-    raise EventError(
-        f"no frame of {facts.name} has the stamp {_seconds(time)}{nearest}; a click needs the exact stamp of its frame"
-    )
-
-
-def _require_pixel(u_px: float, v_px: float, facts: RecordingFacts) -> None:
-    if not (math.isfinite(u_px) and math.isfinite(v_px) and facts.has_pixel(u_px, v_px)):
-        raise EventError(
-            f"({u_px:.1f}, {v_px:.1f}) px is outside the frame of {facts.width_px} x {facts.height_px} px; click inside it"
-        )
-
-
 def _require_sigma(click: ReflectorClick) -> None:
     if click.sigma_px is not None and not 0.0 < click.sigma_px < math.inf:
         raise EventError(
             f"click '{click.id}' has a sigma_px of {click.sigma_px:g}; give a number above 0, or leave it out"
         )
-
-
-def _seconds(time: TimeNs) -> str:
-    sec, nanosec = time_parts(time)
-    return f"{sec}.{nanosec:09d} s"
 
 
 def _number(click_id: str) -> int:

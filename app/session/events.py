@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from app.option_changes import OptionChange
+from app.session.box_tracks import BoxEdges, BoxTrack
 from app.session.state import Outcome
 from calib_core.measurements import ChosenReturn, Mark, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
@@ -11,6 +12,13 @@ from calib_core.results import PairResult
 
 __all__ = [
     "AssumptionsConfirmed",
+    "BoxDrawn",
+    "BoxHidden",
+    "BoxKeyframeRemoved",
+    "BoxLabelled",
+    "BoxMoved",
+    "BoxRemoved",
+    "BoxesLoaded",
     "Cleared",
     "ClickExcluded",
     "ClickMoved",
@@ -136,6 +144,80 @@ class ClicksImported:
 
 
 @dataclass(frozen=True, slots=True)
+class BoxDrawn:
+    """A box was drawn around an object that had none so far.
+
+    Attributes:
+        image_time: stamp of the frame.
+        edges_px: of the box.
+        label: the object's class, such as "person".
+    """
+
+    image_time: TimeNs
+    edges_px: BoxEdges
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class BoxMoved:
+    """The box of an object was corrected in a frame, which makes that frame a keyframe.
+
+    Attributes:
+        id: of the track.
+        image_time: stamp of the frame.
+        edges_px: of the box.
+    """
+
+    id: str
+    image_time: TimeNs
+    edges_px: BoxEdges
+
+
+@dataclass(frozen=True, slots=True)
+class BoxHidden:
+    """An object is hidden, or out of the picture, from a frame on until its next keyframe."""
+
+    id: str
+    image_time: TimeNs
+
+
+@dataclass(frozen=True, slots=True)
+class BoxKeyframeRemoved:
+    """What was said about an object in a frame was taken back; with its last box, the track goes."""
+
+    id: str
+    image_time: TimeNs
+
+
+@dataclass(frozen=True, slots=True)
+class BoxRemoved:
+    """All boxes of an object were deleted."""
+
+    id: str
+
+
+@dataclass(frozen=True, slots=True)
+class BoxLabelled:
+    """An object was given another class."""
+
+    id: str
+    label: str
+
+
+@dataclass(frozen=True, slots=True)
+class BoxesLoaded:
+    """Boxes from a file took the place of all boxes.
+
+    Attributes:
+        tracks: one per object.
+        empty_frames: stamps of the frames that were annotated and have no box.
+    """
+
+    tracks: tuple[BoxTrack, ...]
+    empty_frames: tuple[TimeNs, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class ColumnsMapped:
     """The recording was opened with these values of --map; the next opening uses them again. Not undone with clicks."""
 
@@ -185,6 +267,13 @@ Event: TypeAlias = (
     | OptionsEdited
     | Cleared
     | ClicksImported
+    | BoxDrawn
+    | BoxMoved
+    | BoxHidden
+    | BoxKeyframeRemoved
+    | BoxRemoved
+    | BoxLabelled
+    | BoxesLoaded
     | ScansAdded
     | ColumnsMapped
     | AssumptionsConfirmed

@@ -81,6 +81,7 @@ def _resumed(kept: Session, current: Session) -> Session:
         kept,
         revision=revision,
         next_click=current.next_click,
+        next_box=current.next_box,
         outcome_revision=revision if kept.is_solved else kept.outcome_revision,
         column_map=current.column_map,
         confirmed=current.confirmed,

@@ -5,6 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from app.session.box_tracks import BoxTrack
 from calib_core.arrays import Indices, TimesNs, frozen_array
 from calib_core.measurements import ReflectorClick, TimeNs, Unsolvable
 from calib_core.options import CalibrationOptions
@@ -115,6 +116,9 @@ class Session:
         confirmed: texts of the assumptions about the recording that the user has confirmed.
         dismissed: placements that are not the reflector.
         acknowledged: codes of the warnings that the user has read.
+        boxes: around moving objects, one track per object, in the order in which they were drawn.
+        empty_frames: stamps of the frames that a file of boxes says are without any, ascending.
+        next_box: number of the next track's id ("b7"); it only increases.
     """
 
     clicks: tuple[ReflectorClick, ...] = ()
@@ -128,6 +132,9 @@ class Session:
     confirmed: tuple[str, ...] = ()
     dismissed: tuple[DismissedPlacement, ...] = ()
     acknowledged: tuple[str, ...] = ()
+    boxes: tuple[BoxTrack, ...] = ()
+    empty_frames: tuple[TimeNs, ...] = ()
+    next_box: int = 1
 
     @property
     def is_solved(self) -> bool:

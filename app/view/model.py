@@ -5,6 +5,8 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
+from app.view.box_panel import AccPanel, BoxTrackRow
+from app.view.figure import Figure, Level
 from calib_core.measurements import Mark, Stamp
 from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning
@@ -26,7 +28,6 @@ __all__ = [
 ]
 
 ClickState: TypeAlias = Literal["pending", "inlier", "outlier", "excluded", "unpaired", "untouched"]
-Level: TypeAlias = Literal["plain", "good", "warning"]
 Stage: TypeAlias = Literal["collecting", "solving", "solved", "unsolvable"]
 
 
@@ -100,27 +101,6 @@ class DismissedRow:
 
     time: Stamp
     position_m: tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """One number as displayed.
-
-    Attributes:
-        key: for programs, such as "aed"; stable.
-        label: for display, such as "average distance (AED)".
-        value: formatted, with its standard deviation if that is known: "12.4", "0.31 ± 0.08".
-        unit: such as "px"; "" if it has none.
-        hint: one sentence that explains the number, shown on hover.
-        level: whether it needs attention.
-    """
-
-    key: str
-    label: str
-    value: str
-    unit: str
-    hint: str
-    level: Level = "plain"
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,6 +233,9 @@ class View:
         verdict: how far the calibration can be trusted, and what to do next.
         dismissed: the placements that the user dismissed.
         acknowledged: the codes of the warnings that the user has read.
+        boxes: around moving objects, one row per object.
+        box_labels: the classes to choose from.
+        acc: what the boxes say about the calibration.
     """
 
     revision: int
@@ -279,5 +262,8 @@ class View:
     assumptions: tuple[AssumptionRow, ...] = ()
     dismissed: tuple[DismissedRow, ...] = ()
     acknowledged: tuple[str, ...] = ()
+    boxes: tuple[BoxTrackRow, ...] = ()
+    box_labels: tuple[str, ...] = ()
+    acc: AccPanel = field(default_factory=AccPanel)
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)
     verdict: VerdictRow = VerdictRow("nothing", "nothing yet", "")

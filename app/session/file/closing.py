@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.resources import version
-from app.session import ClicksImported, OptionsChanged, Session
+from app.session import BoxesLoaded, ClicksImported, OptionsChanged, Session
 from app.session.file.errors import SessionFileError
 from app.session.file.folders import user_session_folder
 from app.session.file.guarded_folder import GuardedFolder
@@ -40,7 +40,7 @@ class Closed:
         """What to tell the user, without a full stop at the end."""
         if not self.fault:
             return f"all clicks are saved in {self.folder}"
-        if not self.clicks:
+        if not self.clicks and self.kept_in is None:
             return f"there were no clicks to save, but {self.fault}"
         if self.kept_in is None:
             return f"the clicks ({self.clicks}) could not be saved: {self.fault}"
@@ -73,7 +73,7 @@ def rescued(folder: Path, session: Session, recording: RecordingForm, fault: str
         fault: why it cannot be kept in its folder.
     """
     count = len(session.clicks)
-    if not count:
+    if not count and not session.boxes:
         return Closed(folder, 0, fault)
     for home in (user_session_folder(f"{recording.name}-rescued").parent, Path(tempfile.gettempdir())):
         try:
@@ -92,7 +92,8 @@ def _written(home: Path, session: Session, recording: RecordingForm) -> Path:
         number += 1
     folder = GuardedFolder(path, create=True)
     try:
-        steps = (OptionsChanged(session.options), ClicksImported(session.clicks))
+        loaded = BoxesLoaded(session.boxes, session.empty_frames)
+        steps = (OptionsChanged(session.options), ClicksImported(session.clicks), loaded)
         sums = begin_journal(folder, recording, steps, cocalib=version())
         write_snapshot(folder, session, recording=recording, sums=sums, cocalib=version())
         if fault := snapshot_fault(folder, session.clicks):

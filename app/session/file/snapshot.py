@@ -13,6 +13,8 @@ from msgspec import Meta
 from app.option_changes import options_from_tree
 from app.session import (
     AssumptionsConfirmed,
+    BoxesLoaded,
+    BoxTrack,
     ClicksImported,
     ColumnsMapped,
     DismissedPlacement,
@@ -22,14 +24,16 @@ from app.session import (
     Step,
     WarningsAcknowledged,
 )
+from app.session.file.box_json import BoxTrackForm, form_of_track, track_from_form
 from app.session.file.checksums import line_bytes, sealed, taken_apart
 from app.session.file.errors import SessionFileError
+from app.session.file.form_parts import StampForm
 from app.session.file.guarded_folder import GuardedFolder
 from app.session.file.identity import RecordingForm
 from app.session.file.journal_reading import SCHEMA, SCHEMA_1
-from app.session.file.step_json import ClickForm, PlacementDismissedForm, StampForm, click_from_form, form_of_click
+from app.session.file.step_json import ClickForm, PlacementDismissedForm, click_from_form, form_of_click
 from calib_core.errors import CalibrationError
-from calib_core.measurements import ReflectorClick, Stamp
+from calib_core.measurements import ReflectorClick, Stamp, TimeNs
 from calib_core.options import CalibrationOptions
 
 __all__ = ["SNAPSHOT", "FoundSnapshot", "read_snapshot", "write_snapshot"]
@@ -51,6 +55,8 @@ class _Snapshot(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     confirmed: tuple[str, ...] = ()
     dismissed: tuple[PlacementDismissedForm, ...] = ()
     acknowledged: tuple[str, ...] = ()
+    boxes: tuple[BoxTrackForm, ...] = ()
+    empty_frames: tuple[StampForm, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +75,8 @@ class FoundSnapshot:
         confirmed: the assumptions about the recording that were confirmed by then.
         dismissed: the placements that were dismissed.
         acknowledged: the codes of the warnings that were read.
+        boxes: around moving objects.
+        empty_frames: frames that a file of boxes says are without any.
     """
 
     recording: RecordingForm
@@ -82,6 +90,8 @@ class FoundSnapshot:
     confirmed: tuple[str, ...] = ()
     dismissed: tuple[DismissedPlacement, ...] = ()
     acknowledged: tuple[str, ...] = ()
+    boxes: tuple[BoxTrack, ...] = ()
+    empty_frames: tuple[TimeNs, ...] = ()
 
     @property
     def steps(self) -> tuple[Step, ...]:
@@ -90,7 +100,9 @@ class FoundSnapshot:
         reading += (AssumptionsConfirmed(self.confirmed),) if self.confirmed else ()
         reading += (WarningsAcknowledged(self.acknowledged),) if self.acknowledged else ()
         dismissals = (PlacementDismissed(one.time, one.position_m) for one in self.dismissed)
-        return (*reading, OptionsChanged(self.options), ClicksImported(self.clicks), *dismissals)
+        has_boxes = self.boxes or self.empty_frames
+        loaded = (BoxesLoaded(self.boxes, self.empty_frames),) if has_boxes else ()
+        return (*reading, OptionsChanged(self.options), ClicksImported(self.clicks), *dismissals, *loaded)
 
     def agrees_with(self, sums: Sequence[str]) -> bool:
         """Return whether the journal's lines are those of the snapshot, as far as both have them."""
@@ -129,6 +141,8 @@ def write_snapshot(
             PlacementDismissedForm(StampForm.of(Stamp.of(one.time)), one.position_m) for one in session.dismissed
         ),
         acknowledged=session.acknowledged,
+        boxes=tuple(map(form_of_track, session.boxes)),
+        empty_frames=tuple(StampForm.of(Stamp.of(time)) for time in session.empty_frames),
     )
     folder.replace(SNAPSHOT, line_bytes(sealed(msgspec.json.encode(snapshot))) + b"\n")
 
@@ -163,6 +177,8 @@ def read_snapshot(data: bytes, place: str) -> FoundSnapshot:
             confirmed=snapshot.confirmed,
             dismissed=tuple(DismissedPlacement(one.time.stamp.time, one.position_m) for one in snapshot.dismissed),
             acknowledged=snapshot.acknowledged,
+            boxes=tuple(map(track_from_form, snapshot.boxes)),
+            empty_frames=tuple(form.stamp.time for form in snapshot.empty_frames),
             sum=found.sum or sealed(data).sum,
         )
     except SessionFileError:

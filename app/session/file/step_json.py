@@ -24,6 +24,8 @@ from app.session import (
     Undo,
     WarningsAcknowledged,
 )
+from app.session.file import box_json as boxes
+from app.session.file.form_parts import StampForm, StepPart
 from calib_core.measurements import ChosenReturn, Mark, ReflectorClick, Stamp
 
 __all__ = [
@@ -61,23 +63,6 @@ MapForm: TypeAlias = Annotated[str, Meta(max_length=500)]
 AssumptionForm: TypeAlias = Annotated[str, Meta(max_length=2000)]
 
 
-class StampForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A time."""
-
-    sec: Annotated[int, Meta(ge=0, le=9_223_372_035)]
-    nanosec: Annotated[int, Meta(ge=0, le=999_999_999)]
-
-    @classmethod
-    def of(cls, stamp: Stamp) -> "StampForm":
-        """Convert a stamp to its JSON form."""
-        return cls(stamp.sec, stamp.nanosec)
-
-    @property
-    def stamp(self) -> Stamp:
-        """The stamp as the session uses it."""
-        return Stamp(self.sec, self.nanosec)
-
-
 class ReturnForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A chosen radar return, as in a clicks-1 file."""
 
@@ -100,11 +85,7 @@ class ClickForm(
     chosen: ReturnForm | None = None
 
 
-class _Form(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="type"):
-    """A JSON object with a "type"."""
-
-
-class ClickPlacedForm(_Form, frozen=True, tag="click_placed"):
+class ClickPlacedForm(StepPart, frozen=True, tag="click_placed"):
     """A mark in a frame; without "mark" in a journal, the click that the frame already has is moved."""
 
     image_time: StampForm
@@ -113,7 +94,7 @@ class ClickPlacedForm(_Form, frozen=True, tag="click_placed"):
     sigma_px: float | None = None
 
 
-class ClickMovedForm(_Form, frozen=True, tag="click_moved"):
+class ClickMovedForm(StepPart, frozen=True, tag="click_moved"):
     """A click dragged, nudged or snapped."""
 
     id: ClickId
@@ -122,27 +103,27 @@ class ClickMovedForm(_Form, frozen=True, tag="click_moved"):
     sigma_px: float | None = None
 
 
-class ClickRemovedForm(_Form, frozen=True, tag="click_removed"):
+class ClickRemovedForm(StepPart, frozen=True, tag="click_removed"):
     """A click deleted."""
 
     id: ClickId
 
 
-class ClickExcludedForm(_Form, frozen=True, tag="click_excluded"):
+class ClickExcludedForm(StepPart, frozen=True, tag="click_excluded"):
     """A click excluded, or included again."""
 
     id: ClickId
     excluded: bool
 
 
-class ReturnChosenForm(_Form, frozen=True, tag="return_chosen", rename={"chosen": "return"}):
+class ReturnChosenForm(StepPart, frozen=True, tag="return_chosen", rename={"chosen": "return"}):
     """A return chosen for a click; null takes the choice back."""
 
     id: ClickId
     chosen: ReturnForm | None
 
 
-class PlacementDismissedForm(_Form, frozen=True, tag="placement_dismissed"):
+class PlacementDismissedForm(StepPart, frozen=True, tag="placement_dismissed"):
     """A placement dismissed, or offered again."""
 
     time: StampForm
@@ -150,46 +131,46 @@ class PlacementDismissedForm(_Form, frozen=True, tag="placement_dismissed"):
     dismissed: bool = True
 
 
-class WarningsAcknowledgedForm(_Form, frozen=True, tag="warnings_acknowledged"):
+class WarningsAcknowledgedForm(StepPart, frozen=True, tag="warnings_acknowledged"):
     """Warnings read, or shown again, by their codes."""
 
     codes: Annotated[tuple[CodeForm, ...], Meta(max_length=100)]
     acknowledged: bool = True
 
 
-class OptionsChangedForm(_Form, frozen=True, tag="options_changed"):
+class OptionsChangedForm(StepPart, frozen=True, tag="options_changed"):
     """Options by group and name; the journal contains all of them, a page may send only some."""
 
     options: dict[str, Any]
 
 
-class ClearedForm(_Form, frozen=True, tag="cleared"):
+class ClearedForm(StepPart, frozen=True, tag="cleared"):
     """All clicks deleted."""
 
 
-class ClicksImportedForm(_Form, frozen=True, tag="clicks_imported"):
+class ClicksImportedForm(StepPart, frozen=True, tag="clicks_imported"):
     """Clicks from a file."""
 
     clicks: tuple[ClickForm, ...]
 
 
-class ColumnsMappedForm(_Form, frozen=True, tag="columns_mapped"):
+class ColumnsMappedForm(StepPart, frozen=True, tag="columns_mapped"):
     """The recording is read with these columns."""
 
     column_map: tuple[MapForm, ...]
 
 
-class AssumptionsConfirmedForm(_Form, frozen=True, tag="assumptions_confirmed"):
+class AssumptionsConfirmedForm(StepPart, frozen=True, tag="assumptions_confirmed"):
     """Assumptions about the recording confirmed, by their texts."""
 
     texts: Annotated[tuple[AssumptionForm, ...], Meta(max_length=100)]
 
 
-class UndoForm(_Form, frozen=True, tag="undo"):
+class UndoForm(StepPart, frozen=True, tag="undo"):
     """The last change undone."""
 
 
-class RedoForm(_Form, frozen=True, tag="redo"):
+class RedoForm(StepPart, frozen=True, tag="redo"):
     """The last undone change redone."""
 
 
@@ -206,6 +187,13 @@ StepForm: TypeAlias = (
     | ClicksImportedForm
     | ColumnsMappedForm
     | AssumptionsConfirmedForm
+    | boxes.BoxDrawnForm
+    | boxes.BoxMovedForm
+    | boxes.BoxHiddenForm
+    | boxes.BoxKeyframeRemovedForm
+    | boxes.BoxRemovedForm
+    | boxes.BoxLabelledForm
+    | boxes.BoxesLoadedForm
     | UndoForm
     | RedoForm
 )
@@ -259,6 +247,14 @@ def step_from_form(form: StepForm) -> Step:
         OptionError: an option is unknown, of the wrong type or out of range.
     """
     raise TypeError(f"not the form of a step: {form!r}")
+
+
+for _event, _form_of in boxes.FORM_OF:
+    form_of_step.register(_event)(_form_of)
+
+
+for _form, _event_of in boxes.EVENT_OF:
+    step_from_form.register(_form)(_event_of)
 
 
 @form_of_step.register

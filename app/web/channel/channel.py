@@ -7,6 +7,7 @@ from typing import Protocol
 from app.error_boundary import error_boundary
 from app.session import Step
 from app.view import sentence
+from app.view.box_rows import boxes_in_frame
 from app.web.channel.click_candidates import candidates_of
 from app.web.channel.desk import answer_of
 from app.web.channel.hub import Hub
@@ -21,6 +22,8 @@ from app.web.messages import (
     Command,
     CursorMoved,
     Done,
+    FollowingStopped,
+    FrameBoxes,
     FrameHeader,
     FrameWanted,
     Hello,
@@ -74,6 +77,7 @@ class Channel:
         self._candidates = NewestWins(self._send_candidates, self._report)
         self._forward = True
         self._has_candidates = False
+        self._has_boxes = False
 
     async def run(self, socket: Socket) -> None:
         """Serve the page until it disconnects; the socket's exception is then raised to the caller."""
@@ -108,6 +112,15 @@ class Channel:
         self._space.give(self._cursor)
         if not self._cursor.playing:
             self._candidates.give(self._cursor)
+
+    def show_boxes(self) -> None:
+        """Send the boxes of the frame on the page; nothing as long as there are none, as before."""
+        carried = self._hub.workspace.carried
+        if carried or self._has_boxes:
+            self._has_boxes = bool(carried)
+            index = self._cursor.index
+            returns = self._hub.box_judging.returns(index)
+            self.outbox.put(encode(FrameBoxes(index, boxes_in_frame(carried, index), returns)), kind="boxes")
 
     async def _read(self, socket: Socket) -> None:
         while True:
@@ -147,6 +160,8 @@ class Channel:
         elif isinstance(command, ViewpointWanted):
             if self.scene is not None:
                 self.scene.look_from(command.viewpoint)
+        elif isinstance(command, FollowingStopped):
+            self._hub.box_following.stop()
         elif isinstance(command, SnapWanted):
             hub = self._hub
             self.outbox.put(encode(await snapped(command, hub.moments, hub.frames, hub.executor)))
@@ -187,6 +202,7 @@ class Channel:
         if not 0 <= command.index < len(self._hub.moments):
             return
         self._cursor = command
+        self.show_boxes()
         self.refresh()
 
     async def _greet(self, _wanted: Hello) -> None:

@@ -4,10 +4,12 @@ A page's message is a JSON object with a "type" and, if it wants an answer, a "r
 writes the types as TypeScript; `static/messages.d.ts` holds its output, and a test compares the two.
 """
 
+from app.web.messages.box_messages import FrameBoxes
 from app.web.messages.incoming import (
     MAX_TEXT_BYTES,
     Command,
     CursorMoved,
+    FollowingStopped,
     FrameWanted,
     Hello,
     ImportWanted,
@@ -84,6 +86,8 @@ __all__ = [
     "FolderListing",
     "FolderWanted",
     "FollowNote",
+    "FollowingStopped",
+    "FrameBoxes",
     "FrameHeader",
     "FrameWanted",
     "FramesAdded",

@@ -12,6 +12,7 @@ from app.view import FollowState, PairCandidates, View
 from app.view.review import Review
 from app.view.review_pair import PairReview
 from app.view.review_solutions import Compared
+from app.web.messages.box_messages import FrameBoxes
 from app.web.messages.opening_messages import FolderListing, OpeningChoices
 from app.web.messages.radar_messages import Placements, RadarLook, RadarMap
 from app.web.messages.review_messages import Uncertainty
@@ -313,6 +314,7 @@ Outgoing: TypeAlias = (
     | RadarMap
     | SpaceLook
     | Overlay
+    | FrameBoxes
     | PairCandidates
     | Review
     | PairReview
@@ -338,6 +340,7 @@ TYPES: Mapping[type, str] = {
     RadarMap: "radar_map",
     SpaceLook: "space",
     Overlay: "overlay",
+    FrameBoxes: "frame_boxes",
     PairCandidates: "candidates",
     Review: "review",
     PairReview: "pair_review",
