@@ -61,6 +61,7 @@ def stream_cloud(stream: rr.RecordingStream, view: RecordedView) -> Iterator[Tim
             stream.send_columns(
                 RETURNS, [_times(scans.times_ns)], columns.partition(np.diff(scans.first_return).tolist())
             )
+            stream.flush()
         yield scans.times_ns
 
 
@@ -75,6 +76,7 @@ def stream_frames(stream: rr.RecordingStream, view: RecordedView, streamed: Stre
             _stream_clicks(stream, block, pairs)
         if view.boxes is not None:
             _stream_boxes(stream, block, boxes, labels)
+        stream.flush()  # what is not on the disk yet stays in memory
 
 
 def _stream_pictures(
