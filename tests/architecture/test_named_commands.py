@@ -13,8 +13,13 @@ from app.cli.tyro_hook import flags_of
 PROSE = {"again", "cookie", "therefore", "wrote"}
 """Words that follow the program's name in sentences that do not name a command."""
 
-OTHER_PROGRAMS = {f"--{name}" for name in ("frame-id", "child-frame-id", "qx", "qy", "qz", "qw")}
-"""Options of other programs: ROS's static_transform_publisher."""
+_OF_ROS = ("frame-id", "child-frame-id", "qx", "qy", "qz", "qw")
+_OF_CHROMIUM = (
+    *("headless", "disable-gpu", "disable-extensions", "disable-background-networking", "disable-dev-shm-usage"),
+    *("no-first-run", "no-pdf-header-footer", "host-resolver-rules", "user-data-dir", "no-sandbox", "print-to-pdf"),
+)
+OTHER_PROGRAMS = {f"--{name}" for name in (*_OF_ROS, *_OF_CHROMIUM)}
+"""Options of other programs: ROS's static_transform_publisher, and Chromium, which prints the report."""
 
 _COMMAND = re.compile(r"(?<![\w/.-])cocalib[ \t]+(?P<command>[a-z][\w-]*)(?P<rest>[^\n`;()]*)")
 _FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9.-]*[a-z0-9]")
