@@ -26,6 +26,7 @@ from app.web.exports.query import FieldError
 from app.web.port.preloading import with_preloaded_modules
 from app.web.port.viser_hook import client_page
 from app.workspace import Workspace
+from calib_core.boxes import boxes_text
 from calib_core.errors import CalibrationError
 from calib_core.interchange import CalibrationFile, read_calibration, written_formats
 from calib_core.measurements import MIN_PAIRS, Unsolvable
@@ -178,6 +179,7 @@ class _Downloads:
             "/api/calibration.json": self._calibration,
             "/api/clicks.json": self._clicks,
             "/api/report.html": self._report,
+            "/api/boxes.json": self._boxes,
             "/api/formats.json": _formats,
             "/api/activity.json": self._activity,
             "/api/picture_changes.json": self._picture_changes,
@@ -241,6 +243,9 @@ class _Downloads:
 
     def _clicks(self, _query: str) -> Reply:
         return _download(self._workspace.clicks_text().encode(), "clicks.json")
+
+    def _boxes(self, _query: str) -> Reply:
+        return _download(boxes_text(self._workspace.boxes).encode(), "boxes.json")
 
     def _activity(self, _query: str) -> Reply:
         survey = self._hub.survey
