@@ -81,7 +81,11 @@ def _of_pairs(subject: ReportSubject, calibration: Calibration) -> list[Child]:
 def _what(subject: ReportSubject) -> Markup:
     """Say what is reported, in one line."""
     digest = subject.inputs[0].sha256[:16] if subject.inputs else ""
-    on = f", judged on {subject.recording.name}" if subject.recording is not None else ""
+    on = None
+    if subject.recording is not None:
+        name = subject.recording.name
+        nothing = f", with {name}, in which there are no clicks or boxes to judge it by"
+        on = nothing if subject.judged is None else f", judged on {name}"
     known = tag("span", " (sha256 ", tag("code", f"{digest}…"), ")") if digest else None
     return tag("span", tag("b", subject.name), known, on)
 

@@ -23,7 +23,7 @@ def cautions(subject: ReportSubject) -> Markup:
         items.append(tag("li", f"{len(found) - _MOST} more: {codes}."))
     unpaired = subject.calibration.unpaired if subject.calibration is not None else ()
     items += [
-        tag("li", tag("b", f"{row.id} has no pair. "), f"{sentence(row.reason)} {sentence(row.hint)}")
+        tag("li", _sign("·"), tag("b", f"{row.id} has no pair. "), f"{sentence(row.reason)} {sentence(row.hint)}")
         for row in unpaired[:_MOST_UNPAIRED]
     ]
     if len(unpaired) > _MOST_UNPAIRED:
@@ -59,3 +59,7 @@ def _item(warning: DataWarning) -> Markup:
     return tag(
         "li", sign, tag("code", warning.code), " ", sentence(warning.message), " ", tag("b", sentence(warning.hint))
     )
+
+
+def _sign(shape: str) -> Markup:
+    return tag("span", shape, class_="sign", aria_hidden="true")

@@ -53,7 +53,10 @@ def _files(subject: ReportSubject) -> list[tuple[str, InputFile]]:
     parts = (
         ("this calibration", subject.inputs),
         ("it was made from", made_from),
-        ("judged on", subject.recording.inputs if subject.recording is not None else ()),
+        (
+            "judged on" if subject.judged is not None else "recording",
+            subject.recording.inputs if subject.recording is not None else (),
+        ),
         ("compared with", subject.against.inputs if subject.against is not None else ()),
     )
     roles: dict[InputFile, list[str]] = {}

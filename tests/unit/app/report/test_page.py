@@ -156,11 +156,17 @@ def test_a_file_without_frames_with_returns_has_no_acc(project_root: Path) -> No
     assert "Acc is unknown: no frame has returns of targets." in words
 
 
+def test_a_recording_without_clicks_and_boxes_judges_nothing_and_the_report_says_so(project_root: Path) -> None:
+    idle = replace(subject_for(project_root), recording=watched_recording())
+    assert "with radar.bag, in which there are no clicks or boxes to judge it by" in _words(idle)
+    assert "judged on radar.bag" in _words(replace(idle, judged=Judged(Evaluation(None, box_figures()))))
+
+
 def test_files_are_named_once_with_all_that_they_are(project_root: Path) -> None:
     subject = replace(subject_for(project_root), inputs=(FILE,), recording=watched_recording())
     words = _words(subject)
     assert words.count(FILE.sha256) == 1
-    assert "this calibration, judged on" in words
+    assert "this calibration, recording" in words
 
 
 def test_many_pairs_are_cut_to_those_with_the_largest_residuals(project_root: Path) -> None:
