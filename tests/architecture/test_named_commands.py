@@ -14,7 +14,8 @@ PROSE = {"again", "cookie", "therefore", "wrote"}
 """Words that follow the program's name in sentences that do not name a command."""
 
 OTHER_PROGRAMS = {f"--{name}" for name in ("frame-id", "child-frame-id", "qx", "qy", "qz", "qw")}
-"""Options of other programs: ROS's static_transform_publisher."""
+OTHER_PROGRAMS |= {f"--{name}" for name in ("bind", "serve-web", "web-viewer-port")}
+"""Options of other programs: ROS's static_transform_publisher, Rerun's viewer."""
 
 _COMMAND = re.compile(r"(?<![\w/.-])cocalib[ \t]+(?P<command>[a-z][\w-]*)(?P<rest>[^\n`;()]*)")
 _FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9.-]*[a-z0-9]")
