@@ -9,6 +9,7 @@ import numpy as np
 from app.report.making import subject_of
 from app.report.residual_rows import ResidualRows
 from app.report.subject import Against, Judged, Picture, ReportSubject, Watched
+from calib_core.camera import Camera
 from calib_core.evaluation import BoxFigures, ClassFigure, Evaluation, FrameFigure, Sensitivity, Share
 from calib_core.interchange import compare, imported, read_calibration
 from calib_core.measurements import TimeNs
@@ -27,6 +28,7 @@ __all__ = [
 
 SIZE_PX = (640, 480)
 _N = 60
+_UPRIGHT_PX = (480, 800)
 FILE = InputFile("radar.bag", 12, "5e" * 32)
 
 
@@ -114,13 +116,18 @@ def box_figures() -> BoxFigures:
 
 
 def fullest_subject(project_root: Path) -> ReportSubject:
-    """Return as much as a report can be about: many pairs, warnings, files, boxes, a recording, another calibration."""
+    """Return as much as a report can be about: many pairs, warnings, files, boxes, an upright picture, another calibration."""
     calibration = golden(project_root)
+    width_px, height_px = _UPRIGHT_PX
+    camera = Camera("pinhole", width_px, height_px, np.array([[500.0, 0, 240], [0, 500, 400], [0, 0, 1]]))
     rng = np.random.default_rng(2)
     one = calibration.pairs[0]
     pairs = tuple(
         replace(
-            one, id=f"c{k}", pixel_px=(place := rng.uniform((0, 0), SIZE_PX)), projected_px=place + rng.normal(0, 4, 2)
+            one,
+            id=f"c{k}",
+            pixel_px=(place := rng.uniform((0, 0), _UPRIGHT_PX)),
+            projected_px=place + rng.normal(0, 4, 2),
         )
         for k in range(80)
     )
@@ -129,10 +136,10 @@ def fullest_subject(project_root: Path) -> ReportSubject:
     )
     warnings = tuple(DataWarning(f"code-{k}", long, "place the reflector elsewhere, " * 4) for k in range(20))
     unpaired = tuple(replace(calibration.unpaired[0], id=f"u{k}", reason=long) for k in range(20))
-    full = replace(calibration, pairs=pairs, warnings=warnings, unpaired=unpaired)
+    full = replace(calibration, camera=camera, pairs=pairs, warnings=warnings, unpaired=unpaired)
     subject = subject_for(project_root, full)
     files = tuple(InputFile(f"part_{k}.bag", 10**9 + k, f"{k:064x}") for k in range(40))
-    frame = np.full((480, 640, 3), 200, np.uint8)
+    frame = np.full((height_px, width_px, 3), 200, np.uint8)
     jpeg = cv2.imencode(".jpg", frame)[1].tobytes()
     seen = watched_recording(inputs=files, warnings=warnings, picture=Picture(jpeg, "the frame at 1.000000000 s"))
     moved = replace(full, camera_from_radar=full.camera_from_radar.perturbed(np.full(6, 0.01)))
