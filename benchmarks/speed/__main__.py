@@ -10,6 +10,7 @@ from benchmarks.speed.paging import measure_page
 from benchmarks.speed.recordings import measure_recordings
 from benchmarks.speed.rows import page
 from benchmarks.speed.serving import measure_serving
+from benchmarks.speed.showing import measure_showing
 from benchmarks.speed.solving import measure_solving
 from benchmarks.speed.starting import measure_starting
 
@@ -27,6 +28,7 @@ def main() -> int:
             measure_solving(),
             measure_starting(sample_folder() / "rooftop"),
             measure_recordings(Path(scratch), large=large),
+            measure_showing(Path(scratch)),
         ]
     text = page(tables, command="make bench BENCH=--large" if large else "make bench")
     _PAGE.write_text(text, encoding="utf-8")

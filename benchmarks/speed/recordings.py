@@ -91,15 +91,23 @@ def measure_recordings(scratch: Path, *, large: bool = False) -> Table:
 
 
 def write_bag(
-    path: Path, frames: int, *, compression: str = "", returns: int = 0, clouds: int = 0, hole_bytes: int = 0
+    path: Path,
+    frames: int,
+    *,
+    compression: str = "",
+    returns: int = 0,
+    clouds: int = 0,
+    hole_bytes: int = 0,
+    size_px: tuple[int, int] = (1920, 1080),
+    one_scene: bool = False,
 ) -> Path:
-    """Write a bag with rosbags; with holes, its pictures are far apart in a sparse file."""
+    """Write a bag with rosbags; with holes, its pictures are far apart in a sparse file; of one scene, only noise differs."""
     from rosbags.rosbag1 import Writer
 
     writer = Writer(path)
     if compression:
         writer.set_compression(Writer.CompressionFormat[compression.upper()])
-    pictures = _pictures()
+    pictures = _pictures(size_px, one_scene=one_scene)
     with writer:
         topics = _connections(writer, returns > 0)
         for time_ns, topic, data in _messages(frames, returns, clouds, pictures):
@@ -162,14 +170,16 @@ def _cloud_body() -> bytes:
     return head + struct.pack("<?III", False, 20, len(points), len(points)) + points + b"\x01"
 
 
-def _pictures() -> list[bytes]:
+def _pictures(size_px: tuple[int, int], *, one_scene: bool) -> list[bytes]:
     import cv2
 
     rng = np.random.default_rng(2)
     pictures = []
-    for _ in range(4):
-        small = rng.integers(0, 255, (68, 120, 3), dtype=np.uint8)
-        picture = cv2.resize(small, (1920, 1080), interpolation=cv2.INTER_CUBIC)
+    small = rng.integers(0, 255, (68, 120, 3), dtype=np.uint8)
+    for number in range(4):
+        if number and not one_scene:
+            small = rng.integers(0, 255, (68, 120, 3), dtype=np.uint8)
+        picture = cv2.resize(small, size_px, interpolation=cv2.INTER_CUBIC)
         noise = rng.integers(-6, 6, picture.shape, dtype=np.int16)
         picture = np.clip(picture + noise, 0, 255).astype(np.uint8)
         pictures.append(cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 75])[1].tobytes())

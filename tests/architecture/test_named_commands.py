@@ -10,11 +10,17 @@ import pytest
 from app.cli.commands import COMMANDS
 from app.cli.tyro_hook import flags_of
 
-PROSE = {"again", "cookie", "therefore", "wrote"}
+PROSE = {"again", "boxes-1", "cookie", "reads", "therefore", "wrote"}
 """Words that follow the program's name in sentences that do not name a command."""
 
-OTHER_PROGRAMS = {f"--{name}" for name in ("frame-id", "child-frame-id", "qx", "qy", "qz", "qw")}
-"""Options of other programs: ROS's static_transform_publisher."""
+_TRANSFORM_PUBLISHER = ("frame-id", "child-frame-id", "qx", "qy", "qz", "qw")
+_RERUN = ("bind", "port", "serve-web", "web-viewer-port")
+_CHROMIUM = (
+    *("disable-background-networking", "disable-dev-shm-usage", "disable-extensions", "disable-gpu", "headless"),
+    *("host-resolver-rules", "no-first-run", "no-pdf-header-footer", "no-sandbox", "print-to-pdf", "user-data-dir"),
+)
+OTHER_PROGRAMS = {f"--{name}" for name in (*_TRANSFORM_PUBLISHER, *_RERUN, *_CHROMIUM)}
+"""Options of other programs that ours names or starts."""
 
 _COMMAND = re.compile(r"(?<![\w/.-])cocalib[ \t]+(?P<command>[a-z][\w-]*)(?P<rest>[^\n`;()]*)")
 _FLAG = re.compile(r"(?<![\w-])--[a-z][a-z0-9.-]*[a-z0-9]")
