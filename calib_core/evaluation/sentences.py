@@ -65,7 +65,8 @@ def _sensitivity_sentence(curve: Sensitivity) -> str:
         )
     best = curve.best_deg
     ends = f"{_percent(at[low])} at {low:+g} deg, {_percent(at[high])} at {high:+g} deg"
-    where = "" if max(curve.acc) - at[0.0] < _CLEARLY_HIGHER else f", highest at {best:+g} deg ({_percent(max(curve.acc))}), not here"
+    highest = f", highest at {best:+g} deg ({_percent(max(curve.acc))}), not here"
+    where = highest if max(curve.acc) - at[0.0] >= _CLEARLY_HIGHER else ""
     return f"Acc under {curve.axis}: {_percent(at[0.0])} here, {ends}{where}"
 
 
