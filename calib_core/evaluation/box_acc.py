@@ -108,7 +108,7 @@ def judged_by_boxes(
         frames=_frames(counted, inside),
         classes=_classes(counted, inside),
         ranges=_ranges(counted, inside),
-        sensitivity=_sensitivity(points_camera_m, camera, counted, progress) if len(shares) else (),
+        sensitivity=_sensitivity(points_camera_m, camera, counted, error, progress) if len(shares) else (),
         chance=_chance(points_camera_m, camera, counted) if len(shares) else None,
         rule=counted.rule,
         source=counted.source,
@@ -195,6 +195,7 @@ def _sensitivity(
     points_camera_m: Points3,
     camera: Camera,
     counted: CountedReturns,
+    standard_error: float,
     progress: Callable[[int, int], None] | None,
 ) -> tuple[Sensitivity, ...]:
     curves = []
@@ -205,7 +206,7 @@ def _sensitivity(
             accs.append(_mean_share(inside_own_boxes(pixels, counted.boxes_px), counted.frames))
             if progress is not None:
                 progress(number * len(ANGLES_DEG) + step + 1, len(AXES) * len(ANGLES_DEG))
-        curves.append(Sensitivity(name, ANGLES_DEG, tuple(accs)))
+        curves.append(Sensitivity(name, ANGLES_DEG, tuple(accs), standard_error))
     return tuple(curves)
 
 

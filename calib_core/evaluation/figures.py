@@ -217,16 +217,18 @@ class Sensitivity:
         axis: turned about.
         angles_deg: ascending, 0 among them.
         acc: Acc at each angle, 0 to 1.
+        standard_error: of Acc at 0; smaller changes may be chance. NaN if unknown.
     """
 
     axis: Axis
     angles_deg: tuple[float, ...]
     acc: tuple[float, ...]
+    standard_error: float = float("nan")
 
     @property
     def is_flat(self) -> bool:
-        """Whether Acc cannot see this axis: it changes by less than a percentage point."""
-        return max(self.acc) - min(self.acc) < FLAT_SHARE
+        """Whether Acc cannot see this axis: it changes by less than a percentage point, or than its standard error."""
+        return max(self.acc) - min(self.acc) < max(FLAT_SHARE, float(np.nan_to_num(self.standard_error)))
 
     @property
     def best_deg(self) -> float:

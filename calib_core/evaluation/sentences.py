@@ -11,6 +11,7 @@ NOT_ACCURACY = (
     "by its residuals and error bars"
 )
 _NAMED = 5
+_CLEARLY_HIGHER = 0.005
 
 
 def evaluation_lines(evaluation: Evaluation) -> tuple[str, ...]:
@@ -64,7 +65,8 @@ def _sensitivity_sentence(curve: Sensitivity) -> str:
         )
     best = curve.best_deg
     ends = f"{_percent(at[low])} at {low:+g} deg, {_percent(at[high])} at {high:+g} deg"
-    where = "" if best == 0.0 else f", highest at {best:+g} deg ({_percent(max(curve.acc))}), not here"
+    highest = f", highest at {best:+g} deg ({_percent(max(curve.acc))}), not here"
+    where = highest if max(curve.acc) - at[0.0] >= _CLEARLY_HIGHER else ""
     return f"Acc under {curve.axis}: {_percent(at[0.0])} here, {ends}{where}"
 
 

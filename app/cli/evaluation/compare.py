@@ -55,7 +55,9 @@ class Compare:
             raise InputError("clicks and boxes are those of a recording; give it too: cocalib compare A B RECORDING")
         camera = None if self.camera is None else read_camera_file(self.camera)
         found_a, found_b = (self.frames.read([path])[0] for path in (self.a, self.b))
-        compared = self._on_recording(self.a, self.b, camera) if self.recording else None
+        compared = None
+        if self.recording:
+            compared, camera = self._on_recording(self.a, self.b, camera)
         both = compare(found_a, found_b, camera=camera)
         figures = [(row.label, row.text) for row in both.figures]
         verdict = both.verdict(self.a.name, self.b.name)
@@ -69,7 +71,8 @@ class Compare:
         print("\n".join([*(f"{label}: {text}" for label, text in figures), verdict]))
         return 0
 
-    def _on_recording(self, a: Path, b: Path, camera: "Camera | None") -> "ComparedOnRecording":
+    def _on_recording(self, a: Path, b: Path, camera: "Camera | None") -> "tuple[ComparedOnRecording, Camera]":
+        """Judge both on the recording; also return the lens to compare their poses through."""
         from app.cli.evaluation.judged_calibration import judged_calibration
         from app.comparing import compare_on_recording
         from calib_core.recordings import open_recording
@@ -85,7 +88,7 @@ class Compare:
                     "(--boxes FILE_OR_TOPIC)"
                 )
             with progress_bar("comparing") as progress:
-                return compare_on_recording(
+                compared = compare_on_recording(
                     (of_a.calibration, of_b.calibration),
                     recording,
                     names=(a.name, b.name),
@@ -95,6 +98,7 @@ class Compare:
                     progress=progress,
                     options=options,
                 )
+            return compared, of_a.calibration.camera
 
 
 def _json(a: str, b: str, figures: list[tuple[str, str]], verdict: str, compared: "ComparedOnRecording | None") -> str:

@@ -17,6 +17,7 @@ __all__ = ["MovingReturns", "SensorMotion", "TargetOptions", "moving_returns"]
 SensorMotion: TypeAlias = Literal["auto", "still", "moving"]
 
 _MOVING_SHARE = 0.1  # of the scans that look as if the sensors moved
+_STILL_CELLS = 2.0  # that moving sensors hardly see
 _UNKNOWN_SHARE = 0.5  # of returns without a Doppler speed: the radar then measures none
 
 
@@ -82,7 +83,7 @@ class _Sifted:
         as_still: (n,) speed if the sensors stand still.
         as_moving: (n,) speed with the radar's own velocity taken out; NaN where that cannot be found.
         fitted: number of scans in which most returns move alike, as they do if the sensors move.
-        unfitted: number of scans in which most returns move, but not alike.
+        unfitted: number of scans in which nearly all returns move, but not alike.
         judged: number of scans with enough returns.
         unknown: number of returns without a speed.
         searched: number of returns.
@@ -137,14 +138,15 @@ def _sifted(scans: RadarScans, options: TargetOptions, offset: int) -> _Sifted:
             continue
         judged += 1
         weights = cell_weights(scans.points_radar_m[rows][known])
-        if weights @ (np.abs(speeds[rows][known]) >= options.min_speed_mps) <= 0.5 * weights.sum():
+        still = float(weights @ (np.abs(speeds[rows][known]) < options.min_speed_mps))
+        if still >= 0.5 * weights.sum():
             as_moving[rows] = speeds[rows]  # most stand still, so the radar does
             continue
         ego = ego_velocity(scans.points_radar_m[rows], speeds[rows], tolerance_mps=options.min_speed_mps)
         if ego is not None:
             as_moving[rows] = ego.speeds_mps
         fitted += ego is not None
-        unfitted += ego is None
+        unfitted += ego is None and still < _STILL_CELLS
     fast = [np.abs(np.nan_to_num(some)) >= options.min_speed_mps for some in (speeds, as_moving)]
     kept = np.flatnonzero(unknown | fast[0] | fast[1])
     return _Sifted(
@@ -202,7 +204,7 @@ def _unclear(unfitted: int, judged: int) -> tuple[DataWarning, ...]:
     return (
         DataWarning(
             "mostly-moving",
-            f"most returns move in {unfitted} of {judged} scans, but not as they would if the sensors did: the radar's own "
+            f"nearly all returns move in {unfitted} of {judged} scans, but not as they would if the sensors did: the radar's own "
             "speed cannot be found, and the sensors are taken to stand still",
             "right if the radar leaves out what stands still; if the sensors moved, Acc says nothing here",
         ),

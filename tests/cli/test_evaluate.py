@@ -1,0 +1,233 @@
+"""`cocalib evaluate` and `cocalib compare`: the answer first, stable JSON, exit codes, and bad input in words."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from calib_core.boxes import boxes_text, labels_text
+from calib_core.measurements import TimeNs
+from calib_core.recordings.containers.recorded_messages import (
+    CameraInfoMessage,
+    CloudMessage,
+    CompressedImageMessage,
+    RecordedMessage,
+)
+from calib_core.recordings.containers.writing import write_ros2
+from tests.street import CAMERA, TRUE_POSE, Street, street, turned
+
+Cocalib = Callable[..., Any]
+
+
+def written(path: Path, scene: Street, *, late_s: float = 0.0) -> Path:
+    """Write a street as an MCAP recording; all its pictures are the same."""
+    jpeg = cv2.imencode(".jpg", np.full((CAMERA.height_px, CAMERA.width_px, 3), 90, np.uint8))[1].tobytes()
+    messages = []
+    for frame in scene.boxes:
+        time = frame.image_time
+        messages.append(RecordedMessage("/camera/image/compressed", time, CompressedImageMessage(time, "cam", jpeg)))
+        messages.append(RecordedMessage("/camera/camera_info", time, CameraInfoMessage(time, "cam", CAMERA)))
+    for index in range(len(scene.scans)):
+        scan = scene.scans.scan(index)
+        time = TimeNs(scan.time + round(late_s * 1e9))
+        values = np.column_stack([scan.points_radar_m, scan.doppler_mps, np.full(len(scan), 20.0)])
+        names = ("x", "y", "z", "velocity", "snr")
+        messages.append(RecordedMessage("/radar/points", time, CloudMessage(time, "radar", names, values)))
+    return write_ros2(path, iter(sorted(messages, key=lambda one: one.receive_time)), container="mcap")
+
+
+def matrix_file(path: Path, angle_deg: float = 0.0) -> Path:
+    np.savetxt(path, turned(TRUE_POSE, 1, angle_deg).as_matrix())
+    return path
+
+
+@pytest.fixture(scope="module")
+def scene() -> Street:
+    return street(people=3, seconds=30.0, seed=2, with_names=True)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, scene: Street) -> Path:
+    """Return a folder with a recording, its boxes and labels, and calibrations right and turned by 3 deg."""
+    place = tmp_path_factory.mktemp("street")
+    written(place / "street.mcap", scene)
+    (place / "boxes.json").write_text(boxes_text(scene.boxes))
+    (place / "labels.json").write_text(labels_text(scene.labels))
+    matrix_file(place / "right.txt")
+    matrix_file(place / "turned.txt", 3.0)
+    return place
+
+
+@pytest.fixture
+def solved(cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path) -> Path:
+    out = tmp_path / "calibration.json"
+    assert cocalib("solve", made(), "--clicks", clicks_file, "--out", out).code == 0
+    return out
+
+
+def test_residuals_come_first_and_say_what_they_rest_on(cocalib: Cocalib, solved: Path) -> None:
+    recording = solved.parent / "made.mcap"
+    answer = cocalib("evaluate", solved, recording)
+    first, held, *_ = answer.out.splitlines()
+
+    assert answer.code == 0
+    assert first.startswith("residuals: AED ")
+    assert "8 clicks at 8 placements" in first
+    assert held.startswith("held out: AED ")
+    document = json.loads(cocalib("evaluate", solved, recording, "--json").out)
+    assert document["schema"] == "cocalib/evaluation-1"
+    assert document["residuals"]["aed_px"] == pytest.approx(
+        json.loads(solved.read_text())["metrics"]["aed_px"], abs=0.05
+    )
+    assert [len(document["residuals"][key]["distances_px"]) for key in ("held_out", "k_fold")] == [8, 8]
+    assert document["boxes"] is None
+
+
+def test_acc_is_never_alone(cocalib: Cocalib, folder: Path) -> None:
+    answer = cocalib("evaluate", folder / "right.txt", folder / "street.mcap", "--boxes", folder / "boxes.json")
+
+    assert answer.code == 0, answer.err
+    assert answer.out.startswith("Acc: ")
+    assert "Acc is flat in roll: it cannot see it" in answer.out
+    assert "Acc is not accuracy" in answer.out
+    assert "chance: turned by 10 deg to either side 0." in answer.out
+
+
+def test_the_json_has_the_documented_keys(cocalib: Cocalib, folder: Path) -> None:
+    arguments = ("evaluate", folder / "right.txt", folder / "street.mcap", "--boxes", folder / "boxes.json", "--json")
+    plain = json.loads(cocalib(*arguments).out)
+    truth = json.loads(cocalib(*arguments, "--labels", folder / "labels.json").out)
+    page = Path("docs/evaluation.md").read_text()
+
+    assert all(f"`{key}`" in page for key in [*plain, *plain["boxes"], *plain["boxes"]["frames"][0]])
+    assert abs(plain["boxes"]["acc"] - truth["boxes"]["acc"]) < 0.1
+    assert [one["axis"] for one in plain["boxes"]["sensitivity"]] == ["roll", "pitch", "yaw"]
+    assert plain["boxes"]["sensitivity"][0]["flat"] is True
+    assert "labels say which returns" in truth["boxes"]["rule"]
+
+
+def test_a_turned_calibration_is_told_from_the_right_one(cocalib: Cocalib, folder: Path) -> None:
+    where = (folder / "right.txt", folder / "turned.txt", folder / "street.mcap")
+    answer = cocalib("compare", *where, "--boxes", folder / "boxes.json")
+
+    assert answer.code == 0, answer.err
+    assert answer.out.startswith("A (right.txt) is better than turned.txt on this recording: its Acc is ")
+    assert "rotation: 3 deg apart" in answer.out
+    document = json.loads(cocalib("compare", *where, "--boxes", folder / "boxes.json", "--json").out)
+    assert document["schema"] == "cocalib/comparison-1"
+    assert document["on_recording"]["winner"] == "A"
+    assert document["on_recording"]["acc"]["high"] < 0
+
+
+def test_compare_prints_the_figures_of_check_against(cocalib: Cocalib, folder: Path) -> None:
+    compared = cocalib("compare", folder / "right.txt", folder / "turned.txt").out.splitlines()
+    checked = cocalib("check", folder / "turned.txt", "--against", folder / "right.txt").out.splitlines()
+    told = [line.removeprefix("compared with the other: ") for line in checked if line.startswith("compared with")]
+
+    assert compared[:2] == told[:2]
+    assert compared[0] == "rotation: 3 deg apart"
+
+
+def test_a_calibration_that_was_solved_from_the_clicks_is_not_compared_by_them(
+    cocalib: Cocalib, solved: Path, tmp_path: Path
+) -> None:
+    pose = json.loads(solved.read_text())["camera_from_radar"]
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = pose["rotation"], np.array(pose["translation_m"]) + np.array([0.1, 0.0, 0.0])
+    np.savetxt(tmp_path / "other.txt", matrix)
+    answer = cocalib("compare", solved, tmp_path / "other.txt", tmp_path / "made.mcap")
+
+    assert answer.out.startswith(
+        "cannot tell which is better on this recording: one of them was solved from these clicks"
+    )
+    assert "calibration.json was solved from these clicks" in answer.out
+
+
+def test_small_differences_may_be_noise(cocalib: Cocalib, folder: Path, tmp_path: Path) -> None:
+    close = matrix_file(tmp_path / "close.txt", 0.03)
+    answer = cocalib("compare", folder / "right.txt", close, folder / "street.mcap", "--boxes", folder / "boxes.json")
+    assert answer.out.startswith(
+        ("cannot tell which is better on this recording: the difference may be noise", "no diff")
+    )
+
+
+def test_classes_are_chosen_and_renamed(cocalib: Cocalib, folder: Path) -> None:
+    where = ("evaluate", folder / "right.txt", folder / "street.mcap", "--boxes", folder / "boxes.json")
+
+    named = cocalib(*where, "--class-map", "person=pedestrian", "--classes", "pedestrian")
+    assert "  pedestrian: " in named.out
+    wrong = cocalib(*where, "--classes", "car")
+    assert (wrong.code, "no box is of the class 'car'; there are: 'person'" in wrong.err) == (2, True)
+    assert "expected FROM=TO" in cocalib(*where, "--class-map", "person").err
+
+
+@pytest.mark.parametrize(
+    ("extra", "said"),
+    [
+        ((), "nothing to judge right.txt by: no clicks"),
+        (("--labels", "labels.json"), "--labels applies to boxes"),
+        (("--boxes", "missing.json"), "missing.json"),
+        (("--min-speed-mps", "-1"), "--min-speed-mps: is -1"),
+        (("--max-time-gap-s", "99"), "--max-time-gap-s: is 99"),
+    ],
+)
+def test_bad_options_are_answered_in_words(cocalib: Cocalib, folder: Path, extra: tuple[str, ...], said: str) -> None:
+    answer = cocalib("evaluate", folder / "right.txt", folder / "street.mcap", *extra)
+    assert answer.code == 2
+    assert said in answer.err
+    assert answer.err.count("\n") == 1
+
+
+def test_boxes_and_radar_without_common_stamps_are_refused(
+    cocalib: Cocalib, folder: Path, scene: Street, tmp_path: Path
+) -> None:
+    apart = written(tmp_path / "apart.mcap", scene, late_s=3600.0)
+    answer = cocalib("evaluate", folder / "right.txt", apart, "--boxes", folder / "boxes.json")
+
+    assert answer.code == 2
+    assert "no annotated frame is within 0.05 s of a radar scan" in answer.err
+
+
+def test_boxes_of_another_recording_are_refused(cocalib: Cocalib, folder: Path, scene: Street, tmp_path: Path) -> None:
+    other = replace(
+        scene.boxes,
+        frames=tuple(replace(frame, image_time=TimeNs(frame.image_time + 10**13)) for frame in scene.boxes),
+    )
+    (tmp_path / "other.json").write_text(boxes_text(other))
+    answer = cocalib("evaluate", folder / "right.txt", folder / "street.mcap", "--boxes", tmp_path / "other.json")
+
+    assert answer.code == 2
+    assert "other.json" in answer.err
+
+
+def test_a_calibration_of_another_camera_is_refused(cocalib: Cocalib, folder: Path, solved: Path) -> None:
+    answer = cocalib("evaluate", solved, folder / "street.mcap", "--boxes", folder / "boxes.json")
+
+    assert answer.code == 2
+    assert "calibrated for pictures of 320 x 240 px, but the recording's camera has 1280 x 720 px" in answer.err
+
+
+def test_without_moving_returns_there_is_no_acc(cocalib: Cocalib, folder: Path, scene: Street, tmp_path: Path) -> None:
+    still = written(
+        tmp_path / "still.mcap", replace(scene, scans=replace(scene.scans, doppler_mps=0 * scene.scans.doppler_mps))
+    )
+    answer = cocalib("evaluate", folder / "right.txt", still, "--boxes", folder / "boxes.json")
+
+    assert answer.code == 1
+    assert "no moving target was found in the scans of the annotated frames" in answer.out
+
+
+def test_a_calibration_that_looks_elsewhere_than_the_boxes_is_doubted(
+    cocalib: Cocalib, folder: Path, tmp_path: Path
+) -> None:
+    away = matrix_file(tmp_path / "away.txt", 10.0)
+    answer = cocalib("evaluate", away, folder / "street.mcap", "--boxes", folder / "boxes.json")
+
+    assert answer.code == 3
+    assert answer.out.startswith("Acc: 0.")
+    assert "targets and boxes agree best with a camera turned by" in answer.out

@@ -1,0 +1,55 @@
+"""The real road recording with its published calibration: nothing moves in it, and the commands say so."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli import run
+from calib_core.boxes import boxes_text
+from calib_core.detections import Box, Boxes, FrameBoxes
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import TimeNs
+from calib_core.recordings import open_recording
+
+pytestmark = pytest.mark.real
+
+
+@pytest.fixture
+def published(shared_data: Path, tmp_path: Path) -> tuple[Path, Path, Path]:
+    """Return the recording, the published pose as a bare matrix, and boxes that a person drew in two frames."""
+    place = shared_data / "real_radar_camera_road"
+    recording = place / "pjlab_radar_camera.bag"
+    if not recording.is_file():
+        pytest.skip("the road recording is not there")
+    matrix = np.array(json.loads((place / "published_calibration.json").read_text())["T_radar_to_camera"])
+    pose = RigidTransform(np.linalg.svd(matrix[:3, :3])[0] @ np.linalg.svd(matrix[:3, :3])[2], matrix[:3, 3])
+    np.savetxt(tmp_path / "published.txt", pose.as_matrix())
+    with open_recording(recording) as opened:
+        times = opened.image_times[[1, 4]].tolist()
+    drawn = tuple(FrameBoxes(TimeNs(time), (Box(900, 560, 1000, 640, "car", track="car-1"),)) for time in times)
+    (tmp_path / "boxes.json").write_text(boxes_text(Boxes(drawn, "boxes.json", (1920, 1200))))
+    return recording, tmp_path / "published.txt", tmp_path / "boxes.json"
+
+
+def test_without_clicks_and_boxes_there_is_nothing_to_judge_by(
+    published: tuple[Path, Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording, pose, _ = published
+
+    assert run(["evaluate", str(pose), str(recording)]) == 2
+    assert "nothing to judge published.txt by: no clicks" in capsys.readouterr().err
+
+
+def test_with_boxes_it_says_that_nothing_moves(
+    published: tuple[Path, Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording, pose, boxes = published
+
+    assert run(["evaluate", str(pose), str(recording), "--boxes", str(boxes)]) == 1
+    assert "no moving target was found in the scans of the annotated frames" in capsys.readouterr().out
+    assert run(["compare", str(pose), str(pose), str(recording), "--boxes", str(boxes)]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("cannot tell which is better on this recording: there is nothing to judge them by")
+    assert "at 20 m: 0 px" in out
