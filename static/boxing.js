@@ -39,6 +39,9 @@ export function startBoxing() {
     cancelBox();
   });
   addEventListener("pagehide", flushBox);
+  document.addEventListener("keydown", (event) => {
+    if (event.key === "Escape" && boxing.on && !document.querySelector("dialog[open]")) selectBox(null);
+  });
 }
 
 /** Whether a box takes the pointer. @returns {boolean} */
