@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from app.board_search import find_board
 from app.resources import version
 from app.session import Outcome
 from calib_core.association.pairing import pair_clicks
@@ -114,7 +115,28 @@ def solve_in_steps(
         return
     times = sorted({click.image_time for click in clicks})
     scans = recording.radar_scans_around(times, half_window_s(options))
+    if options.method == "ccm":
+        yield _solved_on_board(recording, clicks, scans, camera, options)
+        return
     yield from calibration_steps(clicks, scans, camera, options, previous=previous, preview=preview)
+
+
+def _solved_on_board(
+    recording: RadarSource,
+    clicks: Sequence[ReflectorClick],
+    scans: RadarScans,
+    camera: Camera,
+    options: CalibrationOptions,
+) -> Outcome:
+    """Solve by the checkerboard that the recording's pictures show."""
+    from calib_core.baselines.checkerboard import calibrate_on_board
+
+    pairing = pair_clicks(clicks, scans, options)
+    excluded = frozenset(click.id for click in clicks if not click.counts)
+    corners_px = find_board(recording, options.board)
+    if isinstance(corners_px, Unsolvable):
+        return dataclasses.replace(corners_px, unpaired=pairing.unpaired, pairs=pairing.pairs)
+    return calibrate_on_board(pairing.pairs, corners_px, camera, options, excluded=excluded, unpaired=pairing.unpaired)
 
 
 def check_clicks(

@@ -55,7 +55,7 @@ def calibrate(
         clicks: in any order; excluded ones are paired and shown, but not used.
         scans: at least those around the clicks.
         camera: the intrinsics.
-        options: None takes the defaults; method "paper" is Algorithm 1 as printed.
+        options: None takes the defaults; method "paper" is Algorithm 1 as printed, "pmm" the pose of the mounting.
         background: scans of the whole recording, to tell what stands there before and after each placement; optional.
     """
     *_, outcome = calibration_steps(clicks, scans, camera, options, background=background, preview=False)
@@ -94,6 +94,9 @@ def calibration_steps(
         return
     pairing = pair_clicks(clicks, scans, options, background=background)
     excluded = frozenset(click.id for click in clicks if not click.counts)
+    if options.method in ("pmm", "ccm"):
+        yield _baseline(pairing.pairs, pairing.unpaired, excluded, camera, options)
+        return
     task = _Task.of(pairing.pairs, pairing.unpaired, excluded, camera, options)
     for outcome in _steps(task, previous=previous, preview=preview):
         if isinstance(outcome, Unsolvable):
@@ -126,8 +129,25 @@ def calibrate_pairs(
         from calib_core.paper.algorithm_1 import solve_pairs_as_printed
 
         return solve_pairs_as_printed(checked_pairs(pairs, with_noise=False), camera, options, excluded)
+    if options.method in ("pmm", "ccm"):
+        return _baseline(_in_order(checked_pairs(pairs, with_noise=False)), (), excluded, camera, options)
     *_, outcome = _steps(_task_of_pairs(pairs, camera, options, excluded), previous=None, preview=False)
     return outcome
+
+
+def _baseline(
+    pairs: Sequence[Pair],
+    unpaired: tuple[Unpaired, ...],
+    excluded: frozenset[str],
+    camera: Camera,
+    options: CalibrationOptions,
+) -> Calibration | Unsolvable:
+    """Run a baseline that needs no pictures; the one on the checkerboard starts where they are, in `calibrate_on_board`."""
+    from calib_core.baselines.mounting import calibrate_by_mounting
+
+    if options.method == "pmm":
+        return calibrate_by_mounting(pairs, camera, options, excluded=excluded, unpaired=unpaired)
+    return unsolved.no_board_pictures(tuple(pairs), unpaired)
 
 
 def preview_pairs(
@@ -156,8 +176,12 @@ def _task_of_pairs(
     pairs: Sequence[Pair], camera: Camera, options: CalibrationOptions, excluded: frozenset[str]
 ) -> "_Task":
     checked_pairs(pairs, with_noise=True)
-    shown = sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))
-    return _Task.of(tuple(shown), (), excluded, camera, options)
+    return _Task.of(tuple(_in_order(pairs)), (), excluded, camera, options)
+
+
+def _in_order(pairs: Sequence[Pair]) -> list[Pair]:
+    """Sort by image time; pairs without a time stay in the order given."""
+    return sorted(pairs, key=lambda pair: (pair.image_time is not None, pair.image_time or 0))
 
 
 def solve_again(calibration: Calibration, options: CalibrationOptions | None = None) -> Calibration | Unsolvable:

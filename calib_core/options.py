@@ -5,12 +5,14 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
 __all__ = [
+    "BoardOptions",
     "CalibrationOptions",
     "CameraPositionPrior",
     "GatingOptions",
     "LensOptions",
     "LocatingOptions",
     "Method",
+    "MountingOptions",
     "NoiseOptions",
     "PaperOptions",
     "RadarOptions",
@@ -20,7 +22,7 @@ __all__ = [
     "without_systematic_errors",
 ]
 
-Method = Literal["default", "paper"]
+Method = Literal["default", "paper", "pmm", "ccm"]
 
 
 def option(default: Any, text: str, *, low: float = -math.inf, high: float = math.inf) -> Any:
@@ -213,10 +215,42 @@ class PaperOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class MountingOptions:
+    """How the camera is mounted on the radar, for the method pmm: turned by roll, then pitch, then yaw about the radar's axes."""
+
+    roll_deg: float = option(0.0, "How far the camera leans to its right [deg].", low=-180.0, high=180.0)
+    pitch_deg: float = option(
+        0.0, "How far the camera looks down from the radar's direction [deg].", low=-90.0, high=90.0
+    )
+    yaw_deg: float = option(
+        0.0, "How far the camera looks to the left of the radar's direction [deg].", low=-180.0, high=180.0
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class BoardOptions:
+    """The checkerboard that the reflector is put on, for the method ccm."""
+
+    columns: int = option(8, "Inner corners along the longer side of the checkerboard.", low=2, high=100)
+    rows: int = option(5, "Inner corners along its shorter side.", low=2, high=100)
+    square_m: float = option(0.1, "Side of a square [m].", low=0.001, high=10.0)
+    reach_squares: float = option(
+        0.35, "A click farther than this from every corner is not on one [squares].", low=0.01, high=0.5
+    )
+    registration: Literal["rigid", "linear"] = option(
+        "rigid",
+        "Register by the best rotation and shift, or by twelve free numbers made a rotation afterwards, which flat boards upset.",
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class CalibrationOptions:
     """All options of a calibration."""
 
-    method: Method = option("default", "The robust estimator, or the paper's Algorithm 1 as printed.")
+    method: Method = option(
+        "default",
+        "The robust estimator; the paper's Algorithm 1 as printed; or a baseline: the mounting (pmm), a checkerboard (ccm).",
+    )
     gating: GatingOptions = field(default_factory=GatingOptions)
     locating: LocatingOptions = field(default_factory=LocatingOptions)
     noise: NoiseOptions = field(default_factory=NoiseOptions)
@@ -225,6 +259,8 @@ class CalibrationOptions:
     reflector: ReflectorOptions = field(default_factory=ReflectorOptions)
     solving: SolvingOptions = field(default_factory=SolvingOptions)
     paper: PaperOptions = field(default_factory=PaperOptions)
+    mounting: MountingOptions = field(default_factory=MountingOptions)
+    board: BoardOptions = field(default_factory=BoardOptions)
 
 
 def without_systematic_errors(options: CalibrationOptions) -> CalibrationOptions:

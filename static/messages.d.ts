@@ -124,9 +124,25 @@ export interface PaperOptions {
   ransac_confidence: number;
 }
 
+/** How the camera is mounted on the radar, for the method pmm: turned by roll, then pitch, then yaw about the radar's axes. */
+export interface MountingOptions {
+  roll_deg: number;
+  pitch_deg: number;
+  yaw_deg: number;
+}
+
+/** The checkerboard that the reflector is put on, for the method ccm. */
+export interface BoardOptions {
+  columns: number;
+  rows: number;
+  square_m: number;
+  reach_squares: number;
+  registration: "rigid" | "linear";
+}
+
 /** All options of a calibration. */
 export interface CalibrationOptions {
-  method: "default" | "paper";
+  method: "default" | "paper" | "pmm" | "ccm";
   gating: GatingOptions;
   locating: LocatingOptions;
   noise: NoiseOptions;
@@ -135,6 +151,8 @@ export interface CalibrationOptions {
   reflector: ReflectorOptions;
   solving: SolvingOptions;
   paper: PaperOptions;
+  mounting: MountingOptions;
+  board: BoardOptions;
 }
 
 /** Where to put the reflector next. */
@@ -247,7 +265,7 @@ export interface View {
   can_undo: boolean;
   can_redo: boolean;
   has_calibration: boolean;
-  method: "default" | "paper";
+  method: "default" | "paper" | "pmm" | "ccm";
   clicks: ClickRow[];
   metrics: Figure[];
   pose: Figure[];
@@ -1015,6 +1033,14 @@ export interface StopFollowingForm {
   request?: number;
 }
 
+/** A file of boxes was read; they take the place of all boxes. */
+export interface LoadBoxesForm {
+  type: "load_boxes";
+  name: string;
+  content_base64: string;
+  request?: number;
+}
+
 /** A page asks what can be chosen. */
 export interface ChoicesWanted {
   type: "choices";
@@ -1117,6 +1143,7 @@ export type FromPage =
   | UncertaintyForm
   | SnapForm
   | StopFollowingForm
+  | LoadBoxesForm
   | ChoicesWanted
   | FolderWanted
   | RecentForgotten

@@ -15,8 +15,8 @@ const FIRST = [
 ];
 /** Options that a method ignores. @type {Record<string, (path: string) => boolean>} */
 const IDLE = {
-  default: (path) => path.startsWith("paper."),
-  paper: (path) => /^(noise|solving|gating|radar|lens|reflector)\./.test(path) || (path.startsWith("locating.") && path !== "locating.max_time_gap_s"),
+  default: (path) => /^(paper|mounting|board)\./.test(path),
+  paper: (path) => /^(noise|solving|gating|radar|lens|reflector|mounting|board)\./.test(path) || (path.startsWith("locating.") && path !== "locating.max_time_gap_s"),
 };
 /** Labels that are clearer than the option's own name. @type {Record<string, string>} */
 const LABELS = {
@@ -49,7 +49,7 @@ const HEADINGS = {
   lens: "Lens: errors of the intrinsics, ±",
   reflector: "Reflector: what all clicks are off by, ±",
 };
-/** @type {Record<string, string>} */
+/** Those to choose from here; the paper's baselines are chosen on the command line. @type {Record<string, string>} */
 const METHODS = { default: "Default", paper: "Paper" };
 /** @type {Record<string, string>} */
 const METHOD_HINTS = {
@@ -92,8 +92,8 @@ function build() {
 
 /** @param {Field} field */
 function segmented(field) {
-  const buttons = field.choices.map((choice) => {
-    const button = make("button", "", METHODS[choice] ?? choice);
+  const buttons = field.choices.filter((choice) => METHODS[choice]).map((choice) => {
+    const button = make("button", "", METHODS[choice]);
     button.dataset.method = choice;
     button.dataset.hint = METHOD_HINTS[choice] ?? field.hint;
     button.onclick = () => change(field.path, choice);

@@ -30,6 +30,11 @@ def disagreement(options: CalibrationOptions) -> Disagreement:
             f"Outside the {options.paper.ransac_threshold_px:g} px of Algorithm 1's RANSAC, which uses it all the same",
             "The default method tells whether it is wrong.",
         )
+    if options.method in ("pmm", "ccm"):
+        return Disagreement(
+            "Farther from its reprojection than the assumed noise explains",
+            "The default method tells whether it is wrong.",
+        )
     usual, given = NoiseOptions(), options.noise
     strict = [text for name, text in _NOISE.items() if getattr(given, name) < _STRICT * getattr(usual, name)]
     if not strict:

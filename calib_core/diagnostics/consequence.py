@@ -14,6 +14,7 @@ on; it rests on an assumption, so it cannot be called good; nothing."""
 _CODES: dict[Consequence, tuple[str, ...]] = {
     "contradictory": (
         "behind-camera",
+        "outside-picture",
         "mirrored-axes",
         "units-suspected",
         "pixels-suspected",
@@ -27,6 +28,8 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
     ),
     "weak": (
         "weak-geometry",
+        "board-geometry",
+        "swapped-parts",
         "one-pair-decides",
         "few-pairs",
         "residuals-too-large",
@@ -43,6 +46,7 @@ _CODES: dict[Consequence, tuple[str, ...]] = {
         "angle-scale",
         "clicks-off-centre",
         "handedness-assumed",
+        "beside-board",
     ),
 }
 """The codes of each consequence, the gravest first."""

@@ -11,13 +11,15 @@ from calib_core.synthetic.scans import labelled_scans
 from calib_core.synthetic.scene.person import PersonState, capsules
 from calib_core.synthetic.scene.stage import Stage
 from calib_core.synthetic.scene.traffic import Actor
-from calib_core.synthetic.scene.vehicles import VehicleState, hidden_by, vehicle_parts
+from calib_core.synthetic.scene.vehicles import VehicleState, hidden_by, outline_points
 
 __all__ = ["is_annotated", "true_boxes", "true_labels"]
 
 _LEAST_VISIBLE = 0.25
 """Least share of an object that must be visible for a box."""
 _LEAST_PX = 3.0
+_ASKED = 80
+"""Of how many points of an outline it is asked whether anything hides them."""
 _TURNS_RAD = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
 _SHOULDER_M = 0.22
 _HEAD_M = 1.85
@@ -76,9 +78,10 @@ def _box(stage: Stage, actor: Actor, actors: tuple[Actor, ...], solids: list[Sol
     clipped_low, clipped_high = np.clip(low, -0.5, border), np.clip(high, -0.5, border)
     if np.any(clipped_high - clipped_low < _LEAST_PX):
         return None
-    visible = seen & camera.in_image(pixels)
+    some = np.linspace(0, len(pixels) - 1, min(_ASKED, len(pixels))).astype(np.int64)
+    visible = seen[some] & camera.in_image(pixels[some])
     others = [other.state for other in actors if other.track != actor.track]
-    visible[visible] = ~_hidden(eye_m, outline_m[visible], others, solids)
+    visible[visible] = ~_hidden(eye_m, outline_m[some][visible], others, solids)
     share = float(visible.mean())
     if share < _LEAST_VISIBLE:
         return None
@@ -89,11 +92,7 @@ def _box(stage: Stage, actor: Actor, actors: tuple[Actor, ...], solids: list[Sol
 def _silhouette(state: PersonState | VehicleState, eye_m: Vector3) -> Points3:
     """Return points (n, 3) on an object's outline as seen from an eye; their pixels bound it."""
     if isinstance(state, VehicleState):
-        steps = np.linspace(0.0, 1.0, 4, endpoint=False)[:, None]
-        rings = [part.corners_m for part in vehicle_parts(state)]
-        return np.concatenate(
-            [a + steps * (b - a) for ring in rings for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
-        )
+        return outline_points(state)
     limbs = capsules(state)
     centres = np.array([end for limb in limbs for end in (limb.start_m, limb.end_m)])
     radii = np.array([radius for limb in limbs for radius in (limb.start_radius_m, limb.end_radius_m)])

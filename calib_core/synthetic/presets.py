@@ -159,13 +159,13 @@ PRESETS: Mapping[PresetName, SimulationOptions] = {
         clicking=Clicking(clicks_per_placement=2, low_m=0.05, late_share=0.1, hasty_first_px=40.0),
     ),
     "paper-d1": SimulationOptions(
-        scene="open-rooftop", person_leaves=True, camera_rate_hz=2.0, defects=_PAPER_RADAR, surroundings=_BARE
+        scene="open-rooftop", person_leaves=True, camera_rate_hz=1.0, defects=_PAPER_RADAR, surroundings=_BARE
     ),
     "paper-d2": SimulationOptions(
         scene="open-yard",
         board_corners=12,
         person_leaves=True,
-        camera_rate_hz=2.0,
+        camera_rate_hz=1.0,
         defects=_PAPER_RADAR,
         surroundings=_BARE,
     ),
@@ -173,14 +173,14 @@ PRESETS: Mapping[PresetName, SimulationOptions] = {
         scene="aisle",
         reflector_edge_m=0.3,
         person_leaves=True,
-        camera_rate_hz=2.0,
+        camera_rate_hz=1.0,
         defects=RadarDefects(threshold_db=26.0, constant_azimuth_deg=0.5, constant_elevation_deg=1.0),
         surroundings=Surroundings(ghost_share=0.0, clutter_db=-12.0),
     ),
     "paper-dr-a": SimulationOptions(
         scene="open-rooftop",
         person_leaves=True,
-        camera_rate_hz=2.0,
+        camera_rate_hz=1.0,
         rig=RigOptions(radar_height_m=1.0, radar_tilt_deg=6.0, camera_offset_m=(0.02, 0.10, 0.06)),
         defects=_PAPER_RADAR,
         surroundings=_BARE,
@@ -189,7 +189,7 @@ PRESETS: Mapping[PresetName, SimulationOptions] = {
     "paper-dr-b": SimulationOptions(
         scene="open-rooftop",
         person_leaves=True,
-        camera_rate_hz=2.0,
+        camera_rate_hz=1.0,
         rig=RigOptions(radar_height_m=1.6, radar_tilt_deg=13.0, camera_offset_m=(-0.05, -0.15, 0.12)),
         defects=_PAPER_RADAR,
         surroundings=_BARE,

@@ -93,6 +93,36 @@ def test_solve_takes_pairs_by_either_method(
     assert document["metrics"]["aed_px"] < 0.01
 
 
+def test_solve_takes_the_pose_of_the_mounting(
+    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "mounting.json"
+    position = ["--camera-position-m", 0.0, 0.0, 0.1]
+    angles = ["--mounting.pitch-deg", 2.0, "--mounting.yaw-deg", -1.0]
+    answer = cocalib("solve", made(), "--clicks", clicks_file, "--out", out, "--method", "pmm", *position, *angles)
+    assert answer.code == 0, answer.err
+    assert "states no error" in answer.out
+    document = json.loads(out.read_text())
+    assert document["options"]["mounting"] == {"roll_deg": 0.0, "pitch_deg": 2.0, "yaw_deg": -1.0}
+    assert document["radar_from_camera"]["translation_m"] == pytest.approx([0.0, 0.0, 0.1])
+    assert document["metrics"]["n"] == len(document["pairs"])
+    again = tmp_path / "again.json"
+    assert cocalib("solve", "--pairs", out, "--out", again).code == 0
+    assert json.loads(again.read_text())["metrics"] == document["metrics"]
+
+
+@pytest.mark.parametrize(
+    ("method", "words"), [("pmm", "--camera-position-m"), ("ccm", "checkerboard of 8 x 5 inner corners")]
+)
+def test_a_baseline_without_what_it_needs_says_what_that_is(
+    cocalib: Cocalib, made: Callable[..., Path], clicks_file: Path, tmp_path: Path, method: str, words: str
+) -> None:
+    answer = cocalib("solve", made(), "--clicks", clicks_file, "--out", tmp_path / "none.json", "--method", method)
+    assert answer.code == 1
+    assert words in answer.err
+    assert not (tmp_path / "none.json").exists()
+
+
 def test_a_measured_camera_position_pulls_the_answer_to_it(
     cocalib: Cocalib, pairs_file: Callable[..., Path], tmp_path: Path
 ) -> None:

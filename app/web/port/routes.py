@@ -13,6 +13,7 @@ from typing import Protocol
 import msgspec
 import numpy as np
 
+from app.report import current_report
 from app.session import Session
 from app.solving import calibration_text
 from app.view import sentence
@@ -177,6 +178,7 @@ class _Downloads:
         return {
             "/api/calibration.json": self._calibration,
             "/api/clicks.json": self._clicks,
+            "/api/report.html": self._report,
             "/api/boxes.json": self._boxes,
             "/api/formats.json": _formats,
             "/api/activity.json": self._activity,
@@ -190,6 +192,11 @@ class _Downloads:
 
     def _calibration(self, _query: str) -> Reply:
         return self._of_calibration(lambda text: _download(text.encode(), "calibration.json"))
+
+    def _report(self, _query: str) -> Reply:
+        return self._of_calibration(
+            lambda text: _download(current_report(text, self._recording).encode(), "report.html")
+        )
 
     def _export(self, name: str, query: str) -> Reply:
         def make(text: str) -> Reply:

@@ -37,6 +37,7 @@ from calib_core.interchange.syntax.content import decoded
 from calib_core.interchange.syntax.json_text import json_text
 from calib_core.interchange.syntax.strict_json import json_object, parse_document
 from calib_core.measurements import ReflectorClick, Unpaired
+from calib_core.options import BoardOptions, MountingOptions
 from calib_core.radar import RadarErrors
 from calib_core.results import Calibration, CheckPoint, DataWarning, Metrics
 from calib_core.verdict import Verdict, verdict_on
@@ -144,6 +145,9 @@ def write_calibration(file: CalibrationFile) -> str:
         if not pair["candidates"]:
             for key in SOLVED_FROM_KEYS:
                 del pair[key]
+    for group, unset in (("mounting", MountingOptions()), ("board", BoardOptions())):
+        if getattr(calibration.options, group) == unset:
+            del content["options"][group]
     absent = set() if calibration.angle_map is not None else {"radar_angle_map"}
     absent |= {"verdict"} if file.verdict is None else set()
     absent |= {"evidence"} if file.evidence is None else set()

@@ -35,10 +35,10 @@ def open_yard() -> Scene:
         Box(25.74, -6.9, 0.08, 1.0, 2.1, "door"),
     )
     board = (
-        Box(5.06, 0.0, 0.06, 2.9, 2.0, "white", base_m=0.25),
-        Box(5.02, 0.0, 0.02, 2.7, 1.8, "checkerboard", base_m=0.35),
-        Cylinder(5.2, 1.2, 0.04, 2.2, "wood"),
-        Cylinder(5.2, -1.2, 0.04, 2.2, "wood"),
+        Box(6.56, 2.25, 0.06, 2.9, 2.0, "white", base_m=0.25),
+        Box(6.52, 2.25, 0.02, 2.7, 1.8, "checkerboard", base_m=0.35),
+        Cylinder(6.7, 3.45, 0.04, 2.2, "wood"),
+        Cylinder(6.7, 1.05, 0.04, 2.2, "wood"),
     )
     scatterers = (Scatterer(25.8, 0.3, 1.1, 13.0), Scatterer(25.7, -6.9, 1.0, 6.0), Scatterer(25.8, 6.0, 1.0, 8.0))
     layout = PairsLayout(2.3, 16.5, 31.0, height_m=0.19, roughness_m=0.004, separation_m=0.6)
@@ -50,7 +50,7 @@ def open_yard() -> Scene:
         scatterers,
         layout,
         sun_azimuth_deg=150.0,
-        board=Board(5.01, -1.35, 0.35, 0.30, 8, 5),
+        board=Board(6.51, 0.9, 0.35, 0.30, 8, 5),
     )
 
 

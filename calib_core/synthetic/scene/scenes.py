@@ -109,6 +109,12 @@ class Board:
         places = [np.full(across.size, self.x_m), self.y_m + self.square_m * across.ravel()]
         return np.stack([*places, self.z_m + self.square_m * up.ravel()], axis=1)
 
+    def hides(self, places_m: np.ndarray) -> np.ndarray:
+        """Return which places (n, 3) are behind the board, or next to that, as seen from above the origin."""
+        across_m = places_m[:, 1] * self.x_m / np.maximum(places_m[:, 0], 1e-9)
+        beside_m = np.maximum(self.y_m - across_m, across_m - self.y_m - self.square_m * (self.columns + 1))
+        return np.asarray((places_m[:, 0] > self.x_m - 0.5) & (beside_m < 0.6))
+
 
 @dataclass(frozen=True, slots=True)
 class Scene:

@@ -6,10 +6,11 @@ import numpy as np
 
 from calib_core.arrays import Points3, Vector3
 from calib_core.camera import Camera
+from calib_core.errors import OptionError
 from calib_core.geometry import RigidTransform
 from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.synthetic.options import IntrinsicsErrors, SimulationOptions
-from calib_core.synthetic.pairs.simulated import draw_positions
+from calib_core.synthetic.pairs.simulated import PairsLayout, draw_positions
 from calib_core.synthetic.radar.antennas import Antenna, antennas_of
 from calib_core.synthetic.radar.defects import radar_from_reported
 from calib_core.synthetic.radar.profiles import RadarProfile, profile_with
@@ -184,13 +185,8 @@ def _islands(story: Story, options: SimulationOptions) -> Islands | None:
 def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, options: SimulationOptions) -> Points3:
     """Draw apex positions in the world, clear of the solids."""
     if not options.placements:
-        return _board_places(rng, scene, options)
-    layout = scene.layout
-    lifted_m = STANDS_LOWER * (options.reflector_edge_m - USUAL_EDGE_M)
-    if lifted_m > 0.0:
-        layout = replace(layout, height_m=layout.height_m + lifted_m)
-    if options.heights:
-        layout = replace(layout, max_height_m=_TRIPOD_M)
+        return _board_places(rng, scene, rig, options)
+    layout = _layout(scene, options)
     world_from_radar = rig.radar_from_world.inverse()
     found: list[np.ndarray] = []
     for _ in range(400):
@@ -199,28 +195,44 @@ def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, o
             rig.camera.project(rig.camera_from_world @ batch), margin_px=-_RIM_SHARE * options.width_px
         )
         whole &= in_sight(added, batch)
+        if scene.board is not None:
+            whole &= ~scene.board.hides(batch)
         for position in batch[whole]:
             apart = all(np.linalg.norm(position[:2] - other[:2]) >= layout.separation_m for other in found)
             if apart and scene.free(position[:2], 0.7) and len(found) < options.placements:
                 found.append(position)
         if len(found) == options.placements:
-            return np.concatenate([np.array(found), _board_places(rng, scene, options)])
+            return np.concatenate([np.array(found), _board_places(rng, scene, rig, options)])
     raise ValueError(f"only {len(found)} of {options.placements} placements fit in the {scene.name}")
 
 
-def _board_places(rng: np.random.Generator, scene: Scene, options: SimulationOptions) -> Points3:
+def _layout(scene: Scene, options: SimulationOptions) -> PairsLayout:
+    """Return where the scene has room for the reflector; a larger one stands higher."""
+    layout = scene.layout
+    lifted_m = STANDS_LOWER * (options.reflector_edge_m - USUAL_EDGE_M)
+    if lifted_m > 0.0:
+        layout = replace(layout, height_m=layout.height_m + lifted_m)
+    return replace(layout, max_height_m=_TRIPOD_M) if options.heights else layout
+
+
+def _board_places(rng: np.random.Generator, scene: Scene, rig: Rig, options: SimulationOptions) -> Points3:
     """Draw apex positions in front of inner corners of the scene's checkerboard, each another corner.
 
     Raises:
-        ValueError: the board has fewer corners.
+        OptionError: the camera sees fewer corners.
     """
-    corners = scene.board_corners_m
-    if options.board_corners > len(corners):
-        raise ValueError(f"the checkerboard has {len(corners)} inner corners; ask for at most as many placements")
     if not options.board_corners:
         return np.zeros((0, 3))
-    chosen = rng.choice(len(corners), options.board_corners, replace=False)
-    return corners[chosen] - [_BEFORE_BOARD_M, 0.0, 0.0]
+    places = scene.board_corners_m - [_BEFORE_BOARD_M, 0.0, 0.0]
+    seen = rig.camera.in_image(
+        rig.camera.project(rig.camera_from_world @ places), margin_px=-_RIM_SHARE * options.width_px
+    )
+    if options.board_corners > int(seen.sum()):
+        raise OptionError(
+            f"simulation option board_corners is {options.board_corners}, but the camera sees {int(seen.sum())} inner "
+            "corners of the checkerboard; ask for fewer, or for another seed"
+        )
+    return places[seen][rng.choice(int(seen.sum()), options.board_corners, replace=False)]
 
 
 def _clutter(rng: np.random.Generator, scene: Scene, options: SimulationOptions) -> tuple[Scatterer, ...]:

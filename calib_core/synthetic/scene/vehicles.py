@@ -1,5 +1,6 @@
 """Robot cars and cars: their shape, as the camera sees it, and the places that the radar sees."""
 
+import functools
 from dataclasses import dataclass
 from typing import Literal
 
@@ -7,7 +8,16 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points3, Values, Vector2, Vector3
 
-__all__ = ["Colour", "Part", "VehicleKind", "VehicleState", "echo_places", "hidden_by", "vehicle_parts", "wheels"]
+__all__ = [
+    "Colour",
+    "Part",
+    "VehicleKind",
+    "VehicleState",
+    "echo_places",
+    "hidden_by",
+    "outline_points",
+    "vehicle_parts",
+]
 
 VehicleKind = Literal["robot", "car"]
 Colour = Literal["paint", "glass", "dark", "orange", "lamp", "tail"]
@@ -133,11 +143,23 @@ def vehicle_parts(state: VehicleState) -> tuple[Part, ...]:
             corners = np.array([forward, left, base]) + offsets
             parts.append(Part(state.world(corners), normal @ state.axes, colour))
         if number == (1 if state.kind == "car" else 0):
-            parts += wheels(state)
+            parts += _wheels(state)
     return tuple(parts)
 
 
-def wheels(state: VehicleState) -> list[Part]:
+def outline_points(state: VehicleState) -> Points3:
+    """Return points (n, 3) on the edges of a vehicle in the world; their pixels bound it."""
+    return state.world(_local_outline(state.kind))
+
+
+@functools.cache
+def _local_outline(kind: VehicleKind) -> Points3:
+    rings = [part.corners_m for part in vehicle_parts(VehicleState(kind, 0.0, 0.0, 0.0))]
+    points = [ring + share * (np.roll(ring, -1, axis=0) - ring) for ring in rings for share in (0.0, 0.5)]
+    return np.unique(np.concatenate(points).round(6), axis=0)
+
+
+def _wheels(state: VehicleState) -> list[Part]:
     """Return the outer sides of the four wheels."""
     along, across, radius = _WHEELS[state.kind]
     turns = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)

@@ -53,7 +53,7 @@ def test_a_camera_position_is_set_and_removed_as_a_whole() -> None:
     [
         ({"noise": {"sigma_pixel": 1.0}}, "unknown option 'noise.sigma_pixel'; did you mean 'noise.sigma_px'?"),
         ({"sigma_px": 1.0}, "did you mean 'noise.sigma_px'?"),
-        ({"xyzzy": 1.0}, "known: gating.max_range_m"),
+        ({"xyzzy": 1.0}, "known: board.columns"),
         ({"noise": {"sigma_px": "wide"}}, "option noise.sigma_px: expected `float`, got `str`"),
         ({"noise": {"sigma_px": None}}, "option noise.sigma_px"),
         ({"noise": {"estimate_scale": 1}}, "option noise.estimate_scale"),
@@ -97,7 +97,7 @@ def test_no_number_may_be_infinite_or_missing(path: str, value: float) -> None:
 
 def test_a_choice_that_was_set_directly_is_checked_too() -> None:
     wrong = CalibrationOptions(method="best")  # type: ignore[arg-type]
-    with pytest.raises(OptionError, match="unknown value 'best'; choose default or paper"):
+    with pytest.raises(OptionError, match="unknown value 'best'; choose default or paper or pmm or ccm"):
         checked_options(wrong)
 
 

@@ -24,4 +24,4 @@ def test_every_preset_is_a_recording_of_its_own(name: PresetName) -> None:
 
 def test_the_page_describes_every_preset_and_no_other(project_root: Path) -> None:
     page = (project_root / "docs" / "simulation.md").read_text()
-    assert re.findall(r"^\| `([a-z-]+)` \|", page, flags=re.MULTILINE) == list(PRESETS)
+    assert re.findall(r"^\| `([a-z0-9-]+)` \|", page, flags=re.MULTILINE) == list(PRESETS)

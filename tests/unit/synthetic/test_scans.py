@@ -6,9 +6,18 @@ import numpy as np
 import pytest
 
 from calib_core.errors import OptionError
-from calib_core.measurements import NS_PER_S
+from calib_core.measurements import NS_PER_S, TimeNs
 from calib_core.radar import direction_cosines
-from calib_core.synthetic import RADAR_PROFILES, SimulatedScans, SimulationOptions, simulate_scans
+from calib_core.synthetic import (
+    PRESETS,
+    RADAR_PROFILES,
+    PresetName,
+    RadarDefects,
+    SimulatedScans,
+    SimulationOptions,
+    Traffic,
+    simulate_scans,
+)
 from calib_core.synthetic.options import SceneName
 
 SHORT = SimulationOptions(placements=4, dwell_s=5.0, seed=3)
@@ -128,7 +137,7 @@ def test_frames_and_scans_are_dropped_at_the_requested_share() -> None:
     assert len(holed.scans) / len(whole.scans) == pytest.approx(0.7, abs=0.08)
 
 
-@pytest.mark.parametrize("scene", ["rooftop", "field", "aisle", "checkerboard"])
+@pytest.mark.parametrize("scene", ["rooftop", "field", "aisle", "checkerboard", "open-rooftop", "open-yard", "road"])
 def test_every_scene_has_room_for_twenty_placements(scene: SceneName) -> None:
     session = simulate_scans(
         SimulationOptions(scene=scene, clutter="none", person=False, dwell_s=4.0, radar_rate_hz=2.0)
@@ -160,11 +169,75 @@ def test_in_heavy_clutter_something_is_stronger_than_the_reflector() -> None:
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"placements": 0}, "placements is 0"),
+        ({"placements": 0}, "placements is 0; it must be at least 1 where nothing else moves"),
         ({"dwell_s": 1.0}, "dwell_s is 1.0"),
         ({"jpeg_quality": 0}, "jpeg_quality is 0"),
+        ({"placements": -1}, "placements is -1; it must be at least 0"),
+        ({"traffic": Traffic(robots=1)}, "robots is 1; it must be 0 in the scene rooftop; ask for --scene aisle"),
+        ({"traffic": Traffic(cars=1)}, "ask for --scene road"),
+        ({"scene": "road", "traffic": Traffic(walkers=1)}, "must be 0 on the road"),
+        ({"scene": "road", "traffic": Traffic(cars=8)}, "cars is 8; it must be at most 4"),
+        ({"scene": "road", "traffic": Traffic(cars=1, farthest_m=16.0)}, "at least 12 m beyond"),
+        ({"board_corners": 2}, "ask for --scene open-yard"),
+        ({"placements": 0, "islands": True, "traffic": Traffic(walkers=1)}, "islands is True"),
+        (
+            {"traffic": Traffic(walkers=1), "defects": RadarDefects(side_radar=True)},
+            "without a radar of several topics",
+        ),
     ],
 )
 def test_an_option_out_of_range_is_refused_by_name(changes: dict[str, float], text: str) -> None:
     with pytest.raises(OptionError, match=text):
         replace(SHORT, **changes)  # type: ignore[arg-type]
+
+
+def test_traffic_leaves_placements_and_clicks_where_they_are(session: SimulatedScans) -> None:
+    busy = simulate_scans(replace(SHORT, traffic=Traffic(walkers=2)))
+    assert np.array_equal(busy.points_radar_m, session.points_radar_m)
+    assert len(busy.scans.points_radar_m) > len(session.scans.points_radar_m)
+    assert np.array_equal(busy.scans.times_ns, session.scans.times_ns)
+
+
+def test_a_reflector_of_twice_the_edge_echoes_12_db_more_and_stands_higher() -> None:
+    usual, large = (
+        simulate_scans(replace(SHORT, clutter="none", person=False, reflector_edge_m=edge)) for edge in (0.16, 0.32)
+    )
+    levels = [
+        np.median([one.scans.between(place.start, place.end).snr_db.max() for place in one.placements])
+        for one in (usual, large)
+    ]
+    assert levels[1] - levels[0] == pytest.approx(40.0 * np.log10(2.0), abs=1.0)
+    heights = [(one.stage.rig.radar_from_world.inverse() @ one.points_radar_m)[:, 2].mean() for one in (usual, large)]
+    assert heights[1] - heights[0] == pytest.approx(0.32 * 0.16, abs=0.01)
+
+
+def test_placements_at_the_checkerboard_are_at_its_corners_in_the_picture() -> None:
+    options = replace(PRESETS["paper-d2"], placements=2, board_corners=6, dwell_s=4.0, radar_rate_hz=2.0)
+    session = simulate_scans(options)
+    board = session.stage.scene.board
+    assert board is not None
+    world = session.stage.rig.radar_from_world.inverse() @ session.points_radar_m
+    apart = np.linalg.norm(world[:, None] - board.corners_m[None], axis=2).min(axis=1)
+    assert (apart < 0.03).sum() == 6
+    assert not board.hides(world[apart > 0.03]).any()
+
+
+def test_only_the_corners_that_the_camera_sees_can_be_asked_for() -> None:
+    narrow = replace(PRESETS["paper-d2"], board_corners=40, field_of_view_deg=40.0)
+    with pytest.raises(OptionError, match=r"board_corners is 40, but the camera sees \d+ inner corners"):
+        simulate_scans(narrow)
+
+
+@pytest.mark.parametrize("preset", ["paper-d1", "paper-d2", "paper-d3"])
+def test_while_the_reflector_stands_in_the_papers_scenes_hardly_anything_else_does(preset: PresetName) -> None:
+    options = replace(PRESETS[preset], placements=4, dwell_s=4.0, radar_rate_hz=4.0)
+    session = simulate_scans(replace(options, board_corners=min(options.board_corners, 2)))
+    for placement in session.placements:
+        middle = (placement.start + placement.end) // 2
+        window = session.scans.between(TimeNs(middle - NS_PER_S), TimeNs(middle + NS_PER_S))
+        still = window.points_radar_m[
+            (window.doppler_mps == 0.0) & (np.linalg.norm(window.points_radar_m, axis=1) < 20.0)
+        ]
+        far = np.abs(np.linalg.norm(still, axis=1) - np.linalg.norm(placement.position_radar_m)) > 0.3
+        assert len(still) >= 4
+        assert far.mean() < 0.3, placement.id

@@ -1,0 +1,150 @@
+"""A pose from elsewhere, judged on pairs that it was not fitted to."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from calib_core.arrays import Flags
+from calib_core.camera import Camera
+from calib_core.estimation.linearization import linearize
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import Pair, Unpaired
+from calib_core.metrics import metrics_of
+from calib_core.options import CalibrationOptions
+from calib_core.plausibility import implausible_input
+from calib_core.radar import polar_from_cartesian
+from calib_core.results import Calibration, DataWarning, PairResult
+
+__all__ = ["judged", "judged_again"]
+
+_EXPLAINED = 11.83  # chi2 of 2 degrees of freedom that noise exceeds in 0.27 % of the pairs
+
+
+def judged(
+    camera_from_radar: RigidTransform,
+    pairs: Sequence[Pair],
+    unpaired: tuple[Unpaired, ...],
+    excluded: frozenset[str],
+    camera: Camera,
+    options: CalibrationOptions,
+    warnings: Sequence[DataWarning] = (),
+) -> Calibration:
+    """Make a calibration without stated uncertainty of a pose and the pairs that it is judged on.
+
+    Of each pair the most plausible radar position counts, never the one that suits the pose.
+
+    Args:
+        camera_from_radar: the pose.
+        pairs: in the order of the results; there may be none.
+        unpaired: clicks without a radar position.
+        excluded: ids of pairs that are shown, but not judged on.
+        camera: the intrinsics.
+        options: the assumed noise.
+        warnings: of the method.
+    """
+    results = tuple(
+        PairResult(
+            id=pair.id,
+            pixel_px=pair.pixel_px,
+            projected_px=np.full(2, np.nan),
+            point_radar_m=pair.candidates[0].position_radar_m,
+            inlier=False,
+            excluded=pair.id in excluded,
+            image_time=pair.image_time,
+            measured=pair,
+        )
+        for pair in pairs
+    )
+    unjudged = Calibration(
+        camera_from_radar, np.full((6, 6), np.nan), camera, metrics_of(np.zeros(0)), results, unpaired, (), options
+    )
+    return judged_again(unjudged, camera_from_radar, warnings)
+
+
+def judged_again(
+    calibration: Calibration, camera_from_radar: RigidTransform, warnings: Sequence[DataWarning] = ()
+) -> Calibration:
+    """Judge another pose on the radar positions of a calibration; the result states no uncertainty.
+
+    Its inliers are the pairs whose residual the assumed noise explains.
+
+    Args:
+        calibration: whose pairs, camera, options and radar errors are kept.
+        camera_from_radar: the pose.
+        warnings: of the method.
+    """
+    bare = Calibration(
+        camera_from_radar=camera_from_radar,
+        covariance=np.full((6, 6), np.nan),
+        camera=calibration.camera,
+        metrics=metrics_of(np.zeros(0)),
+        pairs=calibration.pairs,
+        unpaired=calibration.unpaired,
+        warnings=(),
+        options=calibration.options,
+        radar_errors=calibration.radar_errors,
+    )
+    if not calibration.pairs:
+        return replace(bare, warnings=tuple(warnings))
+    projected_px = bare.reproject(np.array([pair.point_radar_m for pair in calibration.pairs]))
+    results = tuple(
+        replace(_bare(pair), projected_px=at_px, inlier=bool(fits))
+        for pair, at_px, fits in zip(calibration.pairs, projected_px, _explained(bare), strict=True)
+    )
+    lengths_px = np.sort([result.distance_px for result in results if not result.excluded])
+    found = replace(bare, pairs=results, metrics=metrics_of(lengths_px[np.isfinite(lengths_px)]))
+    return replace(found, warnings=(*_of_input(found), *_outside(found), *warnings))
+
+
+def _bare(pair: PairResult) -> PairResult:
+    """Return a pair without what another method computed for it."""
+    unknown = float("nan")
+    return replace(
+        pair,
+        outlier_probability=unknown,
+        influence=unknown,
+        expected_covariance_px2=np.full((2, 2), unknown),
+        held_out_px=unknown,
+    )
+
+
+def _explained(calibration: Calibration) -> Flags:
+    """Return whether the noise that the options assume explains each residual: (n,)."""
+    noise, pairs = calibration.options.noise, calibration.pairs
+    points = calibration.radar_errors.corrected(np.array([pair.point_radar_m for pair in pairs]))
+    sigma_polar = [noise.sigma_range_m, *np.deg2rad([noise.sigma_azimuth_deg, noise.sigma_elevation_deg])]
+    clicks = [pair.measured.sigma_px if pair.measured is not None else None for pair in pairs]
+    model = linearize(
+        calibration.camera_from_radar,
+        calibration.camera,
+        pixels_px=np.array([pair.pixel_px for pair in pairs]),
+        sigma_px=np.array([noise.sigma_px if sigma is None else sigma for sigma in clicks]),
+        polar=polar_from_cartesian(points),
+        sigma_polar=np.tile(sigma_polar, (len(pairs), 1)),
+    )
+    return np.asarray(model.squared <= _EXPLAINED)
+
+
+def _of_input(calibration: Calibration) -> tuple[DataWarning, ...]:
+    used = [pair for pair in calibration.pairs if not pair.excluded]
+    if not used:
+        return ()
+    points, pixels = np.array([pair.point_radar_m for pair in used]), np.array([pair.pixel_px for pair in used])
+    return implausible_input([pair.id for pair in used], points, pixels, calibration.camera, calibration.options)
+
+
+def _outside(calibration: Calibration) -> list[DataWarning]:
+    """Warn if the pose puts most of the radar positions beside the picture that they were clicked in."""
+    used = [pair for pair in calibration.pairs if not pair.excluded]
+    shown = sum(calibration.camera.in_image(pair.projected_px[None])[0] for pair in used)
+    if not used or 2 * shown >= len(used):
+        return []
+    count = "all" if not shown else f"{len(used) - shown} of"
+    return [
+        DataWarning(
+            "outside-picture",
+            f"this pose puts {count} {len(used)} clicked radar positions outside the picture",
+            "do not use this pose; use the default method",
+        )
+    ]
