@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol, TypeAlias
 
 from app.box_tracks.carried import CarriedTrack, Followed, carried_boxes, carried_tracks
+from app.box_tracks.loading import boxes_loaded, read_sent_boxes
 from app.box_tracks.stretches import Start
 from app.hypothesis_sheet import OpenMeaning
 from app.session import (
@@ -264,6 +265,19 @@ class Workspace:
             EventError: a click does not belong to a frame of this recording; nothing changed.
         """
         self.dispatch(ClicksImported(read_clicks(text, source)))
+
+    def load_boxes(self, data: bytes, name: str) -> None:
+        """Put the boxes of a file in the place of all boxes.
+
+        Args:
+            data: the content of the file, of any known format.
+            name: its name.
+
+        Raises:
+            InputError: it cannot be read, is of no known format, or belongs to another recording.
+            EventError: a box does not fit the recording; nothing changed.
+        """
+        self.dispatch(boxes_loaded(read_sent_boxes(data, name, self.facts), self.facts))
 
     def close(self) -> Closed:
         """Stop the solver, write the snapshot and close the session file; return whether all clicks are on the disk.

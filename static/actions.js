@@ -105,7 +105,7 @@ export const ACTIONS = [
 
   { id: "evaluate", group: "Boxes", words: "Draw boxes and judge the calibration by them, or go back to the clicks", keys: ["A"], also: "tab evaluate annotate acc accuracy bounding people cars moving", run: toggleEvaluate, when: withPictures },
   { id: "next-box", group: "Boxes", words: "Select the next box in this frame", keys: ["Q"], also: "object cycle", run: nextBox, when: withBoxes },
-  { id: "deselect-box", group: "Boxes", words: "Select no box: the next one is another object", keys: ["Escape"], also: "unselect none", run: () => selectBox(null), when: withBox },
+  { id: "deselect-box", group: "Boxes", words: "Select no box, so that the next one is another object (Esc)", also: "unselect none", run: () => selectBox(null), when: withBox },
   { id: "new-box", group: "Boxes", words: "New box in the middle; Alt+arrows move it by 1 px, with Shift by 10", also: "draw add keyboard enter", run: newBox, when: withBoxes },
   { id: "box-class", group: "Boxes", words: "Name the class of the box", keys: ["R"], also: "label rename person car", run: editLabel, when: withBoxes },
   { id: "hide-box", group: "Boxes", words: "The object is hidden from this frame on", keys: ["H"], also: "end occluded left gone", run: hideHere, when: withBox },

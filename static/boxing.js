@@ -18,7 +18,7 @@ const LEAST = 3;
 /** Changes by keys are sent once no key was pressed for this long [ms]. */
 const REST = 250;
 
-/** What is dragged: a box and the handle by which, "move" for all of it, "new" for one that is being drawn. @type {{x: number, y: number, u: number, v: number, box: Shown|null, by: (typeof HANDLES)[number]|"move"|"new", moved: boolean}|null} */
+/** What is dragged: a box and the handle by which, "move" for all of it, "new" for one that is being drawn. @type {{x: number, y: number, u: number, v: number, box: Shown|null, by: (typeof HANDLES)[number]|"move"|"new", moved: boolean, frame: number}|null} */
 let press = null;
 /** The objects before a new one was sent, so as to select the new one. @type {Set<string>|null} */
 let known = null;
@@ -36,9 +36,12 @@ export function startBoxing() {
   });
   on(["cursor", "playing"], () => {
     flushBox();
-    cancelBox();
+    if (press && press.frame !== state.cursor) cancelBox();
   });
   addEventListener("pagehide", flushBox);
+  document.addEventListener("keydown", (event) => {
+    if (event.key === "Escape" && boxing.on && !document.querySelector("dialog[open]")) selectBox(null);
+  });
 }
 
 /** Whether a box takes the pointer. @returns {boolean} */
@@ -51,7 +54,7 @@ export function pressBox(x, y, reach) {
   const [u, v] = toImage(x, y);
   const box = selectedBox();
   const by = box ? handleNear(box, x, y, reach) ?? (inside(box.edges, u, v) ? "move" : null) : null;
-  press = { x, y, u, v, box: by ? (box ?? null) : null, by: by ?? "new", moved: false };
+  press = { x, y, u, v, box: by ? (box ?? null) : null, by: by ?? "new", moved: false, frame: state.cursor };
 }
 
 /** @param {number} x @param {number} y CSS px */

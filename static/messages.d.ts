@@ -1033,6 +1033,14 @@ export interface StopFollowingForm {
   request?: number;
 }
 
+/** A file of boxes was read; they take the place of all boxes. */
+export interface LoadBoxesForm {
+  type: "load_boxes";
+  name: string;
+  content_base64: string;
+  request?: number;
+}
+
 /** A page asks what can be chosen. */
 export interface ChoicesWanted {
   type: "choices";
@@ -1135,6 +1143,7 @@ export type FromPage =
   | UncertaintyForm
   | SnapForm
   | StopFollowingForm
+  | LoadBoxesForm
   | ChoicesWanted
   | FolderWanted
   | RecentForgotten

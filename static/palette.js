@@ -9,7 +9,7 @@ import { fitOf } from "./searching.js";
 /** @typedef {import("./places.js").Entry} Entry */
 const KEPT = "cocalib-recent";
 const MOST_RECENT = 6;
-const MOST_ROWS = 60;
+const MOST_ROWS = 90;
 /** How much better a recent entry fits, in the scale of searching.js. */
 const RECENT = 0.5;
 /** How much worse one fits that cannot be done now. */

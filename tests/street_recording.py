@@ -6,13 +6,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from tests.unit.evaluation.moving_scene import CAMERA, TRUE_POSE, Street, street
 
 from app.view import Reference
 from calib_core.detections import Box
 from calib_core.interchange import read_calibration
 from calib_core.measurements import RadarScans, TimeNs
 from tests.picture_recording import PictureRecording
+from tests.street import CAMERA, TRUE_POSE, Street, street
 
 __all__ = ["StreetRecording", "reference_calibration"]
 

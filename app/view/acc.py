@@ -47,7 +47,7 @@ def _figures(boxes: BoxFigures) -> tuple[Figure, ...]:
     return (
         Figure(
             "acc",
-            "returns in their boxes (Acc)",
+            "in their boxes (Acc)",
             value,
             "%",
             "Mean over the frames of the share of the moving targets' returns that are in their target's box, ± its standard "
@@ -55,7 +55,7 @@ def _figures(boxes: BoxFigures) -> tuple[Figure, ...]:
         ),
         Figure(
             "acc_frames",
-            "frames that count",
+            "frames",
             f"{counting}",
             "",
             f"Frames with boxes and with returns of moving targets. {zero} of them have no return in a box, and are counted.",

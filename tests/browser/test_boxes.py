@@ -95,6 +95,16 @@ def test_a_box_is_drawn_followed_corrected_judged_and_kept(
     assert found["schema"] == "cocalib/boxes-1"
     assert [len(frame["boxes"]) for frame in found["frames"]] == [1] * 32
 
+    page.page.get_by_label("File of boxes").set_input_files(download.value.path())
+    page.until("__cocalib.state.view.boxes[0].keyframes.length === 0")  # they stay in the frames of the file
+    assert judged(page) == before
+    other = json.dumps({**found, "frames": [{**found["frames"][0], "image_time": {"sec": 5, "nanosec": 0}}]})
+    page.page.get_by_label("File of boxes").set_input_files(
+        {"name": "other.json", "mimeType": "application/json", "buffer": other.encode()}
+    )
+    expect(page.page.locator(".toast")).to_contain_text("other.json")
+    assert len(page.view["boxes"]) == 1
+
 
 def test_boxes_need_no_mouse_and_fit_every_window(
     open_page: Callable[..., Driver], street_server: RunningServer

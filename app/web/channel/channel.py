@@ -19,6 +19,7 @@ from app.web.channel.snapping import snapped
 from app.web.channel.space_feed import SpaceFeed
 from app.web.channel.view_feed import Shown
 from app.web.messages import (
+    BoxesWanted,
     Command,
     CursorMoved,
     Done,
@@ -179,18 +180,19 @@ class Channel:
         else:
             self._review.give(command)
 
-    async def _change(self, command: Step | ImportWanted) -> None:
+    async def _change(self, command: Step | ImportWanted | BoxesWanted) -> None:
         """Change the session, off the event loop.
 
         Raises:
             CalibrationError: it cannot be done; nothing changed.
         """
         workspace = self._hub.workspace
-        change = (
-            partial(workspace.import_clicks, command.text, command.name)
-            if isinstance(command, ImportWanted)
-            else partial(workspace.dispatch, command)
-        )
+        if isinstance(command, ImportWanted):
+            change = partial(workspace.import_clicks, command.text, command.name)
+        elif isinstance(command, BoxesWanted):
+            change = partial(workspace.load_boxes, command.content, command.name)
+        else:
+            change = partial(workspace.dispatch, command)
         await asyncio.get_running_loop().run_in_executor(self._hub.steps, change)
 
     def _view_text(self) -> str:

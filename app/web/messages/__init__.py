@@ -7,6 +7,7 @@ writes the types as TypeScript; `static/messages.d.ts` holds its output, and a t
 from app.web.messages.box_messages import FrameBoxes
 from app.web.messages.incoming import (
     MAX_TEXT_BYTES,
+    BoxesWanted,
     Command,
     CursorMoved,
     FollowingStopped,
@@ -76,6 +77,7 @@ from app.web.messages.view_changes import ClickChange, RowValues, ViewChange, ch
 __all__ = [
     "MAX_CAMERA_FILE_BYTES",
     "MAX_TEXT_BYTES",
+    "BoxesWanted",
     "ChoicesWanted",
     "ClickChange",
     "Command",

@@ -1,5 +1,7 @@
 """What a page may send: text in, commands out."""
 
+import base64
+import binascii
 import difflib
 from dataclasses import dataclass, replace
 from functools import singledispatch
@@ -18,6 +20,7 @@ from calib_core.measurements import TimeNs
 
 __all__ = [
     "MAX_TEXT_BYTES",
+    "BoxesWanted",
     "Command",
     "CursorMoved",
     "FollowingStopped",
@@ -141,6 +144,19 @@ class SnapWanted:
 
 
 @dataclass(frozen=True, slots=True)
+class BoxesWanted:
+    """A page read a file of boxes.
+
+    Attributes:
+        content: of the file.
+        name: its name.
+    """
+
+    content: bytes
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class FollowingStopped:
     """A page wants boxes to be followed no farther than they have been."""
 
@@ -156,6 +172,7 @@ Command: TypeAlias = (
     | ReviewRequest
     | SnapWanted
     | FollowingStopped
+    | BoxesWanted
 )
 
 
@@ -227,6 +244,13 @@ class SnapForm(_Form, frozen=True, tag="snap_wanted"):
     id: forms.ClickId | None = None
 
 
+class LoadBoxesForm(_Form, frozen=True, tag="load_boxes"):
+    """A file of boxes was read; they take the place of all boxes."""
+
+    name: Annotated[str, Meta(max_length=300)]
+    content_base64: str
+
+
 class StopFollowingForm(_Form, frozen=True, tag="stop_following"):
     """Boxes are to be followed no farther."""
 
@@ -243,6 +267,7 @@ MessageForm: TypeAlias = (
     | ReviewRequest
     | SnapForm
     | StopFollowingForm
+    | LoadBoxesForm
     | OpeningForm
 )
 
@@ -369,6 +394,14 @@ def _import(form: ImportForm) -> Command:
 @_command.register
 def _snap(form: SnapForm) -> Command:
     return SnapWanted(form.image_time.stamp.time, form.pixel_px, form.id)
+
+
+@_command.register
+def _load_boxes(form: LoadBoxesForm) -> Command:
+    try:
+        return BoxesWanted(base64.b64decode(form.content_base64, validate=True), form.name)
+    except binascii.Error as error:
+        raise InputError(f"{form.name}: was not sent as base64: {error}") from None
 
 
 @_command.register

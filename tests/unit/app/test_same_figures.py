@@ -17,7 +17,7 @@ from app.view.number_format import plain, with_sigma
 from app.web.messages import encode
 from calib_core.evaluation import box_figures, moving_targets
 from calib_core.geometry import RigidTransform, rotation_exp
-from calib_core.interchange import CalibrationFile, compare, imported, read_clicks
+from calib_core.interchange import CalibrationFile, check, compare, imported, read_clicks
 from calib_core.measurements import ReflectorClick
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, open_recording
@@ -77,6 +77,9 @@ def test_the_comparison_on_the_page_is_that_of_check(
     assert page["rotation_apart"] == with_sigma(both.rotation_deg, both.rotation_sigma_deg)
     assert page["position_apart"] == with_sigma(both.position_cm, both.position_sigma_cm)
     assert page["rotation_apart"].startswith("1.2")
+    checked = check(imported(CalibrationFile(solved)), against=imported(CalibrationFile(other))).comparison
+    assert checked is not None
+    assert (checked.rotation_deg, checked.position_cm) == (both.rotation_deg, both.position_cm)
     for at in both.pixels:
         assert page[f"apart_{at.distance_m:g}_m"] == plain(at.rms_px)
 
