@@ -1,61 +1,76 @@
-"""Boxes and labels of a recording, from files."""
+"""Find the boxes and labels that a user names on the command line."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-import msgspec
-
-from calib_core.detections import Box, Boxes, FrameBoxes, LabelledScan, ReturnLabels
-from calib_core.errors import InputError
-from calib_core.measurements import Stamp
+from calib_core.boxes import MOVING, changed_boxes, read_boxes, read_labels
+from calib_core.detections import Boxes, ReturnLabels
+from calib_core.errors import InputError, MessageError
+from calib_core.input_files import file_text, read_input
 from calib_core.recordings import Recording
 
 __all__ = ["find_boxes", "find_labels"]
 
+_MAX_LABELS_BYTES = 256 * 1024 * 1024
 
-def find_boxes(file_or_topic: str, recording: Recording) -> Boxes:
-    """Read boxes from a file.
+
+def find_boxes(
+    file_or_topic: str, recording: Recording, *, progress: Callable[[int, int], None] | None = None
+) -> Boxes:
+    """Return the boxes of a file, folder or zip archive, of a topic, or, for the word moving, of what changes in the picture.
+
+    Args:
+        file_or_topic: what the user gave; a file or folder of that name comes first.
+        recording: that the boxes belong to.
+        progress: called with the frames looked at and their number, if boxes are found in the pictures.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: there is no such file or topic, it is of no known format, or belongs to another recording.
+        MessageError: the topic's messages cannot be read.
     """
-    document = _document(file_or_topic, "cocalib/boxes-1")
-    frames = tuple(
-        FrameBoxes(
-            msgspec.convert(frame["image_time"], Stamp).time,
-            tuple(_box(box) for box in frame["boxes"]),
-        )
-        for frame in document["frames"]
+    path = Path(file_or_topic)
+    if _exists(path):
+        return read_boxes(path, image_times=recording.image_times, image_size_px=_image_size_px(recording))
+    if any(topic.name == file_or_topic for topic in recording.topics):
+        return recording.boxes(file_or_topic)
+    if file_or_topic == MOVING:
+        return changed_boxes(recording.image, recording.image_times, source=recording.name, progress=progress)
+    able = ", ".join(topic.name for topic in recording.topics if topic.has_boxes)
+    topics = f"its topics with boxes: {able}" if able else "none of its topics has boxes"
+    raise InputError(
+        f"{file_or_topic}: is neither a file nor a topic of {recording.name} ({topics}); give one, or the word {MOVING} "
+        "for whatever moves before a fixed camera"
     )
-    width, height = document["image_size_px"]
-    return Boxes(frames, Path(file_or_topic).name, (width, height))
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # a name that no file can have
+        return False
 
 
 def find_labels(path: Path) -> ReturnLabels:
-    """Read labels from a file.
+    """Return the true origin of a simulated recording's returns, from its labels.json.
 
     Raises:
         InputError: it cannot be read.
     """
-    document = _document(str(path), "cocalib/labels-1")
-    scans = tuple(
-        LabelledScan(msgspec.convert(scan["radar_time"], Stamp).time, tuple(scan["tracks"]))
-        for scan in document["scans"]
-    )
-    return ReturnLabels(scans, path.name)
-
-
-def _box(document: dict[str, Any]) -> Box:
-    left, top, right, bottom = document["box_px"]
-    label, score, track = document.get("label", ""), document.get("score", 1.0), document.get("track", "")
-    return Box(left, top, right, bottom, label, score, track)
-
-
-def _document(path: str, schema: str) -> dict[str, Any]:
     try:
-        document = msgspec.json.decode(Path(path).read_bytes())
-    except (OSError, msgspec.DecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from error
-    if not isinstance(document, dict) or document.get("schema") != schema:
-        raise InputError(f"{path}: is not {schema}")
-    return document
+        text = file_text(read_input(path, max_bytes=_MAX_LABELS_BYTES, is_what="a file of labels"))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not text (byte {error.start} is not UTF-8); give a file of labels") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}; check the path") from None
+    return read_labels(text, path.name)
+
+
+def _image_size_px(recording: Recording) -> tuple[int, int] | None:
+    """Return the width and height of the recorded pictures; None if the first cannot be read."""
+    if not len(recording.image_times):
+        return None
+    try:
+        height_px, width_px = recording.image(0).shape[:2]
+    except MessageError:
+        return None
+    return width_px, height_px

@@ -15,7 +15,7 @@ from calib_core.measurements import ReflectorClick, TimeNs
 from calib_core.recordings import Recording
 from calib_core.results import Calibration, PairResult
 
-__all__ = ["RecordedView", "recorded_view"]
+__all__ = ["RecordedView", "box_words", "recorded_view"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,6 +101,13 @@ def recorded_view(
         boxes=boxes,
         evaluation=evaluation,
         against=against,
+    )
+
+
+def box_words(box: Box) -> str:
+    """Return what is written at a box: its class and its track, the class only once."""
+    return (
+        box.track if box.label and box.track.startswith(box.label) else " ".join(filter(None, (box.label, box.track)))
     )
 
 

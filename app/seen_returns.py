@@ -23,6 +23,7 @@ _SAMPLED_SCANS = 60
 _SAMPLE_HALF_WINDOW_S = 1e-3
 _MOST, _BEYOND = 0.98, 1.1
 _NEAREST_M, _SLOWEST_MPS = 2.0, 1.0
+_STILL_MPS = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,7 +137,7 @@ class ReturnColours:
 
 
 def return_colours(recording: Recording, quantity: ReturnQuantity) -> ReturnColours:
-    """Choose the ends of the colours from scans spread over the recording, so that they hold 98 % of its returns.
+    """Choose the ends of the colours from scans spread over the recording: they hold 98 % of its returns, or of what moves.
 
     Args:
         recording: with a radar.
@@ -155,7 +156,8 @@ def return_colours(recording: Recording, quantity: ReturnQuantity) -> ReturnColo
             raise InputError(
                 f"{recording.name}: the radar reports no speeds ({recording.radar_topic}); use --colour range"
             )
-        fastest_mps = max(_SLOWEST_MPS, float(np.ceil(np.quantile(known, _MOST))))
+        moving = known[known > _STILL_MPS]
+        fastest_mps = float(np.ceil(np.quantile(moving, _MOST))) if len(moving) else _SLOWEST_MPS
         return ReturnColours("speed", -fastest_mps, fastest_mps)
     far_m = float(np.quantile(known, _MOST)) if len(known) else 0.0
     return ReturnColours("range", 0.0, max(_NEAREST_M, float(f"{_BEYOND * far_m:.2g}")))

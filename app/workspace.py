@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Protocol, TypeAlias
 
 from app.box_tracks.carried import CarriedTrack, Followed, carried_boxes, carried_tracks
-from app.box_tracks.stretches import Stretch
+from app.box_tracks.stretches import Start
 from app.hypothesis_sheet import OpenMeaning
 from app.session import (
     AssumedReading,
+    BoxTrack,
     ClicksImported,
     History,
     RecordingFacts,
@@ -26,7 +27,7 @@ from app.session import (
 )
 from app.session.file import Closed, Restored, open_session_file
 from app.solver_worker import SolverWorker
-from app.view import Reference, View, view
+from app.view import AccPanel, Reference, View, view
 from calib_core.arrays import TimesNs
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
@@ -97,6 +98,7 @@ class Workspace:
         camera: the intrinsics to solve with; None if there are none.
         camera_file: the file that they come from; None for the recording's own.
         intrinsics: where they come from, in words; "" if there are none.
+        acc: what the boxes say about the calibration, as last judged.
         open_meaning: a calibration that does not state what its numbers mean, for a person to pick; None if there is none.
     """
 
@@ -104,6 +106,7 @@ class Workspace:
     camera_file: CameraFile | None = None
     intrinsics: str = ""
     open_meaning: OpenMeaning | None = None
+    acc: AccPanel = AccPanel()
 
     def __init__(
         self,
@@ -118,7 +121,9 @@ class Workspace:
         self.reference = reference
         self._history = restored.history
         self._placements: tuple[Placement, ...] | None = None
-        self._followed: Mapping[Stretch, Followed] = {}
+        self._followed: Mapping[Start, Followed] = {}
+        self._carried: tuple[CarriedTrack, ...] = ()
+        self._carried_from: tuple[tuple[BoxTrack, ...], RecordingFacts, Mapping[Start, Followed]] = ((), facts, {})
         self._journal = journal
         self._solver = solver
         self._lock = threading.Lock()
@@ -143,7 +148,7 @@ class Workspace:
         return self._view_of(self._history)
 
     def _view_of(self, history: History) -> View:
-        return view(history, self.facts, self.reference, self._placements, self._followed)
+        return view(history, self.facts, self.reference, self._placements, self._carried_of(history.present), self.acc)
 
     def show_placements(self, placements: Sequence[Placement]) -> None:
         """Take in the placements that were found in the radar data, so that the View says how many have no click."""
@@ -155,14 +160,28 @@ class Workspace:
     @property
     def carried(self) -> tuple[CarriedTrack, ...]:
         """The boxes of the session in every frame, as far as they have been followed."""
-        return carried_tracks(self.session.boxes, self.facts, self._followed)
+        return self._carried_of(self.session)
+
+    def _carried_of(self, session: Session) -> tuple[CarriedTrack, ...]:
+        """Return the boxes of a session in every frame; those of the last one are kept, since every View needs them."""
+        made_from = (session.boxes, self.facts, self._followed)
+        if any(one is not other for one, other in zip(made_from, self._carried_from, strict=True)):
+            self._carried, self._carried_from = carried_tracks(*made_from), made_from
+        return self._carried
 
     @property
     def boxes(self) -> Boxes:
         """The same as a file of boxes would state them."""
         return carried_boxes(self.carried, self.session, self.facts)
 
-    def show_followed(self, followed: Mapping[Stretch, Followed]) -> None:
+    def show_acc(self, acc: AccPanel) -> None:
+        """Take in what the boxes say about the calibration."""
+        with self._lock:
+            self.acc = acc
+            self._pending.append((self._view_of(self._history), self._subscribers))
+        self._notify()
+
+    def show_followed(self, followed: Mapping[Start, Followed]) -> None:
         """Take in what following the boxes through the pictures has given so far."""
         with self._lock:
             self._followed = dict(followed)

@@ -2,14 +2,14 @@
 /** Every action of the page, once: what it does in words, its keys, and when it can be done. Keys, help and palette are made from this table. */
 
 import { fitEye, zoomEye } from "./birdseye.js";
-import { boxing } from "./boxes.js";
+import { boxing, selectBox } from "./boxes.js";
 import { forgetHere, goToKeyframe, hideHere, newBox, nextBox, nudgeBox, removeBox, withoutBox } from "./boxing.js";
 import { choose, nextCandidate, withoutCandidates } from "./candidates.js";
 import { nudgeBy, removeSelected, toggleExcluded, turnBack } from "./clicking.js";
 import { toggleContours } from "./contours.js";
 import { enterCross, toggleCross } from "./cross.js";
 import { dismissHere, withoutPlacement } from "./dismissing.js";
-import { editLabel, toggleEvaluate } from "./evaluating.js";
+import { chooseBoxes, downloadBoxes, editLabel, stopFollowing, toggleEvaluate } from "./evaluating.js";
 import { openExport } from "./exporting.js";
 import { toggleHelp } from "./help.js";
 import { loadClicks } from "./importing.js";
@@ -105,12 +105,16 @@ export const ACTIONS = [
 
   { id: "evaluate", group: "Boxes", words: "Draw boxes and judge the calibration by them, or go back to the clicks", keys: ["A"], also: "tab evaluate annotate acc accuracy bounding people cars moving", run: toggleEvaluate, when: withPictures },
   { id: "next-box", group: "Boxes", words: "Select the next box in this frame", keys: ["Q"], also: "object cycle", run: nextBox, when: withBoxes },
+  { id: "deselect-box", group: "Boxes", words: "Select no box: the next one is another object", keys: ["Escape"], also: "unselect none", run: () => selectBox(null), when: withBox },
   { id: "new-box", group: "Boxes", words: "New box in the middle; Alt+arrows move it by 1 px, with Shift by 10", also: "draw add keyboard enter", run: newBox, when: withBoxes },
   { id: "box-class", group: "Boxes", words: "Name the class of the box", keys: ["R"], also: "label rename person car", run: editLabel, when: withBoxes },
   { id: "hide-box", group: "Boxes", words: "The object is hidden from this frame on", keys: ["H"], also: "end occluded left gone", run: hideHere, when: withBox },
   { id: "keyframe-back", group: "Boxes", words: "Previous keyframe of the box", keys: [","], help: "Previous or next keyframe", also: "correction jump", run: () => goToKeyframe(-1), when: withBox },
   { id: "keyframe-forward", group: "Boxes", words: "Next keyframe of the box", keys: ["."], help: "Previous or next keyframe", also: "correction jump", run: () => goToKeyframe(1), when: withBox },
   { id: "forget-keyframe", group: "Boxes", words: "Take back what was said about the box in this frame", keys: ["Shift+Delete"], also: "keyframe remove correction", run: forgetHere, when: withBox },
+  { id: "stop-following", group: "Boxes", words: "Follow the boxes no farther", also: "cancel tracking stop", run: stopFollowing, when: () => withPictures() || (state.view?.boxes.some((track) => track.following) ? "" : "No box is being followed") },
+  { id: "load-boxes", group: "Boxes", words: "Load boxes from a file", also: "import open coco yolo cvat kitti openlabel annotations", run: chooseBoxes, when: withPictures },
+  { id: "save-boxes", group: "Boxes", words: "Download the boxes", also: "export save boxes.json annotations", run: downloadBoxes, when: () => withPictures() || (state.view?.boxes.length ? "" : "There are no boxes yet") },
   { id: "remove-box", group: "Boxes", words: "Delete all boxes of the object", also: "track erase", run: removeBox, when: withBox },
 
   { id: "fit", group: "Picture", words: "Fit the picture", keys: ["F"], also: "zoom reset whole 100", run: () => (state.looking ? fitEye() : fit()), when: opened },

@@ -70,6 +70,37 @@ export function handleAt([left, top, right, bottom], [across, along]) {
   return [across === "left" ? left : across === "right" ? right : (left + right) / 2, along === "top" ? top : along === "bottom" ? bottom : (top + bottom) / 2];
 }
 
+/** Draw the returns of moving targets: filled triangles are in their box, hollow ones are not, crosses belong to no box. @param {CanvasRenderingContext2D} pen */
+export function drawBoxedReturns(pen) {
+  const returns = boxing.frame?.index === state.shown?.index ? (boxing.frame?.returns ?? []) : [];
+  const size = 5 * viewport.ratio;
+  for (const [u, v, box, isInside] of returns) {
+    const [x, y] = toDevice(u, v);
+    const colour = box ? colourOf(box) : ink.grey;
+    pen.beginPath();
+    if (box) {
+      pen.moveTo(x, y - size);
+      pen.lineTo(x + size * 0.9, y + size * 0.7);
+      pen.lineTo(x - size * 0.9, y + size * 0.7);
+      pen.closePath();
+    } else for (const side of [-1, 1]) {
+      pen.moveTo(x - 0.7 * size, y - side * 0.7 * size);
+      pen.lineTo(x + 0.7 * size, y + side * 0.7 * size);
+    }
+    pen.lineWidth = 4 * viewport.ratio;
+    pen.strokeStyle = ink.edge;
+    pen.stroke();
+    if (isInside) {
+      pen.fillStyle = colour;
+      pen.fill();
+    }
+    pen.lineWidth = 1.6 * viewport.ratio;
+    pen.strokeStyle = isInside ? "#ffffff" : colour;
+    pen.stroke();
+  }
+  return returns.length > 0;
+}
+
 /** Draw the boxes of the frame on screen: stated solid, followed solid and thin, in between dashed. @param {CanvasRenderingContext2D} pen */
 export function drawBoxes(pen) {
   const rows = shownBoxes();

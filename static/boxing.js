@@ -60,7 +60,8 @@ export function dragBox(x, y) {
   press.moved = true;
   const [u, v] = toImage(x, y);
   const edges = draggedTo(u, v);
-  boxing.draft = { id: press.box?.id ?? "", frame: state.shown?.index ?? -1, edges, label: press.box?.label ?? boxing.label, sent: false };
+  const object = press.box ?? goneOn();
+  boxing.draft = { id: object?.id ?? "", frame: state.shown?.index ?? -1, edges, label: object?.label ?? boxing.label, sent: false };
   emit("boxes");
 }
 
@@ -87,6 +88,9 @@ export function cursorOver(x, y) {
   if (handle) return handle[0] && handle[1] ? ((handle[0] === "left") === (handle[1] === "top") ? "nwse-resize" : "nesw-resize") : handle[0] ? "ew-resize" : "ns-resize";
   return box && inside(box.edges, ...toImage(x, y)) ? "move" : "crosshair";
 }
+
+/** The selected object, if this frame has no box of it: a new box goes on with it. */
+const goneOn = () => (selectedBox() && selectedBox()?.kind !== "draft" ? undefined : selectedTrack());
 
 /** @param {number} u @param {number} v @returns {Edges} */
 function draggedTo(u, v) {
@@ -191,7 +195,8 @@ export function newBox() {
   const [left] = toImage(0, 0);
   const half = Math.min(viewport.imageWidth, 2 * (u - left)) / 16;
   if (!onImage(u, v)) return;
-  boxing.draft = { id: "", frame: state.shown.index, edges: ordered([u - half, v - 1.6 * half, u + half, v + 1.6 * half]), label: boxing.label, sent: false };
+  const object = goneOn();
+  boxing.draft = { id: object?.id ?? "", frame: state.shown.index, edges: ordered([u - half, v - 1.6 * half, u + half, v + 1.6 * half]), label: object?.label ?? boxing.label, sent: false };
   send_();
 }
 

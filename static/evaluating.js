@@ -1,11 +1,14 @@
 // @ts-check
 /** The tab "Evaluate": while it is open, boxes are drawn on the picture; it lists them and says what they say about the calibration. */
 
+import { accSection, drawAcc } from "./acc.js";
+import { ask, content } from "./asking.js";
 import { boxing, colourOf, selectBox, selectedBox, selectedTrack, shownBoxes } from "./boxes.js";
 import { hideHere, newBox, removeBox, setEdge, setLabel } from "./boxing.js";
 import { showTab } from "./layout.js";
-import { make } from "./notices.js";
+import { make, toast } from "./notices.js";
 import { goTo } from "./player.js";
+import { send, tell } from "./socket.js";
 import { emit, on, state } from "./state.js";
 
 /** @typedef {import("./boxes.js").Track} Track */
@@ -26,11 +29,20 @@ const edges = SIDES.map(() => make("input", "", []));
 const hide = make("button", "second", "Hidden here");
 const remove = make("button", "second", "Delete");
 const add = make("button", "second", "New box");
+const edgeRow = make("div", "edges", [make("span", "", "Edges"), ...edges, make("span", "unit", "px")]);
+const large = make("button", "second", "⤢");
+const files = make("div", "box-files", []);
+const stop = make("button", "second", "Stop following");
+const save = make("button", "second", "Download boxes");
+const picker = make("input", "", []);
+/** A larger file is not sent: a message of 4 MB is the limit [bytes]. */
+const LARGEST_FILE = 2_800_000;
 let drawn = "";
 
 export function startEvaluating() {
   buildEdit();
-  page.append(edit, table, empty);
+  buildFiles();
+  page.append(edit, accSection(), table, empty, files);
   body.addEventListener("click", pressed);
   on(["box"], follow);
   on(["view", "boxes", "shown", "recording"], draw);
@@ -41,6 +53,12 @@ export function startEvaluating() {
 export function toggleEvaluate() {
   if (page.hidden) before = document.querySelector('#tabs [aria-selected="true"]')?.id ?? before;
   showTab(page.hidden ? "tab-evaluate" : before);
+}
+
+/** Give the tab the whole column, or the 3D view its place back. */
+function enlarge() {
+  document.body.classList.toggle("review-large");
+  emit("box");
 }
 
 /** Boxes take the pointer while the tab is open. */
@@ -70,14 +88,73 @@ function buildEdit() {
   hide.dataset.hint = "The object is hidden, or out of the picture, from this frame on. (H)";
   remove.dataset.hint = "Delete all boxes of this object. (Del)";
   add.dataset.hint = "A new box in the middle of the picture, for those who do not drag. (Enter)";
+  large.dataset.hint = "Give this tab the whole column, or the 3D view its place back.";
+  large.setAttribute("aria-label", "Enlarge");
+  large.onclick = enlarge;
   hide.onclick = hideHere;
   remove.onclick = removeBox;
   add.onclick = newBox;
   edit.append(
     make("label", "", ["Class", label, labels]),
-    make("div", "edges", [make("span", "", "Edges"), ...edges, make("span", "unit", "px")]),
-    make("div", "acts", [add, hide, remove]),
+    edgeRow,
+    make("div", "acts", [add, hide, remove, large]),
   );
+}
+
+/** Boxes from and to files. */
+function buildFiles() {
+  const load = make("button", "second", "Load boxes…");
+  load.dataset.hint = "Boxes of a labelling tool or of a detector: boxes.json, COCO, YOLO, CVAT, KITTI, OpenLABEL… They take the place of all boxes here. Dropping the file on this tab does the same.";
+  save.dataset.hint = "All boxes, as boxes.json: for cocalib evaluate --boxes, or to load again.";
+  stop.dataset.hint = "Leave the boxes where they have been followed to so far.";
+  load.onclick = chooseBoxes;
+  save.onclick = downloadBoxes;
+  stop.onclick = stopFollowing;
+  picker.type = "file";
+  picker.hidden = true;
+  picker.setAttribute("aria-label", "File of boxes");
+  picker.onchange = async () => {
+    if (picker.files?.[0]) await takeBoxes(picker.files[0]);
+    picker.value = "";
+  };
+  files.append(load, save, stop, picker);
+  page.addEventListener("dragover", (event) => event.preventDefault());
+  page.addEventListener("drop", (event) => {
+    const dropped = event.dataTransfer?.files[0];
+    if (!dropped) return;
+    event.preventDefault();
+    event.stopPropagation();
+    document.body.classList.remove("dropping");
+    takeBoxes(dropped);
+  });
+}
+
+/** Choose a file of boxes. */
+export const chooseBoxes = () => picker.click();
+
+/** Leave the boxes where they have been followed to. */
+export const stopFollowing = () => tell({ type: "stop_following" });
+
+/** @param {File} given */
+async function takeBoxes(given) {
+  if (given.size > LARGEST_FILE) return toast(`${given.name} is too large for the page.`, "Give it to cocalib evaluate --boxes instead.");
+  const bytes = new Uint8Array(await given.arrayBuffer());
+  let text = "";
+  for (let at = 0; at < bytes.length; at += 32768) text += String.fromCharCode(...bytes.subarray(at, at + 32768));
+  const refusal = await send({ type: "load_boxes", name: given.name, content_base64: btoa(text) });
+  if (refusal) toast(refusal);
+}
+
+/** Download all boxes. */
+export async function downloadBoxes() {
+  const { answer, reason } = await ask("api/boxes.json");
+  const file = answer && (await content(answer.blob()));
+  if (!file) return toast(reason || "The boxes did not arrive.", "Try again.");
+  const url = URL.createObjectURL(file);
+  const anchor = make("a", "", []);
+  [anchor.href, anchor.download] = [url, "boxes.json"];
+  anchor.click();
+  setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }
 
 /** Put the focus into the class. */
@@ -92,6 +169,9 @@ function draw() {
   count.textContent = tracks.length ? String(tracks.length) : "";
   if (page.hidden) return;
   drawEdit();
+  drawAcc();
+  stop.hidden = !tracks.some((track) => track.following);
+  save.disabled = !tracks.length;
   const text = JSON.stringify([tracks, boxing.selected, shownBoxes().map((box) => box.id)]);
   if (text === drawn) return;
   drawn = text;
@@ -111,6 +191,7 @@ function drawEdit() {
     field.disabled = !box;
     if (document.activeElement !== field) field.value = box ? box.edges[index].toFixed(0) : "";
   });
+  edgeRow.hidden = !box;
   hide.disabled = !track || state.cursor <= track.first;
   remove.disabled = !track;
 }
@@ -151,7 +232,7 @@ export function boxAdvice() {
   const [track, box] = [selectedTrack(), selectedBox()];
   if (!state.view?.boxes.length) return { text: ["Drag a box around someone who moves. Wheel: zoom, ", { key: "Shift" }, "+drag: pan, ", { key: "A" }, ": back to the clicks"], act: true };
   if (!track) return { text: ["Click a box to select it, or drag a new one"], act: false };
-  if (!box) return { text: [`${track.id} has no box in this frame: drag it anew from a frame that has one, or `, { key: "," }, " goes to a keyframe"], act: false };
+  if (!box) return { text: [`${track.id} has no box in this frame: drag one to go on with it. `, { key: "Esc" }, " for another object"], act: false };
   if (track.note && state.cursor === track.last) return { text: [track.note], act: true };
   if (box.kind === "between") return { text: [`${track.id} was lost before this frame: its box is drawn straight to the next keyframe. Drag it where it is off`], act: true };
   return { text: [`${track.id}: drag to move, handles resize, `, { key: "H" }, " hidden from here on, ", { key: "." }, " next keyframe"], act: false };

@@ -14,6 +14,18 @@ import { on, state } from "./state.js";
 /** The server's preview of a format: ExportPreview in app/web/channel/export_preview.py. @typedef {Record<string, any>} Preview */
 const KEPT = "cocalib-export";
 const CLICKS = "clicks";
+const REPORT = "report";
+const IN_REPORT = [
+  "Answer: verdict, transform both ways, error bars",
+  "Cautions: warnings, and what to do",
+  "Uncertainty in the picture at 5, 20 and 60 m",
+  "Residuals against range, azimuth, place and time",
+  "Coverage of picture and range",
+  "Pairs",
+  "Provenance: files by their hashes, options, versions",
+];
+/** What is downloaded as it is, without fields to fill in. @type {Record<string, string>} */
+const PLAIN = { [CLICKS]: "api/clicks.json", [REPORT]: "api/report.html" };
 const ASKING = "Asking the server for the file…";
 const dialog = /** @type {HTMLDialogElement} */ (document.getElementById("export-dialog"));
 const button = /** @type {HTMLButtonElement} */ (document.getElementById("export"));
@@ -68,7 +80,7 @@ async function loadFormats() {
   const given = answer && (await content(answer.json()));
   if (!given) return;
   formats = given;
-  if (!formats.some((format) => format.key === kept.format) && kept.format !== CLICKS) kept.format = "json";
+  if (!formats.some((format) => format.key === kept.format) && !(kept.format in PLAIN)) kept.format = "json";
   drawList();
 }
 
@@ -109,10 +121,11 @@ function build() {
   dialog.append(make("div", "top", [title, close]), list, make("section", "", [head, names.element, rectified.row, parent.element, before, text, notes]), side, foot);
 }
 
-/** The formats, and the clicks as one of them. */
+/** The formats, and the clicks and the report as two of them. */
 function drawList() {
   const clicks = { key: CLICKS, label: "Clicks, to continue elsewhere", group: "Go on", also: "clicks.json session", takes_parent: false, takes_rectified: false };
-  drawFormats([...formats, clicks], kept.format);
+  const report = { key: REPORT, label: "Report: how good, where, and why", group: "Go on", also: "report.html pdf print quality", takes_parent: false, takes_rectified: false };
+  drawFormats([...formats, clicks, report], kept.format);
 }
 
 /** Keep Tab inside the panel. @param {KeyboardEvent} event */
@@ -133,12 +146,13 @@ async function load() {
   const mine = ++asked;
   if (!formats.length) await loadFormats();
   const key = kept.format;
-  const { answer, reason, isLost } = await ask(key === CLICKS ? "api/clicks.json" : address("preview"));
+  const { answer, reason, isLost } = await ask(key === CLICKS ? PLAIN[key] : key === REPORT ? "api/preview/json" : address("preview"));
   const said = answer && (await content(key === CLICKS ? answer.text() : answer.json()));
   if (mine !== asked) return;
   if (said === null) drawReason(reason || BROKE_OFF, isLost || !reason);
-  else if (said.reason) drawReason(said.reason, false, said.field);
   else if (key === CLICKS) drawClicks(said);
+  else if (said.reason) drawReason(said.reason, false, key === REPORT ? null : said.field);
+  else if (key === REPORT) drawReport(said);
   else drawPreview(said);
 }
 
@@ -181,6 +195,16 @@ function drawClicks(content) {
   drawFields({});
   show(content, "clicks.json", false);
   for (const part of [before, notes, side]) part.replaceChildren();
+}
+
+/** Say what the report contains; it is written when it is downloaded. @param {Preview} preview of calibration.json */
+function drawReport(preview) {
+  head.replaceChildren(make("span", "", "One HTML file for a colleague: opens in any browser without a network, prints to at most four pages"));
+  drawFields({});
+  show(IN_REPORT.join("\n"), "report.html", true);
+  notes.replaceChildren();
+  before.replaceChildren();
+  side.replaceChildren(...(preview.pose ? [frameDrawing(preview.pose), make("p", "direction", preview.pose.words)] : []));
 }
 
 /** Show why there is nothing to save yet. @param {string} reason @param {boolean} [canRetry] @param {"frames"|"parent"|"rectified"|null} [field] that has to be filled in or corrected */
@@ -229,7 +253,7 @@ async function copyText() {
 /** Download the file under the name in the field; if the server refuses, show why. */
 async function download() {
   if (save.disabled) return;
-  const { answer, reason, isLost } = await ask(kept.format === CLICKS ? "api/clicks.json" : address("export"));
+  const { answer, reason, isLost } = await ask(PLAIN[kept.format] ?? address("export"));
   const file = answer && (await content(answer.blob()));
   if (!file) return drawReason(reason || BROKE_OFF, isLost || !reason);
   const url = URL.createObjectURL(file);

@@ -13,6 +13,7 @@ const MOUSE = [
   ["drag", "Pan the picture"],
   ["click", "Place the mark for this frame"],
   ["drag a mark", "Move it"],
+  ["drag", "With the tab Evaluate open: draw, move or resize a box; Shift+drag pans"],
   ["Alt wheel", "Loupe: 4 to 16 times"],
   ["wheel", "On the timeline: zoom; with Shift: pan"],
   ["double click", "On the timeline: show all of it"],
@@ -27,7 +28,9 @@ const MARKS = [
   ["M8 3a5 5 0 1 0 .01 0z|2.5 2.5|guess", "dashed circle: expected position of the reflector"],
   ["M1 8 8 4.5 15 8 8 11.5z|2.5 2.5|guess", "dashed diamond (ring in 3D): best next placement"],
   ["M8 5.5a2.5 2.5 0 1 0 .01 0z|fill|still", "dot: static radar return"],
-  ["M8 4.5 12 11.5H4z|fill|moving", "triangle: moving radar return"],
+  ["M8 4.5 12 11.5H4z|fill|moving", "triangle: moving radar return; with boxes, one in its target's box"],
+  ["M8 4.5 12 11.5H4z||moving", "hollow triangle: one outside its target's box; cross: its target has no box"],
+  ["M2 3h12v10H2z", "box: drawn or followed; dashed: straight on where it was lost"],
 ];
 
 export function toggleHelp() {

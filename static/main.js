@@ -4,7 +4,7 @@
 import { act, actionNamed } from "./actions.js";
 import { startArriving } from "./arriving.js";
 import { ask, content } from "./asking.js";
-import { takeFrameBoxes } from "./boxes.js";
+import { boxing, takeFrameBoxes } from "./boxes.js";
 import { startBoxing } from "./boxing.js";
 import { startCandidates, take as takeCandidates } from "./candidates.js";
 import { startClicking } from "./clicking.js";
@@ -197,5 +197,5 @@ startSpace();
 
 /** Exposed for the browser tests. */
 Object.assign(window, {
-  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots },
+  __cocalib: { state, viewport, zoom, toCss, toImage, onImage, clicks, clickIn, clicksIn, goTo, unconfirmed, follower, plots, boxing },
 });

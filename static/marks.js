@@ -4,7 +4,7 @@
  * 95 % of good residuals = ellipse, radar returns = dots (static) and triangles (moving).
  */
 
-import { boxing, drawBoxes } from "./boxes.js";
+import { boxing, drawBoxedReturns, drawBoxes } from "./boxes.js";
 import { drawCandidates } from "./candidates.js";
 import { ink, residualColour } from "./colours.js";
 import { drawCompared } from "./compare.js";
@@ -41,8 +41,9 @@ export function drawMarks(pen) {
 
 /** What moves, and the boxes around it; the clicks are out of the way. @param {Ink} pen @param {import("./messages.js").Overlay|null} overlay */
 function drawEvaluated(pen, overlay) {
-  if (state.layers.returns && overlay?.returns) drawReturns(pen, overlay.returns.filter(([, , , , , isStill]) => !isStill));
   drawBoxes(pen);
+  if (!state.layers.returns || drawBoxedReturns(pen)) return;
+  drawReturns(pen, (overlay?.returns ?? []).filter(([, , , , , isStill]) => !isStill));
 }
 
 /** Whether a placement in a frame still wants a click. @param {number} index @param {number} range its own [m] */

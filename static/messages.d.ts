@@ -192,6 +192,37 @@ export interface BoxTrackRow {
   following: boolean;
 }
 
+/** Acc of one class. */
+export interface ClassRow {
+  label: string;
+  acc: string;
+  frames: number;
+  returns: number;
+  inside: number;
+}
+
+/** Acc of the calibration turned about one axis of the camera. */
+export interface SensitivityRow {
+  axis: "roll" | "pitch" | "yaw";
+  angles_deg: number[];
+  acc_percent: number[];
+  values: string[];
+  words: string;
+  is_flat: boolean;
+}
+
+/** What the boxes of the page say about the calibration on the page. */
+export interface AccPanel {
+  figures: Figure[];
+  classes: ClassRow[];
+  sensitivity: SensitivityRow[];
+  caution: string;
+  rule: string;
+  problem: string;
+  warnings: DataWarning[];
+  judging: boolean;
+}
+
 /** One error that all pairs share, as a row of a table. */
 export interface SystematicErrorRow {
   key: string;
@@ -250,6 +281,7 @@ export interface View {
   acknowledged: string[];
   boxes: BoxTrackRow[];
   box_labels: string[];
+  acc: AccPanel;
   systematic_errors: SystematicErrorTable;
   verdict: VerdictRow;
 }
@@ -537,11 +569,15 @@ export interface Overlay {
 /** One box in a frame; written as an array, since it is sent with every frame. */
 export type BoxInFrame = [id: string, label: string, left_px: number, top_px: number, right_px: number, bottom_px: number, kind: "stated" | "followed" | "between", confidence: number];
 
+/** A return of a moving target on the picture; written as an array. */
+export type BoxedReturn = [u_px: number, v_px: number, box: string, inside: boolean];
+
 /** The boxes of the frame that a page shows. */
 export interface FrameBoxes {
   type: "frame_boxes";
   index: number;
   boxes: BoxInFrame[];
+  returns: BoxedReturn[];
 }
 
 /** One radar return that may belong to a click. */
@@ -991,6 +1027,12 @@ export interface SnapForm {
   request?: number;
 }
 
+/** Boxes are to be followed no farther. */
+export interface StopFollowingForm {
+  type: "stop_following";
+  request?: number;
+}
+
 /** A page asks what can be chosen. */
 export interface ChoicesWanted {
   type: "choices";
@@ -1092,6 +1134,7 @@ export type FromPage =
   | CompareForm
   | UncertaintyForm
   | SnapForm
+  | StopFollowingForm
   | ChoicesWanted
   | FolderWanted
   | RecentForgotten

@@ -3,17 +3,19 @@
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal, TypeAlias
 
 import numpy as np
 
-from app.box_tracks.stretches import MOST_FRAMES, Stretch, stretches_of
+from app.box_tracks.stretches import MOST_FRAMES, Start, Stretch, stretches_of
 from app.session import BoxEdges, BoxTrack, RecordingFacts, Session
 from calib_core.detections import Box, Boxes, FrameBoxes
 from calib_core.measurements import TimeNs
 
 __all__ = ["BoxKind", "CarriedTrack", "Followed", "PlacedBox", "carried_boxes", "carried_tracks"]
 
+_NOTHING: Mapping[Start, "Followed"] = MappingProxyType({})
 BoxKind: TypeAlias = Literal["stated", "followed", "between"]
 
 
@@ -36,17 +38,25 @@ class PlacedBox:
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """What following one stretch has given so far.
+    """What following a box has given so far.
 
     Attributes:
-        boxes: from the frame after the first one on, without gaps.
-        ended: why it ends before the stretch does; "" if it does not.
-        is_complete: there is no more to come.
+        boxes: from the frame after its start on, without gaps.
+        ended: why it cannot be followed beyond them; "" if it can.
     """
 
     boxes: tuple[PlacedBox, ...] = ()
     ended: str = ""
-    is_complete: bool = False
+
+    def within(self, stretch: Stretch) -> "Followed":
+        """Return what of it belongs to a stretch."""
+        if len(self.boxes) < stretch.length:
+            return self
+        return Followed(self.boxes[: stretch.length])
+
+    def completes(self, stretch: Stretch) -> bool:
+        """Return whether there is no more to come for a stretch."""
+        return bool(self.ended) or len(self.boxes) >= stretch.length
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +84,14 @@ class CarriedTrack:
 
 
 def carried_tracks(
-    tracks: Sequence[BoxTrack], facts: RecordingFacts, followed: Mapping[Stretch, Followed]
+    tracks: Sequence[BoxTrack], facts: RecordingFacts, followed: Mapping[Start, Followed] = _NOTHING
 ) -> tuple[CarriedTrack, ...]:
     """Put together what was stated and what was followed.
 
     Args:
         tracks: of the session.
         facts: the recording's frames.
-        followed: what is known of each stretch; one that is missing has yet to be followed.
+        followed: what is known from each start; one that is missing has yet to be followed.
     """
     return tuple(_carried(track, facts, followed) for track in tracks)
 
@@ -104,45 +114,46 @@ def carried_boxes(tracks: Sequence[CarriedTrack], session: Session, facts: Recor
     return Boxes(found, "the boxes on the page", (facts.width_px, facts.height_px))
 
 
-def _carried(track: BoxTrack, facts: RecordingFacts, followed: Mapping[Stretch, Followed]) -> CarriedTrack:
+def _carried(track: BoxTrack, facts: RecordingFacts, followed: Mapping[Start, Followed]) -> CarriedTrack:
     boxes: list[PlacedBox] = []
     note, complete = "", True
-    for stretch, next_edges, is_cut in stretches_of(track, facts):
-        found = followed.get(stretch, Followed(is_complete=stretch.length == 0))
-        boxes.append(PlacedBox(stretch.first, stretch.edges_px, "stated"))
-        boxes += _bridged(stretch, next_edges, is_cut, found) if next_edges else found.boxes
-        complete &= found.is_complete
-        note = _note(found, stretch, is_cut, next_edges)
+    for stretch in stretches_of(track, facts):
+        found = followed.get(stretch.start, Followed()).within(stretch)
+        boxes.append(PlacedBox(stretch.start.frame, stretch.start.edges_px, "stated"))
+        boxes += _bridged(stretch, stretch.next_edges_px, found) if stretch.next_edges_px else found.boxes
+        complete &= found.completes(stretch)
+        note = _note(found, stretch)
     return CarriedTrack(track.id, track.label, tuple(boxes), note, complete)
 
 
-def _note(found: Followed, stretch: Stretch, is_cut: bool, next_edges: BoxEdges | None) -> str:
+def _note(found: Followed, stretch: Stretch) -> str:
     """Say where the box ends in a stretch; nothing if it goes on to the next stated one."""
-    last = stretch.first + len(found.boxes) + 1
-    if found.ended and not next_edges:
-        return f"Ends in frame {last}: {found.ended}. Draw it again in a later frame, or press H where it is hidden."
-    if is_cut and found.is_complete and not found.ended:
+    last = stretch.start.frame + len(found.boxes) + 1
+    if found.ended and not stretch.next_edges_px:
+        return f"Ends in frame {last}: {found.ended}. To go on, draw it in a later frame while it is selected."
+    if stretch.is_cut and found.completes(stretch):
         return f"Ends in frame {last}, after {MOST_FRAMES} frames. Correct it there to follow it farther."
     return ""
 
 
-def _bridged(stretch: Stretch, next_edges: BoxEdges, is_cut: bool, found: Followed) -> Iterator[PlacedBox]:
+def _bridged(stretch: Stretch, next_edges: BoxEdges, found: Followed) -> Iterator[PlacedBox]:
     """Yield the boxes up to the next stated one: the drift taken out, and straight on from where the box was lost.
 
     What was followed to the end is off there by its drift, which is taken back evenly over the stretch.
     """
     boxes, target = found.boxes, np.array(next_edges)
-    if is_cut or not found.is_complete:
+    if not found.completes(stretch):
         yield from boxes
         return
+    first = stretch.start.frame
     if boxes and boxes[-1].frame == stretch.last:
         drift = target - np.array(boxes[-1].edges_px)
         for box in boxes[:-1]:
-            share = (box.frame - stretch.first) / stretch.length
+            share = (box.frame - first) / stretch.length
             yield PlacedBox(box.frame, _edges(np.array(box.edges_px) + share * drift), "followed", box.confidence)
         return
     yield from boxes
-    start, edges = (boxes[-1].frame, boxes[-1].edges_px) if boxes else (stretch.first, stretch.edges_px)
+    start, edges = (boxes[-1].frame, boxes[-1].edges_px) if boxes else (first, stretch.start.edges_px)
     for frame in range(start + 1, stretch.last):
         share = (frame - start) / (stretch.last - start)
         yield PlacedBox(frame, _edges((1 - share) * np.array(edges) + share * target), "between", 0.0)

@@ -89,6 +89,11 @@ COMMANDS: Mapping[str, Command] = {
             "Compare two calibrations; with a recording, say which is better there, and whether that is more than noise.",
         ),
         Command(
+            "report",
+            "app.cli.evaluation.report:Report",
+            "Write a report on a calibration: one HTML file, and a PDF if wanted: how good, where, and how one knows.",
+        ),
+        Command(
             "import",
             "app.cli.import_file:Import",
             "Convert a calibration from any known format to cocalib/calibration-1 JSON.",

@@ -12,9 +12,6 @@ from calib_core.errors import InputError
 
 if TYPE_CHECKING:
     from app.recorded_view import RecordedView
-    from calib_core.interchange import CameraFile
-    from calib_core.recordings import Recording
-    from calib_core.results import Calibration
 
 __all__ = ["ShownFiles", "shown_recording"]
 
@@ -54,7 +51,9 @@ def shown_recording(files: ShownFiles) -> "Iterator[RecordedView]":
     """
     from app.boxes import find_boxes
     from app.recorded_view import recorded_view
-    from calib_core.interchange import CameraFile, read_clicks
+    from app.recording_check import calibration_of
+    from app.solving import camera_for
+    from calib_core.interchange import CameraFile, read_any_file, read_clicks
     from calib_core.recordings import open_recording
 
     if not files.recording:
@@ -63,8 +62,11 @@ def shown_recording(files: ShownFiles) -> "Iterator[RecordedView]":
         raise InputError("--calibration FILE is missing: the calibration that the returns are projected with")
     camera_file = None if files.camera is None else CameraFile.read(files.camera)
     with open_recording(tuple(files.recording), files.topics) as recording:
-        calibration = _calibration(files.calibration, recording, camera_file)
-        against = None if files.against is None else _calibration(files.against, recording, camera_file)
+        camera = camera_for(recording, camera_file)
+        calibration = calibration_of(read_any_file(files.calibration), str(files.calibration), camera)
+        against = None
+        if files.against is not None:
+            against = calibration_of(read_any_file(files.against), str(files.against), camera)
         clicks = () if files.clicks is None else read_clicks(read_text(files.clicks), source=str(files.clicks))
         if clicks:
             clicks = told_clicks_at_frames(clicks, recording, source=str(files.clicks))
@@ -74,23 +76,3 @@ def shown_recording(files: ShownFiles) -> "Iterator[RecordedView]":
                 recording, calibration, files.colour, clicks=clicks, boxes=boxes, against=against, progress=progress
             )
         yield view
-
-
-def _calibration(path: Path, recording: "Recording", camera_file: "CameraFile | None") -> "Calibration":
-    """Read a calibration of any format, with its own intrinsics, or those given, or the recording's.
-
-    Raises:
-        InputError: it cannot be read, or nothing states intrinsics.
-    """
-    from app.solving import camera_for
-    from calib_core.interchange import adopted_calibration, read_any_file
-
-    found = read_any_file(path)
-    if found.file is not None:
-        return found.file.calibration
-    camera = found.camera or camera_for(recording, camera_file)
-    if camera is None:
-        raise InputError(
-            f"{path}: neither the file nor the recording has intrinsics to project with; give --camera FILE"
-        )
-    return adopted_calibration(found, str(path), camera=camera)

@@ -11,7 +11,7 @@ from calib_core.errors import InputError
 
 __all__ = ["Video"]
 
-_MOST_TRAIL_SCANS = 100
+_TRAIL_SCANS, _MOST_TRAIL_SCANS = 5, 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Video:
     out: NewFile
     """Output video: .mp4 or .mov (times to a microsecond), or .mkv (to a millisecond)."""
     overlay: Switch = False
-    """Draw what the radar saw over the frames; needs --calibration."""
+    """Draw what the radar saw over the frames, through a calibration."""
     calibration: File = None
     """With --overlay: calibration to project the returns with, in any format that export writes."""
     against: File = None
@@ -39,7 +39,7 @@ class Video:
     """With --overlay: boxes, drawn with their classes and evaluated (Acc): a file of a labelling tool, or a topic."""
     colour: Literal["range", "speed"] = "range"
     """With --overlay: what the colours of returns show."""
-    trail: int = 5
+    trail: int = _TRAIL_SCANS
     """With --overlay: number of earlier scans whose returns stay, smaller the older they are; 0 for none."""
     topics: Topics = field(default_factory=TopicFlags)
 
@@ -51,6 +51,8 @@ class Video:
             raise InputError(
                 "--calibration, --against, --camera, --clicks and --boxes apply with --overlay only; add it"
             )
+        if self.colour != "range" or self.trail != _TRAIL_SCANS:
+            raise InputError("--trail and --colour apply with --overlay only; add it")
         from calib_core.recordings import open_recording, write_video
 
         with (

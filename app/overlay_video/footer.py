@@ -3,17 +3,18 @@
 from collections.abc import Sequence
 from datetime import UTC, datetime
 
-import cv2
 import numpy as np
 
 from app.colours import RETURN_RAMPS
-from app.overlay_video.marks import label, text_height_px
+from app.overlay_video.marks import label, label_width_px
 from app.seen_returns import ReturnColours
 from calib_core.measurements import NS_PER_S, TimeNs
 
 __all__ = ["footer_height_px", "footers", "time_text", "write_changing"]
 
 _BACKGROUND = (20, 16, 13)
+_TITLE_FROM = 0.5
+"""A title has room between this share of the width and the legend; a longer one is left out."""
 _INK, _DIM = (240, 236, 232), (164, 152, 140)
 
 
@@ -30,7 +31,7 @@ def time_text(time: TimeNs, start: TimeNs) -> str:
 
 
 def footers(width_px: int, height_px: int, colours: ReturnColours, titles: Sequence[str]) -> list[np.ndarray]:
-    """Return the strips of the panels, without what changes: titles to the right of the middle, the legend at the right end.
+    """Return the strips of the panels, without what changes: titles in the right half, the legend at the end.
 
     Args:
         width_px: of a panel.
@@ -43,9 +44,9 @@ def footers(width_px: int, height_px: int, colours: ReturnColours, titles: Seque
         left = _legend(strip, colours)
         if title:
             letters = _letters(strip)
-            room = left - 0.62 * width_px
-            shown = title if len(title) * letters * 1.6 < room else f"{title[: max(3, int(room / letters / 1.6))]}..."
-            label(strip, shown, (0.62 * width_px, _base_line(strip)), _DIM, letters)
+            width = label_width_px(title, letters)
+            if width < left - _TITLE_FROM * width_px:
+                label(strip, title, (left - width - letters, _base_line(strip)), _DIM, letters)
     return strips
 
 
@@ -57,7 +58,7 @@ def write_changing(strip: np.ndarray, words: str) -> None:
 
 def _letters(strip: np.ndarray) -> float:
     """Return the height of capital letters [px] that fits the strip and its width."""
-    return min(0.38 * strip.shape[0], strip.shape[1] / 90.0, 1.2 * text_height_px(strip) * 2)
+    return min(0.34 * strip.shape[0], strip.shape[1] / 90.0)
 
 
 def _base_line(strip: np.ndarray) -> float:
@@ -75,16 +76,11 @@ def _legend(strip: np.ndarray, colours: ReturnColours) -> float:
     stops = np.linspace(0.0, 1.0, len(ramp))
     row = np.stack([np.interp(shares, stops, channel) for channel in ramp[:, ::-1].T], axis=1)
     right = width - round(letters)
-    high_px = _width(high, letters)
+    high_px = round(label_width_px(high, letters))
     bar_right = right - high_px - round(0.6 * letters)
     top, bottom = round(0.36 * height), round(0.64 * height)
     strip[top:bottom, bar_right - bar_px : bar_right] = np.rint(row).astype(np.uint8)
     label(strip, high, (right - high_px, _base_line(strip)), _DIM, letters)
-    low_px = bar_right - bar_px - round(0.6 * letters) - _width(low, letters)
+    low_px = bar_right - bar_px - round(0.6 * letters) - round(label_width_px(low, letters))
     label(strip, low, (low_px, _base_line(strip)), _DIM, letters)
     return float(low_px - letters)
-
-
-def _width(words: str, letters: float) -> int:
-    scale = letters / cv2.getTextSize("H", cv2.FONT_HERSHEY_SIMPLEX, 1.0, 1)[0][1]
-    return int(cv2.getTextSize(words, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)[0][0])

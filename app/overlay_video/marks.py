@@ -6,10 +6,20 @@ import cv2
 import numpy as np
 
 from app.colours import residual_colours
+from app.recorded_view import box_words
 from calib_core.arrays import Flags, Points2
 from calib_core.detections import Box
 
-__all__ = ["HUES", "draw_boxes", "draw_clicks", "draw_returns", "draw_trail", "label", "text_height_px"]
+__all__ = [
+    "HUES",
+    "draw_boxes",
+    "draw_clicks",
+    "draw_returns",
+    "draw_trail",
+    "label",
+    "label_width_px",
+    "text_height_px",
+]
 
 HUES = ((255, 210, 80), (110, 220, 130), (90, 190, 255), (255, 140, 120), (200, 160, 255), (240, 240, 240))
 """Colours of the classes of boxes, red first."""
@@ -83,7 +93,10 @@ def draw_clicks(picture: np.ndarray, clicks_px: Points2, projected_px: Points2, 
             cv2.line(picture, _fixed(u_px, v_px), _fixed(*projected), colour, 2, cv2.LINE_AA, _SHIFT)
             cv2.circle(picture, _fixed(*projected), round(0.7 * size * (1 << _SHIFT)), _RING, 2, cv2.LINE_AA, _SHIFT)
         words = f"{name}: {length_px:.1f} px" if seen else f"{name}: behind the camera"
-        label(picture, words, (u_px + 1.4 * size, v_px - 0.8 * size), _WHITE)
+        width = label_width_px(words, size)
+        fits = u_px + 1.8 * size + width < picture.shape[1]
+        left = u_px + 1.8 * size if fits else u_px - 1.8 * size - width
+        label(picture, words, (left, v_px - 0.9 * size), _WHITE, plate=True)
 
 
 def draw_boxes(picture: np.ndarray, boxes: Sequence[Box], labels: Sequence[str]) -> None:
@@ -93,9 +106,9 @@ def draw_boxes(picture: np.ndarray, boxes: Sequence[Box], labels: Sequence[str])
         corners = (_fixed(box.left_px, box.top_px), _fixed(box.right_px, box.bottom_px))
         cv2.rectangle(picture, *corners, _EDGE, 4, cv2.LINE_AA, _SHIFT)
         cv2.rectangle(picture, *corners, hue, 2, cv2.LINE_AA, _SHIFT)
-        words = " ".join(filter(None, (box.label, box.track)))
+        words = box_words(box)
         if words:
-            label(picture, words, (box.left_px, box.top_px - 0.5 * text_height_px(picture)), hue)
+            label(picture, words, (box.left_px, box.top_px - 0.6 * text_height_px(picture)), hue, plate=True)
 
 
 def label(
@@ -104,8 +117,10 @@ def label(
     place_px: tuple[float, float],
     colour: tuple[int, int, int],
     height_px: float | None = None,
+    *,
+    plate: bool = False,
 ) -> float:
-    """Write one line with a dark edge, inside the picture; return its width [px].
+    """Write one line inside the picture; return its width [px].
 
     Args:
         picture: changed.
@@ -113,17 +128,31 @@ def label(
         place_px: of the left end of the base line.
         colour: blue first.
         height_px: of capital letters.
+        plate: darken what is behind the line, so that it can be read on any picture.
     """
     height_px = text_height_px(picture) if height_px is None else height_px
-    scale = height_px / cv2.getTextSize("H", _FONT, 1.0, 1)[0][1]
-    plain = words.encode("ascii", "replace").decode()
-    (width, _), _ = cv2.getTextSize(plain, _FONT, scale, 1)
+    plain, scale, width = _measured(words, height_px)
     u_px = min(max(place_px[0], 2.0), max(2.0, picture.shape[1] - width - 2.0))
-    v_px = min(max(place_px[1], height_px + 2.0), picture.shape[0] - 2.0)
-    at = (round(u_px), round(v_px))
-    cv2.putText(picture, plain, at, _FONT, scale, _EDGE, 3, cv2.LINE_AA)
-    cv2.putText(picture, plain, at, _FONT, scale, colour, 1, cv2.LINE_AA)
-    return float(width)
+    v_px = min(max(place_px[1], 1.5 * height_px), picture.shape[0] - 0.5 * height_px)
+    if plate:
+        margin = round(0.4 * height_px)
+        top, bottom = max(0, round(v_px - height_px) - margin), round(v_px) + margin
+        behind = picture[top:bottom, max(0, round(u_px) - margin) : round(u_px + width) + margin]
+        behind[:] = behind // 4
+    cv2.putText(picture, plain, (round(u_px), round(v_px)), _FONT, scale, colour, 1, cv2.LINE_AA)
+    return width
+
+
+def label_width_px(words: str, height_px: float) -> float:
+    """Return how wide a line is [px]."""
+    return _measured(words, height_px)[2]
+
+
+def _measured(words: str, height_px: float) -> tuple[str, float, float]:
+    """Return what can be written of a line, OpenCV's scale for letters of a height, and the width [px]."""
+    plain = words.encode("ascii", "replace").decode()
+    scale = height_px / cv2.getTextSize("H", _FONT, 1.0, 1)[0][1]
+    return plain, scale, float(cv2.getTextSize(plain, _FONT, scale, 1)[0][0])
 
 
 def _triangle(picture: np.ndarray, u_px: float, v_px: float, size: float, colour: Sequence[int], smooth: int) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import rerun as rr
 
 from app.colours import residual_colours
-from app.recorded_view import RecordedView
+from app.recorded_view import RecordedView, box_words
 from app.rerun.entities import (
     ACC,
     AED,
@@ -71,7 +71,8 @@ def stream_frames(stream: rr.RecordingStream, view: RecordedView, streamed: Stre
     for block in frame_blocks(view.recording):
         yield from _stream_pictures(stream, view, block, streamed)
         _stream_returns(stream, view, block, streamed)
-        _stream_clicks(stream, block, pairs)
+        if pairs:
+            _stream_clicks(stream, block, pairs)
         if view.boxes is not None:
             _stream_boxes(stream, block, boxes, labels)
 
@@ -156,7 +157,7 @@ def _stream_boxes(
     columns = rr.Boxes2D.columns(
         centers=(edges[:, :2] + edges[:, 2:]) / 2.0 + HALF_PIXEL_PX,
         half_sizes=(edges[:, 2:] - edges[:, :2]) / 2.0,
-        labels=[" ".join(filter(None, (box.label, box.track))) or "object" for box in all_boxes],
+        labels=[box_words(box) or "object" for box in all_boxes],
         colors=[_HUES[labels.index(box.label) % len(_HUES)] for box in all_boxes],
     )
     stream.send_columns(BOXES, [_times(block.times_ns)], columns.partition([len(frame) for frame in own]))

@@ -1,5 +1,6 @@
 """What the screen shows, as a value: `view(session)` is pure, and every client draws the same View."""
 
+from app.view.box_panel import AccPanel
 from app.view.build import view
 from app.view.candidates import CandidateRow, PairCandidates, click_candidates, pair_of_click
 from app.view.following import FollowState, Pace, advice_words, pace_words
@@ -9,6 +10,7 @@ from app.view.summary import summary_lines
 from app.view.wording import sentence, warning_in_sentences
 
 __all__ = [
+    "AccPanel",
     "Advice",
     "CandidateRow",
     "ClickRow",

@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 
 import msgspec
+import numpy as np
 
 from app.box_tracks.carried import BoxKind, CarriedTrack
 from app.session import BoxTrack, RecordingFacts
-from app.view.model import BoxTrackRow
+from app.view.box_panel import BoxTrackRow
+from calib_core.evaluation import BoxFigures
 
-__all__ = ["BoxInFrame", "box_rows", "boxes_in_frame", "known_labels"]
+__all__ = ["BoxInFrame", "BoxedReturn", "box_rows", "boxes_in_frame", "known_labels", "returns_in_frame"]
 
 _USUAL_LABELS = ("person", "car", "truck", "bicycle", "robot")
 
@@ -35,6 +37,22 @@ class BoxInFrame(msgspec.Struct, frozen=True, array_like=True):
     bottom_px: float
     kind: BoxKind
     confidence: float
+
+
+class BoxedReturn(msgspec.Struct, frozen=True, array_like=True):
+    """A return of a moving target on the picture; written as an array.
+
+    Attributes:
+        u_px: column at which the calibration puts it.
+        v_px: row.
+        box: id of its target's box in this frame; "" if that has none.
+        inside: it is in that box.
+    """
+
+    u_px: float
+    v_px: float
+    box: str
+    inside: bool
 
 
 def box_rows(
@@ -77,6 +95,34 @@ def boxes_in_frame(carried: Sequence[CarriedTrack], frame: int) -> tuple[BoxInFr
         BoxInFrame(track.id, track.label, *one.edges_px, one.kind, round(one.confidence, 2))
         for track, one in found
         if one is not None
+    )
+
+
+def returns_in_frame(
+    figures: BoxFigures, image_time: int, carried: Sequence[CarriedTrack], frame: int
+) -> tuple[BoxedReturn, ...]:
+    """Return the moving targets' returns of one frame, as far as they are before the camera.
+
+    Args:
+        figures: of the judged boxes.
+        image_time: stamp of the frame.
+        carried: the boxes.
+        frame: index of the frame.
+    """
+    place = next((index for index, one in enumerate(figures.frames) if one.image_time == image_time), None)
+    if figures.returns is None or place is None:
+        return ()
+    here = [(track.id, np.array(box.edges_px)) for track in carried if (box := track.at(frame)) is not None]
+    returns = figures.returns
+    rows = np.flatnonzero((returns.frames == place) & np.isfinite(returns.pixels_px).all(axis=1))
+    return tuple(
+        BoxedReturn(
+            round(float(returns.pixels_px[row, 0]), 2),
+            round(float(returns.pixels_px[row, 1]), 2),
+            next((name for name, edges in here if np.allclose(edges, returns.boxes_px[row], atol=0.01)), ""),
+            bool(returns.inside[row]),
+        )
+        for row in rows.tolist()
     )
 
 

@@ -1,12 +1,11 @@
 """Build the View of a session, in one pure call."""
 
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Sequence
 
-from app.box_tracks.carried import Followed, carried_tracks
-from app.box_tracks.stretches import Stretch
+from app.box_tracks.carried import CarriedTrack, carried_tracks
 from app.session import History, RecordingFacts, Session
 from app.view.advice import advice_for
+from app.view.box_panel import AccPanel
 from app.view.box_rows import box_rows, known_labels
 from app.view.click_rows import click_rows
 from app.view.figures import assumed_figures, firm_text, metric_figures, pose_figures, residual_limit_px
@@ -28,15 +27,14 @@ _WITHOUT_PICTURES = (
     "Add the camera's file to calibrate: cocalib open RADAR CAMERA.",
 )
 
-_NOTHING_FOLLOWED: Mapping[Stretch, Followed] = MappingProxyType({})
-
 
 def view(
     history: History,
     facts: RecordingFacts,
     reference: Reference | None = None,
     placements: Sequence[Placement] | None = None,
-    followed: Mapping[Stretch, Followed] = _NOTHING_FOLLOWED,
+    carried: Sequence[CarriedTrack] | None = None,
+    acc: AccPanel | None = None,
 ) -> View:
     """Return everything there is to draw about the current session.
 
@@ -45,7 +43,8 @@ def view(
         facts: the recording's frames.
         reference: a calibration to review; None if there is none.
         placements: found in the radar data; None before they have been looked for.
-        followed: what following boxes through the pictures has given so far.
+        carried: the session's boxes through the frames; None as long as they have not been followed.
+        acc: what the boxes say about the calibration; None before they have been judged.
     """
     session = history.present
     outcome = session.outcome
@@ -83,8 +82,9 @@ def view(
         verdict=verdict_row(verdict, session, placements),
         dismissed=tuple(DismissedRow(Stamp.of(one.time), one.position_m) for one in session.dismissed),
         acknowledged=session.acknowledged,
-        boxes=box_rows(session.boxes, carried_tracks(session.boxes, facts, followed), facts),
+        boxes=box_rows(session.boxes, carried_tracks(session.boxes, facts) if carried is None else carried, facts),
         box_labels=known_labels(session.boxes),
+        acc=acc or AccPanel(),
     )
 
 

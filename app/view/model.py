@@ -5,6 +5,8 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
+from app.view.box_panel import AccPanel, BoxTrackRow
+from app.view.figure import Figure, Level
 from calib_core.measurements import Mark, Stamp
 from calib_core.options import CalibrationOptions, Method
 from calib_core.results import DataWarning
@@ -12,7 +14,6 @@ from calib_core.verdict import VerdictLevel
 
 __all__ = [
     "Advice",
-    "BoxTrackRow",
     "ClickRow",
     "ClickState",
     "DismissedRow",
@@ -27,7 +28,6 @@ __all__ = [
 ]
 
 ClickState: TypeAlias = Literal["pending", "inlier", "outlier", "excluded", "unpaired", "untouched"]
-Level: TypeAlias = Literal["plain", "good", "warning"]
 Stage: TypeAlias = Literal["collecting", "solving", "solved", "unsolvable"]
 
 
@@ -91,33 +91,6 @@ class ClickRow:
 
 
 @dataclass(frozen=True, slots=True)
-class BoxTrackRow:
-    """One object with a box: its row in the table.
-
-    Attributes:
-        id: of its track.
-        label: its class.
-        first: index of the first frame with its box.
-        last: index of the last one.
-        boxes: number of frames with its box.
-        keyframes: indices of the frames in which a person stated something about it; empty for boxes from a file.
-        hidden: those of them from which on it is hidden.
-        note: where and why its box ends; "" when there is nothing to say.
-        following: it is being followed through the frames.
-    """
-
-    id: str
-    label: str
-    first: int
-    last: int
-    boxes: int
-    keyframes: tuple[int, ...]
-    hidden: tuple[int, ...]
-    note: str
-    following: bool
-
-
-@dataclass(frozen=True, slots=True)
 class DismissedRow:
     """A placement that the user dismissed.
 
@@ -128,27 +101,6 @@ class DismissedRow:
 
     time: Stamp
     position_m: tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """One number as displayed.
-
-    Attributes:
-        key: for programs, such as "aed"; stable.
-        label: for display, such as "average distance (AED)".
-        value: formatted, with its standard deviation if that is known: "12.4", "0.31 ± 0.08".
-        unit: such as "px"; "" if it has none.
-        hint: one sentence that explains the number, shown on hover.
-        level: whether it needs attention.
-    """
-
-    key: str
-    label: str
-    value: str
-    unit: str
-    hint: str
-    level: Level = "plain"
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,6 +235,7 @@ class View:
         acknowledged: the codes of the warnings that the user has read.
         boxes: around moving objects, one row per object.
         box_labels: the classes to choose from.
+        acc: what the boxes say about the calibration.
     """
 
     revision: int
@@ -311,5 +264,6 @@ class View:
     acknowledged: tuple[str, ...] = ()
     boxes: tuple[BoxTrackRow, ...] = ()
     box_labels: tuple[str, ...] = ()
+    acc: AccPanel = field(default_factory=AccPanel)
     systematic_errors: SystematicErrorTable = field(default_factory=SystematicErrorTable)
     verdict: VerdictRow = VerdictRow("nothing", "nothing yet", "")

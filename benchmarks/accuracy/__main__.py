@@ -2,10 +2,24 @@
 
 import argparse
 import os
+import shlex
 import sys
+from collections.abc import Callable, Collection
+from fnmatch import fnmatch
 from pathlib import Path
 
-from benchmarks.accuracy import advice, clutter, coverage, efficiency, many, mirrored, real, smooth, verdicts
+from benchmarks.accuracy import (
+    advice,
+    clutter,
+    coverage,
+    efficiency,
+    keystrokes,
+    many,
+    mirrored,
+    real,
+    smooth,
+    verdicts,
+)
 from benchmarks.accuracy.defects import (
     adversarial,
     crying_wolf,
@@ -49,37 +63,44 @@ TABLES: dict[str, tuple[Row, ...]] = {
 """The rows by their name for --only, in the order they are measured: the longest table is last."""
 
 
-def sections(kept: Kept) -> tuple[Section, ...]:
-    """Return the sections in the order of the page."""
-    return (
-        verdicts.section(kept),
-        shared_errors.section(kept),
-        shared_errors.clean_section(kept),
-        adversarial.section(kept),
-        crying_wolf.section(kept),
-        flat_radars.section(kept),
-        handedness.section(kept),
-        dragging.section(kept),
-        two_reflectors.section(kept),
-        several_topics.section(kept),
-        efficiency.section(kept),
-        efficiency.peer_section(kept),
-        coverage.section(kept),
-        clutter.section(kept),
-        smooth.section(kept),
-        many.section(kept),
-        real.section(kept),
-        mirrored.section(kept),
-        advice.section(kept),
-    )
+_SECTIONS: dict[str, tuple[Callable[[Kept], Section], ...]] = {
+    "verdict": (verdicts.section,),
+    "shared": (shared_errors.section,),
+    "clean": (shared_errors.clean_section,),
+    "adversarial": (adversarial.section,),
+    "wolf": (crying_wolf.section,),
+    "flat": (flat_radars.section,),
+    "handedness": (handedness.section,),
+    "drag": (dragging.section,),
+    "placements": (two_reflectors.section,),
+    "topics": (several_topics.section,),
+    "efficiency": (efficiency.section, keystrokes.section),
+    "peers": (efficiency.peer_section,),
+    "coverage": (coverage.section,),
+    "clutter": (clutter.section,),
+    "smooth": (smooth.section,),
+    "many": (many.section,),
+    "real": (real.section,),
+    "mirrored": (mirrored.section,),
+    "advice": (advice.section,),
+}
+"""The sections of each table, in the order of the page."""
 
 
-def main() -> int:
-    """Measure the accuracy and write the page. An interrupted run resumes if the code is unchanged."""
+def sections(kept: Kept, only: Collection[str] = ()) -> tuple[Section, ...]:
+    """Return the sections of all tables, or of some only, in the order of the page."""
+    return tuple(write(kept) for name, several in _SECTIONS.items() if not only or name in only for write in several)
+
+
+def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=main.__doc__)
     parser.add_argument(
         "--only", action="append", choices=sorted(TABLES), help="measure this table only; may be repeated"
     )
+    parser.add_argument(
+        "--rows", action="append", help="measure rows with such a key only, such as 'peers-*-20-*'; may be repeated"
+    )
+    parser.add_argument("--alone", action="store_true", help="write the tables of --only and no others")
     parser.add_argument("--trials", type=int, default=None, help="largest number of trials per row")
     parser.add_argument(
         "--seed",
@@ -94,20 +115,30 @@ def main() -> int:
     parser.add_argument(
         "--kept", type=Path, help="continue with this folder of raw figures, whatever version of the code made it"
     )
-    arguments = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> int:
+    """Measure the accuracy and write the page. An interrupted run resumes if the code is unchanged."""
+    arguments = _arguments()
     keeper = Keeper(arguments.kept or arguments.scratch / digest_of_sources())
     fresh = fresh_seeds(keeper.folder) if arguments.seed == "fresh" else last_fresh_seeds(keeper.folder)
     first = fresh.first_trial if fresh is not None and arguments.seed == "fresh" else 0
     rows = [row for name in TABLES if not arguments.only or name in arguments.only for row in TABLES[name]]
+    rows = [row for row in rows if not arguments.rows or any(fnmatch(row.key, one) for one in arguments.rows)]
+    command = (
+        shlex.join(["python", "-m", "benchmarks.accuracy", *sys.argv[1:]]) if arguments.alone else "make bench-accuracy"
+    )
+    shown = arguments.only if arguments.alone and arguments.only else ()
     if not arguments.write_only:
         run(rows, keeper, jobs=arguments.jobs, most=arguments.trials, first=first)
     everything = [row for several in TABLES.values() for row in several]
-    fixed_sections = sections(kept_figures(everything, keeper, most=arguments.trials))
+    fixed_sections = sections(kept_figures(everything, keeper, most=arguments.trials), shown)
     if fresh is None:
-        text = page(fixed_sections)
+        text = page(fixed_sections, command=command)
     else:
         kept = kept_figures(everything, keeper, most=arguments.trials, first=fresh.first_trial)
-        text = page(fixed_sections, sections(kept), commit=fresh.commit)
+        text = page(fixed_sections, sections(kept, shown), commit=fresh.commit, command=command)
     arguments.page.write_text(text, encoding="utf-8")
     return 0
 

@@ -20,7 +20,7 @@ from benchmarks.accuracy.figures import (
     share,
     summed_up,
 )
-from benchmarks.accuracy.methods import PEERS, available, solve_ours
+from benchmarks.accuracy.methods import NOT_RUN, PEERS, available, solve_ours
 from benchmarks.accuracy.rows import Figures, Kept, Part, Row, Section
 from calib_core.geometry import RigidTransform
 from calib_core.results import Calibration
@@ -230,6 +230,8 @@ def peer_section(kept: Kept) -> Section:
         parts.append(
             Part(scene.capitalize(), ("noise", "pairs", "wrong", "trials", "ours, 1 cm", "ours", *names), tuple(cells))
         )
+    absent = {name: "not run: its library is not installed" for name in PEERS if not available(name)} | NOT_RUN
+    parts.append(Part("Without a row", ("method", "why"), tuple(absent.items())))
     return Section("How do other methods do on the same draws?", _PEER_TEXT, tuple(parts), ())
 
 
@@ -237,7 +239,9 @@ _PEER_TEXT = """Rotation / camera position, RMSE over the bound as above, and th
 cannot use a measured camera position, so they and "ours" are compared with the bound without one; "ours, 1 cm" is compared
 with its own bound. Fewer trials than above: the first of the same draws. Pixel thresholds of the other methods are set to
 three sigmas of the true residual, which a user cannot know; ours needs none. "8 px" is Algorithm 1 with OpenCV's default,
-which its authors use. The RMSE leaves out trials without a pose: read it together with `f`."""
+which its authors use. GMLPnP (arXiv 2408.01945) and the bias-compensated PnP (after arXiv 2507.19829, told the true noise)
+were written from the papers' texts and reject no outliers, like SQPnP + LM. The RMSE leaves out trials without a pose: read it
+together with `f`."""
 
 
 def _peer_cell(trials: Sequence[Figures], prefix: str = "") -> str:

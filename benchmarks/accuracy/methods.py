@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.accuracy.cases import Case, options_of
+from benchmarks.accuracy.reproduced import bias_compensated_pnp, gmlpnp
 from calib_core.calibration import calibrate_pairs
 from calib_core.geometry import RigidTransform
 from calib_core.options import CalibrationOptions
@@ -15,7 +16,7 @@ from calib_core.paper.pnp import refine_lm, solve_pnp
 from calib_core.results import Calibration
 from calib_core.synthetic import NOISE_PROFILES, SimulatedPairs
 
-__all__ = ["PEERS", "Method", "as_printed", "available", "best_threshold_px", "solve_ours", "sqpnp_lm"]
+__all__ = ["NOT_RUN", "PEERS", "Method", "as_printed", "available", "best_threshold_px", "solve_ours", "sqpnp_lm"]
 
 Method = Callable[[SimulatedPairs, Case], "RigidTransform | None"]
 
@@ -113,6 +114,18 @@ def _pycolmap(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
     return _finite(pose[:, :3], pose[:, 3])
 
 
+def _gmlpnp(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
+    """Run GMLPnP, which is told nothing about the noise."""
+    return gmlpnp(*_arrays(simulated), simulated.camera)
+
+
+def _bias_compensated(simulated: SimulatedPairs, case: Case) -> RigidTransform | None:
+    """Run the bias-compensated PnP with the true noise."""
+    profile = NOISE_PROFILES[case.noise]
+    sigma_polar = np.tile(profile.sigma_polar, (len(simulated.pairs), 1))
+    return bias_compensated_pnp(*_arrays(simulated), sigma_polar, profile.sigma_px, simulated.camera)
+
+
 def _finite(rotation: np.ndarray, translation_m: np.ndarray) -> RigidTransform | None:
     if not (np.isfinite(rotation).all() and np.isfinite(translation_m).all()):
         return None
@@ -145,7 +158,16 @@ PEERS: dict[str, Method] = {
     "MAGSAC + LM": _magsac_lm,
     "PoseLib": _poselib,
     "pycolmap": _pycolmap,
+    "GMLPnP": _gmlpnp,
+    "bias-compensated PnP": _bias_compensated,
 }
+NOT_RUN = {
+    "CaRaCTO": "not reproduced: made for radars without elevation, and its equations are not in the text that could be had",
+    "3DUPnP": "not reproduced to the letter: only its beginning could be had; the row of bias-compensated PnP follows the two "
+    "steps that it states",
+}
+"""Methods of the field without a row of their own, and why."""
+
 _MODULES = {"PoseLib": "poselib", "pycolmap": "pycolmap"}
 
 

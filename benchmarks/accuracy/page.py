@@ -9,7 +9,7 @@ __all__ = ["page"]
 
 _HEAD = """# Accuracy
 
-Written by `make bench-accuracy`; do not edit. Everything except the real pairs is simulated, with a fixed seed per trial: the
+Written by `COMMAND`; do not edit. Everything except the real pairs is simulated, with a fixed seed per trial: the
 figures do not depend on the number of processors, and every method gets the same draws. `make bench-accuracy SEED=fresh` draws
 from the hash of the present commit instead, so that nobody has seen the draws before; where it was run, its figures stand next
 to those of the fixed seeds.
@@ -17,7 +17,7 @@ to those of the fixed seeds.
 There are two families. Default: the errors that real radars, lenses and clicks have are drawn from the priors that the options
 state, and the estimator is given the default options. Ideal: radar, lens and clicks have nothing but independent noise, and the
 estimator is told so; the Cramer-Rao bound assumes the same. What of the ideal family was not run again is in
-[accuracy-ideal.md](accuracy-ideal.md), as measured with c35a642, whose ideal estimator is the same.
+[accuracy-ideal.md](accuracy-ideal.md), as measured with c35a642, whose ideal estimator is the same.ELSEWHERE
 
 Noise levels are assumptions based on
 vendors' figures; no real radar was measured. `ti` is a TI AWR1843 (range 1.5 cm, azimuth 0.55 deg, elevation 1 deg),
@@ -30,18 +30,30 @@ standard errors, so more trials would be needed. "Missed": it misses the aim sig
 one row in forty is missed by chance.
 """
 
+_USUAL = "make bench-accuracy"
+_ELSEWHERE = """ The other methods and the
+cost of each way of marking were last run alone: [accuracy-methods.md](accuracy-methods.md)."""
 
-def page(sections: Sequence[Section], fresh: Sequence[Section] = (), *, commit: str = "") -> str:
+
+def page(
+    sections: Sequence[Section],
+    fresh: Sequence[Section] = (),
+    *,
+    commit: str = "",
+    command: str = _USUAL,
+) -> str:
     """Return the page in Markdown.
 
     Args:
         sections: of the fixed seeds.
         fresh: the same sections of the fresh seeds; none if they were not run.
         commit: whose hash gave the fresh seeds.
+        command: what wrote the page.
     """
     others = fresh or [None] * len(sections)
     shown = [_section(one, other) for one, other in zip(sections, others, strict=True)]
-    return "\n".join([_HEAD, _summary(_claims(sections), _claims(fresh), commit), *shown])
+    head = _HEAD.replace("COMMAND", command).replace("ELSEWHERE", _ELSEWHERE if command == _USUAL else "")
+    return "\n".join([head, _summary(_claims(sections), _claims(fresh), commit), *shown])
 
 
 def _claims(sections: Sequence[Section]) -> list[Claim]:

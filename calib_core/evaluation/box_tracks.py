@@ -1,4 +1,4 @@
-"""Box tracks: which boxes of successive frames are around one object, as their source says, or by how they overlap."""
+"""Box tracks: which boxes of successive frames are around one object, as their source says, or by how they move."""
 
 from dataclasses import dataclass
 
@@ -9,8 +9,9 @@ from calib_core.detections import Box, Boxes
 
 __all__ = ["BoxTable", "box_table"]
 
-_LEAST_OVERLAP = 0.25  # intersection over union of two boxes of one object in successive frames
+_LONGEST_STEP = 0.8  # widths or heights from where a box is expected, for a box of the same object
 _LONGEST_GAP = 3  # frames that an object may be missed in
+_NEW_SHARE = 0.3  # of the newest step in the mean step of a box
 _SIDES = ("left_px", "top_px", "right_px", "bottom_px")
 
 
@@ -46,7 +47,7 @@ def box_table(boxes: Boxes) -> BoxTable:
     """Lay boxes out as columns, and follow the objects whose source does not.
 
     Args:
-        boxes: with the tracks of their source where it states them; other boxes are linked by their overlap.
+        boxes: with the tracks of their source where it states them; other boxes are linked by how they move.
     """
     frames = np.array([i for i, frame in enumerate(boxes) for _ in frame.boxes], dtype=np.int64)
     every = [box for frame in boxes for box in frame.boxes]
@@ -55,53 +56,73 @@ def box_table(boxes: Boxes) -> BoxTable:
     return BoxTable(boxes.times_ns, frames, sides, labels, _tracks(frames, every, sides), names)
 
 
+@dataclass(slots=True)
+class _Object:
+    """An object while it is followed: its last box, and how that moves per frame."""
+
+    row: int
+    frame: int
+    step_px: np.ndarray
+
+    def expected(self, sides: np.ndarray, frame: int) -> np.ndarray:
+        """Return where its box (4,) would be in a later frame."""
+        return np.asarray(sides[self.row] + self.step_px * (frame - self.frame))
+
+    def seen(self, row: int, sides: np.ndarray, frame: int) -> None:
+        """Take its box of a later frame."""
+        step_px = (sides[row] - sides[self.row]) / (frame - self.frame)
+        self.step_px = (1.0 - _NEW_SHARE) * self.step_px + _NEW_SHARE * step_px
+        self.row, self.frame = row, frame
+
+
 def _tracks(frames: Indices, every: list[Box], sides: np.ndarray) -> Indices:
     """Return the number of the object of each box (b,)."""
     named = {name: number for number, name in enumerate(dict.fromkeys(box.track for box in every if box.track))}
     tracks = np.array([named.get(box.track, -1) for box in every], dtype=np.int64)
     count = len(named)
-    open_rows: list[int] = []  # the last boxes of the objects that are followed
+    followed: list[_Object] = []
     unnamed = np.flatnonzero(tracks < 0)
-    for frame in np.unique(frames[unnamed]).tolist():
-        rows = _rows_of(frames, unnamed, frame)
-        open_rows = [row for row in open_rows if frame - frames[row] <= _LONGEST_GAP]
-        linked = _linked(open_rows, rows.tolist(), every, sides)
+    starts = np.flatnonzero(np.diff(frames[unnamed], prepend=-1))
+    for rows in np.split(unnamed, starts)[1:]:
+        frame = int(frames[rows[0]])
+        followed = [one for one in followed if frame - one.frame <= _LONGEST_GAP]
+        linked = _linked(followed, rows.tolist(), frame, every, sides)
         for row in rows.tolist():
-            before = linked.get(row)
-            tracks[row] = count if before is None else tracks[before]
-            count += before is None
-        continued = set(linked.values())
-        open_rows = [row for row in open_rows if row not in continued] + rows.tolist()
+            known = linked.get(row)
+            if known is None:
+                followed.append(_Object(row, frame, np.zeros(4)))
+                tracks[row], count = count, count + 1
+            else:
+                tracks[row] = tracks[known.row]
+                known.seen(row, sides, frame)
     return tracks
 
 
-def _rows_of(frames: Indices, unnamed: Indices, frame: int) -> Indices:
-    low, high = np.searchsorted(frames[unnamed], (frame, frame + 1))
-    return np.asarray(unnamed[low:high])
-
-
-def _linked(before: list[int], now: list[int], every: list[Box], sides: np.ndarray) -> dict[int, int]:
-    """Return for boxes of this frame the box that they continue, the largest overlaps first."""
-    if not before:
+def _linked(
+    followed: list[_Object], now: list[int], frame: int, every: list[Box], sides: np.ndarray
+) -> dict[int, _Object]:
+    """Return for boxes of this frame the object that they continue: the nearest to where it is expected."""
+    if not followed:
         return {}
-    overlap = _overlap(sides[before], sides[now])
-    same = np.array([[every[a].label == every[b].label for b in now] for a in before])
-    overlap = np.where(same, overlap, 0.0)
-    linked: dict[int, int] = {}
-    for flat in np.argsort(-overlap, axis=None, kind="stable").tolist():
+    steps = _steps(np.array([one.expected(sides, frame) for one in followed]), sides[now])
+    same = np.array([[every[one.row].label == every[row].label for row in now] for one in followed])
+    steps = np.where(same, steps, np.inf)
+    linked: dict[int, _Object] = {}
+    taken: set[int] = set()
+    for flat in np.argsort(steps, axis=None, kind="stable").tolist():
         i, j = divmod(flat, len(now))
-        if overlap[i, j] < _LEAST_OVERLAP:
+        if steps[i, j] > _LONGEST_STEP:
             break
-        if before[i] not in linked.values() and now[j] not in linked:
-            linked[now[j]] = before[i]
+        if i not in taken and now[j] not in linked:
+            linked[now[j]] = followed[i]
+            taken.add(i)
     return linked
 
 
-def _overlap(some: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the intersection over union (a, b) of boxes (a, 4) and (b, 4)."""
-    low = np.maximum(some[:, None, :2], others[None, :, :2])
-    high = np.minimum(some[:, None, 2:], others[None, :, 2:])
-    both = np.prod(np.maximum(high - low, 0.0), axis=2)
-    areas = [np.prod(one[:, 2:] - one[:, :2], axis=1) for one in (some, others)]
-    union = areas[0][:, None] + areas[1][None] - both
-    return np.asarray(both / np.where(union > 0, union, 1.0))
+def _steps(expected: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Return how far boxes (b, 4) are from expected ones (a, 4), in widths and heights, sizes included: (a, b)."""
+    size = np.maximum(
+        np.maximum((expected[:, 2:] - expected[:, :2])[:, None], (found[:, 2:] - found[:, :2])[None]), 1.0
+    )
+    apart = (found[None] - expected[:, None]).reshape(len(expected), len(found), 2, 2)
+    return np.asarray(np.sqrt(((apart / size[:, :, None]) ** 2).sum(axis=3).mean(axis=2)))

@@ -3,7 +3,8 @@
 Radar and camera see a target at a bearing each. Whatever the pose, the two differ by one angle that all targets share, and
 by the parallax, which falls with the range. Both are found from all targets and boxes together: the angle is the one under
 which most sightings meet a box. Each target is then given the box track that it meets best over the life that both share,
-the longest agreement first, and in each frame a target has at most one box and a box at most one target.
+the longest agreement first, and in each frame a target has at most one box and a box at most one target. What the radar
+follows in parts, such as the two ends of a car, joins the part that is matched.
 """
 
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ _MOST_PARALLAX_M = 3.0  # distance between the sensors, across
 _STEP_RAD = np.deg2rad(0.5)
 _MOST_VOTES = 20_000
 _ROUNDS = 3
+_PART_M = 5.0  # between the ranges of parts of one target
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +114,8 @@ def match_by_bearing(sightings: Sightings, table: BoxTable, camera: Camera) -> M
         chosen = _chosen(meetings, sightings, table, bearings)
     boxes = np.full(len(sightings.frames), -1)
     boxes[meetings.sightings[chosen]] = meetings.boxes[chosen]
+    parts = _parts(meetings, meetings.misfits(bearings), sightings, table, boxes)
+    boxes[meetings.sightings[parts]] = meetings.boxes[parts]
     return _matches(sightings, boxes, bearings if len(chosen) else None, camera)
 
 
@@ -191,7 +195,7 @@ def _refined(meetings: _Meetings, bearings: Bearings) -> Bearings:
     turn = bearings.turn_rad
     rest = _wrapped(kept.apart_rad - turn)
     weight = 1.0 / kept.tolerance_rad
-    prior = np.array([[0.0, 1.0 / _MOST_PARALLAX_M]]) * float(np.sqrt(len(rest))) * 0.1 * weight.mean()
+    prior = np.array([[0.0, 1.0 / _MOST_PARALLAX_M]])
     design = np.concatenate([np.stack([np.ones(len(rest)), kept.inverse_range], axis=1) * weight[:, None], prior])
     more, parallax = np.linalg.lstsq(design, np.append(rest * weight, 0.0), rcond=None)[0].tolist()
     return Bearings(
@@ -221,6 +225,31 @@ def _chosen(meetings: _Meetings, sightings: Sightings, table: BoxTable, bearings
         taken_boxes[meetings.boxes[free]] = True
         chosen.append(free)
     return np.sort(np.concatenate(chosen))
+
+
+def _parts(meetings: _Meetings, misfits: Values, sightings: Sightings, table: BoxTable, boxes: Indices) -> Indices:
+    """Return the meetings of targets that are parts of a matched one: all along at its range, in the bearing of its box.
+
+    A car is often followed as two or three targets. This too is decided by times, ranges and bearings alone.
+    """
+    range_of_box = np.full(len(table.frames), np.nan)
+    matched = np.flatnonzero(boxes >= 0)
+    range_of_box[boxes[matched]] = sightings.range_m[matched]
+    targets, tracks = sightings.targets[meetings.sightings], table.tracks[meetings.boxes]
+    free = ~np.isin(targets, sightings.targets[matched])
+    with np.errstate(invalid="ignore"):
+        near = np.abs(sightings.range_m[meetings.sightings] - range_of_box[meetings.boxes]) <= _PART_M
+    near &= free & (misfits <= 1.0)
+    lives = np.bincount(sightings.targets, minlength=int(sightings.targets.max(initial=0)) + 1)
+    keys = targets * (int(tracks.max(initial=0)) + 1) + tracks
+    pair, shared = np.unique(keys[near], return_inverse=True, return_counts=True)[1:]
+    rows, taken, kept = np.flatnonzero(near), set[int](), [np.zeros(0, dtype=np.int64)]
+    for one in np.argsort(-shared, kind="stable").tolist():
+        target = int(targets[rows[pair == one][0]])
+        if target not in taken and 2 * shared[one] >= lives[target]:
+            taken.add(target)
+            kept.append(rows[pair == one])
+    return np.concatenate(kept)
 
 
 def _middle(angles_rad: Values) -> float:

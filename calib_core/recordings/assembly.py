@@ -37,7 +37,7 @@ from calib_core.recordings.stamping import StampedTopic, read_stamps
 from calib_core.recordings.time.clock_choice import ClockChoice, choose_clock, choose_clocks
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, about_clocks, diagnose
 from calib_core.recordings.time.clock_faults import Stamps
-from calib_core.recordings.topics import Rhythm, Topic, TopicSummary, join_topics
+from calib_core.recordings.topics import BOX_LAYOUT, Rhythm, Topic, TopicSummary, join_topics
 from calib_core.recordings.usages import Usage, usage_of
 from calib_core.results import DataWarning
 
@@ -348,6 +348,12 @@ def _computed(topic: Topic) -> str:
     return source.computed if isinstance(source, PlainSource) else ""
 
 
+def _layout(topic: Topic, usage: Usage) -> str:
+    if usage.boxes is not None:
+        return f"{BOX_LAYOUT}, {usage.boxes.name}"
+    return "; ".join(filter(None, (usage.radar.description, _computed(topic)))) if usage.radar else ""
+
+
 def _summary(
     topic: Topic,
     inventory: Inventory,
@@ -368,7 +374,7 @@ def _summary(
         clock=diagnosis.chosen if diagnosis else "receive",
         problem=usage.problem,
         chosen=any(t and t.name == topic.name for t in (*used.all, used.camera_info)),
-        layout="; ".join(filter(None, (usage.radar.description, _computed(topic)))) if usage.radar else "",
+        layout=_layout(topic, usage),
         rate_hz=rhythm.rate_hz,
         longest_gap_s=rhythm.longest_gap_s,
         jitter_s=rhythm.jitter_s,

@@ -40,6 +40,7 @@ def summary_text(summary: RecordingSummary) -> str:
         *_labelled("radar", _radar(summary.radar)),
         *_labelled("radars", _sensors(summary)),
         *_labelled("camera", _camera(summary.camera)),
+        *_labelled("boxes", _boxes(summary.topics)),
     ]
     confirmed = [one.assumption.text for one in summary.assumptions if one.confirmed]
     lines.extend(_labelled("confirmed", [f"{text}." for text in confirmed]))
@@ -207,6 +208,11 @@ def _camera(camera: CameraSummary | None) -> list[str]:
         size,
         _intrinsics(camera),
     ]
+
+
+def _boxes(topics: Sequence[TopicSummary]) -> list[str]:
+    """List the topics that can be given as --boxes."""
+    return [f"{one.name}: {one.layout}, {_counted(one.count, 'message')}" for one in topics if one.has_boxes]
 
 
 def _intrinsics(camera: CameraSummary) -> str:

@@ -12,11 +12,14 @@ import numpy as np
 
 from calib_core.arrays import TimesNs
 from calib_core.camera import Camera
-from calib_core.errors import RecordingError
+from calib_core.detections import Boxes
+from calib_core.errors import InputError, RecordingError
 from calib_core.input_files import name_text, special_kind
 from calib_core.measurements import RadarScans, TimeNs
 from calib_core.recordings.assembly import Assembly, assemble
 from calib_core.recordings.assumptions import Assumption, StatedAssumption
+from calib_core.recordings.boxes.topic_boxes import boxes_in_topic
+from calib_core.recordings.camera.image_stream import ImageStream
 from calib_core.recordings.camera.images import EncodedImage
 from calib_core.recordings.column_map import parse_column_map
 from calib_core.recordings.containers.opening import open_sources
@@ -31,13 +34,15 @@ from calib_core.recordings.radar.column_plans import column_readings
 from calib_core.recordings.radar.several_topics.merged_stream import MergedStream
 from calib_core.recordings.radar.several_topics.sensors import RadarSensor, figures_of
 from calib_core.recordings.selection import Need, RecordingOptions
+from calib_core.recordings.stamping import read_stamps
 from calib_core.recordings.time.written_dates import parse_zone
-from calib_core.recordings.topics import TopicSummary
+from calib_core.recordings.topics import TopicSummary, join_topics
 from calib_core.results import DataWarning, InputFile
 
 __all__ = ["Recording", "inspect_recording", "open_recording", "require_files"]
 
 _HASH_BYTES = 1 << 22
+_STAMP_BYTES = 12
 
 
 class Recording:
@@ -274,6 +279,26 @@ class Recording:
         self._check_open()
         return self._assembly.radar.around(times, half_window_s) if self._assembly.radar else RadarScans()
 
+    def boxes(self, topic: str) -> Boxes:
+        """Decode a topic's boxes around objects, and give them the stamps of the frames they were made from.
+
+        Args:
+            topic: its name, such as /detections with vision_msgs/Detection2DArray.
+
+        Raises:
+            InputError: there is no such topic, it has no boxes, or they are not of the frames in use.
+            MessageError: it cannot be read.
+        """
+        self._check_open()
+        if self._assembly.images is None:
+            raise InputError(f"{self.name}: has no camera frames that boxes could belong to; add the camera's file")
+        found = next((one for one in join_topics(self.sources, {topic})[0] if len(one)), None)
+        if found is None:
+            able = ", ".join(one.name for one in self.topics if one.has_boxes) or "none"
+            raise InputError(f"{self.name}: no messages of a topic {topic}; topics with boxes: {able}")
+        images = self._assembly.images
+        return boxes_in_topic(found, stamps_ns=_header_stamps(images, self.image_clock), times_ns=images.times_ns)
+
     def fingerprint(self, progress: Callable[[int, int], None] | None = None) -> tuple[InputFile, ...]:
         """Hash all files. The result is cached, since hashing takes about a second per gigabyte.
 
@@ -300,6 +325,16 @@ class Recording:
             files.append(InputFile(name_text(source.path.name), source.size_bytes, digest.hexdigest()))
         self._fingerprint = tuple(files)
         return self._fingerprint
+
+
+def _header_stamps(images: ImageStream, clock: str | None) -> TimesNs:
+    """Return the stamps in the frames' messages, which boxes repeat; they are not those in use if receive times are."""
+    if clock == "header":
+        return images.times_ns
+    stamped = read_stamps([(images.topic, _STAMP_BYTES)])[0]
+    stamps = stamped.header_ns
+    usable = stamps is not None and len(stamps) == len(images.topic) and bool((np.diff(stamps[images.row]) > 0).all())
+    return stamps[images.row] if stamps is not None and usable else images.times_ns
 
 
 def open_recording(

@@ -14,9 +14,11 @@ from calib_core.recordings.messages.definitions import Definition, definition_of
 from calib_core.recordings.time.clock_diagnosis import ClockDiagnosis, between_islands
 from calib_core.results import DataWarning
 
-__all__ = ["Rhythm", "Topic", "TopicKind", "TopicSummary", "join_topics", "read_heads"]
+__all__ = ["BOX_LAYOUT", "Rhythm", "Topic", "TopicKind", "TopicSummary", "join_topics", "read_heads"]
 
 TopicKind = Literal["radar", "image", "camera-info", "other"]
+BOX_LAYOUT = "boxes around objects"
+"""How the layout of a topic with boxes begins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +56,11 @@ class TopicSummary:
     layout: str
     problem: str | None
     clocks: ClockDiagnosis | None = None
+
+    @property
+    def has_boxes(self) -> bool:
+        """Whether it holds boxes around objects."""
+        return self.layout.startswith(BOX_LAYOUT)
 
 
 @dataclass(frozen=True, slots=True)

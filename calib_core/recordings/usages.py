@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.errors import MessageError, RecordingError
+from calib_core.recordings.boxes.layouts import BoxLayout, box_layout
 from calib_core.recordings.camera.camera_info import is_camera_info
 from calib_core.recordings.camera.images import ImageLayout, is_picture
 from calib_core.recordings.messages.definitions import PRIMITIVES, Definition
@@ -49,12 +50,14 @@ class Usage:
         problem: see TopicSummary.
         radar: its layout, if it is a radar topic.
         image: its layout, if it is an image topic.
+        boxes: its layout, if it has boxes around objects.
     """
 
     kind: TopicKind
     problem: str | None = None
     radar: RadarLayout | None = None
     image: ImageLayout | None = None
+    boxes: BoxLayout | None = None
 
     @property
     def distinct_times(self) -> float:
@@ -75,6 +78,9 @@ def usage_of(topic: Topic, stated: StatedReading = _NOTHING) -> Usage:
         return Usage("other", problem=str(error))
     if is_camera_info(definition):
         return Usage("camera-info")
+    boxes = box_layout(definition)
+    if boxes is not None:
+        return Usage("other", boxes=boxes)
     pictures = is_picture(definition)
     usage = Usage("image" if pictures else "other", problem="no messages")
     for row in sorted({0, len(topic) // 2, len(topic) - 1}) if len(topic) else ():

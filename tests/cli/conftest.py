@@ -52,6 +52,7 @@ class Made:
     with_radar: bool = True
     radar_late_s: float = 0.0
     nan_scans: int = 0
+    with_speeds: bool = True
 
     @property
     def positions_radar_m(self) -> np.ndarray:
@@ -95,11 +96,10 @@ class Made:
             values = np.concatenate([points, [[0.0, 20.0]]], axis=1)
             if k % 7 < self.nan_scans:
                 values[:, 0] = np.nan
-            made.append(
-                RecordedMessage(
-                    "/radar/points", time, CloudMessage(time, "radar", ("x", "y", "z", "velocity", "snr"), values)
-                )
-            )
+            names = ("x", "y", "z", "velocity", "snr") if self.with_speeds else ("x", "y", "z", "snr")
+            if not self.with_speeds:
+                values = np.delete(values, 3, axis=1)
+            made.append(RecordedMessage("/radar/points", time, CloudMessage(time, "radar", names, values)))
         return iter(sorted(made, key=lambda message: message.receive_time))
 
 

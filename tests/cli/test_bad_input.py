@@ -220,7 +220,9 @@ def test_wrong_usage_gets_a_clear_error(cocalib: Cocalib, arguments: list[str], 
     assert expected in line
 
 
-@pytest.mark.parametrize("command", ["open", "info", "solve", "export", "check", "import", "video", "simulate"])
+@pytest.mark.parametrize(
+    "command", ["open", "info", "solve", "export", "check", "import", "video", "record-rrd", "rerun", "simulate"]
+)
 def test_the_help_names_every_value(cocalib: Cocalib, command: str) -> None:
     answer = cocalib(command, "--help")
     assert answer.code == 0

@@ -25,6 +25,7 @@ INPUTS = {
     "info": ["info", "{}"],
     "open": ["open", "{}", "--no-browser"],
     "video": ["video", "{}", "--out", "v.mp4"],
+    "overlay": ["video", "{}", "--overlay", "--calibration", "absent.json", "--out", "v.mp4"],
     "clicks": ["solve", "absent.bag", "--clicks", "{}"],
     "pairs": ["solve", "--pairs", "{}"],
     "check": ["check", "{}"],

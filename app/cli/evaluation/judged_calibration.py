@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from calib_core.recordings import Recording
     from calib_core.results import Calibration, DataWarning
 
-__all__ = ["JudgedCalibration", "judged_calibration"]
+__all__ = ["JudgedCalibration", "judged_calibration", "require_size"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,14 +51,14 @@ def judged_calibration(
     found, _ = frames.read([path])
     recorded = recording.camera()
     calibration = calibration_of(found, str(path), camera or recorded)
-    _require_size(calibration.camera, recording, path)
+    require_size(calibration.camera, recording, path)
     lens = other_camera(found, recorded)
     return JudgedCalibration(
         found, calibration, tuple(DataWarning(one.code, f"{path.name}: {one.message}", one.hint) for one in lens)
     )
 
 
-def _require_size(camera: "Camera", recording: "Recording", path: Path) -> None:
+def require_size(camera: "Camera", recording: "Recording", path: Path) -> None:
     """Refuse a calibration for pictures of another size.
 
     Raises:

@@ -22,6 +22,7 @@ from app.web.messages import (
     Command,
     CursorMoved,
     Done,
+    FollowingStopped,
     FrameBoxes,
     FrameHeader,
     FrameWanted,
@@ -107,7 +108,6 @@ class Channel:
 
     def refresh(self) -> None:
         """Draw again, after a change of the session or once the 3D view is connected."""
-        self.show_boxes()
         self._overlay.give(self._cursor)
         self._space.give(self._cursor)
         if not self._cursor.playing:
@@ -119,7 +119,8 @@ class Channel:
         if carried or self._has_boxes:
             self._has_boxes = bool(carried)
             index = self._cursor.index
-            self.outbox.put(encode(FrameBoxes(index, boxes_in_frame(carried, index))), kind="boxes")
+            returns = self._hub.box_judging.returns(index)
+            self.outbox.put(encode(FrameBoxes(index, boxes_in_frame(carried, index), returns)), kind="boxes")
 
     async def _read(self, socket: Socket) -> None:
         while True:
@@ -159,6 +160,8 @@ class Channel:
         elif isinstance(command, ViewpointWanted):
             if self.scene is not None:
                 self.scene.look_from(command.viewpoint)
+        elif isinstance(command, FollowingStopped):
+            self._hub.box_following.stop()
         elif isinstance(command, SnapWanted):
             hub = self._hub
             self.outbox.put(encode(await snapped(command, hub.moments, hub.frames, hub.executor)))
@@ -199,6 +202,7 @@ class Channel:
         if not 0 <= command.index < len(self._hub.moments):
             return
         self._cursor = command
+        self.show_boxes()
         self.refresh()
 
     async def _greet(self, _wanted: Hello) -> None:

@@ -10,7 +10,9 @@ from typing import Protocol
 
 from app.error_boundary import error_boundary
 from app.resources import version
-from app.view import View, warning_in_sentences
+from app.view import AccPanel, View, warning_in_sentences
+from app.web.channel.box_following import BoxFollowing
+from app.web.channel.box_judging import BoxJudging
 from app.web.channel.desk import ClosedDesk, Desk
 from app.web.channel.live_edge import LiveEdge
 from app.web.channel.outbox import Outbox
@@ -86,6 +88,10 @@ class Hub:
         self.tabs: set[Tab] = set()
         self.steps = ThreadPoolExecutor(max_workers=1, thread_name_prefix="steps")
         self.feed = ViewFeed(workspace.view)
+        self.box_following = BoxFollowing(
+            workspace, recording, executor, lambda progress: self.broadcast(progress, "progress")
+        )
+        self.box_judging = BoxJudging(workspace, recording, executor, lambda: self.box_following.is_busy)
         self._searching: asyncio.Task[None] | None = None
         self._edge = (
             LiveEdge(self, workspace, recording, self.camera) if isinstance(recording, FollowedRecording) else None
@@ -105,6 +111,8 @@ class Hub:
         if self._searching is not None:
             self._searching.cancel()
             await asyncio.gather(self._searching, return_exceptions=True)
+        await self.box_following.close()
+        await self.box_judging.close()
         await self.frames.close()
 
     @property
@@ -149,12 +157,14 @@ class Hub:
             tab.outbox.put(text, kind=kind)
 
     def _take(self, view: View) -> None:
+        only_boxes = _without_boxes(view) == _without_boxes(self.feed.newest)
         self.feed.take(view)
+        self.box_following.follow()
+        self.box_judging.judge()
         for tab in self.tabs:
             tab.show()
-        if view.solving:
-            for tab in self.tabs:
-                tab.show_boxes()
+            tab.show_boxes()
+        if view.solving or only_boxes:
             return  # overlay and 3D view show the last answer until the next one; redrawing would only slow the solver
         for tab in self.tabs:
             tab.refresh()
@@ -214,6 +224,11 @@ class Hub:
             opening=self._opening,
             intrinsics=self.workspace.intrinsics,
         )
+
+
+def _without_boxes(view: View) -> View:
+    """Return what the overlay and the 3D view depend on."""
+    return replace(view, boxes=(), box_labels=(), acc=AccPanel(), can_undo=False, can_redo=False)
 
 
 def _settled(recording: Recording) -> list[DataWarning]:

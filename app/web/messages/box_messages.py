@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from app.view.box_rows import BoxInFrame
+from app.view.box_rows import BoxedReturn, BoxInFrame
 
 __all__ = ["FrameBoxes"]
 
@@ -14,7 +14,9 @@ class FrameBoxes:
     Attributes:
         index: of the frame.
         boxes: around objects in it.
+        returns: of moving targets at its time.
     """
 
     index: int
     boxes: tuple[BoxInFrame, ...]
+    returns: tuple[BoxedReturn, ...]

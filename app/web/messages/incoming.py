@@ -20,6 +20,7 @@ __all__ = [
     "MAX_TEXT_BYTES",
     "Command",
     "CursorMoved",
+    "FollowingStopped",
     "FrameWanted",
     "Hello",
     "ImportWanted",
@@ -139,8 +140,22 @@ class SnapWanted:
     id: str | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class FollowingStopped:
+    """A page wants boxes to be followed no farther than they have been."""
+
+
 Command: TypeAlias = (
-    Step | Hello | ViewWanted | FrameWanted | CursorMoved | ViewpointWanted | ImportWanted | ReviewRequest | SnapWanted
+    Step
+    | Hello
+    | ViewWanted
+    | FrameWanted
+    | CursorMoved
+    | ViewpointWanted
+    | ImportWanted
+    | ReviewRequest
+    | SnapWanted
+    | FollowingStopped
 )
 
 
@@ -212,6 +227,10 @@ class SnapForm(_Form, frozen=True, tag="snap_wanted"):
     id: forms.ClickId | None = None
 
 
+class StopFollowingForm(_Form, frozen=True, tag="stop_following"):
+    """Boxes are to be followed no farther."""
+
+
 OpeningForm: TypeAlias = ChoicesWanted | FolderWanted | RecentForgotten | OpenWith
 MessageForm: TypeAlias = (
     forms.StepForm
@@ -223,6 +242,7 @@ MessageForm: TypeAlias = (
     | ImportForm
     | ReviewRequest
     | SnapForm
+    | StopFollowingForm
     | OpeningForm
 )
 
@@ -349,6 +369,11 @@ def _import(form: ImportForm) -> Command:
 @_command.register
 def _snap(form: SnapForm) -> Command:
     return SnapWanted(form.image_time.stamp.time, form.pixel_px, form.id)
+
+
+@_command.register
+def _stop_following(form: StopFollowingForm) -> Command:
+    return FollowingStopped()
 
 
 @_command.register

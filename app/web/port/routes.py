@@ -13,6 +13,7 @@ from typing import Protocol
 import msgspec
 import numpy as np
 
+from app.report import current_report
 from app.session import Session
 from app.solving import calibration_text
 from app.view import sentence
@@ -25,6 +26,7 @@ from app.web.exports.query import FieldError
 from app.web.port.preloading import with_preloaded_modules
 from app.web.port.viser_hook import client_page
 from app.workspace import Workspace
+from calib_core.boxes import boxes_text
 from calib_core.errors import CalibrationError
 from calib_core.interchange import CalibrationFile, read_calibration, written_formats
 from calib_core.measurements import MIN_PAIRS, Unsolvable
@@ -176,6 +178,8 @@ class _Downloads:
         return {
             "/api/calibration.json": self._calibration,
             "/api/clicks.json": self._clicks,
+            "/api/report.html": self._report,
+            "/api/boxes.json": self._boxes,
             "/api/formats.json": _formats,
             "/api/activity.json": self._activity,
             "/api/picture_changes.json": self._picture_changes,
@@ -188,6 +192,11 @@ class _Downloads:
 
     def _calibration(self, _query: str) -> Reply:
         return self._of_calibration(lambda text: _download(text.encode(), "calibration.json"))
+
+    def _report(self, _query: str) -> Reply:
+        return self._of_calibration(
+            lambda text: _download(current_report(text, self._recording).encode(), "report.html")
+        )
 
     def _export(self, name: str, query: str) -> Reply:
         def make(text: str) -> Reply:
@@ -234,6 +243,9 @@ class _Downloads:
 
     def _clicks(self, _query: str) -> Reply:
         return _download(self._workspace.clicks_text().encode(), "clicks.json")
+
+    def _boxes(self, _query: str) -> Reply:
+        return _download(boxes_text(self._workspace.boxes).encode(), "boxes.json")
 
     def _activity(self, _query: str) -> Reply:
         survey = self._hub.survey

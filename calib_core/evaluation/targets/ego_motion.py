@@ -6,11 +6,13 @@ import numpy as np
 
 from calib_core.arrays import Flags, Points3, Values, Vector2, frozen_array
 
-__all__ = ["EgoVelocity", "ego_velocity"]
+__all__ = ["LEAST_RETURNS", "EgoVelocity", "cell_weights", "ego_velocity"]
 
 LEAST_RETURNS = 8
 """Fewer returns of a scan do not tell the radar's velocity from that of one target."""
 
+_LEAST_CELLS = 6  # that agree: a near car fills a few with many returns
+_CELL_M = 3.0
 _LEAST_DIRECTIONS = 5  # that differ: one or two targets fit any velocity of the radar
 _DIRECTION_RAD = np.deg2rad(5.0)
 _AGREEING_SHARE = 0.5
@@ -35,7 +37,7 @@ class EgoVelocity:
 
 
 def ego_velocity(points_radar_m: Points3, doppler_mps: Values, *, tolerance_mps: float) -> EgoVelocity | None:
-    """Find the velocity that most returns of a scan agree on, if they all stand still; None if they do not tell.
+    """Find the velocity that most of a scan agrees on, if they all stand still; None if they do not tell.
 
     What stands still in direction d has the Doppler speed -d v. RANSAC over two returns at a time, then least squares.
 
@@ -50,8 +52,10 @@ def ego_velocity(points_radar_m: Points3, doppler_mps: Values, *, tolerance_mps:
     if known.sum() < LEAST_RETURNS:
         return None
     directions, speeds = points_radar_m[known, :2] / range_m[known, None], doppler_mps[known]
-    agreeing = _most_agreeing(directions, speeds, tolerance_mps)
-    if agreeing.mean() < _AGREEING_SHARE or not _spread(directions[agreeing]):
+    weights = cell_weights(points_radar_m[known])
+    agreeing = _most_agreeing(directions, speeds, weights, tolerance_mps)
+    cells = float(weights[agreeing].sum())
+    if cells < max(_LEAST_CELLS, _AGREEING_SHARE * weights.sum()) or not _spread(directions[agreeing]):
         return None
     velocity = np.linalg.lstsq(-directions[agreeing], speeds[agreeing], rcond=None)[0]
     over_ground = np.full(len(doppler_mps), np.nan)
@@ -59,7 +63,14 @@ def ego_velocity(points_radar_m: Points3, doppler_mps: Values, *, tolerance_mps:
     return EgoVelocity(velocity, over_ground)
 
 
-def _most_agreeing(directions: np.ndarray, speeds: Values, tolerance_mps: float) -> Flags:
+def cell_weights(points_radar_m: Points3) -> Values:
+    """Weigh returns (n,) so that each cell of the ground counts once, however many returns a near target gives."""
+    cells = np.floor(points_radar_m[:, :2] / _CELL_M)
+    own, counts = np.unique(cells, axis=0, return_inverse=True, return_counts=True)[1:]
+    return np.asarray(1.0 / counts[own.reshape(-1)])
+
+
+def _most_agreeing(directions: np.ndarray, speeds: Values, weights: Values, tolerance_mps: float) -> Flags:
     rng = np.random.default_rng(1)  # the same scan gives the same answer
     first, second = rng.integers(len(speeds), size=(2, _TRIALS))
     a, b = directions[first], directions[second]
@@ -72,7 +83,7 @@ def _most_agreeing(directions: np.ndarray, speeds: Values, tolerance_mps: float)
     velocities = np.stack([of_a * b[:, 1] - of_b * a[:, 1], of_b * a[:, 0] - of_a * b[:, 0]], axis=1)
     velocities /= determinant[:, None]
     within = np.abs(speeds + velocities @ directions.T) <= tolerance_mps
-    return np.asarray(within[within.sum(axis=1).argmax()])
+    return np.asarray(within[(within @ weights).argmax()])
 
 
 def _spread(directions: np.ndarray) -> bool:

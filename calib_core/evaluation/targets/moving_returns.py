@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from calib_core.arrays import Flags, Indices, Values, frozen_array
-from calib_core.evaluation.targets.ego_motion import LEAST_RETURNS, ego_velocity
+from calib_core.evaluation.targets.ego_motion import LEAST_RETURNS, cell_weights, ego_velocity
 from calib_core.measurements import RadarScans, joined_alternatives
 from calib_core.options import option
 from calib_core.results import DataWarning
@@ -136,12 +136,15 @@ def _sifted(scans: RadarScans, options: TargetOptions, offset: int) -> _Sifted:
         if options.sensors == "still" or known.sum() < LEAST_RETURNS:
             continue
         judged += 1
-        mostly = bool((np.abs(speeds[rows][known]) >= options.min_speed_mps).mean() > 0.5)
+        weights = cell_weights(scans.points_radar_m[rows][known])
+        if weights @ (np.abs(speeds[rows][known]) >= options.min_speed_mps) <= 0.5 * weights.sum():
+            as_moving[rows] = speeds[rows]  # most stand still, so the radar does
+            continue
         ego = ego_velocity(scans.points_radar_m[rows], speeds[rows], tolerance_mps=options.min_speed_mps)
         if ego is not None:
             as_moving[rows] = ego.speeds_mps
-        fitted += mostly and ego is not None
-        unfitted += mostly and ego is None
+        fitted += ego is not None
+        unfitted += ego is None
     fast = [np.abs(np.nan_to_num(some)) >= options.min_speed_mps for some in (speeds, as_moving)]
     kept = np.flatnonzero(unknown | fast[0] | fast[1])
     return _Sifted(

@@ -1,6 +1,5 @@
 """Target clusters: the moving returns of each scan, grouped by distances that are scaled by the radar's noise."""
 
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -26,7 +25,7 @@ class TargetClusters:
         scans: (c,) index of the scan of each.
         positions_m: (c, 3) mean of its returns.
         covariances_m2: (c, 2, 2) of that position in x and y, as of one return of the target.
-        doppler_mps: (c,) median Doppler speed; NaN without.
+        doppler_mps: (c,) mean Doppler speed; NaN without.
         of_return: (n,) the cluster of each return.
     """
 
@@ -63,11 +62,9 @@ def target_clusters(scans: RadarScans, options: TargetOptions) -> TargetClusters
     first = np.unique(of_return, return_index=True)[1]
     jacobian = cartesian_jacobian(polar[first])[:, :2] * sigma[first, None, :]
     own_m2 = jacobian @ np.swapaxes(jacobian, 1, 2) + options.spacing_m**2 * np.eye(2)
-    order = np.argsort(of_return, kind="stable")
-    ends = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-    doppler = [float(np.median(scans.doppler_mps[order[a:b]])) for a, b in itertools.pairwise(ends)]
+    doppler = np.bincount(of_return, weights=scans.doppler_mps, minlength=count) / np.maximum(sizes, 1.0)
     return TargetClusters(
-        scans.scan_of_return()[first], positions / np.maximum(sizes, 1.0)[:, None], own_m2, np.array(doppler), of_return
+        scans.scan_of_return()[first], positions / np.maximum(sizes, 1.0)[:, None], own_m2, doppler, of_return
     )
 
 

@@ -18,11 +18,13 @@ from calib_core.measurements import NS_PER_S, RadarScans
 
 __all__ = ["FoundTargets", "find_targets", "moving_targets"]
 
-_GATE = 11.829158081900795  # the 99.73 % quantile of chi2 with 2 degrees of freedom
+_GATE = 14.156413609126675  # the 99.73 % quantile of chi2 with 3 degrees of freedom
+_DOPPLER_SIGMA_MPS = 0.7  # of a cluster's mean Doppler speed: limbs and wheels move for themselves
 _ACCELERATION_MPS2 = 2.0  # standard deviation of a target's acceleration
 _FIRST_SPEED_MPS = 3.0  # standard deviation of a new target's velocity, where Doppler does not tell
 _COAST_S = 1.0  # longest time that a target stays alive without being seen
 _COAST_SCANS = 3  # or as many scans, if that is longer
+_MERGE_S = 0.5  # longest time unseen of a target that merges with another
 _LEAST_SIGHTINGS = 3
 _LEAST_TRAVEL_M = 1.0  # of a target without Doppler speeds
 _LEAST_TRAVEL_SIGMAS = 6.0
@@ -51,6 +53,7 @@ class _Target:
     time_ns: int  # of the state
     seen_ns: int
     clusters: list[int] = field(default_factory=list)
+    ended: bool = False
 
 
 def moving_targets(scans: RadarScans, options: TargetOptions | None = None) -> tuple[TargetTrack, ...]:
@@ -117,7 +120,7 @@ def _followed(
         rows = np.arange(ends[scan], ends[scan + 1])
         if not len(rows):
             continue
-        alive = [target for target in alive if time_ns - target.seen_ns <= coast_ns]
+        alive = [one for one in alive if not one.ended and time_ns - one.seen_ns <= coast_ns]
         taken = _assign(alive, rows, clusters, time_ns)
         new = [_new(clusters, int(row), time_ns) for row in rows if int(row) not in taken]
         alive += new
@@ -138,15 +141,38 @@ def _assign(alive: list[_Target], rows: Indices, clusters: TargetClusters, time_
     innovations = covariances[:, None] + clusters.covariances_m2[rows][None]
     steps = clusters.positions_m[rows, :2][None] - states[:, None]
     squared = np.einsum("tci,tcij,tcj->tc", steps, np.linalg.inv(innovations), steps)
+    squared += _doppler_squared(alive, clusters, rows)
     cost = np.where(squared <= _GATE, squared, 100.0 * _GATE)
+    owners = {int(j): int(i) for i, j in zip(*linear_sum_assignment(cost), strict=True) if squared[i, j] <= _GATE}
     given: set[int] = set()
-    for i, j in zip(*linear_sum_assignment(cost), strict=True):
-        if squared[i, j] <= _GATE:
-            _update(alive[i], innovations[i, j], steps[i, j])
-            alive[i].clusters.append(int(rows[j]))
-            alive[i].seen_ns = time_ns
-            given.add(int(rows[j]))
+    for j, i in owners.items():
+        rivals = [alive[k] for k in np.flatnonzero(squared[:, j] <= _GATE) if k not in owners.values()]
+        if _merged(alive[i], rivals, time_ns):
+            for target in (alive[i], *rivals):
+                target.ended = True
+            continue
+        _update(alive[i], innovations[i, j], steps[i, j])
+        alive[i].clusters.append(int(rows[j]))
+        alive[i].seen_ns = time_ns
+        given.add(int(rows[j]))
     return given
+
+
+def _merged(target: _Target, rivals: list[_Target], time_ns: int) -> bool:
+    """Return whether targets become one cluster here: afterwards nobody can say which one is which, so they end."""
+    known = [one for one in rivals if len(one.clusters) >= _LEAST_SIGHTINGS]
+    recent = any(time_ns - one.seen_ns <= _MERGE_S * NS_PER_S for one in known)
+    return recent and len(target.clusters) >= _LEAST_SIGHTINGS
+
+
+def _doppler_squared(alive: list[_Target], clusters: TargetClusters, rows: Indices) -> np.ndarray:
+    """Return the squared distance (t, c) of each cluster's Doppler speed from each target's; 0 where unknown."""
+    along = clusters.positions_m[rows, :2]
+    along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    expected = np.array([target.state[2:] for target in alive]) @ along.T
+    velocity_m2 = np.array([target.covariance[2:, 2:] for target in alive])
+    variance = np.einsum("ci,tij,cj->tc", along, velocity_m2, along) + _DOPPLER_SIGMA_MPS**2
+    return np.asarray(np.nan_to_num((clusters.doppler_mps[rows] - expected) ** 2 / variance))
 
 
 def _new(clusters: TargetClusters, row: int, time_ns: int) -> _Target:

@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 
+from calib_core.interchange.own.detection_documents import BOXES_SCHEMA, LABELS_SCHEMA, BoxesDocument, LabelsDocument
 from calib_core.interchange.own.documents import (
     CALIBRATION_SCHEMA,
     CLICKS_SCHEMA,
@@ -22,6 +23,8 @@ _DOCUMENTS: dict[str, Any] = {
     CLICKS_SCHEMA: ClicksDocument,
     PAIRS_SCHEMA: PairsDocument,
     CALIBRATION_SCHEMA: CalibrationDocument,
+    BOXES_SCHEMA: BoxesDocument,
+    LABELS_SCHEMA: LabelsDocument,
 }
 
 

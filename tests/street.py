@@ -11,7 +11,13 @@ from calib_core.measurements import RadarScan, RadarScans, TimeNs
 from calib_core.radar import cartesian_from_polar, polar_from_cartesian
 
 START_NS = 1_700_000_000_000_000_000
-CAMERA = Camera("pinhole", 1280, 720, np.array([[900.0, 0.0, 639.5], [0.0, 900.0, 359.5], [0.0, 0.0, 1.0]]))
+CAMERA = Camera(
+    "plumb_bob",
+    1280,
+    720,
+    np.array([[900.0, 0.0, 639.5], [0.0, 900.0, 359.5], [0.0, 0.0, 1.0]]),
+    np.array([-0.12, 0.03, 0.001, -0.0005, 0.0]),
+)
 OPTICAL_FROM_RADAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 TRUE_POSE = RigidTransform(
     rotation_exp(np.deg2rad([2.0, -6.0, 1.0])) @ OPTICAL_FROM_RADAR, np.array([0.25, 0.1, -0.05])
@@ -57,7 +63,7 @@ def street(
         seed: of the noise and the walks.
         with_doppler: whether the radar measures it.
         with_names: whether the boxes say who is in them.
-        ego_mps: velocity of both sensors over ground; everything is given relative to them.
+        ego_mps: velocity of both sensors over ground; what stands still passes by, the people keep pace.
         label: class of the boxes.
     """
     rng = np.random.default_rng(seed)
@@ -71,7 +77,9 @@ def street(
         time = TimeNs(START_NS + step * 100_000_000)
         seconds_now = 0.1 * step
         where, velocity = _walked(starts, speeds, seconds_now)
-        scan, who = _scan(time, where, velocity, still, np.array(ego_mps), rng, with_doppler)
+        passed = still - np.array(ego_mps) * seconds_now
+        passed[:, 0] = 3.0 + (passed[:, 0] - 3.0) % 40.0
+        scan, who = _scan(time, where, velocity, passed, np.array(ego_mps), rng, with_doppler)
         scans.append(scan)
         labels.append(LabelledScan(time, who))
         frames.append(FrameBoxes(TimeNs(time + 12_000_000), _boxes(where, label, with_names)))
@@ -108,7 +116,7 @@ def _scan(
         for _ in range(rng.integers(1, 4)):
             point = np.array([*(place + rng.normal(0, 0.12, 2)), rng.normal(0.0, 0.25)])
             points.append(point)
-            doppler.append((speed - ego_mps) @ place / np.linalg.norm(place) + rng.normal(0, 0.05))
+            doppler.append(speed @ place / np.linalg.norm(place) + rng.normal(0, 0.05))
             who.append(f"person-{number}")
     for place in still:
         points.append(np.array([*place, rng.normal(0, 0.2)]))

@@ -1,0 +1,112 @@
+"""The report: one HTML file without scripts, fonts or links, the same bytes for the same inputs."""
+
+import base64
+from functools import cache
+from pathlib import Path
+
+from app.report.markup import Child, Markup, tag
+from app.report.residual_rows import rows_at_clicks, rows_of_pairs
+from app.report.sections.acc import acc
+from app.report.sections.answer import answer
+from app.report.sections.cautions import cautions
+from app.report.sections.comparison import comparison
+from app.report.sections.coverage import coverage
+from app.report.sections.pairs import pair_table
+from app.report.sections.provenance import provenance
+from app.report.sections.residuals import residuals
+from app.report.sections.uncertainty import uncertainty
+from app.report.subject import ReportSubject
+from calib_core.results import Calibration
+
+__all__ = ["report_html"]
+
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+_PICTURE_WIDTH = 320.0
+
+
+def report_html(subject: ReportSubject) -> str:
+    """Return the report on a calibration as HTML that is well-formed XML, too."""
+    title = f"Calibration report: {subject.name}"
+    body = tag(
+        "body",
+        _definitions(subject),
+        tag("header", tag("h1", "Radar-camera calibration report"), tag("p", _what(subject))),
+        tag("main", *_sections(subject)),
+        tag("footer", _foot()),
+    )
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("title", title),
+        Markup(f"<style>{_style()}</style>"),
+    )
+    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en', xmlns='http://www.w3.org/1999/xhtml').text}\n"
+
+
+def _sections(subject: ReportSubject) -> list[Child]:
+    """Return the sections in their order; what nothing is known of is left out."""
+    shown: list[Child] = [answer(subject), cautions(subject)]
+    if subject.against is not None:
+        shown.append(comparison(subject.against, subject.name))
+    shown.append(uncertainty(subject))
+    if subject.calibration is not None:
+        shown += _of_pairs(subject, subject.calibration)
+    boxes = subject.judged.evaluation.boxes if subject.judged is not None else None
+    shown.append(acc(boxes) if boxes is not None else None)
+    shown.append(provenance(subject))
+    return shown
+
+
+def _of_pairs(subject: ReportSubject, calibration: Calibration) -> list[Child]:
+    """Return residuals, coverage and the table: at the clicks of the recording if it was judged there, else of the own pairs."""
+    figures = subject.judged.evaluation.residuals if subject.judged is not None else None
+    if figures is not None and subject.judged is not None and subject.recording is not None:
+        rows = rows_at_clicks(figures, subject.judged.clicks, calibration)
+        known = ", which it was solved from" if rows.solved_from else ""
+        of = f"at the clicks in {subject.recording.name}{known}"
+    else:
+        rows, of = rows_of_pairs(calibration), "of the calibration's own pairs"
+    if not len(rows):
+        return []
+    with_picture = subject.recording is not None and subject.recording.picture is not None
+    return [
+        residuals(calibration, rows, of=of, with_picture=with_picture),
+        coverage(calibration, rows, with_picture=with_picture),
+        pair_table(rows),
+    ]
+
+
+def _what(subject: ReportSubject) -> Markup:
+    """Say what is reported, in one line."""
+    digest = subject.inputs[0].sha256[:16] if subject.inputs else ""
+    on = f", judged on {subject.recording.name}" if subject.recording is not None else ""
+    known = tag("span", " (sha256 ", tag("code", f"{digest}…"), ")") if digest else None
+    return tag("span", tag("b", subject.name), known, on)
+
+
+def _definitions(subject: ReportSubject) -> Markup | None:
+    """Return the frame that several drawings use, once."""
+    calibration = subject.calibration
+    picture = subject.recording.picture if subject.recording is not None else None
+    if picture is None or calibration is None:
+        return None
+    height = _PICTURE_WIDTH * calibration.camera.height_px / calibration.camera.width_px
+    data = f"data:image/jpeg;base64,{base64.b64encode(picture.jpeg).decode('ascii')}"
+    frame = Markup(
+        f'<image id="picture" width="{_PICTURE_WIDTH:g}" height="{height:.2f}" preserveAspectRatio="none" href="{data}"/>'
+    )
+    return tag("svg", tag("defs", frame), class_="definitions", aria_hidden="true", xmlns="http://www.w3.org/2000/svg")
+
+
+@cache
+def _style() -> str:
+    return Path(__file__).with_name("report.css").read_text(encoding="utf-8")
+
+
+def _foot() -> str:
+    return (
+        "Radar: x forward, y left, z up. Camera: x right, y down, z forward. Pixel (0, 0) is the centre of the top-left pixel. "
+        "AED and CDSD divide by N and N - 1. The same inputs give the same file, byte for byte."
+    )

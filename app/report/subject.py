@@ -1,0 +1,102 @@
+"""What a report is about, as values: a calibration, and what a recording and another calibration say of it."""
+
+from dataclasses import dataclass
+
+from calib_core.evaluation import Evaluation
+from calib_core.interchange import Comparison, FrameNames, ImportedCalibration
+from calib_core.measurements import ReflectorClick
+from calib_core.results import Calibration, DataWarning, InputFile
+
+__all__ = ["Against", "Judged", "Picture", "ReportSubject", "Watched"]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A frame to draw over.
+
+    Attributes:
+        jpeg: the frame, downscaled.
+        words: which frame it is.
+    """
+
+    jpeg: bytes
+    words: str
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """A recording that the calibration is judged on.
+
+    Attributes:
+        name: of the recording.
+        inputs: its files, by their content.
+        topics: what was read from it, as (what, topic).
+        warnings: of reading it.
+        picture: one of its frames; None if none can be read.
+    """
+
+    name: str
+    inputs: tuple[InputFile, ...]
+    topics: tuple[tuple[str, str], ...] = ()
+    warnings: tuple[DataWarning, ...] = ()
+    picture: Picture | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What a recording says of the calibration.
+
+    Attributes:
+        evaluation: the figures.
+        clicks: that the residuals are at.
+    """
+
+    evaluation: Evaluation
+    clicks: tuple[ReflectorClick, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Against:
+    """Another calibration of the same sensors.
+
+    Attributes:
+        name: of its file.
+        inputs: its files, by their content.
+        comparison: the other one is the first of the two.
+        judged: which one is better on the recording, as sentences without their final periods.
+    """
+
+    name: str
+    inputs: tuple[InputFile, ...]
+    comparison: Comparison
+    judged: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReportSubject:
+    """What a report is about.
+
+    Attributes:
+        name: of the calibration's file, without its folder.
+        found: what was read.
+        calibration: the same with a camera; None if no camera is known.
+        version: of the program that writes the report.
+        inputs: the files that it was read from, by their content.
+        recording: that it is judged on.
+        judged: what the recording says of it.
+        against: another calibration.
+    """
+
+    name: str
+    found: ImportedCalibration
+    calibration: Calibration | None
+    version: str
+    inputs: tuple[InputFile, ...] = ()
+    recording: Watched | None = None
+    judged: Judged | None = None
+    against: Against | None = None
+
+    @property
+    def frames(self) -> FrameNames:
+        """The names of the two frames; the usual ones if the file has none."""
+        return self.found.frames or FrameNames()

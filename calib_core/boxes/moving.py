@@ -1,0 +1,226 @@
+"""Boxes around what moves before a fixed camera: the difference of each frame from the scene without movement.
+
+The background is the median of frames spread over the recording, its noise the median deviation from it. A frame's
+brightness is fitted to the background per channel, pixels that differ by many sigmas are joined to regions, regions to
+boxes, and boxes that overlap from frame to frame to tracks. Everything happens in pictures of at most 480 pixels across.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib_core.arrays import TimesNs
+from calib_core.boxes.overlap_tracks import tracked
+from calib_core.detections import Box, Boxes, FrameBoxes
+from calib_core.errors import InputError, MessageError
+from calib_core.measurements import TimeNs
+
+__all__ = ["MOVING", "changed_boxes"]
+
+MOVING = "moving"
+"""The label of every box, and the word for --boxes."""
+
+_WORKING_WIDTH_PX = 480
+_BACKGROUND_FRAMES = 25
+_FEWEST_FRAMES = 5
+_LEAST_SIGMA = 2.5
+"""Grey levels: what JPEG and a sensor do to a pixel in which nothing happens."""
+_SIGMAS = 6.0
+_LEAST_AREA = 40
+"""Pixels of the working picture: a person of 5 by 16 pixels has some 50."""
+_MOST_CHANGED = 0.4
+_MOST_CHANGED_FRAMES = 0.5
+_JOIN_PX = 5
+_STEP_NS = 200_000_000
+_STRETCH_FRAMES = 30
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Background:
+    """The scene without movement, in the working size.
+
+    Attributes:
+        median: (h, w, 3) float32 grey levels.
+        sigma: (h, w, 3) float32 of a pixel's usual deviation.
+    """
+
+    median: np.ndarray
+    sigma: np.ndarray
+
+
+def changed_boxes(
+    image: Callable[[int], np.ndarray],
+    image_times: TimesNs,
+    *,
+    source: str = MOVING,
+    most_frames: int = 600,
+    progress: Callable[[int, int], None] | None = None,
+) -> Boxes:
+    """Find what moves before a fixed camera; the boxes carry the label "moving" and tracks.
+
+    At most most_frames frames and 25 for the background are decoded; of these, 25 are in memory, reduced. A recording with more
+    frames is looked at in stretches of 6 s at 5 Hz, evenly spread: within a stretch an object keeps its track.
+
+    Args:
+        image: returns frame i as uint8 (h, w, 3); raises MessageError for one that cannot be read.
+        image_times: (m,) stamps of the frames, ascending.
+        source: for messages.
+        most_frames: how many frames to look at.
+        progress: called with the frames done and their number.
+
+    Raises:
+        InputError: there are too few readable frames, or the camera itself moves.
+    """
+    pictures = list(_readable(image, _spread(len(image_times), _BACKGROUND_FRAMES)))
+    if len(pictures) < _FEWEST_FRAMES:
+        raise InputError(
+            f"{source}: {len(pictures)} readable frames; finding movement needs {_FEWEST_FRAMES} or more: record for longer"
+        )
+    small = [_reduced(picture) for _, picture in pictures]
+    size = (pictures[0][1].shape[1], pictures[0][1].shape[0])
+    del pictures
+    background = _background(small)
+    _refuse_moving_camera([_changed(picture, background) for picture in small], source)
+    found: list[tuple[TimeNs, list[Box]]] = []
+    stretches = _stretches(image_times, most_frames)
+    total = sum(map(len, stretches))
+    named: list[FrameBoxes] = []
+    first_track = 1
+    for stretch in stretches:
+        found = []
+        for index, picture in _readable(image, stretch):
+            found.append((TimeNs(int(image_times[index])), _regions(_changed(_reduced(picture), background), size)))
+            if progress:
+                progress(len(named) + len(found), total)
+        tracks = tracked([boxes for _, boxes in found], first_track)
+        first_track += len({box.track for boxes in tracks for box in boxes})
+        named.extend(FrameBoxes(time, boxes) for (time, _), boxes in zip(found, tracks, strict=True))
+    note = f"boxes are around whatever changes in the picture; {len(named)} of {len(image_times)} frames were looked at"
+    return Boxes(tuple(named), source, size, (note,))
+
+
+def _readable(image: Callable[[int], np.ndarray], indices: Sequence[int]) -> Iterator[tuple[int, np.ndarray]]:
+    """Yield the frames that can be read and have one size: that of the first."""
+    shape: tuple[int, ...] = ()
+    for index in indices:
+        with contextlib.suppress(MessageError):
+            picture = image(index)
+            shape = shape or picture.shape
+            if picture.shape == shape:
+                yield index, picture
+
+
+def _spread(count: int, most: int) -> list[int]:
+    """Return at most so many of the first count numbers, evenly spread."""
+    if not count:
+        return []
+    spread: list[int] = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64)).tolist()
+    return spread
+
+
+def _stretches(image_times: TimesNs, most: int) -> list[range]:
+    """Return the frames to look at: all, or evenly spread stretches of neighbours 0.2 s apart."""
+    count = len(image_times)
+    if count <= most:
+        return [range(count)]
+    step = max(1, round(_STEP_NS / max(1.0, float(np.median(np.diff(image_times))))))
+    if count <= most * step:
+        return [range(0, count, step)]
+    span = _STRETCH_FRAMES * step
+    starts = _spread(count - span + 1, max(1, most // _STRETCH_FRAMES))
+    return [range(start, start + span, step) for start in starts]
+
+
+def _reduced(picture: np.ndarray) -> np.ndarray:
+    """Reduce a picture to the working size; each pixel is the mean of those it replaces."""
+    import cv2
+
+    height, width = picture.shape[:2]
+    if width <= _WORKING_WIDTH_PX:
+        return np.ascontiguousarray(picture)
+    reduced_height = max(1, round(height * _WORKING_WIDTH_PX / width))
+    return np.asarray(cv2.resize(picture, (_WORKING_WIDTH_PX, reduced_height), interpolation=cv2.INTER_AREA))
+
+
+def _background(pictures: Sequence[np.ndarray]) -> _Background:
+    stack = np.stack(pictures)
+    median = np.median(stack, axis=0).astype(np.float32)
+    deviation = np.median(np.abs(stack - median), axis=0).astype(np.float32)
+    return _Background(median, np.maximum(1.4826 * deviation, _LEAST_SIGMA).astype(np.float32))
+
+
+def _changed(picture: np.ndarray, background: _Background) -> np.ndarray:
+    """Return which pixels of a frame differ from the background: (h, w) bool, cleaned of specks."""
+    import cv2
+
+    values = picture.astype(np.float32)
+    middle = background.median
+    usable = (middle > 8) & (middle < 247)
+    gains = [
+        float(np.median(values[..., channel][mask] / middle[..., channel][mask])) if mask.any() else 1.0
+        for channel, mask in enumerate(np.moveaxis(usable, -1, 0))
+    ]
+    gain = np.clip(np.array(gains, dtype=np.float32), 0.5, 2.0)
+    off = np.abs(values - gain * middle) / background.sigma
+    strong = (off.max(axis=-1) > _SIGMAS).astype(np.uint8)
+    kernel = np.ones((3, 3), dtype=np.uint8)
+    opened = cv2.morphologyEx(strong, cv2.MORPH_OPEN, kernel)
+    joined = cv2.morphologyEx(opened, cv2.MORPH_CLOSE, np.ones((2 * _JOIN_PX + 1,) * 2, dtype=np.uint8))
+    return np.asarray(joined).astype(bool)
+
+
+def _refuse_moving_camera(masks: Sequence[np.ndarray], source: str) -> None:
+    """Refuse frames in which most of the picture changes.
+
+    Raises:
+        InputError: it does, in most frames.
+    """
+    shares = np.array([mask.mean() for mask in masks])
+    moved = int(np.count_nonzero(shares > _MOST_CHANGED))
+    if moved > _MOST_CHANGED_FRAMES * len(shares):
+        raise InputError(
+            f"{source}: more than {100 * _MOST_CHANGED:.0f} % of the picture changes in {moved} of {len(shares)} frames, so "
+            "the camera itself moves; movement is found for a fixed camera only: give a file or topic of boxes"
+        )
+
+
+def _regions(mask: np.ndarray, size: tuple[int, int]) -> list[Box]:
+    """Return a box around each region of a mask, in pixels of the recorded picture."""
+    import cv2
+
+    if mask.mean() > _MOST_CHANGED:  # a flash, or the exposure at work
+        return []
+    _, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    parts = [row for row in stats[1:].tolist() if row[cv2.CC_STAT_AREA] >= _LEAST_AREA]
+    edges = _merged([(left, top, left + width, top + height) for left, top, width, height, _ in parts])
+    across, down = size[0] / mask.shape[1], size[1] / mask.shape[0]
+    return [
+        Box(left * across - 0.5, top * down - 0.5, right * across - 0.5, bottom * down - 0.5, MOVING)
+        for left, top, right, bottom in edges
+    ]
+
+
+def _merged(parts: list[tuple[int, int, int, int]]) -> list[tuple[int, int, int, int]]:
+    """Join boxes that overlap, or that stand above each other with a small gap, as head and legs of a person."""
+    merged: list[tuple[int, int, int, int]] = []
+    for part in sorted(parts):
+        found = part
+        while True:
+            touching = [one for one in merged if _belong_together(one, found)]
+            if not touching:
+                break
+            merged = [one for one in merged if one not in touching]
+            every = [found, *touching]
+            low, high = zip(*((one[:2], one[2:]) for one in every), strict=True)
+            found = (*np.min(low, axis=0).tolist(), *np.max(high, axis=0).tolist())
+        merged.append(found)
+    return merged
+
+
+def _belong_together(one: tuple[int, int, int, int], other: tuple[int, int, int, int]) -> bool:
+    across = min(one[2], other[2]) - max(one[0], other[0])
+    down = min(one[3], other[3]) - max(one[1], other[1])
+    narrower = min(one[2] - one[0], other[2] - other[0])
+    return (across > 0 and down > 0) or (across > narrower / 2 and down > -2 * _JOIN_PX)

@@ -1,0 +1,107 @@
+"""`cocalib report`: calibrations of every kind, a recording, and what cannot be done."""
+
+from pathlib import Path
+
+import pytest
+
+from app.cli import run
+
+
+@pytest.fixture(scope="module")
+def sample(project_root: Path) -> Path:
+    return project_root / "sample_data" / "rooftop"
+
+
+@pytest.fixture(scope="module")
+def golden(project_root: Path) -> Path:
+    return project_root / "tests" / "golden" / "calibration-1.json"
+
+
+@pytest.fixture(scope="module")
+def solved(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("solved") / "calibration.json"
+    bags = [str(sample / "radar.bag"), str(sample / "camera.bag")]
+    assert run(["solve", *bags, "--clicks", str(sample / "clicks.json"), "--out", str(out)]) == 0
+    return out
+
+
+def test_on_its_recording_the_report_has_held_out_errors_and_a_picture_and_names_no_folder(
+    solved: Path, sample: Path, tmp_path: Path
+) -> None:
+    bags = [str(sample / "radar.bag"), str(sample / "camera.bag")]
+    out = tmp_path / "report.html"
+    assert run(["report", str(solved), *bags, "--against", str(solved), "--out", str(out)]) == 0
+    html = out.read_text(encoding="utf-8")
+    assert "Residuals at the clicks in radar.bag + camera.bag, which it was solved from" in html
+    assert "data:image/jpeg;base64," in html
+    assert "no difference on this recording" in html.lower()
+    for folder in (solved.parent, sample, tmp_path):
+        assert str(folder) not in html
+    assert len(html.encode()) < 3_000_000
+
+
+def test_a_calibration_by_the_paper_is_reported_with_its_doubts(solved: Path, tmp_path: Path) -> None:
+    paper, out = tmp_path / "paper.json", tmp_path / "paper.html"
+    assert run(["solve", "--pairs", str(solved), "--method", "paper", "--out", str(paper)]) == 0
+    assert run(["report", str(paper), "--out", str(out)]) == 0
+    html = out.read_text(encoding="utf-8")
+    assert "contradictory" in html
+    assert "No error bars: this calibration states no covariance." in html
+
+
+def test_a_foreign_calibration_without_a_camera_takes_the_one_of_the_recording(
+    golden: Path, solved: Path, sample: Path, tmp_path: Path
+) -> None:
+    foreign, out = tmp_path / "tf.txt", tmp_path / "tf.html"
+    assert run(["export", str(solved), "--to", "tf2", "--out", str(foreign)]) == 0
+    assert run(["report", str(foreign), "--out", str(out)]) == 0
+    assert "The file contains no camera" in out.read_text(encoding="utf-8")
+    bags = [str(sample / "radar.bag"), str(sample / "camera.bag")]
+    assert run(["report", str(foreign), *bags, "--clicks", str(sample / "clicks.json"), "--out", str(out)]) == 0
+    html = out.read_text(encoding="utf-8")
+    assert "The file contains no camera" not in html
+    assert "Residuals at the clicks in radar.bag + camera.bag" in html
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "CALIBRATION is missing; see cocalib report --help"),
+        (["GOLDEN"], "report writes a file: give its name with --out FILE.html"),
+        (
+            ["GOLDEN", "--boxes", "boxes.json", "--out", "OUT"],
+            "apply with a RECORDING only; give it after the calibration",
+        ),
+        (["/nowhere.json", "--out", "OUT"], "/nowhere.json: "),
+        (["GOLDEN", "--out", "/nowhere/report.html"], "/nowhere/report.html: cannot be written: "),
+    ],
+)
+def test_what_cannot_be_done_is_said(
+    arguments: list[str], said: str, golden: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [{"GOLDEN": str(golden), "OUT": str(tmp_path / "out.html")}.get(one, one) for one in arguments]
+    assert run(["report", *given]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out.html").exists()
+
+
+def test_a_calibration_for_pictures_of_another_size_is_refused(
+    golden: Path, sample: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bags = [str(sample / "radar.bag"), str(sample / "camera.bag")]
+    assert run(["report", str(golden), *bags, "--out", str(tmp_path / "out.html")]) == 2
+    assert (
+        "calibrated for pictures of 640 x 480 px, but the recording's camera has 960 x 600 px"
+        in capsys.readouterr().err
+    )
+
+
+def test_without_a_browser_the_html_is_written_and_the_pdf_is_refused(
+    golden: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COCALIB_BROWSER", "/nowhere/browser")
+    out, pdf = tmp_path / "out.html", tmp_path / "out.pdf"
+    assert run(["report", str(golden), "--out", str(out), "--pdf", str(pdf)]) == 2
+    assert "COCALIB_BROWSER=/nowhere/browser is not a program" in capsys.readouterr().err
+    assert out.exists()
+    assert not pdf.exists()

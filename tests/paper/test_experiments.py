@@ -1,0 +1,99 @@
+"""The paper's experiments: recordings with pictures, read from bags and solved, give what the table's scans alone give."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli import run as cocalib
+from benchmarks.paper.page import PAPER, order_kept, page, verdict_of
+from benchmarks.paper.rows import Figures, Seed
+from benchmarks.paper.settings import FITTED, Dataset, ccm_options, options_of, pmm_options, ppm_options
+from calib_core.calibration import calibrate
+from calib_core.measurements import Unsolvable
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration
+from calib_core.synthetic import SimulatedScans, simulate, simulate_scans, write_recording
+
+SMALL = dataclasses.replace(FITTED, width_px=480, placements=5)
+
+
+def recorded(dataset: Dataset, folder: Path) -> SimulatedScans:
+    """Write a data set as bags and clicks; return its scans alone."""
+    options = dataclasses.replace(options_of(dataset, 1, SMALL, board_corners=5), camera_rate_hz=1.0)
+    write_recording(simulate(options), folder)
+    return simulate_scans(options)
+
+
+def solved(folder: Path, options: CalibrationOptions, *flags: object) -> dict[str, float]:
+    """Solve by the command and return the metrics of the file."""
+    out = folder / "calibration.json"
+    bags = [folder / "radar.bag", folder / "camera.bag"]
+    arguments = ["solve", *bags, "--clicks", folder / "clicks.json", "--out", out, "--method", options.method, *flags]
+    assert cocalib([str(one) for one in arguments]) == 0
+    return json.loads(out.read_text())["metrics"]
+
+
+@pytest.mark.parametrize("dataset", ["d1", "d3", "dr-a", "dr-b"])
+def test_bags_clicks_and_the_command_give_what_the_scans_alone_give(dataset: Dataset, tmp_path: Path) -> None:
+    simulated = recorded(dataset, tmp_path)
+    alone = calibrate(simulated.clicks, simulated.scans, simulated.camera, ppm_options(SMALL))
+    assert isinstance(alone, Calibration)
+    found = solved(tmp_path, ppm_options(SMALL))
+    assert found["n"] == alone.metrics.n == 5
+    assert found["aed_px"] == pytest.approx(alone.metrics.aed_px, abs=0.02)
+    if dataset == "d1":
+        mounting = calibrate(simulated.clicks, simulated.scans, simulated.camera, pmm_options(simulated))
+        assert isinstance(mounting, Calibration)
+        tape = ["--camera-position-m", *simulated.stage.options.rig.camera_offset_m]
+        found = solved(tmp_path, pmm_options(simulated), *tape)
+        assert found["aed_px"] == pytest.approx(mounting.metrics.aed_px, abs=0.02)
+
+
+def test_the_board_in_the_pictures_gives_the_pose_of_the_checkerboard_method(tmp_path: Path) -> None:
+    simulated = recorded("d2", tmp_path)
+    board = simulated.stage.scene.board
+    assert board is not None
+    flags = ["--board.columns", board.columns, "--board.rows", board.rows, "--board.square-m", board.square_m]
+    found = solved(tmp_path, ccm_options(simulated, linear=False), *flags)
+    calibration = json.loads((tmp_path / "calibration.json").read_text())
+    assert found["n"] == 5
+    assert "registered on 5 corners of a board 5" in next(
+        one["message"] for one in calibration["warnings"] if one["code"] == "board-geometry"
+    )
+    by_points = calibrate(simulated.clicks, simulated.scans, simulated.camera, ppm_options(SMALL))
+    assert not isinstance(by_points, Unsolvable)
+    wrong = np.array(calibration["camera_from_radar"]["rotation"]) @ simulated.camera_from_radar.rotation.T
+    assert np.rad2deg(np.arccos(np.clip((np.trace(wrong) - 1.0) / 2.0, -1.0, 1.0))) < 8.0
+
+
+def test_a_row_says_whether_it_reaches_its_limit() -> None:
+    assert verdict_of("PPM+D1", [Figures(15.31 * 1.14, 9.0, 0.0)]) == "reached (+14 %)"
+    assert verdict_of("PPM+D1", [Figures(15.31 * 1.16, 9.0, 0.0)]) == "missed (+16 %)"
+    assert verdict_of("PMM+D1", [Figures(79.0 * 0.76, 9.0, 0.0)]) == "reached (-24 %)"
+    assert verdict_of("PPM+D2", [Figures(15.0, 10.0, 0.0)]) == "missed (ratio -43 %)"
+    assert verdict_of("CCM+D1, 4 corners, linear", [Figures(500.0, 9.0, 1.0)]) == "reached: all points outside"
+    assert verdict_of("CCM+D1, 4 corners, linear", [Figures(500.0, 9.0, 0.5)]) == "missed: 50 % outside"
+    assert verdict_of("PPM+DR-A", [Figures(15.0, 9.0, 0.0)]) == "no figure to compare with"
+
+
+def test_the_order_of_the_rows_is_compared_with_the_papers() -> None:
+    known = {"PPM+D3": 11.0, "PPM+D1": 15.0, "R_PPM+T_m+D1": 16.0, "PMM+D1": 80.0, "R_I+T_c+D1": 85.0}
+    kept = Seed({name: Figures(aed, 9.0, 0.0) for name, aed in known.items()})
+    assert order_kept([kept]).endswith("Ours is the same.")
+    turned = Seed({**kept.rows, "R_I+T_c+D1": Figures(70.0, 9.0, 0.0)})
+    assert order_kept([turned]).endswith("R_I+T_c+D1 < PMM+D1.")
+
+
+def test_the_page_has_all_nine_rows_and_says_what_is_not_available() -> None:
+    one = Seed({name: Figures(20.0, 10.0, 1.0, 5000.0) for name in PAPER})
+    text = page(
+        [one], FITTED, [], [("nothing", [one])], [("people", [0.9], [0.9], [0.02], "89 %")], date="today", command="it"
+    )
+    assert len(PAPER) == 9
+    for name in PAPER:
+        assert f"\n| {name} | " in text
+    assert "| PPM+DR-A | not available to us |" in text
+    assert "{" not in text

@@ -1,0 +1,143 @@
+"""Residuals with a planted pattern, and calibrations to report."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from app.report.making import subject_of
+from app.report.residual_rows import ResidualRows
+from app.report.subject import Against, Judged, Picture, ReportSubject, Watched
+from calib_core.evaluation import BoxFigures, ClassFigure, Evaluation, FrameFigure, Sensitivity, Share
+from calib_core.interchange import compare, imported, read_calibration
+from calib_core.measurements import TimeNs
+from calib_core.results import Calibration, DataWarning, InputFile
+
+__all__ = [
+    "FILE",
+    "SIZE_PX",
+    "box_figures",
+    "fullest_subject",
+    "golden",
+    "planted_rows",
+    "subject_for",
+    "watched_recording",
+]
+
+SIZE_PX = (640, 480)
+_N = 60
+FILE = InputFile("radar.bag", 12, "5e" * 32)
+
+
+def planted_rows(*, growing_with: str = "", shift_px: float = 0.0, n: int = _N) -> ResidualRows:
+    """Return residuals of about 2 px in all directions, three times as long at the upper end of one quantity.
+
+    Args:
+        growing_with: "range", "azimuth" (to both sides), "left", "column", "middle" (away from it), "time"; "" for none.
+        shift_px: added to all of them, to the right.
+        n: number of pairs.
+    """
+    rng = np.random.default_rng(3)
+    ranges, azimuths = rng.uniform(3.0, 20.0, n), rng.uniform(-40.0, 40.0, n)
+    pixels = rng.uniform((0, 0), SIZE_PX, (n, 2))
+    times = rng.uniform(0.0, 100.0, n)
+    quantity = {
+        "range": ranges,
+        "azimuth": np.abs(azimuths),
+        "left": azimuths,
+        "column": pixels[:, 0],
+        "middle": np.linalg.norm(pixels - (np.array(SIZE_PX) - 1) / 2, axis=1),
+        "time": times,
+    }.get(growing_with, np.zeros(n))
+    share = (quantity - quantity.min()) / max(float(np.ptp(quantity)), 1e-9)
+    lengths = rng.uniform(1.0, 3.0, n) * (1.0 + 3.0 * share)
+    angles = rng.uniform(0.0, 2.0 * np.pi, n)
+    residuals = lengths[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1) + (shift_px, 0.0)
+    bearing = np.deg2rad(azimuths)
+    points = np.stack([ranges * np.cos(bearing), ranges * np.sin(bearing), np.zeros(n)], axis=1)
+    unknown = np.full(n, np.nan)
+    return ResidualRows(
+        tuple(f"c{index}" for index in range(n)),
+        ("used",) * n,
+        points,
+        pixels,
+        pixels + residuals,
+        times,
+        unknown,
+        unknown,
+        unknown,
+        unknown,
+        solved_from=True,
+    )
+
+
+def golden(project_root: Path) -> Calibration:
+    """Return the calibration of the golden file: five pairs, a warning, a click without a pair."""
+    path = project_root / "tests" / "golden" / "calibration-1.json"
+    return read_calibration(path.read_text(encoding="utf-8"), path.name).calibration
+
+
+def subject_for(project_root: Path, calibration: Calibration | None = None) -> ReportSubject:
+    """Return what is reported of the golden file, with another calibration in it if one is given."""
+    path = project_root / "tests" / "golden" / "calibration-1.json"
+    file = read_calibration(path.read_text(encoding="utf-8"), path.name)
+    file = file if calibration is None else replace(file, calibration=calibration)
+    return subject_of(imported(file), file.calibration, path.name)
+
+
+def watched_recording(**changes: object) -> Watched:
+    """Return a recording with a frame to draw over."""
+    picture = Picture(b"\xff\xd8 a picture", "the frame at 1.000000000 s")
+    return replace(Watched("radar.bag", (FILE,), (("radar", "/radar"),), (), picture), **changes)
+
+
+def box_figures() -> BoxFigures:
+    """Return figures of nine frames with four returns each."""
+    frames = tuple(FrameFigure(TimeNs(k), TimeNs(k), 4, (4, 0, 3)[k % 3], 1, 5.0) for k in range(9))
+    return BoxFigures(
+        acc=0.58,
+        acc_standard_error=0.1,
+        acc_without_zero_frames=0.87,
+        frames=frames,
+        classes=(ClassFigure("person", 0.6, 9, 36, 21), ClassFigure("", None, 0, 0, 0)),
+        ranges=(Share(0.0, 5.0, 30, 10), Share(5.0, 10.0, 40, 38), Share(10.0, 15.0, 1, 0)),
+        sensitivity=(
+            Sensitivity("roll", (-1.0, 0.0, 1.0), (0.58, 0.58, 0.579)),
+            Sensitivity("pitch", (-1.0, 0.0, 1.0), (0.5, 0.58, 0.6)),
+            Sensitivity("yaw", (-1.0, 0.0, 1.0), (0.3, 0.58, 0.2)),
+        ),
+        chance=0.02,
+        rule="each return counts once",
+        source="boxes.json",
+    )
+
+
+def fullest_subject(project_root: Path) -> ReportSubject:
+    """Return as much as a report can be about: many pairs, warnings, files, boxes, a recording, another calibration."""
+    calibration = golden(project_root)
+    rng = np.random.default_rng(2)
+    one = calibration.pairs[0]
+    pairs = tuple(
+        replace(
+            one, id=f"c{k}", pixel_px=(place := rng.uniform((0, 0), SIZE_PX)), projected_px=place + rng.normal(0, 4, 2)
+        )
+        for k in range(80)
+    )
+    long = (
+        "the residuals of the pairs at the left edge are twice as long as the noise of clicks and radar explains, " * 2
+    )
+    warnings = tuple(DataWarning(f"code-{k}", long, "place the reflector elsewhere, " * 4) for k in range(20))
+    unpaired = tuple(replace(calibration.unpaired[0], id=f"u{k}", reason=long) for k in range(20))
+    full = replace(calibration, pairs=pairs, warnings=warnings, unpaired=unpaired)
+    subject = subject_for(project_root, full)
+    files = tuple(InputFile(f"part_{k}.bag", 10**9 + k, f"{k:064x}") for k in range(40))
+    frame = np.full((480, 640, 3), 200, np.uint8)
+    jpeg = cv2.imencode(".jpg", frame)[1].tobytes()
+    seen = watched_recording(inputs=files, warnings=warnings, picture=Picture(jpeg, "the frame at 1.000000000 s"))
+    moved = replace(full, camera_from_radar=full.camera_from_radar.perturbed(np.full(6, 0.01)))
+    against = Against(
+        "other.json", (FILE,), compare(subject_for(project_root, moved).found, subject.found), (long,) * 4
+    )
+    judged = Judged(Evaluation(None, replace(box_figures(), rule=long)))
+    return replace(subject, recording=seen, judged=judged, against=against, inputs=(FILE,))

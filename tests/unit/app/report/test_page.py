@@ -1,0 +1,197 @@
+"""The report's HTML: deterministic, self-contained, well-formed, escaped, honest about what is not known."""
+
+import re
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.report import Against, Judged, ReportSubject, known_calibration, report_html, subject_of
+from app.view.number_format import plain
+from calib_core.evaluation import Evaluation
+from calib_core.geometry import quaternion_wxyz_from_matrix
+from calib_core.interchange import compare, export, imported, read_any
+from calib_core.results import DataWarning
+from tests.unit.app.report.planted import FILE, box_figures, golden, subject_for, watched_recording
+
+_HTML = "{http://www.w3.org/1999/xhtml}"
+_SVG = "{http://www.w3.org/2000/svg}"
+
+
+def _parsed(subject: ReportSubject) -> ElementTree.Element:
+    return ElementTree.fromstring(report_html(subject).removeprefix("<!DOCTYPE html>\n"))
+
+
+def _words(subject: ReportSubject) -> str:
+    return " ".join("".join(_parsed(subject).find(f"{_HTML}body").itertext()).split())  # type: ignore[union-attr]
+
+
+def test_the_same_inputs_give_the_same_bytes(project_root: Path) -> None:
+    full = replace(
+        subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, box_figures()))
+    )
+    assert report_html(full) == report_html(
+        replace(subject_for(project_root), recording=full.recording, judged=full.judged)
+    )
+
+
+def test_it_is_small_and_needs_nothing_from_elsewhere(project_root: Path) -> None:
+    html = report_html(replace(subject_for(project_root), recording=watched_recording()))
+    assert len(html.encode()) < 3_000_000
+    addresses = re.findall(r'(?:href|src|url\(|action)="?([^"\s)]+)', html)
+    assert addresses
+    assert all(one.startswith(("data:", "#")) for one in addresses)
+    assert "<script" not in html
+    assert "@import" not in html
+
+
+def test_the_numbers_are_those_of_the_calibration(project_root: Path) -> None:
+    subject = subject_for(project_root)
+    page, pose = _parsed(subject), golden(project_root).camera_from_radar
+    for name, expected in (("camera_from_radar", pose), ("radar_from_camera", pose.inverse())):
+        (part,) = (one for one in page.iter(f"{_HTML}div") if one.get("id") == name)
+        values = np.array([float(one.attrib["value"]) for one in part.iter(f"{_HTML}data")])
+        assert np.array_equal(values[:12].reshape(3, 4)[:, :3], expected.rotation)
+        assert np.array_equal(values[:12].reshape(3, 4)[:, 3], expected.translation_m)
+        assert np.array_equal(values[12:], quaternion_wxyz_from_matrix(expected.rotation))
+    words = _words(subject)
+    metrics = golden(project_root).metrics
+    assert f"average distance (AED){plain(metrics.aed_px)} px" in words
+    assert f"chi2 / degrees of freedom{plain(metrics.chi2)} / {metrics.degrees_of_freedom}" in words
+
+
+def test_every_drawing_and_table_can_be_heard(project_root: Path) -> None:
+    page = _parsed(
+        replace(
+            subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, box_figures()))
+        )
+    )
+    drawings = [one for one in page.iter(f"{_SVG}svg") if one.get("aria-hidden") != "true"]
+    assert len(drawings) >= 14
+    assert all(one.get("role") == "img" and one.findtext(f"{_SVG}title") for one in drawings)
+    for table in page.iter(f"{_HTML}table"):
+        assert all(cell.get("scope") for cell in table.iter(f"{_HTML}th"))
+        assert table.find(f".//{_HTML}th") is not None
+    levels = [one.tag.removeprefix(_HTML) for one in page.iter() if re.fullmatch(rf"{_HTML}h\d", one.tag)]
+    assert levels[:2] == ["h1", "h2"]
+    assert levels.count("h1") == 1
+
+
+def test_text_of_a_recording_or_a_file_stays_text(project_root: Path) -> None:
+    evil = "<img src=x onerror=alert(1)>"
+    warning = DataWarning("odd", evil, evil)
+    calibration = golden(project_root)
+    calibration = replace(
+        calibration, pairs=tuple(replace(one, id=evil) for one in calibration.pairs), warnings=(warning,)
+    )
+    found = subject_for(project_root, calibration).found
+    seen = watched_recording(
+        name=evil, topics=(("radar", evil),), warnings=(warning,), inputs=(replace(FILE, name=evil),)
+    )
+    against = Against(evil, (), compare(found, found), (evil,))
+    subject = replace(subject_for(project_root, calibration), name=evil, recording=seen, against=against)
+    html = report_html(subject)
+    assert "<img" not in html
+    assert "&lt;img src=x onerror=alert(1)&gt;" in html
+    assert not list(_parsed(subject).iter(f"{_HTML}img"))
+
+
+def test_a_method_without_a_noise_model_gets_no_error_bars_and_no_map(project_root: Path) -> None:
+    calibration = golden(project_root)
+    options = replace(calibration.options, method="paper")
+    unknown = np.full((6, 6), np.nan)
+    words = _words(subject_for(project_root, replace(calibration, covariance=unknown, options=options)))
+    assert "weak" in words
+    assert "The method states no error of its pose" in words
+    assert "No error bars: this calibration states no covariance." in words
+    assert "This method states no uncertainty, so there is nothing to draw." in words
+    assert " ± " not in words.split("Cautions")[0].replace("Bars: ± two", "")
+
+
+def test_an_imported_calibration_is_not_judged(project_root: Path) -> None:
+    calibration = golden(project_root)
+    file = subject_for(project_root).found.file
+    assert file is not None
+    found = read_any(str(export(file, "tf2").content).encode(), "tf.txt")
+    bare = subject_of(found, known_calibration(found, "tf.txt", camera=None), "tf.txt")
+    words = _words(bare)
+    assert bare.calibration is None
+    assert "not judged" in words
+    assert "so nothing in it says how good the pose is" in words
+    assert "The file contains no camera, so nothing is said in pixels." in words
+    with_camera = subject_of(found, known_calibration(found, "tf.txt", camera=calibration.camera), "tf.txt")
+    words = _words(with_camera)
+    assert "not judged" in words
+    assert "This calibration states no uncertainty, so there is no map of it." in words
+    assert "Imported from tf.txt" in words
+    assert "Residuals" not in words
+
+
+def test_acc_comes_with_the_sentence_that_it_is_not_accuracy(project_root: Path) -> None:
+    words = _words(
+        replace(
+            subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, box_figures()))
+        )
+    )
+    assert (
+        "Acc 58.0 ± 10.0 % over 9 frames (without the frames of 0 %: 87.0 %; turned by 10 deg, which is about chance: 2.0 %)"
+        in words
+    )
+    assert "Acc is not accuracy" in words
+    assert "Of 9 frames 3 have all returns inside and 3 have none; frames of 0 % are kept." in words
+    assert (
+        "Best at 5.00 to 10.0 m (95.0 % of 40 returns inside), worst at 0 to 5.00 m (33.3 % of 30 returns inside)."
+        in words
+    )
+    assert "roll 0.1 points; pitch 10.0 points, highest at +1 deg; yaw 38.0 points" in words
+
+
+def test_a_file_without_frames_with_returns_has_no_acc(project_root: Path) -> None:
+    none = replace(box_figures(), acc=None, acc_without_zero_frames=None, chance=None, frames=(), classes=(), ranges=())
+    words = _words(
+        replace(subject_for(project_root), recording=watched_recording(), judged=Judged(Evaluation(None, none)))
+    )
+    assert "Acc is unknown: no frame has returns of targets." in words
+
+
+def test_files_are_named_once_with_all_that_they_are(project_root: Path) -> None:
+    subject = replace(subject_for(project_root), inputs=(FILE,), recording=watched_recording())
+    words = _words(subject)
+    assert words.count(FILE.sha256) == 1
+    assert "this calibration, judged on" in words
+
+
+def test_many_pairs_are_cut_to_those_with_the_largest_residuals(project_root: Path) -> None:
+    calibration = golden(project_root)
+    one = calibration.pairs[0]
+    many = tuple(replace(one, id=f"n{k}", projected_px=np.add(one.pixel_px, (k, 0.0))) for k in range(100))
+    words = _words(subject_for(project_root, replace(calibration, pairs=many)))
+    assert "30 of 100 pairs: those with the largest residuals" in words
+    assert "n99" in words
+    assert "n70" in words
+    assert "n69 " not in words
+
+
+@pytest.mark.parametrize("size", [0, 1, 2])
+def test_hardly_any_pairs_are_reported_without_failing(project_root: Path, size: int) -> None:
+    calibration = golden(project_root)
+    assert "Answer" in _words(subject_for(project_root, replace(calibration, pairs=calibration.pairs[:size])))
+
+
+def test_pairs_behind_the_camera_have_no_residual(project_root: Path) -> None:
+    calibration = golden(project_root)
+    lost = tuple(replace(one, projected_px=np.full(2, np.nan)) for one in calibration.pairs)
+    words = _words(subject_for(project_root, replace(calibration, pairs=lost)))
+    assert "There are no residuals: no pair has a reprojection." in words
+
+
+def test_a_comparison_shows_the_figures_of_check(project_root: Path) -> None:
+    calibration = golden(project_root)
+    moved = replace(calibration, camera_from_radar=calibration.camera_from_radar.perturbed(np.full(6, 0.01)))
+    this, other = subject_for(project_root), subject_for(project_root, moved)
+    compared = compare(imported(other.found.file), this.found)  # type: ignore[arg-type]
+    words = _words(replace(this, against=Against("other.json", (), compared)))
+    for figure in compared.figures:
+        assert f"{figure.label}{figure.text}" in words

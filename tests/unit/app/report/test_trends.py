@@ -1,0 +1,80 @@
+"""Each sentence under a residual plot names what was planted, and nothing where nothing was."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from app.report.residual_rows import ResidualRows
+from app.report.trends import azimuth_sentence, place_sentence, range_sentence, shift_sentence, time_sentence, trend
+from tests.unit.app.report.planted import SIZE_PX, planted_rows
+
+
+def _place(rows: ResidualRows) -> str:
+    return place_sentence(rows, SIZE_PX)
+
+
+@pytest.mark.parametrize(
+    ("planted", "sentence", "said"),
+    [
+        ("range", range_sentence, "Residuals grow with range: "),
+        ("azimuth", azimuth_sentence, "Residuals grow to both sides: "),
+        ("left", azimuth_sentence, "Residuals grow to the left: "),
+        ("column", _place, "Residuals grow to the right edge: "),
+        ("middle", _place, "Residuals grow away from the middle of the picture: "),
+        ("time", time_sentence, "Residuals grow with time: "),
+    ],
+)
+def test_a_planted_trend_is_named(planted: str, sentence: Callable[[ResidualRows], str], said: str) -> None:
+    assert sentence(planted_rows(growing_with=planted)).startswith(said)
+    assert sentence(planted_rows()).startswith("No trend ")
+
+
+def test_a_residual_that_shrinks_with_range_points_at_the_position() -> None:
+    rows = planted_rows(growing_with="range")
+    turned = ResidualRows(
+        rows.ids, rows.kinds, rows.points_radar_m * (25.0 / rows.ranges_m - 1.0)[:, None], rows.pixels_px,
+        rows.projected_px, rows.times_s, rows.expected_px, rows.held_out_px, rows.outlier_probability, rows.influence,
+        solved_from=True,
+    )  # fmt: skip
+    assert range_sentence(turned).startswith("Residuals shrink with range: ")
+    assert "camera's position" in range_sentence(turned)
+
+
+def test_a_shift_that_all_residuals_share_is_named_with_its_size() -> None:
+    assert shift_sentence(planted_rows(shift_px=4.0)).startswith("The residuals lean together by (4")
+    assert shift_sentence(planted_rows()).startswith("The residuals share no direction")
+
+
+def test_the_halves_in_a_sentence_are_those_of_the_data() -> None:
+    rows = planted_rows(growing_with="range")
+    middle = np.median(rows.ranges_m)
+    near, far = (
+        np.sqrt(np.mean(rows.lengths_px[part] ** 2)) for part in (rows.ranges_m <= middle, rows.ranges_m > middle)
+    )
+    assert f"{near:.3g} px (RMS) up to {middle:.3g} m and {far:.3g} px beyond" in range_sentence(rows)
+
+
+def test_a_trend_is_the_rank_correlation_with_its_probability() -> None:
+    scipy_stats = pytest.importorskip("scipy.stats")
+    rng = np.random.default_rng(0)
+    values, lengths = rng.integers(0, 9, 40).astype(float), rng.integers(0, 9, 40).astype(float)
+    found, expected = trend(values, lengths), scipy_stats.spearmanr(values, lengths)
+    assert found is not None
+    assert found.correlation == pytest.approx(expected.statistic)
+    assert found.p_value == pytest.approx(expected.pvalue)
+
+
+def test_chance_alone_is_seldom_called_a_trend() -> None:
+    rng = np.random.default_rng(1)
+    named = 0
+    for _ in range(400):
+        found = trend(rng.uniform(size=20), rng.uniform(size=20))
+        assert found is not None
+        named += found.p_value < 0.01
+    assert named <= 12  # 4 expected; 12 would be four standard deviations
+
+
+@pytest.mark.parametrize("sentence", [range_sentence, azimuth_sentence, _place, time_sentence, shift_sentence])
+def test_few_pairs_show_no_trend_and_the_sentence_says_so(sentence: Callable[[ResidualRows], str]) -> None:
+    assert sentence(planted_rows(n=5)) == "5 pairs are too few to show a trend; 8 or more are needed."

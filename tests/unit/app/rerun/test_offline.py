@@ -1,0 +1,104 @@
+"""Nothing of Rerun's reaches the internet, and everything else works where rerun-sdk is missing.
+
+`strace -f -e trace=connect` of the viewer in this environment shows connections to 127.0.0.1 only; without it, it asks a
+name server. What the page of the web viewer asks for is seen in tests/browser/test_rerun_viewer.py.
+"""
+
+import http.client
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+from app.rerun import require_display
+from app.rerun.sdk import offline_environment
+from app.rerun.web_viewer import POLICY, serve_view
+from calib_core.errors import InputError
+
+BLOCKED = """
+import sys
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("rerun", "rerun_cli", "rerun_bindings"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+sys.meta_path.insert(0, Absent())
+import importlib.util
+found = importlib.util.find_spec
+importlib.util.find_spec = lambda name, package=None: None if name.startswith("rerun") else found(name, package)
+from app.cli import run
+sys.exit(run(sys.argv[1:]))
+"""
+
+
+def without_rerun(*arguments: object) -> "subprocess.CompletedProcess[str]":
+    """Run a command in an interpreter that has no rerun-sdk."""
+    command = [sys.executable, "-c", BLOCKED, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_a_viewer_is_told_to_send_nothing_even_if_the_user_forces_it() -> None:
+    environment = offline_environment(
+        {"FORCE_RERUN_ANALYTICS": "1", "PATH": "/bin", "HTTPS_PROXY": "http://proxy:3128"}
+    )
+    assert environment["CI"] == "1"
+    assert "FORCE_RERUN_ANALYTICS" not in environment
+    assert {environment[name] for name in ("ALL_PROXY", "HTTPS_PROXY", "HTTP_PROXY")} == {"http://127.0.0.1:9"}
+    assert environment["PATH"] == "/bin"
+
+
+def test_commands_without_rerun_work_where_it_is_missing(project_root: Path) -> None:
+    answer = without_rerun("info", project_root / "sample_data" / "rooftop" / "radar.bag")
+    assert answer.returncode == 0, answer.stderr
+
+
+@pytest.mark.parametrize("command", ["record-rrd", "rerun"])
+def test_commands_that_need_rerun_say_how_to_install_it(command: str, tmp_path: Path) -> None:
+    more = ("--out", tmp_path / "view.rrd") if command == "record-rrd" else ()
+    answer = without_rerun(command, tmp_path / "a.bag", "--calibration", tmp_path / "c.json", *more)
+    assert answer.returncode == 2
+    assert "needs rerun-sdk, which is not installed" in answer.stderr
+    assert "pip install rerun-sdk" in answer.stderr
+    assert "Traceback" not in answer.stderr
+
+
+def test_without_a_display_other_ways_are_named() -> None:
+    with pytest.raises(InputError, match="record-rrd"):
+        require_display({}, "linux")
+    for environment, platform in (({"DISPLAY": ":0"}, "linux"), ({"WAYLAND_DISPLAY": "w"}, "linux"), ({}, "darwin")):
+        require_display(environment, platform)
+
+
+def test_the_web_viewer_is_served_to_who_has_the_link_under_a_policy(tmp_path: Path) -> None:
+    pytest.importorskip("rerun_cli", reason="there is no wheel of rerun-sdk for this machine")
+    view = tmp_path / "view.rrd"
+    view.write_bytes(b"RRF2" + bytes(1000))
+    with serve_view(view) as served:
+        thread = threading.Thread(target=served.server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        try:
+            link = urlsplit(served.url)
+            assert link.hostname == "127.0.0.1"
+            assert fetched(link.netloc, f"{link.path}view.rrd") == (200, POLICY, view.read_bytes())
+            code, policy, page = fetched(link.netloc, link.path)
+            assert (code, policy) == (200, POLICY)
+            assert b"re_viewer" in page
+            for path in ("/", "/view.rrd", f"/{'x' * 22}/view.rrd", f"{link.path}../view.rrd", f"{link.path}etc"):
+                assert fetched(link.netloc, path)[0] == 404
+            assert fetched(link.netloc, f"{link.path}view.rrd", host="evil.example")[0] == 404
+        finally:
+            served.server.shutdown()
+            thread.join()
+
+
+def fetched(netloc: str, path: str, host: str | None = None) -> tuple[int, str | None, bytes]:
+    """Return the answer to a request: its code, its policy and its content."""
+    connection = http.client.HTTPConnection(netloc)
+    try:
+        connection.request("GET", path, headers={"Host": host or netloc})
+        answer = connection.getresponse()
+        return answer.status, answer.getheader("Content-Security-Policy"), answer.read()
+    finally:
+        connection.close()

@@ -1,0 +1,102 @@
+"""The page, `evaluate`, `compare` and `check --against` state the same figures of the same calibration."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.evaluating import evaluate_recording
+from app.session import History, RecordingFacts, Session
+from app.solving import solve_clicks
+from app.view import Reference, view
+from app.view.acc import acc_panel
+from app.view.number_format import plain, with_sigma
+from app.web.messages import encode
+from calib_core.evaluation import box_figures, moving_targets
+from calib_core.geometry import RigidTransform, rotation_exp
+from calib_core.interchange import CalibrationFile, compare, imported, read_clicks
+from calib_core.measurements import ReflectorClick
+from calib_core.options import CalibrationOptions
+from calib_core.recordings import Recording, open_recording
+from calib_core.results import Calibration
+from tests.street_recording import StreetRecording, reference_calibration
+
+
+@pytest.fixture(scope="module")
+def recording(project_root: Path) -> Iterator[Recording]:
+    sample = project_root / "sample_data" / "rooftop"
+    with open_recording([sample / "camera.bag", sample / "radar.bag"]) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def clicks(project_root: Path) -> tuple[ReflectorClick, ...]:
+    return read_clicks((project_root / "sample_data" / "rooftop" / "clicks.json").read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def solved(recording: Recording, clicks: tuple[ReflectorClick, ...]) -> Calibration:
+    outcome = solve_clicks(recording, clicks, recording.camera(), CalibrationOptions())
+    assert isinstance(outcome, Calibration)
+    return outcome
+
+
+def figures_of(rows: object) -> dict[str, str]:
+    return {row.key: row.value for row in rows}  # type: ignore[attr-defined]
+
+
+def shown(solved: Calibration, recording: Recording, clicks: tuple[ReflectorClick, ...], reference: Reference | None):
+    session = Session(clicks=clicks, outcome=solved, outcome_revision=0)
+    facts = RecordingFacts("sample", recording.image_times, solved.camera.width_px, solved.camera.height_px)
+    return view(History(session), facts, reference)
+
+
+def test_the_residuals_on_the_page_are_those_of_evaluate(
+    recording: Recording, clicks: tuple[ReflectorClick, ...], solved: Calibration
+) -> None:
+    judged = evaluate_recording(solved, recording, clicks=clicks, held_out=False).residuals
+    assert judged is not None
+    page = figures_of(shown(solved, recording, clicks, None).metrics)
+    assert page["aed"] == plain(judged.metrics.aed_px)
+    assert page["cdsd"] == plain(judged.metrics.cdsd_px)
+    assert page["rms"] == plain(judged.metrics.rms_px)
+    assert page["inliers"] == f"{judged.inliers.sum()} of {len(judged.ids)}"
+    assert judged.metrics.aed_px == pytest.approx(solved.metrics.aed_px, rel=1e-12)
+
+
+def test_the_comparison_on_the_page_is_that_of_check(
+    recording: Recording, clicks: tuple[ReflectorClick, ...], solved: Calibration
+) -> None:
+    turn = RigidTransform(rotation_exp(np.deg2rad([0.4, -0.3, 1.1])), np.array([0.02, -0.05, 0.01]))
+    other = replace(solved, camera_from_radar=turn @ solved.camera_from_radar)
+    both = compare(imported(CalibrationFile(other)), imported(CalibrationFile(solved)))
+    page = figures_of(shown(solved, recording, clicks, Reference("other.json", other)).comparison)
+    assert page["rotation_apart"] == with_sigma(both.rotation_deg, both.rotation_sigma_deg)
+    assert page["position_apart"] == with_sigma(both.position_cm, both.position_sigma_cm)
+    assert page["rotation_apart"].startswith("1.2")
+    for at in both.pixels:
+        assert page[f"apart_{at.distance_m:g}_m"] == plain(at.rms_px)
+
+
+def test_acc_on_the_page_is_that_of_the_core() -> None:
+    walk, reference = StreetRecording(), reference_calibration()
+    evaluation = evaluate_recording(reference.calibration, walk, boxes=walk.street.boxes, held_out=False)
+    panel = acc_panel(evaluation)
+    found = moving_targets(walk.street.scans)
+    core = box_figures(
+        reference.calibration.camera_from_radar, walk.camera(), walk.street.scans, walk.street.boxes, targets=found
+    )
+    assert core.acc is not None
+    assert figures_of(panel.figures)["acc"].split(" ±")[0] == f"{100 * core.acc:.1f}"
+    assert [row.axis for row in panel.sensitivity] == ["roll", "pitch", "yaw"]
+    assert all(row.values[1] == f"{100 * core.acc:.1f} %" for row in panel.sensitivity)
+    assert "not accuracy" in panel.caution
+    assert json.loads(encode(shown_panel(panel)))["acc"]["figures"][0]["key"] == "acc"
+
+
+def shown_panel(panel):
+    facts = RecordingFacts("street", np.arange(3) * 10**8, 1280, 720)
+    return view(History(), facts, acc=panel)

@@ -1,0 +1,271 @@
+"""Small files in each tool's documented layout: which frame, which pixels, and what is refused."""
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calib_core.boxes import read_boxes
+from calib_core.detections import Box, Boxes
+from calib_core.errors import InputError
+
+START_NS = 1_700_000_000_000_000_000
+TIMES = START_NS + 100_000_000 * np.arange(10)
+SIZE = (640, 480)
+PERSON = Box(99.5, 49.5, 139.5, 149.5, "person")
+"""Left 100, top 50, width 40, height 100 from the corner of the top-left pixel."""
+
+
+def read(path: Path) -> Boxes:
+    return read_boxes(path, image_times=TIMES, image_size_px=SIZE)
+
+
+def only_boxes(boxes: Boxes) -> dict[int, tuple[Box, ...]]:
+    """Return the boxes by the number of the recorded frame."""
+    return {int(np.searchsorted(TIMES, frame.image_time)): frame.boxes for frame in boxes}
+
+
+def write(folder: Path, name: str, content: Any) -> Path:
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
+    return path
+
+
+def coco(names: list[str], bbox: Any = (100, 50, 40, 100), **image: Any) -> dict[str, Any]:
+    return {
+        "images": [
+            {"id": 7 + at, "file_name": name, "width": 640, "height": 480, **image} for at, name in enumerate(names)
+        ],
+        "annotations": [{"id": 1, "image_id": 7, "category_id": 3, "bbox": list(bbox), "iscrowd": 0}],
+        "categories": [{"id": 3, "name": "person"}],
+    }
+
+
+@pytest.mark.parametrize(
+    ("names", "frames"),
+    [
+        ([f"cam/{TIMES[2]}.png", f"cam/{TIMES[4]}.png"], [2, 4]),
+        (["1700000000.200000.jpg", "1700000000.400000.jpg"], [2, 4]),
+        (["1700000000_200000000.jpg", "1700000000_400000000.jpg"], [2, 4]),
+        (["frame_000000.png", "frame_000003.png"], [0, 3]),
+        (["0002_cam0.png", "0010_cam0.png"], [1, 9]),
+    ],
+)
+def test_coco_pictures_are_found_by_stamp_or_number(tmp_path, names, frames):
+    found = only_boxes(read(write(tmp_path, "instances.json", coco(names))))
+
+    assert list(found) == frames
+    assert found[frames[0]] == (PERSON,)
+    assert found[frames[1]] == ()
+
+
+def test_coco_detections_are_found_by_number_and_keep_scores(tmp_path):
+    detections = [
+        {"image_id": 0, "category_id": 1, "bbox": [100, 50, 40, 100], "score": 0.25},
+        {"image_id": 9, "category_id": 1, "bbox": [100, 50, 40, 100], "score": 0.5},
+    ]
+    boxes = read(write(tmp_path, "results.json", detections))
+
+    assert {at: found[0].score for at, found in only_boxes(boxes).items()} == {0: 0.25, 9: 0.5}
+    assert boxes.labels == ("1",)
+    assert any("counts from 0" in note for note in boxes.notes)
+
+
+def test_coco_of_a_video_keeps_tracks(tmp_path):
+    document = coco(["a.png"], frame_id=0)
+    document["annotations"][0]["attributes"] = {"track_id": 12}
+
+    assert only_boxes(read(write(tmp_path, "video.json", document)))[0][0].track == "12"
+
+
+@pytest.mark.parametrize("kind", ["folder", "zip"])
+def test_yolo_folders_are_scaled_by_the_picture(tmp_path, kind):
+    folder = tmp_path / "data"
+    write(folder, "data.yaml", "nc: 2\nnames: [car, person]\n")
+    write(folder, "labels/000001.txt", "1 0.1875 0.208333333 0.0625 0.208333333 0.5 17\n")
+    write(folder, "labels/000010.txt", "")
+    path = folder
+    if kind == "zip":
+        path = tmp_path / "data.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            for file in folder.rglob("*.*"):
+                archive.write(file, file.relative_to(folder))
+    boxes = read(path)
+
+    found = only_boxes(boxes)
+    assert list(found) == [0, 9]
+    assert found[9] == ()
+    box = found[0][0]
+    np.testing.assert_allclose(
+        (box.left_px, box.top_px, box.right_px, box.bottom_px), (99.5, 49.5, 139.5, 149.5), atol=1e-5
+    )
+    assert (box.label, box.score, box.track) == ("person", 0.5, "17")
+
+
+@pytest.mark.parametrize(
+    ("line", "score", "track"),
+    [
+        ("0 0.5 0.5 0.1 0.1", 1.0, ""),
+        ("0 0.5 0.5 0.1 0.1 0.75", 0.75, ""),
+        ("0 0.5 0.5 0.1 0.1 4", 1.0, "4"),
+        ("0 0.5 0.5 0.1 0.1 0.75 4", 0.75, "4"),
+        ("0 0.45 0.45 0.55 0.45 0.55 0.55 0.45 0.55", 1.0, ""),
+    ],
+)
+def test_yolo_lines_with_and_without_score_track_and_polygon(tmp_path, line, score, track):
+    write(tmp_path, "labels/0.txt", line)
+    box = only_boxes(read(tmp_path))[0][0]
+
+    np.testing.assert_allclose((box.left_px, box.right_px), (287.5, 351.5), atol=1e-9)
+    assert (box.score, box.track) == (score, track)
+
+
+CVAT_VIDEO = """<?xml version="1.0" encoding="utf-8"?>
+<annotations><version>1.1</version>
+<meta><task><size>10</size><start_frame>0</start_frame><stop_frame>9</stop_frame>
+<original_size><width>640</width><height>480</height></original_size></task></meta>
+<track id="5" label="person">
+<box frame="2" outside="0" keyframe="1" xtl="100" ytl="50" xbr="140" ybr="150"/>
+<box frame="4" outside="0" keyframe="1" xtl="120" ytl="50" xbr="160" ybr="150"/>
+<box frame="5" outside="1" keyframe="1" xtl="120" ytl="50" xbr="160" ybr="150"/>
+<box frame="8" outside="0" keyframe="1" xtl="10" ytl="50" xbr="50" ybr="150"/>
+</track></annotations>"""
+
+
+def test_cvat_tracks_are_interpolated_and_end_where_the_object_leaves(tmp_path):
+    boxes = read(write(tmp_path, "annotations.xml", CVAT_VIDEO))
+    found = only_boxes(boxes)
+
+    assert list(found) == list(range(10))
+    assert {at: [box.left_px for box in inside] for at, inside in found.items() if inside} == {
+        2: [99.5],
+        3: [109.5],
+        4: [119.5],
+        8: [9.5],
+        9: [9.5],
+    }
+    assert found[3][0].track == "5"
+    assert boxes.image_size_px == SIZE
+
+
+def test_cvat_images_are_found_by_name_and_turned_boxes_are_enclosed(tmp_path):
+    text = (
+        '<annotations><image id="0" name="frame_000000.png" width="640" height="480">'
+        '<box label="person" xtl="100" ytl="50" xbr="140" ybr="150" occluded="0"/>'
+        '<box label="sign" xtl="100" ytl="80" xbr="140" ybr="100" rotation="90"/>'
+        '<polygon label="road" points="1,1;2,2;3,1"/></image></annotations>'
+    )
+    boxes = read(write(tmp_path, "annotations.xml", text))
+
+    upright, turned = only_boxes(boxes)[0]
+    assert upright == PERSON
+    np.testing.assert_allclose(
+        (turned.left_px, turned.top_px, turned.right_px, turned.bottom_px), (109.5, 69.5, 129.5, 109.5)
+    )
+    assert "1 shapes that are not boxes are left out" in boxes.notes
+
+
+KITTI_3D = "1.8 0.5 1.2 1.0 1.6 9.0 0.1"
+
+
+def test_kitti_tracks_keep_pixels_and_count_frames_between_as_empty(tmp_path):
+    lines = [
+        f"1 4 Pedestrian 0 0 -0.2 100.0 50.0 140.0 150.0 {KITTI_3D}",
+        "1 -1 DontCare -1 -1 -10 0.0 0.0 9.0 9.0 -1 -1 -1 -1000 -1000 -1000 -10",
+        f"3 4 Pedestrian 0 0 -0.2 110.0 50.0 150.0 150.0 {KITTI_3D}",
+    ]
+    found = only_boxes(read(write(tmp_path, "0004.txt", "\n".join(lines))))
+
+    assert list(found) == [1, 2, 3]
+    assert found[1] == (Box(100.0, 50.0, 140.0, 150.0, "Pedestrian", track="4"),)
+    assert found[2] == ()
+
+
+def test_kitti_objects_are_one_file_per_picture(tmp_path):
+    write(tmp_path, "label_2/000000.txt", f"Car 0.00 0 1.85 100.0 50.0 140.0 150.0 {KITTI_3D} 0.25")
+    write(tmp_path, "label_2/000004.txt", "")
+
+    assert only_boxes(read(tmp_path)) == {0: (Box(100.0, 50.0, 140.0, 150.0, "Car", 0.25),), 4: ()}
+
+
+def openlabel(**frame: Any) -> dict[str, Any]:
+    bbox = {"name": "shape", "val": [120, 100, 40, 100], "coordinate_system": "Camera"}
+    objects = {"obj-1": {"object_data": {"bbox": [bbox]}}}
+    return {
+        "openlabel": {
+            "metadata": {"schema_version": "1.0.0"},
+            "objects": {"obj-1": {"name": "someone", "type": "person"}},
+            "frames": {"0": {"objects": objects, **frame}, "1": {"objects": {}}},
+        }
+    }
+
+
+def test_openlabel_boxes_are_given_by_their_centre(tmp_path):
+    found = only_boxes(read(write(tmp_path, "labels.json", openlabel())))
+
+    assert found == {0: (Box(99.5, 49.5, 139.5, 149.5, "person", track="obj-1"),), 1: ()}
+
+
+def test_openlabel_frames_are_found_by_their_stamps(tmp_path):
+    document = openlabel(frame_properties={"timestamp": "2023-11-14T22:13:20.300Z"})
+    del document["openlabel"]["frames"]["1"]
+
+    assert list(only_boxes(read(write(tmp_path, "labels.json", document)))) == [3]
+
+
+OTHER = "is it of another recording?"
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (coco([f"{START_NS - 10**12}.png"]), OTHER),
+        (coco([f"{TIMES[3] + 40_000_000}.png"]), OTHER),
+        (coco(["000400.png", "000000.png"]), "frames numbered 0 to 400, which do not fit the recording's 10 frames"),
+        (coco(["0.png"], width=1920, height=1080), "made on pictures of 1920 x 1080 px"),
+        (coco(["0.png"], bbox=(1000, 50, 40, 100)), "1 of 1 boxes lie outside the picture of 640 x 480 px"),
+        (coco(["0.png"], bbox=(100, 50, -40, 100)), "annotations[0].bbox: the right or lower edge"),
+        (coco(["0.png"], bbox=(100, 50, "wide", 100)), "annotations[0].bbox: expected a number, found 'wide'"),
+        (
+            coco(["left.png", "0.png"]) | {"annotations": [{"image_id": 99}]},
+            "annotations[0].image_id: there is no image 99",
+        ),
+        (coco([]) | {"annotations": []}, "has no annotated frame"),
+        (CVAT_VIDEO.replace("<size>10<", "<size>99<"), "a sequence of 99 frames, the recording has 10"),
+        (CVAT_VIDEO.replace('xtl="10"', 'xtl="left"'), "track 5, frame 8: xtl: expected a number"),
+        ("<!DOCTYPE x><annotations/>", "declares a document type"),
+        ("<annotations>", "not XML"),
+        ("{", "not JSON"),
+        ({"schema": "cocalib/boxes-2"}, "expected 'cocalib/boxes-1'"),
+        ({"some": "thing"}, "is no known file of boxes; known: cocalib boxes-1, OpenLABEL"),
+        ("some text", "is no known file of boxes"),
+        ("", "is no known file of boxes"),
+    ],
+)
+def test_files_that_cannot_be_these_frames_are_refused(tmp_path, content, words):
+    with pytest.raises(InputError) as error:
+        read(write(tmp_path, "file.json", content))
+    assert words in str(error.value)
+
+
+def test_folders_without_boxes_and_damaged_archives_are_refused(tmp_path):
+    for path, words in (
+        (tmp_path / "missing.json", "cannot be read"),
+        (tmp_path, "has no file of boxes"),
+        (write(tmp_path, "damaged.zip", "PK\x03\x04 and nothing else"), "a damaged zip archive"),
+    ):
+        with pytest.raises(InputError) as error:
+            read(path)
+        assert words in str(error.value)
+
+
+def test_frames_that_the_recording_lacks_are_left_out_and_counted(tmp_path):
+    names = [f"{START_NS - 10**12}.png", *(f"{time}.png" for time in TIMES[:3])]
+    boxes = read(write(tmp_path, "instances.json", coco(names)))
+
+    assert list(only_boxes(boxes)) == [0, 1, 2]
+    assert "1 of 4 annotated frames are not in the recording and are left out" in boxes.notes

@@ -1,0 +1,148 @@
+"""Residuals by hand, associations that no judged calibration chooses, and whole placements left out."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from calib_core.association.clustering import candidate_at
+from calib_core.calibration import calibrate_pairs
+from calib_core.camera import Camera
+from calib_core.evaluation import associated_pairs, residual_figures
+from calib_core.evaluation.bins import edges_of, spreads
+from calib_core.evaluation.residuals import held_out
+from calib_core.geometry import RigidTransform
+from calib_core.measurements import NS_PER_S, Pair, TimeNs
+from calib_core.options import CalibrationOptions
+from calib_core.results import Calibration, Metrics
+from calib_core.synthetic import simulate_pairs
+from tests.street import OPTICAL_FROM_RADAR
+
+PINHOLE = Camera("pinhole", 200, 100, np.array([[100.0, 0.0, 100.0], [0.0, 100.0, 50.0], [0.0, 0.0, 1.0]]))
+AHEAD = Calibration(
+    camera_from_radar=RigidTransform(OPTICAL_FROM_RADAR, np.zeros(3)),
+    covariance=np.full((6, 6), np.nan),
+    camera=PINHOLE,
+    metrics=Metrics(float("nan"), float("nan"), float("nan"), 0),
+    pairs=(),
+    unpaired=(),
+    warnings=(),
+    options=CalibrationOptions(),
+)
+
+
+def pair(name: str, point: tuple[float, float, float], pixel: tuple[float, float], time_s: float = 0.0) -> Pair:
+    candidate = candidate_at(np.array(point, dtype=np.float64), CalibrationOptions().noise)
+    return Pair(name, np.array(pixel), (candidate,), image_time=TimeNs(int(time_s * NS_PER_S)))
+
+
+@pytest.fixture(scope="module")
+def solved() -> tuple[Calibration, tuple[Pair, ...]]:
+    simulated = simulate_pairs(14, rng=np.random.default_rng(3), noise="imaging")
+    return calibrate_pairs(simulated.pairs, simulated.camera).unwrap(), simulated.pairs
+
+
+def test_the_figures_are_those_computed_by_hand():
+    pairs = [pair("a", (10, 0, 0), (103, 54)), pair("b", (10, 1, 0), (90, 50)), pair("c", (20, 2, 1), (90, 57))]
+    figures = residual_figures(pairs, AHEAD, with_held_out=False)
+
+    assert figures.projected_px == pytest.approx(np.array([[100, 50], [90, 50], [90, 45]]))
+    assert figures.distances_px == pytest.approx([5, 0, 12])
+    assert figures.metrics.aed_px == pytest.approx(17 / 3)
+    spread = sum((e - 17 / 3) ** 2 for e in (5, 0, 12))
+    assert figures.metrics.cdsd_px == pytest.approx((spread / 2) ** 0.5)
+    assert figures.median_px == 5.0
+    assert figures.metrics.n == 3
+    assert sum(one.n for one in figures.by_range) == 3
+    assert figures.by_row[0].low <= 50
+    assert figures.by_row[-1].high >= 57
+
+
+def test_a_residual_that_no_noise_explains_is_no_inlier():
+    pairs = [pair("a", (10, 0, 0), (101, 50)), pair("b", (10, 1, 0), (190, 50))]
+    figures = residual_figures(pairs, AHEAD, with_held_out=False)
+
+    assert figures.inliers.tolist() == [True, False]
+    assert figures.inlier_share == 0.5
+
+
+def test_a_reflector_behind_the_camera_has_no_residual_and_is_counted_as_lost():
+    figures = residual_figures([pair("a", (10, 0, 0), (100, 50)), pair("b", (-10, 0, 0), (100, 50))], AHEAD)
+
+    assert figures.metrics.n == 1
+    assert figures.metrics.aed_px == 0.0
+    assert np.isnan(figures.distances_px[1])
+    assert figures.inlier_share == 0.5
+
+
+def test_the_judged_calibration_does_not_choose_the_returns(solved):
+    calibration, pairs = solved
+    true = [one.candidates[0] for one in pairs]
+    wrong_pose = calibration.camera_from_radar.perturbed(np.array([0, 0, 0, 0, np.radians(4.0), 0]))
+    wrong = dataclasses.replace(calibration, camera_from_radar=wrong_pose)
+    # beside each reflector stands something that the wrong calibration would put on the click
+    tempting = []
+    for one in pairs:
+        range_m = np.linalg.norm(one.candidates[0].position_radar_m)
+        ray = calibration.camera.rays(one.pixel_px[None])[0]
+        point = wrong_pose.inverse() @ (ray * range_m)[None]
+        half = [
+            dataclasses.replace(candidate_at(place, CalibrationOptions().noise), score=0.5)
+            for place in (one.candidates[0].position_radar_m, point[0])
+        ]
+        tempting.append(dataclasses.replace(one, candidates=tuple(half)))
+    tempting[0:5] = pairs[0:5]
+    found = associated_pairs(tempting, calibration.camera, calibration.options)
+
+    assert [one.candidates[0].position_radar_m.tolist() for one in found.pairs] == [
+        one.position_radar_m.tolist() for one in true
+    ]
+    judged = residual_figures(found, wrong, with_held_out=False)
+    assert judged.median_px > 5.0 * residual_figures(found, calibration, with_held_out=False).median_px
+
+
+def test_clicks_of_one_placement_are_left_out_together():
+    simulated = simulate_pairs(8, rng=np.random.default_rng(4), noise="imaging")
+    twice = [
+        dataclasses.replace(one, id=f"{one.id}-{k}", image_time=TimeNs((10 * i + k) * NS_PER_S))
+        for i, one in enumerate(simulated.pairs)
+        for k in range(2)
+    ]
+    calibration = calibrate_pairs(twice, simulated.camera).unwrap()
+    figures = residual_figures(twice, calibration)
+
+    assert figures.placements.tolist() == [i for i in range(8) for _ in range(2)]
+    assert figures.held_out is not None
+    assert figures.held_out.folds == 8
+    assert figures.k_fold is not None
+    assert figures.k_fold.folds == 5
+    singly = residual_figures(twice[::2], calibration)
+    assert singly.held_out is not None
+    assert figures.held_out.distances_px[::2] == pytest.approx(singly.held_out.distances_px, abs=1.5)
+
+
+def test_held_out_clicks_are_predicted_without_themselves(solved):
+    calibration, pairs = solved
+    moved = dataclasses.replace(pairs[3], pixel_px=pairs[3].pixel_px + np.array([60.0, 0.0]))
+    found = associated_pairs([*pairs[:3], moved, *pairs[4:]], calibration.camera, calibration.options)
+    groups = np.arange(len(pairs))
+    distances = held_out(found, calibration.camera, calibration.options, groups).distances_px
+
+    assert 50.0 < distances[3] < 70.0
+    assert np.median(np.delete(distances, 3)) < 10.0
+
+
+def test_the_same_clicks_give_the_same_figures(solved):
+    calibration, pairs = solved
+    first, second = (residual_figures(pairs, calibration) for _ in range(2))
+    assert first.held_out is not None
+    assert second.held_out is not None
+    assert first.held_out.distances_px.tobytes() == second.held_out.distances_px.tobytes()
+
+
+def test_bins_have_round_edges_that_hold_every_value():
+    assert edges_of(np.array([3.2, 17.0])).tolist() == [0, 5, 10, 15, 20]
+    assert edges_of(np.array([5.0])).tolist()[0] <= 5.0 <= edges_of(np.array([5.0])).tolist()[-1]
+    assert len(edges_of(np.zeros(0))) == 0
+    bins = spreads(np.array([1.0, 2.0, 9.0, np.nan]), np.array([1.0, 3.0, np.nan, 2.0]))
+    assert sum(one.n for one in bins) == 2
