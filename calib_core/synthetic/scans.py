@@ -264,7 +264,7 @@ def _with_passing_errors(stage: Stage, echoes: list[_Echo], time_s: float) -> li
     """Give moving objects the error that stays the same where an object stands still: it is another one in every scan."""
     rng = np.random.default_rng([stage.options.seed, 21, round(time_s * 1e6)])
     profile = stage.profile
-    sigma = [0.004, profile.azimuth_bias_sigma, profile.elevation_bias_sigma]
+    sigma = np.array([0.004, profile.azimuth_bias_sigma, profile.elevation_bias_sigma])
     return [replace(echo, bias=sigma * rng.standard_normal((len(echo.rcs_dbsm), 3))) for echo in echoes]
 
 
