@@ -181,7 +181,8 @@ def targets_at(stage: Stage, time_s: float) -> Targets:
     people = [story.people_at(moment_s, person=stage.options.person) for moment_s in moments_s]
     count = len(people[0]) if len(people[0]) == len(people[2]) else int(stage.options.person)
     echoes += [_actor_echo(stage, *actors) for actors in zip(people[0][:count], people[2][:count], strict=True)]
-    echoes += [_actor_echo(stage, *actors) for actors in zip(before.traffic, after.traffic, strict=True)]
+    traffic = [_actor_echo(stage, *actors) for actors in zip(before.traffic, after.traffic, strict=True)]
+    echoes += _with_passing_errors(stage, traffic, time_s)
     from_world = stage.rig.radar_from_world
     start = from_world @ np.concatenate([echo.before_m for echo in echoes])
     end = from_world @ np.concatenate([echo.after_m for echo in echoes])
@@ -257,6 +258,14 @@ def _actor_echo(stage: Stage, before: Actor, after: Actor) -> _Echo:
     assert isinstance(before.state, PersonState), "what is not a vehicle is a person"
     assert isinstance(after.state, PersonState), "and stays one"
     return replace(_person_echo(before.state, after.state), track=before.track)
+
+
+def _with_passing_errors(stage: Stage, echoes: list[_Echo], time_s: float) -> list[_Echo]:
+    """Give moving objects the error that stays the same where an object stands still: it is another one in every scan."""
+    rng = np.random.default_rng([stage.options.seed, 21, round(time_s * 1e6)])
+    profile = stage.profile
+    sigma = np.array([0.004, profile.azimuth_bias_sigma, profile.elevation_bias_sigma])
+    return [replace(echo, bias=sigma * rng.standard_normal((len(echo.rcs_dbsm), 3))) for echo in echoes]
 
 
 def _vehicle_echo(stage: Stage, before: VehicleState, after: VehicleState, track: str) -> _Echo:

@@ -6,6 +6,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from calib_core.arrays import Points2, Values, Vector2, frozen_array
+from calib_core.errors import OptionError
 from calib_core.synthetic.options import Traffic
 from calib_core.synthetic.scene.person import PersonState
 from calib_core.synthetic.scene.scenes import Scene
@@ -132,14 +133,14 @@ def _next_place(
     """Draw where to go next: some metres away, with nothing in between.
 
     Raises:
-        ValueError: there is no way out.
+        OptionError: there is no way out.
     """
     for _ in range(500):
         there = _place(rng, scene, label, clearance_m)
         steps = np.linspace(0.0, 1.0, 40)[:, None] * (there - here) + here
         if np.linalg.norm(there - here) > 2.0 and all(scene.free(step, clearance_m) for step in steps):
             return there
-    raise ValueError(f"no room to move in the {scene.name}: ask for another scene")
+    raise OptionError(f"no room to move in the {scene.name}: ask for another scene")
 
 
 def _place(rng: np.random.Generator, scene: Scene, label: ActorLabel, clearance_m: float) -> Vector2:
@@ -153,7 +154,7 @@ def _place(rng: np.random.Generator, scene: Scene, label: ActorLabel, clearance_
         place = np.array([x_m, float(rng.uniform(-aside_m, aside_m))])
         if scene.free(place, clearance_m):
             return place
-    raise ValueError(f"no room to move in the {scene.name}: ask for another scene")
+    raise OptionError(f"no room to move in the {scene.name}: ask for another scene")
 
 
 def _round_trip(rng: np.random.Generator, number: int, traffic: Traffic, duration_s: float) -> Mover:
