@@ -7,7 +7,7 @@ PARALLEL := -n logical --maxprocesses 4 --dist loadfile
 FAST := tests/golden tests/paper tests/properties $(wildcard tests/unit/test_*.py) \
   $(addprefix tests/unit/,advice association diagnostics estimation interchange)
 
-.PHONY: help env dev demo test fuzz test-fast test-lowest test-newest check lock bench bench-accuracy sample picture clean
+.PHONY: help env dev demo test fuzz test-fast test-lowest test-newest check lock bench bench-accuracy paper sample picture clean
 
 help:  ## List the targets.
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 18
@@ -67,6 +67,9 @@ bench: dev  ## Measure speed, as ratios within one run; write docs/speed.md. BEN
 bench-accuracy: SEED ?= fixed
 bench-accuracy: $(VENV)/.bench  ## Measure accuracy against the bound and other estimators; write docs/accuracy.md (an hour or two). SEED=fresh: draws from the commit's hash.
 	$(BIN)/python -m benchmarks.accuracy --seed $(SEED) $(ACCURACY)
+
+paper: dev  ## Repeat the paper's experiments on simulated sessions; write docs/paper-experiments.md and its figures.
+	$(BIN)/python -m benchmarks.paper $(PAPER)
 
 sample: env  ## Regenerate sample_data/, bit for bit.
 	$(BIN)/python -m calib_core.synthetic.sample sample_data

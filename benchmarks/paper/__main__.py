@@ -25,6 +25,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 _RANGE_SEEDS = tuple(range(1, 5))
 _ACC_SEEDS = tuple(range(1, 4))
 _RANGE = {
+    "the best of the fit's grid": replace(FITTED, constant_azimuth_deg=0.4, constant_elevation_deg=0.7),
     "20 placements": replace(FITTED, placements=20),
     "1280 x 720": replace(FITTED, width_px=1280),
     "640 x 360": replace(FITTED, width_px=640),

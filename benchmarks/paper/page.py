@@ -11,6 +11,7 @@ from benchmarks.paper.settings import BOARD_CORNERS, FIT_SEEDS, Settings
 
 __all__ = ["PAPER", "Paper", "order_kept", "page", "verdict_of"]
 
+_ENORMOUS = 1e6
 _NOT_AVAILABLE = "not available to us"
 
 
@@ -79,7 +80,11 @@ def _spread(figures: Sequence[Figures], name: str, digits: int = 1) -> str:
     values = values[np.isfinite(values)]
     if not len(values):
         return "-"
-    return f"{np.median(values):.{digits}f} ({values.min():.{digits}f} to {values.max():.{digits}f})"
+    middle, low, high = (
+        f"{one:.{digits}f}" if one < _ENORMOUS else f"above {_ENORMOUS:.0f}"
+        for one in (np.median(values), values.min(), values.max())
+    )
+    return f"{middle} ({low} to {high})"
 
 
 def _stated(stated: Paper) -> str:
@@ -236,6 +241,10 @@ logarithms of ours over the paper's.
 
 {fitted}
 
+The table uses azimuth 0.25 deg and elevation 0.8 deg, from a first look at D1 on seeds 1 to 8: they are not the place of the
+grid with the smallest mismatch, which is at its edge, because D2's ratio, out of reach anyway, draws it there. What that place
+gives, the same within 1 px, is among the other choices below.
+
 ## What the paper does not say
 
 Image size, noise, number of placements and the size of the larger reflector are not available to us. The picture's width
@@ -254,7 +263,7 @@ px over {range_count} seeds:
 - The scenes are simulated. The sizes of errors that the paper does not state were fitted, so PPM+D1 says nothing about our
   implementation of the method; D3, PMM and the swaps follow from it.
 - D2's ratio of 2.65 is not reached by any setting in the range searched: independent errors at every placement give
-  at most about 2. It means an error that the points of D2 share, which this simulation does not have.
+  at most about 2. It suggests an error that the points of D2 share, which this simulation does not have.
 - PMM's CDSD is smaller than the paper's: the simulated mounting error is a rotation, nearly the same for all points.
 - PMM and R_I + T_c depend on the mounting error, which is drawn anew for each seed; their ranges are wide.
 
@@ -267,6 +276,10 @@ kept; the paper's authors drop them, so theirs compares with the column without 
 | what moves | paper | Acc | without frames of 0 % | turned by 10 deg |
 |---|---|---|---|---|
 {acc}
+
+The row of near cars is a failure of finding targets, not of the calibration: of seed 1's 3,407 returns of cars the radar's
+own clusters kept 88, and others in their place; with the true labels the same calibration has 98 % near and 93 % far. The
+paper's 66 % is between the two rows and is not explained by them.
 
 Acc is not accuracy: it hardly notices an error that keeps the returns inside their boxes.
 

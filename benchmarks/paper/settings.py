@@ -58,7 +58,7 @@ class Settings:
 
 
 FITTED = Settings(constant_azimuth_deg=0.25, constant_elevation_deg=0.8)
-"""Found by `python -m benchmarks.paper --fit`, on PPM+D1 and PPM+D2."""
+"""From a first look at PPM+D1; `python -m benchmarks.paper --fit` searches a grid around it on PPM+D1 and PPM+D2."""
 
 
 def options_of(
