@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib_core.arrays import Vector2, Vector3, frozen_array
+from calib_core.errors import OptionError
 from calib_core.measurements import TimeNs
 from calib_core.synthetic.scene.person import PersonState, capsules
 from calib_core.synthetic.scene.stage import Stage
@@ -59,12 +60,12 @@ def _best_frame(stage: Stage, resting: Resting, taken: list[TimeNs]) -> TimeNs:
     """Find the frame nearest to the middle of a placement in which the whole reflector is visible.
 
     Raises:
-        ValueError: no frame shows it; the frame rate is too low for the dwell.
+        OptionError: no frame shows it; the frame rate is too low for the dwell.
     """
     for time in clear_frames(stage, resting):
         if time not in taken:
             return time
-    raise ValueError(f"no frame shows placement {resting.index + 1}: raise the frame rate or the dwell time")
+    raise OptionError(f"no frame shows placement {resting.index + 1}: raise the frame rate or the dwell time")
 
 
 def clear_frames(stage: Stage, resting: Resting) -> Iterator[TimeNs]:

@@ -203,7 +203,7 @@ def _positions(rng: np.random.Generator, scene: Scene, added: Scene, rig: Rig, o
                 found.append(position)
         if len(found) == options.placements:
             return np.concatenate([np.array(found), _board_places(rng, scene, rig, options)])
-    raise ValueError(f"only {len(found)} of {options.placements} placements fit in the {scene.name}")
+    raise OptionError(f"only {len(found)} of {options.placements} placements fit in the {scene.name}; ask for fewer")
 
 
 def _layout(scene: Scene, options: SimulationOptions) -> PairsLayout:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib_core.arrays import Flags, Points3, Vector3
+from calib_core.errors import OptionError
 from calib_core.synthetic.options import Surroundings
 from calib_core.synthetic.scene.scenes import Box, Cylinder, Scatterer, Scene
 
@@ -59,7 +60,7 @@ def furnished(rng: np.random.Generator, scene: Scene, surroundings: Surroundings
         surroundings: what to add.
 
     Raises:
-        ValueError: the parked cars do not fit in the scene.
+        OptionError: the parked cars do not fit in the scene.
     """
     solids: list[Box | Cylinder] = []
     scatterers: list[Scatterer] = []
@@ -100,7 +101,7 @@ def _car(rng: np.random.Generator, scene: Scene) -> tuple[list[Box], list[Scatte
         if all(scene.free(end, 0.5 * width_m + _CAR_CLEARANCE_M) for end in ends):
             break
     else:
-        raise ValueError(f"the parked cars do not fit in the {scene.name}: ask for fewer")
+        raise OptionError(f"the parked cars do not fit in the {scene.name}: ask for fewer")
     colour = rng.choice(["blue", "white", "dark"])
     parts = [
         Box(x_m, y_m, 0.8 * length_m, 0.9 * width_m, 0.25, "dark"),

@@ -241,3 +241,8 @@ def test_while_the_reflector_stands_in_the_papers_scenes_hardly_anything_else_do
         far = np.abs(np.linalg.norm(still, axis=1) - np.linalg.norm(placement.position_radar_m)) > 0.3
         assert len(still) >= 4
         assert far.mean() < 0.3, placement.id
+
+
+def test_a_frame_rate_too_low_for_the_dwell_is_answered_in_words() -> None:
+    with pytest.raises(OptionError, match="no frame shows placement 1: raise the frame rate or the dwell time"):
+        simulate_scans(replace(SHORT, camera_rate_hz=0.1))
