@@ -11,7 +11,7 @@ from calib_core.errors import InputError
 from calib_core.evaluation import Evaluation, PairedDifference, acc_difference, residual_difference
 from calib_core.evaluation.paired_difference import Winner
 from calib_core.measurements import ReflectorClick
-from calib_core.results import Calibration
+from calib_core.results import Calibration, DataWarning
 
 __all__ = ["ComparedOnRecording", "compare_on_recording", "comparison_lines"]
 
@@ -127,9 +127,16 @@ def comparison_lines(compared: ComparedOnRecording) -> tuple[str, ...]:
                 "compare on another recording"
             )
     rows += [
-        f"warning: {one.message}; {one.hint}" for one in dict.fromkeys((*compared.a.warnings, *compared.b.warnings))
+        f"warning{_of_one(one, compared)}: {one.message}; {one.hint}"
+        for one in dict.fromkeys((*compared.a.warnings, *compared.b.warnings))
     ]
     return tuple(rows)
+
+
+def _of_one(warning: DataWarning, compared: ComparedOnRecording) -> str:
+    """Return which of the two a warning is about; empty if about both."""
+    about = [warning in one.warnings for one in (compared.a, compared.b)]
+    return "" if all(about) else f" about {compared.names[about.index(True)]}"
 
 
 def _answer(compared: ComparedOnRecording) -> str:

@@ -245,7 +245,8 @@ def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:
             DataWarning(
                 "no-targets",
                 "no moving target was found in the scans of the annotated frames, so there is no Acc",
-                "record people, cars or robots that move, or lower --min-speed-mps; what stands still has no Doppler speed",
+                f"record people, cars or robots that move within {TargetOptions().max_range_m:g} m of the radar, or lower "
+                "--min-speed-mps; what stands still has no Doppler speed",
             ),
         )
     if not returns.matched_targets:

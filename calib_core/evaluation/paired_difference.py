@@ -12,9 +12,10 @@ from calib_core.evaluation.figures import BoxFigures, ResidualFigures
 __all__ = ["PairedDifference", "Winner", "acc_difference", "residual_difference"]
 
 Winner: TypeAlias = Literal["A", "B", "equal", "unknown"]
-"""The better one; "equal" if the two are the same there, "unknown" if the difference may be noise."""
+"""The better one; "equal" if the two are the same there (residuals: to 0.01 px), "unknown" if the difference may be noise."""
 
 _SIGNIFICANT_P = 0.05
+_SAME_PX = 0.01  # the digits of a pose in a file move a pixel by less
 _LEAST_GROUPS = 3
 
 
@@ -53,7 +54,8 @@ def residual_difference(a: ResidualFigures, b: ResidualFigures, *, lost_px: floa
     groups = a.placements if len(a.placements) else np.arange(len(a.ids))
     differences = np.bincount(groups, weights=lengths[1] - lengths[0]) / np.maximum(np.bincount(groups), 1)
     error = float(differences.std(ddof=1) / np.sqrt(len(differences))) if len(differences) > 1 else float("nan")
-    return _judged(float(differences.mean()), error, len(differences), less_is_better=True)
+    same = bool((np.abs(lengths[1] - lengths[0]) < _SAME_PX).all())
+    return _judged(float(differences.mean()), error, len(differences), less_is_better=True, same=same)
 
 
 def acc_difference(a: BoxFigures, b: BoxFigures) -> PairedDifference | None:
@@ -71,10 +73,10 @@ def acc_difference(a: BoxFigures, b: BoxFigures) -> PairedDifference | None:
     return _judged(float(differences.mean()), error, groups, less_is_better=False)
 
 
-def _judged(mean: float, error: float, groups: int, *, less_is_better: bool) -> PairedDifference:
+def _judged(mean: float, error: float, groups: int, *, less_is_better: bool, same: bool = False) -> PairedDifference:
     from scipy.special import stdtr, stdtrit
 
-    if mean == 0.0 and not error > 0.0:
+    if same or (mean == 0.0 and not error > 0.0):
         return PairedDifference(0.0, error, 0.0, 0.0, 1.0, groups, "equal")
     if not np.isfinite(error) or groups < _LEAST_GROUPS:
         nan = float("nan")

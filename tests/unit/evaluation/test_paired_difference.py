@@ -45,6 +45,15 @@ def test_the_difference_is_students_t_over_placements():
     assert residual_difference(b, a, lost_px=1000.0).winner == "A"
 
 
+def test_the_same_pose_with_other_digits_is_no_difference():
+    lengths = [5.0, 6.0, 7.0, 8.0]
+    finer = residual_difference(residuals(lengths), residuals([one + 1e-5 for one in lengths]), lost_px=1000.0)
+    one_differs = residual_difference(residuals(lengths), residuals([*lengths[:3], 8.5]), lost_px=1000.0)
+
+    assert (finer.winner, finer.p_value) == ("equal", 1.0)
+    assert one_differs.winner == "unknown"
+
+
 def test_clicks_of_one_placement_do_not_count_as_evidence_each():
     a = residuals([5.0] * 12, [0] * 6 + [1] * 6)
     b = residuals([4.0] * 6 + [4.5] * 6, [0] * 6 + [1] * 6)
