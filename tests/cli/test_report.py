@@ -105,3 +105,15 @@ def test_without_a_browser_the_html_is_written_and_the_pdf_is_refused(
     assert "COCALIB_BROWSER=/nowhere/browser is not a program" in capsys.readouterr().err
     assert out.exists()
     assert not pdf.exists()
+
+
+@pytest.mark.parametrize("option", ["--out", "--pdf"])
+def test_the_report_never_takes_the_place_of_the_calibration(
+    option: str, golden: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    calibration = tmp_path / "calibration.json"
+    calibration.write_bytes(golden.read_bytes())
+    out = {"--out": str(tmp_path / "report.html")} | {option: str(calibration)}
+    assert run(["report", str(calibration), *(word for pair in out.items() for word in pair)]) == 2
+    assert "name it NAME." in capsys.readouterr().err
+    assert calibration.read_bytes() == golden.read_bytes()

@@ -60,12 +60,16 @@ class Report:
         """Return the output file.
 
         Raises:
-            InputError: a file is missing, or an option says nothing without another one.
+            InputError: a file is missing or has another suffix, or an option says nothing without another one.
         """
         if self.calibration is None:
             raise InputError("CALIBRATION is missing; see cocalib report --help")
         if self.out is None:
             raise InputError("report writes a file: give its name with --out FILE.html")
+        if self.out.suffix.lower() not in (".html", ".htm"):  # such as that of the calibration itself
+            raise InputError(f"{self.out}: the report is an .html file; name it NAME.html")
+        if self.pdf is not None and self.pdf.suffix.lower() != ".pdf":
+            raise InputError(f"{self.pdf}: the printed report is a .pdf file; name it NAME.pdf")
         if not self.recording and (self.evidence != EvidenceFlags() or self.topics != TopicFlags()):
             raise InputError(
                 "clicks, boxes, and the options of a recording apply with a RECORDING only; give it after the calibration"
