@@ -146,6 +146,7 @@ def evidence_in(
     if boxes is None:
         return Evidence(pairs, unpaired, None, lost)
     _require_camera(boxes, camera)
+    lost = (*lost, *_taken(boxes))
     if labels is not None:
         reach_s = options.max_gap_s or longest_gap_s(recording.radar_times)
         scans = recording.radar_scans_around(boxes.times_ns.tolist(), reach_s + 1e-3)
@@ -237,6 +238,12 @@ def _lost(unpaired: Sequence[Unpaired]) -> tuple[DataWarning, ...]:
     first = unpaired[0]
     message = f"none of {len(unpaired)} clicks has a radar position, so there are no residuals: {first.reason}"
     return (DataWarning("no-paired-clicks", message, first.hint),)
+
+
+def _taken(boxes: Boxes) -> tuple[DataWarning, ...]:
+    """Pass on what reading the boxes took for granted or left out."""
+    hint = "check that this is so: boxes of other frames or other objects give a wrong Acc"
+    return tuple(DataWarning("boxes-note", f"{boxes.source}: {note}", hint) for note in boxes.notes)
 
 
 def _about(returns: CountedReturns) -> tuple[DataWarning, ...]:

@@ -74,7 +74,10 @@ def shown_recording(paths: Sequence[Path], topics: TopicFlags, files: ShownFlags
         clicks = () if files.clicks is None else read_clicks(read_text(files.clicks), source=str(files.clicks))
         if clicks:
             clicks = told_clicks_at_frames(clicks, recording, source=str(files.clicks))
-        boxes = None if files.boxes is None else find_boxes(files.boxes, recording)
+        boxes = None
+        if files.boxes is not None:
+            with progress_bar("reading boxes") as progress:
+                boxes = find_boxes(files.boxes, recording, progress=progress)
         with progress_bar("evaluating") as progress:
             view = recorded_view(
                 recording, calibration, files.colour, clicks=clicks, boxes=boxes, against=against, progress=progress

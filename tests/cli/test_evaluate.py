@@ -231,3 +231,28 @@ def test_a_calibration_that_looks_elsewhere_than_the_boxes_is_doubted(
     assert answer.code == 3
     assert answer.out.startswith("Acc: 0.")
     assert "targets and boxes agree best with a camera turned by" in answer.out
+
+
+def test_what_reading_the_boxes_took_for_granted_is_said(
+    cocalib: Cocalib, folder: Path, scene: Street, tmp_path: Path
+) -> None:
+    found = [
+        {
+            "image_id": number,
+            "category_id": 1,
+            "bbox": [box.left_px, box.top_px, box.right_px - box.left_px, box.bottom_px - box.top_px],
+            "score": 0.9,
+        }
+        for number, frame in enumerate(scene.boxes)
+        for box in frame.boxes
+    ]
+    (tmp_path / "detections.json").write_text(json.dumps(found))
+    where = (folder / "right.txt", folder / "street.mcap", "--boxes", tmp_path / "detections.json")
+    document = json.loads(cocalib("evaluate", *where, "--json").out)
+    notes = [one for one in document["warnings"] if one["code"] == "boxes-note"]
+
+    assert any("number" in one["message"] for one in notes)
+    assert all(one["message"].startswith("detections.json: ") for one in notes)
+    assert f"warning: {notes[0]['message']}" in cocalib("evaluate", *where).out
+    assert cocalib("report", *where, "--out", tmp_path / "report.html").code == 0
+    assert "boxes-note" in (tmp_path / "report.html").read_text()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 import tyro
 
 from app.cli.flags import File, called
-from app.cli.output import read_text, told_clicks_at_frames
+from app.cli.output import progress_bar, read_text, told_clicks_at_frames
 from calib_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -77,7 +77,8 @@ class EvidenceFlags:
         from app.boxes import find_boxes, find_labels
         from calib_core.evaluation import renamed_classes
 
-        boxes = find_boxes(self.boxes, recording)
+        with progress_bar("reading boxes") as progress:
+            boxes = find_boxes(self.boxes, recording, progress=progress)
         if self.class_map:
             boxes = renamed_classes(boxes, dict(map(_renaming, self.class_map)))
         return boxes, None if self.labels is None else find_labels(self.labels)

@@ -1,0 +1,43 @@
+"""Ctrl+C while a recording is judged, reported or drawn: exit code 130, one line at most, and no half file."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pytest
+
+import app.evaluating
+
+Cocalib = Callable[..., Any]
+
+
+def interrupted(*_: object, **__: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("command", ["evaluate", "compare", "report", "record-rrd", "video"])
+def test_an_interrupt_leaves_no_file_and_no_traceback(
+    cocalib: Cocalib,
+    made: Callable[..., Path],
+    clicks_file: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    command: str,
+) -> None:
+    recording, pose = made(), tmp_path / "calibration.json"
+    assert cocalib("solve", recording, "--clicks", clicks_file, "--out", pose).code == 0
+    before = sorted(tmp_path.rglob("*"))
+    monkeypatch.setattr(app.evaluating, "pair_clicks", interrupted)
+    clicks = ("--clicks", clicks_file)
+    arguments: dict[str, tuple[object, ...]] = {
+        "evaluate": (pose, recording),
+        "compare": (pose, pose, recording),
+        "report": (pose, recording, "--out", tmp_path / "made.html"),
+        "record-rrd": (recording, "--calibration", pose, "--out", tmp_path / "made.rrd"),
+        "video": (recording, "--overlay", "--calibration", pose, "--out", tmp_path / "made.mp4"),
+    }
+    answer = cocalib(command, *arguments[command], *clicks)
+
+    assert answer.code == 130
+    assert "Traceback" not in answer.out + answer.err
+    assert sorted(tmp_path.rglob("*")) == before
