@@ -4,8 +4,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
+import tyro
+
+from app.cli.flags import File, called
 from app.cli.output import progress_bar, read_text, told_clicks_at_frames
 from app.cli.recording_flags import TopicFlags
 from calib_core.errors import InputError
@@ -13,37 +16,38 @@ from calib_core.errors import InputError
 if TYPE_CHECKING:
     from app.recorded_view import RecordedView
 
-__all__ = ["ShownFiles", "shown_recording"]
+__all__ = ["Shown", "ShownFlags", "shown_recording"]
 
 
 @dataclass(frozen=True, slots=True)
-class ShownFiles:
-    """What the user names.
+class ShownFlags:
+    """What is drawn over a recording."""
 
-    Attributes:
-        recording: its files.
-        topics: of the recording.
-        calibration: the file to project with.
-        camera: intrinsics, if the calibration's file has none.
-        clicks: a file of clicks in this recording.
-        boxes: a file of boxes, or the topic of the recording that has them.
-        against: a file with another calibration.
-        colour: what the colours of returns show.
-    """
+    calibration: File = None
+    """Calibration to project the returns with, in any format that export writes."""
+    camera: File = None
+    """Intrinsics to use if the calibration has none, or instead of the recording's: camera_info YAML, OpenCV, Kalibr, JSON."""
+    clicks: File = None
+    """Clicks in this recording (cocalib/clicks-1 JSON); by default those in the calibration, if they are of this recording."""
+    boxes: Annotated[str | None, called("FILE_OR_TOPIC")] = None
+    """Boxes around objects, drawn with their classes and evaluated (Acc): a file of a labelling tool, or a topic."""
+    against: File = None
+    """Another calibration, whose returns are shown too."""
+    colour: Literal["range", "speed"] = "range"
+    """What the colours of returns show."""
 
-    recording: Sequence[Path]
-    topics: TopicFlags
-    calibration: Path | None
-    camera: Path | None
-    clicks: Path | None
-    boxes: str | None
-    against: Path | None
-    colour: Literal["range", "speed"]
+
+Shown: TypeAlias = Annotated[ShownFlags, tyro.conf.arg(name="")]
 
 
 @contextmanager
-def shown_recording(files: ShownFiles) -> "Iterator[RecordedView]":
+def shown_recording(paths: Sequence[Path], topics: TopicFlags, files: ShownFlags) -> "Iterator[RecordedView]":
     """Open the recording and read everything that is to be drawn over it.
+
+    Args:
+        paths: of the recording.
+        topics: of the recording.
+        files: what is drawn.
 
     Raises:
         InputError: a file cannot be read, or is not of this recording.
@@ -56,12 +60,12 @@ def shown_recording(files: ShownFiles) -> "Iterator[RecordedView]":
     from calib_core.interchange import CameraFile, read_any_file, read_clicks
     from calib_core.recordings import open_recording
 
-    if not files.recording:
+    if not paths:
         raise InputError("RECORDING is missing; name one or more files or folders")
     if files.calibration is None:
         raise InputError("--calibration FILE is missing: the calibration that the returns are projected with")
     camera_file = None if files.camera is None else CameraFile.read(files.camera)
-    with open_recording(tuple(files.recording), files.topics) as recording:
+    with open_recording(tuple(paths), topics) as recording:
         camera = camera_for(recording, camera_file)
         calibration = calibration_of(read_any_file(files.calibration), str(files.calibration), camera)
         against = None

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from app.cli.flags import File, NewFile, Switch, called
 from app.cli.output import progress_bar, seconds_text
 from app.cli.recording_flags import Recordings, TopicFlags, Topics
-from app.cli.shown_recording import ShownFiles, shown_recording
+from app.cli.shown_recording import ShownFlags, shown_recording
 from calib_core.errors import InputError
 
 __all__ = ["Video"]
@@ -74,18 +74,9 @@ class Video:
         if not 0 <= self.trail <= _MOST_TRAIL_SCANS:
             raise InputError(f"--trail {self.trail}: give a number of scans from 0 to {_MOST_TRAIL_SCANS}")
         require_encoder(self.out)
-        files = ShownFiles(
-            self.recording,
-            self.topics,
-            self.calibration,
-            self.camera,
-            self.clicks,
-            self.boxes,
-            self.against,
-            self.colour,
-        )
+        shown = ShownFlags(self.calibration, self.camera, self.clicks, self.boxes, self.against, self.colour)
         titles = tuple(name_text(path.name) for path in (self.calibration, self.against) if path is not None)
-        with shown_recording(files) as view, progress_bar("drawing frames") as progress:
+        with shown_recording(self.recording, self.topics, shown) as view, progress_bar("drawing frames") as progress:
             written = write_overlay(view, self.out, OverlayOptions(titles, self.trail), progress=progress)
         width, height = written.size_px
         print(

@@ -25,14 +25,15 @@ from app.rerun.unmoving import HALF_PIXEL_PX, LARGE_PX, ellipse_strips
 from app.seen_returns import FrameBlock, SeenReturns, frame_blocks, seen_in
 from calib_core.arrays import Indices, TimesNs
 from calib_core.detections import Box
-from calib_core.errors import MessageError
+from calib_core.errors import InputError, MessageError
 from calib_core.measurements import TimeNs
 from calib_core.results import PairResult
 
-__all__ = ["Streamed", "stream_cloud", "stream_figures", "stream_frames"]
+__all__ = ["Streamed", "flush", "stream_cloud", "stream_figures", "stream_frames"]
 
 _AGAINST = (230, 120, 230)
 _CHUNK_BYTES = 4 << 20
+_PATIENCE_S = 60.0
 _HUES = ((255, 210, 80), (110, 220, 130), (90, 190, 255), (255, 140, 120), (200, 160, 255), (240, 240, 240))
 
 
@@ -61,7 +62,7 @@ def stream_cloud(stream: rr.RecordingStream, view: RecordedView) -> Iterator[Tim
             stream.send_columns(
                 RETURNS, [_times(scans.times_ns)], columns.partition(np.diff(scans.first_return).tolist())
             )
-            stream.flush()
+            flush(stream)
         yield scans.times_ns
 
 
@@ -76,7 +77,6 @@ def stream_frames(stream: rr.RecordingStream, view: RecordedView, streamed: Stre
             _stream_clicks(stream, block, pairs)
         if view.boxes is not None:
             _stream_boxes(stream, block, boxes, labels)
-        stream.flush()  # what is not on the disk yet stays in memory
 
 
 def _stream_pictures(
@@ -109,6 +109,7 @@ def _send_pictures(
 ) -> None:
     columns = rr.EncodedImage.columns(blob=pictures, media_type=formats)
     stream.send_columns(PICTURE, [_times(np.array(times, dtype=np.int64))], columns)
+    flush(stream)
     streamed.frames += len(pictures)
 
 
@@ -218,6 +219,18 @@ def stream_figures(stream: rr.RecordingStream, view: RecordedView) -> None:
         times = np.array([time for time, _ in acc], dtype=np.int64)
         shares = 100.0 * np.array([share for _, share in acc])
         stream.send_columns(ACC, [_times(times)], rr.Scalars.columns(scalars=shares))
+
+
+def flush(stream: rr.RecordingStream) -> None:
+    """Wait until all is written: what is not on the disk yet stays in memory.
+
+    Raises:
+        InputError: it is not written in time; once Rerun's writer has failed, it never is.
+    """
+    try:
+        stream.flush(timeout_sec=_PATIENCE_S)
+    except RuntimeError as error:
+        raise InputError(f"Rerun's writer does not go on ({error}); write to another disk") from error
 
 
 def _times(times_ns: TimesNs) -> rr.TimeColumn:

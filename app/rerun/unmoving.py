@@ -9,6 +9,7 @@ from app.colours import residual_colours
 from app.recorded_view import RecordedView
 from app.rerun.entities import (
     AGAINST_CAMERA,
+    AGAINST_RETURNS,
     CAMERA,
     CAMERA_POSITION,
     PAIRS,
@@ -48,6 +49,7 @@ def log_unmoving(stream: rr.RecordingStream, view: RecordedView) -> None:
     stream.log(SEEN_RETURNS, rr.Points2D.from_fields(radii=rr.Radius.ui_points(4.0), draw_order=30.0), static=True)
     _log_camera(stream, CAMERA, PICTURE, view.calibration, _FRUSTUM_SHARE * far_m, _CAMERA)
     if view.against is not None:
+        stream.log(AGAINST_RETURNS, rr.Points2D.from_fields(radii=rr.Radius.ui_points(3.0)), static=True)
         _log_camera(stream, AGAINST_CAMERA, f"{AGAINST_CAMERA}/frustum", view.against, _FRUSTUM_SHARE * far_m, _AGAINST)
     _log_camera_position(stream, view.calibration)
     if view.pairs:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["WrittenView", "write_view"]
 
 _APPLICATION = "cocalib"
+_RESERVE_BYTES = 64 << 20
+"""More than is written between two looks at the free space."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +55,7 @@ def write_view(view: RecordedView, path: Path, *, progress: Callable[[int, int],
     require_sdk()
     try:
         with whole_path(path) as part, _stream_to(part, view) as stream:
-            written = _write(stream, view, progress)
+            written = _write(stream, view, part, progress)
             stream.disconnect()
             _require_complete(part, path)
     except OSError as error:
@@ -76,6 +78,20 @@ def _stream_to(part: Path, view: RecordedView) -> "Iterator[rr.RecordingStream]"
         yield stream
     finally:
         stream.disconnect()
+
+
+def _require_space(part: Path) -> None:
+    """Refuse to go on when the disk is nearly full: once Rerun's writer fails, closing its stream can wait for ever.
+
+    Raises:
+        InputError: too little is free for what is written before the next look.
+    """
+    free_bytes = shutil.disk_usage(part.parent).free
+    if free_bytes < _RESERVE_BYTES:
+        raise InputError(
+            f"{part.parent}: the disk is nearly full ({free_bytes / 1e6:.0f} MB are free); nothing was left behind. Free some "
+            "space, or write to another disk"
+        )
 
 
 def _require_complete(part: Path, path: Path) -> None:
@@ -102,17 +118,22 @@ def _require_complete(part: Path, path: Path) -> None:
 
 
 def _write(
-    stream: "rr.RecordingStream", view: RecordedView, progress: Callable[[int, int], None] | None
+    stream: "rr.RecordingStream", view: RecordedView, part: Path, progress: Callable[[int, int], None] | None
 ) -> WrittenView:
     from app.rerun.moving import Streamed, stream_cloud, stream_figures, stream_frames
     from app.rerun.unmoving import log_unmoving
 
+    _require_space(part)
     stream.send_recording_name(view.recording.name)
     log_unmoving(stream, view)
     stream_figures(stream, view)
-    scans = sum(len(times_ns) for times_ns in stream_cloud(stream, view))
+    scans = 0
+    for times_ns in stream_cloud(stream, view):
+        _require_space(part)
+        scans += len(times_ns)
     streamed, total = Streamed(), len(view.recording.image_times)
     for done in stream_frames(stream, view, streamed):
+        _require_space(part)
         if progress:
             progress(done, total)
     return WrittenView(streamed.frames, scans, streamed.unreadable, streamed.fault)

@@ -72,7 +72,9 @@ def test_the_board_in_the_pictures_gives_the_pose_of_the_checkerboard_method(tmp
     found = solved(tmp_path, ccm_options(simulated, linear=False), *flags)
     calibration = json.loads((tmp_path / "calibration.json").read_text())
     assert found["n"] == 5
-    assert "registered on 5 corners of a board 5" in next(
+    rig = simulated.stage.rig
+    middle_camera_m = rig.camera_from_radar @ (rig.radar_from_world @ board.corners_m.mean(axis=0)[None])
+    assert f"registered on 5 corners of a board {np.linalg.norm(middle_camera_m):.1f} m away" in next(
         one["message"] for one in calibration["warnings"] if one["code"] == "board-geometry"
     )
     by_points = calibrate(simulated.clicks, simulated.scans, simulated.camera, ppm_options(SMALL))

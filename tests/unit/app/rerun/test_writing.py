@@ -1,8 +1,10 @@
 """What is written for Rerun is read back with Rerun's own reader and compared with the recording and its calibration."""
 
 import dataclasses
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -165,6 +167,16 @@ def test_an_interrupted_file_leaves_the_old_one_and_nothing_else(view: RecordedV
         write_view(view, path, progress=stop)
     assert [file.name for file in tmp_path.iterdir()] == ["view.rrd"]
     assert path.read_bytes() == b"old"
+
+
+def test_a_disk_that_fills_up_is_noticed_before_the_writer_fails(
+    view: RecordedView, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free = iter([10**12, 10**12, 10**12, 5_000_000])
+    monkeypatch.setattr(shutil, "disk_usage", lambda _path: SimpleNamespace(free=next(free)))
+    with pytest.raises(InputError, match="disk is nearly full"):
+        write_view(view, tmp_path / "view.rrd")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_without_its_end_is_refused(view: RecordedView, tmp_path: Path) -> None:
