@@ -68,7 +68,7 @@ def missed(seeds: Sequence[Seed]) -> str:
         for name, one in found.items()
         if one and not is_reached(name, one)
     ]
-    return f"Missed are {'; '.join(lines)}." if lines else "No row misses its limit."
+    return f"Rows that miss their limit: {'; '.join(lines)}." if lines else "No row misses its limit."
 
 
 def order_kept(seeds: Sequence[Seed]) -> str:

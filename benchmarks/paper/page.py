@@ -15,6 +15,7 @@ __all__ = ["page"]
 
 _ENORMOUS = 1e6
 _NOT_AVAILABLE = "not available to us"
+_BOARD = "CCM+D1, 4 corners, linear"
 _RANGE = ("PPM+D1", "PPM+D3", "PMM+D1", "R_PPM+T_m+D1", "R_I+T_c+D1")
 
 
@@ -36,7 +37,8 @@ def page(measured: Measured, settings: Settings, places: Sequence[Fitted], *, co
         table="\n".join(_row(name, seeds) for name in PAPER),
         order=order_kept(seeds),
         missed=missed(seeds),
-        further="\n".join(_further_row(name, seeds) for name in ["CCM+D1, 4 corners, linear", *others]),
+        all_outside=sum(one.outside == 1.0 for one in figures_of(_BOARD, seeds)),
+        further="\n".join(_further_row(name, seeds) for name in [_BOARD, *others]),
         fitted=_fit_table(places),
         best=_best(places),
         highest_ratio=max(one.ratio_d2 for one in places),

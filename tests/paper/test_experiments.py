@@ -116,7 +116,10 @@ def test_a_row_says_whether_it_reaches_its_limit() -> None:
 def test_the_rows_that_miss_their_limit_are_named_below_the_table() -> None:
     good, bad = Figures(15.31, 9.4, 0.0), Figures(15.0, 10.0, 0.0)
     assert missed([Seed({"PPM+D1": good})]) == "No row misses its limit."
-    assert missed([Seed({"PPM+D1": good, "PPM+D2": bad})]) == "Missed are PPM+D2 (AED / CDSD -43 %; limit 15 %)."
+    assert (
+        missed([Seed({"PPM+D1": good, "PPM+D2": bad})])
+        == "Rows that miss their limit: PPM+D2 (AED / CDSD -43 %; limit 15 %)."
+    )
 
 
 def test_the_order_of_the_rows_is_compared_with_the_papers() -> None:
