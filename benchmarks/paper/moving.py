@@ -12,9 +12,9 @@ from calib_core.evaluation import BoxFigures
 from calib_core.measurements import NS_PER_S, RadarScans, TimeNs
 from calib_core.results import Calibration
 from calib_core.synthetic import PRESETS, PresetName, simulate
-from calib_core.synthetic.annotations import true_boxes
+from calib_core.synthetic.annotations import true_boxes, true_labels
 
-__all__ = ["MOVING", "acc_of"]
+__all__ = ["MOVING", "Judged", "acc_of"]
 
 MOVING: dict[PresetName, str] = {
     "people": "people walking",
@@ -45,11 +45,21 @@ class _Radar:
         return RadarScans.from_scans([self.scans.scan(int(i)) for i in np.flatnonzero(near)])
 
 
-def acc_of(preset: PresetName, calibration: Calibration, seed: int, settings: Settings) -> BoxFigures:
-    """Judge a calibration of D1 on a recording of moving targets with the same rig, by the radar's own targets.
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """One calibration judged by the boxes of one recording.
 
-    The boxes are true ones; which returns belong to a target is decided by the radar alone, as on a real recording.
+    Attributes:
+        by_targets: the radar's own targets decide which returns belong to an object, as on a real recording.
+        by_labels: the simulation's labels decide.
     """
+
+    by_targets: BoxFigures
+    by_labels: BoxFigures
+
+
+def acc_of(preset: PresetName, calibration: Calibration, seed: int, settings: Settings) -> Judged:
+    """Judge a calibration of D1 on a recording of moving targets with the same rig; the boxes are true ones."""
     d1 = options_of("d1", seed, settings)
     options = replace(PRESETS[preset], seed=seed, width_px=d1.width_px, height_px=d1.height_px, rig=d1.rig)
     errors = {
@@ -58,7 +68,10 @@ def acc_of(preset: PresetName, calibration: Calibration, seed: int, settings: Se
     }
     options = replace(options, defects=replace(options.defects, **errors), angle_bins=False)
     recording = simulate(options)
-    scans = RadarScans.from_scans(list(recording.scans()))
-    found = evaluate_recording(calibration, _Radar(scans), boxes=true_boxes(recording)).boxes
-    assert found is not None, "boxes were given"
-    return found
+    radar = _Radar(RadarScans.from_scans(list(recording.scans())))
+    boxes = true_boxes(recording)
+    by_targets = evaluate_recording(calibration, radar, boxes=boxes).boxes
+    by_labels = evaluate_recording(calibration, radar, boxes=boxes, labels=true_labels(recording)).boxes
+    assert by_targets is not None, "boxes were given"
+    assert by_labels is not None, "boxes were given"
+    return Judged(by_targets, by_labels)

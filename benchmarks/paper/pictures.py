@@ -14,9 +14,14 @@ __all__ = ["histogram", "over_range", "residuals", "write_pictures"]
 _STYLE = (
     "<style>text{font:13px sans-serif;fill:#222}.axis{stroke:#444;fill:none}.grid{stroke:#ddd}"
     ".click{stroke:#0072b2;stroke-width:1.6}.at{stroke:#d55e00;fill:none;stroke-width:1.6}.off{stroke:#888}"
-    ".bar{fill:#0072b2}.bar2{fill:#e69f00}</style>"
+    ".bar0{fill:#0072b2}.bar1{fill:#e69f00}.bar2{fill:#009e73}"
+    ".middle{text-anchor:middle}.end{text-anchor:end}</style>"
 )
-_WIDTH, _MARGIN = 640.0, 46.0
+_WIDTH, _MARGIN = 640.0, 54.0
+_LOW, _TALL = 270.0, 200.0
+"""Of the axes of Figs. 5 and 6."""
+_FEWEST_RETURNS = 20
+"""Below these, the share of a range says nothing."""
 
 
 def _svg(width: float, height: float, title: str, parts: Sequence[str]) -> str:
@@ -44,72 +49,71 @@ def residuals(calibration: Calibration, title: str) -> str:
 
 def histogram(figures: Sequence[tuple[str, BoxFigures]], title: str) -> str:
     """Draw the histogram of each frame's Acc, frames of 0 % included, one colour per recording."""
-    low, tall, bins = 250.0, 200.0, np.linspace(0.0, 1.0, 11)
-    counts = [np.histogram([f.share for f in one.frames if f.returns], bins)[0] for _, one in figures]
-    shares = [count / max(int(count.sum()), 1) for count in counts]
-    most = max(float(share.max()) for share in shares)
+    parts = _axes("returns inside their box [%]", figures)
     step = (_WIDTH - 2 * _MARGIN) / 10.0
     wide = (step - 6.0) / len(figures)
-    parts = [f'<path class="axis" d="M{_MARGIN} {low - tall}V{low}H{_WIDTH - _MARGIN}"/>']
-    for k, ((name, _), share) in enumerate(zip(figures, shares, strict=True)):
-        kind = "bar" if k == 0 else "bar2"
-        for b, value in enumerate(share):
-            tall_px = tall * float(value) / most
-            x = _MARGIN + b * step + 3.0 + k * wide
-            parts.append(
-                f'<rect class="{kind}" x="{x:.1f}" y="{low - tall_px:.1f}" width="{wide:.1f}" height="{tall_px:.1f}"/>'
-            )
-        parts.append(f'<rect class="{kind}" x="{_MARGIN + 20 + 150 * k:.0f}" y="30" width="12" height="12"/>')
-        parts.append(f'<text x="{_MARGIN + 38 + 150 * k:.0f}" y="41">{name}</text>')
-    parts += [f'<text x="{_MARGIN + b * step - 8:.0f}" y="{low + 18:.0f}">{10 * b}</text>' for b in range(11)]
-    parts.append(f'<text x="{_WIDTH / 2 - 80:.0f}" y="{low + 38:.0f}">returns inside their box [%]</text>')
-    parts.append(f'<text x="6" y="{low - tall + 6:.0f}">{100 * most:.0f} %</text>')
-    return _svg(_WIDTH, low + 50.0, title, parts)
+    for k, (_, one) in enumerate(figures):
+        count = np.histogram([frame.share for frame in one.frames if frame.returns], np.linspace(0.0, 1.0, 11))[0]
+        for b, value in enumerate(count / max(int(count.sum()), 1)):
+            x, high = _MARGIN + b * step + 3.0 + k * wide, _TALL * float(value)
+            at = f'x="{x:.1f}" y="{_LOW - high:.1f}" width="{wide:.1f}" height="{high:.1f}"'
+            parts.append(f'<rect class="bar{k}" {at}/>')
+    parts += [_under(10 * b, _MARGIN + b * step) for b in range(11)]
+    return _svg(_WIDTH, _LOW + 50.0, title, parts)
 
 
 def over_range(figures: Sequence[tuple[str, BoxFigures]], title: str) -> str:
-    """Draw the share of returns inside their box against their range."""
-    low, tall = 250.0, 200.0
-    farthest = max(share.high_m for _, one in figures for share in one.ranges if share.returns)
-    parts = [f'<path class="axis" d="M{_MARGIN} {low - tall}V{low}H{_WIDTH - _MARGIN}"/>']
+    """Draw the share of returns inside their box against their range, where there are enough."""
+    parts = _axes("range [m]", figures)
+    shown = [[share for share in one.ranges if share.returns >= _FEWEST_RETURNS] for _, one in figures]
+    farthest = max((share.high_m for shares in shown for share in shares), default=10.0)
+    for k, shares in enumerate(shown):
+        for share in shares:
+            x = _MARGIN + (_WIDTH - 2 * _MARGIN) * 0.5 * (share.low_m + share.high_m) / farthest
+            y = _LOW - _TALL * share.inside / share.returns
+            parts.append(f'<circle class="bar{k}" cx="{x:.1f}" cy="{y:.1f}" r="5"/>')
+    parts += [
+        _under(metres, _MARGIN + (_WIDTH - 2 * _MARGIN) * metres / farthest)
+        for metres in range(0, int(farthest) + 1, 10)
+    ]
+    return _svg(_WIDTH, _LOW + 50.0, title, parts)
+
+
+def _axes(below: str, figures: Sequence[tuple[str, BoxFigures]]) -> list[str]:
+    """Draw the axes, a grid of per cent, what is below, and which colour is which."""
+    parts = []
     for percent in (25, 50, 75, 100):
-        y = low - tall * percent / 100.0
-        parts.append(
-            f'<path class="grid" d="M{_MARGIN} {y:.1f}H{_WIDTH - _MARGIN}"/><text x="8" y="{y + 5:.1f}">{percent} %</text>'
-        )
-    for k, (name, one) in enumerate(figures):
-        kind = "bar" if k == 0 else "bar2"
-        for share in one.ranges:
-            if share.returns:
-                x = _MARGIN + (_WIDTH - 2 * _MARGIN) * 0.5 * (share.low_m + share.high_m) / farthest
-                y = low - tall * share.inside / share.returns
-                parts.append(f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="5"/>')
-        parts.append(f'<circle class="{kind}" cx="{_MARGIN + 26 + 150 * k:.0f}" cy="36" r="5"/>')
-        parts.append(f'<text x="{_MARGIN + 38 + 150 * k:.0f}" y="41">{name}</text>')
-    for metres in range(0, int(farthest) + 1, 10):
-        x = _MARGIN + (_WIDTH - 2 * _MARGIN) * metres / farthest
-        parts.append(f'<text x="{x - 6:.1f}" y="{low + 18:.0f}">{metres}</text>')
-    parts.append(f'<text x="{_WIDTH / 2 - 30:.0f}" y="{low + 38:.0f}">range [m]</text>')
-    return _svg(_WIDTH, low + 50.0, title, parts)
+        y = _LOW - _TALL * percent / 100.0
+        parts.append(f'<path class="grid" d="M{_MARGIN:.0f} {y:.0f}H{_WIDTH - _MARGIN:.0f}"/>')
+        parts.append(f'<text class="end" x="{_MARGIN - 6:.0f}" y="{y + 5:.0f}">{percent} %</text>')
+    parts.append(f'<path class="axis" d="M{_MARGIN:.0f} {_LOW - _TALL:.0f}V{_LOW:.0f}H{_WIDTH - _MARGIN:.0f}"/>')
+    parts.append(f'<text class="middle" x="{_WIDTH / 2:.0f}" y="{_LOW + 40:.0f}">{below}</text>')
+    for k, (name, _) in enumerate(figures):
+        x = _MARGIN + 8.0 + 170.0 * k
+        parts.append(f'<circle class="bar{k}" cx="{x:.0f}" cy="44" r="5"/><text x="{x + 11:.0f}" y="49">{name}</text>')
+    return parts
+
+
+def _under(value: int, x: float) -> str:
+    return f'<text class="middle" x="{x:.1f}" y="{_LOW + 18:.0f}">{value}</text>'
 
 
 def write_pictures(
     folder: Path,
     calibrations: Sequence[tuple[str, Calibration]],
-    people: BoxFigures,
-    cars: BoxFigures,
+    judged: Sequence[tuple[str, BoxFigures]],
 ) -> None:
     """Write fig-2.svg to fig-6.svg.
 
     Args:
         folder: created if it does not exist.
         calibrations: three with their titles, for Figs. 2 to 4.
-        people: for Figs. 5 and 6.
-        cars: likewise.
+        judged: at most three recordings of moving targets with their names, for Figs. 5 and 6.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for number, (title, calibration) in enumerate(calibrations, start=2):
-        (folder / f"fig-{number}.svg").write_text(residuals(calibration, title), encoding="utf-8")
-    both = [("people", people), ("cars", cars)]
-    (folder / "fig-5.svg").write_text(over_range(both, "Acc against range"), encoding="utf-8")
-    (folder / "fig-6.svg").write_text(histogram(both, "Acc of each frame"), encoding="utf-8")
+        (folder / f"fig-{number}.svg").write_text(
+            residuals(calibration, f"{title}: AED {calibration.metrics.aed_px:.1f} px"), encoding="utf-8"
+        )
+    (folder / "fig-5.svg").write_text(over_range(judged, "Acc against range"), encoding="utf-8")
+    (folder / "fig-6.svg").write_text(histogram(judged, "Share of frames by their Acc"), encoding="utf-8")

@@ -8,9 +8,21 @@ import numpy as np
 import pytest
 
 from app.cli import run as cocalib
-from benchmarks.paper.page import PAPER, order_kept, page, verdict_of
+from benchmarks.paper.fit import AZIMUTHS_DEG, ELEVATIONS_DEG, mismatch_of, read_fit
+from benchmarks.paper.limits import PAPER, missed, order_kept, verdict_of
+from benchmarks.paper.measured import AccRow, Measured, read_measured, write_measured
+from benchmarks.paper.page import page
 from benchmarks.paper.rows import Figures, Seed
-from benchmarks.paper.settings import FITTED, Dataset, ccm_options, options_of, pmm_options, ppm_options
+from benchmarks.paper.settings import (
+    FIT_SEEDS,
+    FITTED,
+    SEEDS,
+    Dataset,
+    ccm_options,
+    options_of,
+    pmm_options,
+    ppm_options,
+)
 from calib_core.calibration import calibrate
 from calib_core.measurements import Unsolvable
 from calib_core.options import CalibrationOptions
@@ -71,14 +83,43 @@ def test_the_board_in_the_pictures_gives_the_pose_of_the_checkerboard_method(tmp
     assert np.rad2deg(np.arccos(np.clip((np.trace(wrong) - 1.0) / 2.0, -1.0, 1.0))) < 8.0
 
 
+def test_the_tables_settings_are_the_best_of_the_committed_fit() -> None:
+    places = read_fit()
+    figures = {(one.constant_azimuth_deg, one.constant_elevation_deg): one for one in places}
+    assert sorted(figures) == [(azimuth, elevation) for azimuth in AZIMUTHS_DEG for elevation in ELEVATIONS_DEG]
+    worked_out = {place: mismatch_of(one.aed_d1_px, one.cdsd_d1_px, one.ratio_d2) for place, one in figures.items()}
+    assert all(one.mismatch == pytest.approx(worked_out[place], abs=1e-4) for place, one in figures.items())
+    best = min(worked_out, key=lambda place: worked_out[place])
+    assert (FITTED.constant_azimuth_deg, FITTED.constant_elevation_deg) == best
+    assert AZIMUTHS_DEG[0] < best[0] < AZIMUTHS_DEG[-1]
+    assert ELEVATIONS_DEG[0] < best[1] < ELEVATIONS_DEG[-1]
+    assert not set(FIT_SEEDS) & set(SEEDS)
+
+
+def test_the_fit_compares_with_the_papers_figures_of_d1_and_d2() -> None:
+    assert mismatch_of(15.31, 9.40, 2.65) == pytest.approx(0.0, abs=1e-12)
+    assert mismatch_of(15.31 * np.e, 9.40, 2.65 / np.e**2) == pytest.approx(1.0 + 4.0)
+
+
 def test_a_row_says_whether_it_reaches_its_limit() -> None:
-    assert verdict_of("PPM+D1", [Figures(15.31 * 1.14, 9.0, 0.0)]) == "reached (+14 %)"
-    assert verdict_of("PPM+D1", [Figures(15.31 * 1.16, 9.0, 0.0)]) == "missed (+16 %)"
-    assert verdict_of("PMM+D1", [Figures(79.0 * 0.76, 9.0, 0.0)]) == "reached (-24 %)"
-    assert verdict_of("PPM+D2", [Figures(15.0, 10.0, 0.0)]) == "missed (ratio -43 %)"
-    assert verdict_of("CCM+D1, 4 corners, linear", [Figures(500.0, 9.0, 1.0)]) == "reached: all points outside"
-    assert verdict_of("CCM+D1, 4 corners, linear", [Figures(500.0, 9.0, 0.5)]) == "missed: 50 % outside"
+    assert verdict_of("PPM+D1", [Figures(15.31 * 1.14, 9.4, 0.0)]) == "reached: AED +14 %, CDSD +0 %; limit 15 %"
+    assert verdict_of("PPM+D1", [Figures(15.31 * 1.16, 9.4, 0.0)]) == "missed: AED +16 %, CDSD +0 %; limit 15 %"
+    assert verdict_of("PPM+D1", [Figures(15.31, 9.4 * 0.8, 0.0)]) == "missed: AED +0 %, CDSD -20 %; limit 15 %"
+    assert verdict_of("PMM+D1", [Figures(79.0 * 0.76, 19.0, 0.0)]) == "reached: AED -24 %, CDSD +0 %; limit 25 %"
+    assert verdict_of("PPM+D2", [Figures(15.0, 10.0, 0.0)]) == "missed: AED / CDSD -43 %; limit 15 %"
+    board = "CCM+D1, 4 corners, linear"
+    assert verdict_of(board, [Figures(500.0, 9.0, 1.0)]) == "reached: 100 % outside, limit 100 %"
+    assert verdict_of(board, [Figures(500.0, 9.0, 0.5)]) == "missed: 50 % outside, limit 100 %"
     assert verdict_of("PPM+DR-A", [Figures(15.0, 9.0, 0.0)]) == "no figure to compare with"
+
+
+def test_the_rows_that_miss_their_limit_are_named_below_the_table() -> None:
+    good, bad = Figures(15.31, 9.4, 0.0), Figures(15.0, 10.0, 0.0)
+    assert missed([Seed({"PPM+D1": good})]) == "No row misses its limit."
+    assert (
+        missed([Seed({"PPM+D1": good, "PPM+D2": bad})])
+        == "Rows that miss their limit: PPM+D2 (AED / CDSD -43 %; limit 15 %)."
+    )
 
 
 def test_the_order_of_the_rows_is_compared_with_the_papers() -> None:
@@ -89,13 +130,28 @@ def test_the_order_of_the_rows_is_compared_with_the_papers() -> None:
     assert order_kept([turned]).endswith("R_I+T_c+D1 < PMM+D1.")
 
 
-def test_the_page_has_all_nine_rows_and_says_what_is_not_available() -> None:
+def measured_once() -> Measured:
     one = Seed({name: Figures(20.0, 10.0, 1.0, 5000.0) for name in PAPER})
-    text = page(
-        [one], FITTED, [], [("nothing", [one])], [("people", [0.9], [0.9], [0.02], "89 %")], date="today", command="it"
-    )
+    people = AccRow("people", "89 %", (0.91,), (0.92,), (0.93,), (0.02,))
+    return Measured("today", (one,), (("nothing", (one,)),), (people,))
+
+
+def test_the_page_has_all_nine_rows_and_says_what_is_not_available() -> None:
+    text = page(measured_once(), FITTED, read_fit(), command="it")
     assert len(PAPER) == 9
     for name in PAPER:
         assert f"\n| {name} | " in text
     assert "| PPM+DR-A | not available to us |" in text
+    assert "| people | 89 % | 91 % (91 to 91) | 92 % (92 to 92) | 93 % (93 to 93) | 2 % (2 to 2) |" in text
     assert "{" not in text
+
+
+def test_the_figures_of_a_run_come_back_from_their_file(tmp_path: Path) -> None:
+    path = tmp_path / "measured.json"
+    write_measured(measured_once(), path)
+    assert read_measured(path) == measured_once()
+
+
+def test_the_documented_page_is_what_the_last_run_measured() -> None:
+    documented = Path(__file__).parents[2] / "docs" / "paper-experiments.md"
+    assert documented.read_text(encoding="utf-8") == page(read_measured(), FITTED, read_fit(), command="make paper")
