@@ -52,7 +52,7 @@ FRAME = {"image_time": {"sec": 5, "nanosec": 0}, "boxes": [{"label": "person", "
         ({"frames": [FRAME, FRAME]}, "frames[0] and frames[1] have the same stamp"),
         ({"frames": [{**FRAME, "boxes": [{"box_px": [3, 2, 1, 4]}]}]}, "frames[0].boxes[0].box_px: expected left, top"),
         ({"frames": [{**FRAME, "boxes": [{"box_px": [3, 2, 9]}]}]}, "frames[0].boxes[0].box_px"),
-        ({"frames": [{**FRAME, "boxs": []}]}, "unknown key; did you mean boxes?"),
+        ({"frames": [{**FRAME, "boxes_": []}]}, "unknown key; did you mean boxes?"),
         ({"frames": [{**FRAME, "boxes": [{"box_px": [1, 2, 3, float("nan")]}]}]}, "box_px[3]: nan"),
         ({"image_size_px": [0, 4]}, "image_size_px"),
     ],
