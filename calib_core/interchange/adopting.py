@@ -1,6 +1,7 @@
 """Convert a calibration written by another tool, in any known format, to a calibration-1 file."""
 
 from dataclasses import dataclass, replace
+from pathlib import PurePath
 
 import numpy as np
 
@@ -226,6 +227,6 @@ def _covariance(found: ImportedCalibration) -> Matrix66:
 def _imported_warning(found: ImportedCalibration, source: str) -> DataWarning:
     return DataWarning(
         "imported",
-        f"imported from {source} ({found.format}): its pairs and input data are unknown",
+        f"imported from {PurePath(source).name} ({found.format}): its pairs and input data are unknown",
         "check it with cocalib open RECORDING --calibration FILE: click the reflector",
     )
