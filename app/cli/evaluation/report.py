@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from app.cli.evaluation.evidence_flags import EvidenceFlags, EvidenceUsed
-from app.cli.flags import File, called
+from app.cli.flags import File, Switch, called
 from app.cli.output import progress_bar, write_whole
 from app.cli.recording_flags import Recordings, TopicFlags, Topics
 from app.cli.tree_flags import FrameFlags, Frames
@@ -33,8 +33,8 @@ class Report:
     """Judge it on this recording as well: bags, folders of pictures, radar CSV, videos; several are read as one."""
     out: File = None
     """Output file (.html)."""
-    pdf: Annotated[Path | None, called("FILE.pdf")] = None
-    """Also print it to this PDF, with Chrome, Chromium, Edge or Brave."""
+    pdf: Switch = False
+    """Also print it to a PDF beside the HTML, with the same name, by Chrome, Chromium, Edge or Brave."""
     evidence: EvidenceUsed = field(default_factory=EvidenceFlags)
     against: File = None
     """Compare it with this other calibration of the same sensors."""
@@ -51,9 +51,10 @@ class Report:
         html = report_html(self._subject())
         write_whole(out, html)
         print(f"written to {out}")
-        if self.pdf is not None:
-            write_whole(self.pdf, print_pdf(html))
-            print(f"printed to {self.pdf}")
+        if self.pdf:
+            printed = out.with_suffix(".pdf")
+            write_whole(printed, print_pdf(html))
+            print(f"printed to {printed}")
         return 0
 
     def _required_out(self) -> Path:
@@ -68,8 +69,6 @@ class Report:
             raise InputError("report writes a file: give its name with --out FILE.html")
         if self.out.suffix.lower() not in (".html", ".htm"):  # such as that of the calibration itself
             raise InputError(f"{self.out}: the report is an .html file; name it NAME.html")
-        if self.pdf is not None and self.pdf.suffix.lower() != ".pdf":
-            raise InputError(f"{self.pdf}: the printed report is a .pdf file; name it NAME.pdf")
         if not self.recording and (self.evidence != EvidenceFlags() or self.topics != TopicFlags()):
             raise InputError(
                 "clicks, boxes, and the options of a recording apply with a RECORDING only; give it after the calibration"
