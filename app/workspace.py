@@ -28,7 +28,7 @@ from app.session import (
 )
 from app.session.file import Closed, Restored, open_session_file
 from app.solver_worker import SolverWorker
-from app.view import AccPanel, Reference, View, view
+from app.view import AccPanel, Reference, View, shown_calibration, view
 from calib_core.arrays import TimesNs
 from calib_core.association.placements import Placement
 from calib_core.camera import Camera
@@ -39,11 +39,13 @@ from calib_core.interchange import CameraFile, read_clicks, write_clicks
 from calib_core.measurements import NS_PER_S, ReflectorClick, TimeNs
 from calib_core.options import CalibrationOptions
 from calib_core.recordings import Recording, assumption_hint
-from calib_core.results import DataWarning
+from calib_core.results import Calibration, DataWarning
 
-__all__ = ["Journal", "Solver", "Subscriber", "Workspace", "open_workspace", "recording_facts"]
+__all__ = ["Journal", "Judged", "Solver", "Subscriber", "Workspace", "open_workspace", "recording_facts"]
 
 Subscriber: TypeAlias = Callable[[View], None]
+Judged: TypeAlias = tuple[tuple[CarriedTrack, ...], Calibration | None]
+"""Boxes and a calibration that they say something about."""
 
 
 class Journal(Protocol):
@@ -123,6 +125,7 @@ class Workspace:
         self._history = restored.history
         self._placements: tuple[Placement, ...] | None = None
         self._followed: Mapping[Start, Followed] = {}
+        self._judged: Judged = ((), None)
         self._carried: tuple[CarriedTrack, ...] = ()
         self._carried_from: tuple[tuple[BoxTrack, ...], RecordingFacts, Mapping[Start, Followed]] = ((), facts, {})
         self._journal = journal
@@ -149,7 +152,10 @@ class Workspace:
         return self._view_of(self._history)
 
     def _view_of(self, history: History) -> View:
-        return view(history, self.facts, self.reference, self._placements, self._carried_of(history.present), self.acc)
+        carried = self._carried_of(history.present)
+        is_old = bool(self.acc.figures) and self._judged != self._to_judge(history.present)
+        acc = replace(self.acc, judging=True) if is_old else self.acc
+        return view(history, self.facts, self.reference, self._placements, carried, acc)
 
     def show_placements(self, placements: Sequence[Placement]) -> None:
         """Take in the placements that were found in the radar data, so that the View says how many have no click."""
@@ -175,10 +181,19 @@ class Workspace:
         """The same as a file of boxes would state them."""
         return carried_boxes(self.carried, self.session, self.facts)
 
-    def show_acc(self, acc: AccPanel) -> None:
-        """Take in what the boxes say about the calibration."""
+    @property
+    def to_judge(self) -> Judged:
+        """The boxes and the calibration that they say something about: none while it is being checked."""
+        return self._to_judge(self.session)
+
+    def _to_judge(self, session: Session) -> Judged:
+        found = shown_calibration(session, self.reference)
+        return self._carried_of(session), None if found is None or found.checking else found
+
+    def show_acc(self, acc: AccPanel, judged: Judged) -> None:
+        """Take in what the boxes say about the calibration, and which boxes and calibration were judged."""
         with self._lock:
-            self.acc = acc
+            self.acc, self._judged = acc, judged
             self._pending.append((self._view_of(self._history), self._subscribers))
         self._notify()
 

@@ -9,11 +9,11 @@ from functools import partial
 
 from app.error_boundary import error_boundary
 from app.evaluating import Evidence, evidence_in, judged
-from app.view import sentence, shown_calibration
+from app.view import sentence
 from app.view.acc import acc_panel, no_acc
 from app.view.box_panel import AccPanel
 from app.view.box_rows import BoxedReturn, returns_in_frame
-from app.workspace import Workspace
+from app.workspace import Judged, Workspace
 from calib_core.camera import Camera
 from calib_core.detections import Boxes
 from calib_core.errors import CalibrationError
@@ -44,14 +44,18 @@ class BoxJudging:
         self._recording = recording
         self._executor = executor
         self._is_waiting = is_waiting
-        self._judged: tuple[object, object] | None = None
+        self._judged: Judged | None = None
         self._evidence: tuple[Boxes, Camera, Evidence] | None = None
         self._figures: BoxFigures | None = None
         self._task: asyncio.Task[None] | None = None
 
     def judge(self) -> None:
         """Judge the present calibration by the present boxes, if they have not been judged."""
-        if self._wanted() != self._judged and not self._is_waiting() and (self._task is None or self._task.done()):
+        if (
+            self._workspace.to_judge != self._judged
+            and not self._is_waiting()
+            and (self._task is None or self._task.done())
+        ):
             self._task = asyncio.get_running_loop().create_task(self._run())
 
     async def close(self) -> None:
@@ -67,22 +71,15 @@ class BoxJudging:
             return ()
         return returns_in_frame(figures, int(workspace.facts.image_times[frame]), workspace.carried, frame)
 
-    def _calibration(self) -> Calibration | None:
-        found = shown_calibration(self._workspace.session, self._workspace.reference)
-        return None if found is None or found.checking else found
-
-    def _wanted(self) -> tuple[object, object]:
-        return self._workspace.carried, self._calibration()
-
     async def _run(self) -> None:
         with error_boundary("judging the calibration by boxes", _log.error):
-            while (wanted := self._wanted()) != self._judged and not self._is_waiting():
+            while (wanted := self._workspace.to_judge) != self._judged and not self._is_waiting():
                 self._judged = wanted
-                self._workspace.show_acc(replace(self._workspace.acc, judging=True))
-                work = partial(self._panel, self._workspace.boxes, self._calibration())
+                self._workspace.show_acc(replace(self._workspace.acc, judging=True), wanted)
+                work = partial(self._panel, self._workspace.boxes, wanted[1])
                 panel = await asyncio.get_running_loop().run_in_executor(self._executor, work)
-                if self._wanted() == wanted:
-                    self._workspace.show_acc(panel)
+                if self._workspace.to_judge == wanted:
+                    self._workspace.show_acc(panel, wanted)
 
     def _panel(self, boxes: Boxes, calibration: Calibration | None) -> AccPanel:
         self._figures = None

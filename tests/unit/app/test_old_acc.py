@@ -1,0 +1,42 @@
+"""Acc in the View: it says so as soon as it belongs to other boxes than those shown."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.session import BoxDrawn
+from app.view import AccPanel
+from app.view.figure import Figure
+from app.workspace import Workspace, open_workspace
+from calib_core.measurements import TimeNs
+from tests.street_recording import StreetRecording, reference_calibration
+
+FIGURES = (Figure("acc", "in their boxes (Acc)", "86.4", "%", ""),)
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Iterator[Workspace]:
+    walk = StreetRecording()
+    opened = open_workspace(
+        walk, camera=walk.camera(), session_folder=tmp_path / "s", name="street", reference=reference_calibration()
+    )
+    yield opened
+    opened.close()
+
+
+def test_figures_of_earlier_boxes_are_marked_in_the_view_that_has_the_new_ones(workspace: Workspace) -> None:
+    workspace.show_acc(AccPanel(figures=FIGURES), workspace.to_judge)
+    assert not workspace.view.acc.judging
+    seen = []
+    workspace.subscribe(seen.append)
+    workspace.dispatch(BoxDrawn(TimeNs(int(workspace.facts.image_times[3])), (10.0, 10.0, 60.0, 90.0), "person"))
+    assert all(one.acc.judging for one in seen if one.boxes)
+    assert workspace.view.acc.judging
+    workspace.show_acc(AccPanel(figures=FIGURES), workspace.to_judge)
+    assert not workspace.view.acc.judging
+
+
+def test_without_figures_there_is_nothing_to_mark(workspace: Workspace) -> None:
+    workspace.dispatch(BoxDrawn(TimeNs(int(workspace.facts.image_times[3])), (10.0, 10.0, 60.0, 90.0), "person"))
+    assert not workspace.view.acc.judging
